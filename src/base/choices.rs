@@ -1,0 +1,168 @@
+//! Randomness as a recorded list of named choices: a run is a function of it.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+
+/// What was chosen from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ChoiceKind {
+    /// One of `of` things, counted from 0. The value is a whole number; nominal is 0.
+    Index {
+        /// How many there were.
+        of: usize,
+    },
+    /// Uniform between two bounds, both included.
+    Real {
+        /// Smallest value.
+        low: f64,
+        /// Largest value.
+        high: f64,
+        /// The value that stands for "nothing special".
+        nominal: f64,
+    },
+    /// Normally distributed about 0; nominal is 0.
+    Normal {
+        /// Standard deviation.
+        sigma: f64,
+    },
+}
+
+/// One recorded decision.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Choice {
+    /// Path-like name, such as `target.yaw`. Names may repeat: then the order counts.
+    pub name: String,
+    /// What was chosen from.
+    pub kind: ChoiceKind,
+    /// What was chosen, in the unit of whoever asked.
+    pub value: f64,
+}
+
+/// Where decisions come from, and the record of those made.
+#[derive(Debug, Clone)]
+pub struct Choices {
+    origin: Origin,
+    made: Vec<Choice>,
+}
+
+#[derive(Debug, Clone)]
+enum Origin {
+    Random(Box<ChaCha8Rng>),
+    /// Values by name, in order; a name that is not there (any more) gets its nominal value.
+    Recorded(BTreeMap<String, VecDeque<f64>>),
+}
+
+impl Choices {
+    /// Fresh decisions: the same seed and index give the same ones, on every machine.
+    pub fn random(seed: u64, index: u64) -> Self {
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        generator.set_stream(index);
+        Self { origin: Origin::Random(Box::new(generator)), made: Vec::new() }
+    }
+
+    /// The decisions of a record, by name. What the record lacks gets its nominal value.
+    pub fn recorded(record: &[Choice]) -> Self {
+        let mut by_name: BTreeMap<String, VecDeque<f64>> = BTreeMap::new();
+        for choice in record {
+            by_name.entry(choice.name.clone()).or_default().push_back(choice.value);
+        }
+        Self { origin: Origin::Recorded(by_name), made: Vec::new() }
+    }
+
+    /// One of `of` things, counted from 0. `of` must not be 0.
+    pub fn index(&mut self, name: &str, of: usize) -> usize {
+        debug_assert!(of > 0, "a choice needs something to choose from");
+        let last = of.saturating_sub(1);
+        let value = self.decide(name, 0.0, |generator| {
+            // 53 random bits over a handful of things: the bias is under 1e-13.
+            ((unit(generator) * of as f64) as usize).min(last) as f64
+        });
+        let value = (value.max(0.0) as usize).min(last);
+        self.record(name, ChoiceKind::Index { of }, value as f64);
+        value
+    }
+
+    /// A number between two bounds, both included; `nominal` is clamped to them.
+    pub fn real(&mut self, name: &str, low: f64, high: f64, nominal: f64) -> f64 {
+        let nominal = nominal.clamp(low, high);
+        let value = self.decide(name, nominal, |generator| low + (high - low) * unit(generator)).clamp(low, high);
+        self.record(name, ChoiceKind::Real { low, high, nominal }, value);
+        value
+    }
+
+    /// Normally distributed noise about 0 with the given standard deviation, at most 4 of them away.
+    pub fn normal(&mut self, name: &str, sigma: f64) -> f64 {
+        let value = self.decide(name, 0.0, |generator| {
+            // Box–Muller, from libm so that every machine gets the same bits.
+            let radius = libm::sqrt(-2.0 * libm::log(1.0 - unit(generator)));
+            let angle = std::f64::consts::TAU * unit(generator);
+            (radius * libm::cos(angle)).clamp(-4.0, 4.0) * sigma
+        });
+        self.record(name, ChoiceKind::Normal { sigma }, value);
+        value
+    }
+
+    /// What has been decided so far, in order.
+    pub fn made(&self) -> &[Choice] {
+        &self.made
+    }
+
+    /// The record, for keeping.
+    pub fn into_made(self) -> Vec<Choice> {
+        self.made
+    }
+
+    fn decide(&mut self, name: &str, nominal: f64, draw: impl FnOnce(&mut ChaCha8Rng) -> f64) -> f64 {
+        match &mut self.origin {
+            Origin::Random(generator) => draw(generator),
+            Origin::Recorded(values) => values.get_mut(name).and_then(VecDeque::pop_front).unwrap_or(nominal),
+        }
+    }
+
+    fn record(&mut self, name: &str, kind: ChoiceKind, value: f64) {
+        self.made.push(Choice { name: name.to_owned(), kind, value });
+    }
+}
+
+/// A number in [0, 1) from 53 random bits.
+fn unit(generator: &mut ChaCha8Rng) -> f64 {
+    (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn draw(choices: &mut Choices) -> (usize, f64, f64) {
+        (choices.index("model", 5), choices.real("yaw", -1.0, 1.0, 0.0), choices.normal("noise", 0.01))
+    }
+
+    #[test]
+    fn a_record_gives_the_same_decisions_again() {
+        let mut first = Choices::random(7, 3);
+        let drawn = draw(&mut first);
+        assert_eq!(draw(&mut Choices::random(7, 3)), drawn);
+        assert_ne!(draw(&mut Choices::random(7, 4)), drawn);
+        let mut again = Choices::recorded(first.made());
+        assert_eq!(draw(&mut again), drawn);
+        assert_eq!(again.made(), first.made());
+    }
+
+    #[test]
+    fn what_a_record_lacks_is_nominal() {
+        assert_eq!(draw(&mut Choices::recorded(&[])), (0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn noise_has_its_spread() {
+        let mut choices = Choices::random(1, 0);
+        let values: Vec<f64> = (0..20_000).map(|_| choices.normal("n", 2.0)).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+        assert!(mean.abs() < 0.06, "{mean}");
+        assert!((variance.sqrt() - 2.0).abs() < 0.05, "{variance}");
+    }
+}

@@ -1,0 +1,40 @@
+//! Content hashes: what came from where, and whether two traces are the same.
+
+use sha2::{Digest as _, Sha256};
+
+/// A running SHA-256 over parts that can't run into each other (each is preceded by its length).
+#[derive(Debug, Clone, Default)]
+pub struct Digest(Sha256);
+
+impl Digest {
+    /// An empty digest.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds one part.
+    pub fn update(&mut self, part: &[u8]) {
+        self.0.update((part.len() as u64).to_le_bytes());
+        self.0.update(part);
+    }
+
+    /// Adds numbers by their bits, so that only the same bits give the same digest.
+    pub fn update_bits(&mut self, values: &[f32]) {
+        self.0.update((values.len() as u64).to_le_bytes());
+        for value in values {
+            self.0.update(value.to_bits().to_le_bytes());
+        }
+    }
+
+    /// The first 128 bits in hexadecimal: enough to tell things apart, short enough to read.
+    pub fn finish(self) -> String {
+        self.0.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
+    }
+}
+
+/// Digest of one text.
+pub fn digest_of(text: &str) -> String {
+    let mut digest = Digest::new();
+    digest.update(text.as_bytes());
+    digest.finish()
+}

@@ -1,0 +1,93 @@
+//! Files of a project: a folder on disk, or the copy of this repository's that the binary carries.
+
+use std::path::{Component, Path, PathBuf};
+
+use crate::base::Source;
+
+#[derive(rust_embed::RustEmbed)]
+#[folder = "."]
+#[include = "ontology/**"]
+#[include = "rules/**"]
+#[include = "models/**"]
+struct Carried;
+
+/// A place that files are read from, by path.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Files {
+    /// What the binary carries: `ontology/`, `rules/` and `models/` as they were when it was built.
+    Shipped,
+    /// The file system; paths are as the user gave them.
+    Disk,
+}
+
+impl Files {
+    /// Reads a text. The source's name is the path, with `built-in:` before it where it was carried.
+    ///
+    /// # Errors
+    /// A lower-case sentence that says why it can't be read (it does not repeat the path).
+    pub fn read(&self, path: &Path) -> Result<Source, String> {
+        match self {
+            Self::Shipped => {
+                let key = slashed(&normalised(path));
+                let file = Carried::get(&key).ok_or("the program carries no such file")?;
+                let text = String::from_utf8(file.data.into_owned()).map_err(|_| "it is not UTF-8 text")?;
+                Ok(Source::new(format!("built-in:{key}"), text))
+            }
+            Self::Disk => {
+                let bytes = std::fs::read(path).map_err(|error| describe(&error))?;
+                let text = String::from_utf8(bytes).map_err(|_| "it is not UTF-8 text")?;
+                Ok(Source::new(path.display().to_string(), text))
+            }
+        }
+    }
+
+    /// Paths of the files directly in a folder, sorted; none where there is no such folder.
+    pub fn list(&self, folder: &Path) -> Vec<PathBuf> {
+        let mut paths: Vec<PathBuf> = match self {
+            Self::Shipped => {
+                let folder = normalised(folder);
+                Carried::iter()
+                    .map(|name| PathBuf::from(name.as_ref()))
+                    .filter(|path| path.parent() == Some(&folder))
+                    .collect()
+            }
+            Self::Disk => std::fs::read_dir(folder)
+                .into_iter()
+                .flatten()
+                .filter_map(Result::ok)
+                .map(|entry| entry.path())
+                .filter(|path| path.is_file())
+                .collect(),
+        };
+        paths.sort();
+        paths
+    }
+}
+
+/// A path with `.` and `..` taken out, where that is possible without looking at the disk.
+fn normalised(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir if out.file_name().is_some() => {
+                out.pop();
+            }
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+fn slashed(path: &Path) -> String {
+    path.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+}
+
+fn describe(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        std::io::ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),
+        std::io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
+        _ => error.to_string().to_lowercase(),
+    }
+}

@@ -1,0 +1,22 @@
+//! What every stage speaks: sources and diagnostics, terms, poses, recorded choices, shipped files.
+//!
+//! Never: reads a configuration, knows an action, a rule or a robot, or prints.
+
+mod choices;
+mod diagnostic;
+mod digest;
+mod files;
+mod geometry;
+pub mod names;
+mod source;
+mod suggest;
+mod term;
+
+pub use choices::{Choice, ChoiceKind, Choices};
+pub use diagnostic::{Diagnostic, Diagnostics, Severity};
+pub use digest::{Digest, digest_of};
+pub use files::Files;
+pub use geometry::Pose;
+pub use source::{Source, Span};
+pub use suggest::{did_you_mean, nearest};
+pub use term::{Term, TermId, Terms};

@@ -1,0 +1,37 @@
+//! Texts that people write, and places in them.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Place in a source text. Unit: bytes from the start, end exclusive.
+pub type Span = Range<usize>;
+
+/// A text with the name under which people know it (usually the path as the user gave it).
+///
+/// Cheap to clone: both parts are shared.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Source {
+    /// Path or title, as it appears in messages.
+    pub name: Arc<str>,
+    /// The whole text.
+    pub text: Arc<str>,
+}
+
+impl Source {
+    /// A source from its name and its text.
+    pub fn new(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Self {
+        Self { name: name.into(), text: text.into() }
+    }
+
+    /// Line and column of a byte offset. Unit: both count from 1; a column counts characters.
+    pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
+        let mut end = offset.min(self.text.len());
+        while !self.text.is_char_boundary(end) {
+            end -= 1;
+        }
+        let before = &self.text[..end];
+        let line = before.matches('\n').count() + 1;
+        let start_of_line = before.rfind('\n').map_or(0, |idx| idx + 1);
+        (line, before[start_of_line..].chars().count() + 1)
+    }
+}

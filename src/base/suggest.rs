@@ -1,0 +1,46 @@
+//! "Did you mean": the known name nearest to a mistyped one.
+
+/// The candidate nearest to `name`, if one is near enough to be a likely typing error.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    candidates
+        .into_iter()
+        .map(|candidate| (similarity(name, candidate), candidate))
+        // 0.75: "freind" finds "friend", "mass" does not find "glass_1".
+        .filter(|(similarity, _)| *similarity >= 0.75)
+        .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)))
+        .map(|(_, candidate)| candidate)
+}
+
+fn similarity(a: &str, b: &str) -> f64 {
+    let (a, b) = (a.to_lowercase(), b.to_lowercase());
+    strsim::jaro_winkler(&a, &b).max(strsim::normalized_damerau_levenshtein(&a, &b))
+}
+
+/// Help text: the nearest known name, or the known names.
+pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
+    match nearest(name, candidates.clone()) {
+        Some(found) => format!("did you mean `{found}`?"),
+        None => {
+            let mut known: Vec<&str> = candidates.into_iter().collect();
+            known.sort_unstable();
+            known.dedup();
+            if known.is_empty() {
+                return "there are none to choose from".to_owned();
+            }
+            format!("known names: {}", known.join(", "))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_typing_error_finds_its_word_and_a_strange_word_finds_none() {
+        let names = ["pickObject", "surfaceObjects", "world"];
+        assert_eq!(nearest("pickOject", names), Some("pickObject"));
+        assert_eq!(nearest("banana", names), None);
+        assert!(did_you_mean("banana", names).contains("surfaceObjects"));
+    }
+}

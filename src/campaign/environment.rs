@@ -1,0 +1,112 @@
+//! All that a campaign needs before its first run, checked.
+
+use std::path::Path;
+
+use crate::actions;
+use crate::base::{Diagnostic, Diagnostics};
+use crate::config::{self, Campaign, Launcher, Overrides};
+use crate::history::CampaignRecord;
+use crate::ontology::{self, Ontology};
+use crate::rules::RuleBook;
+use crate::scenario::Space;
+use crate::world;
+
+/// A configuration with its ontology, scene space and rules, prepared once and shared by all workers.
+pub struct Env {
+    /// The configuration.
+    pub campaign: Campaign,
+    /// Its ontology.
+    pub ontology: Ontology,
+    /// The scenes that it describes.
+    pub space: Space,
+    /// The rules of all properties, ready to judge.
+    pub rules: RuleBook,
+}
+
+impl Env {
+    /// Reads and checks everything that a campaign depends on.
+    ///
+    /// # Errors
+    /// All faults that can be found at once: first those of the configuration, then those of the ontology, then
+    /// those of scene space, rules, robot and skills together.
+    pub fn prepare(config: &Path, overrides: &Overrides) -> Result<Self, Diagnostics> {
+        let campaign = config::load(config, overrides)?;
+        let (files, path) = &campaign.ontology;
+        let ontology = ontology::load(files, path)?;
+        let mut faults = Diagnostics::new();
+        check_launcher(&campaign, &mut faults);
+        check_skills(&campaign, &ontology, &mut faults);
+        if let Err(error) = world::check_robot(&campaign.robot) {
+            faults.push(error.diagnostic());
+        }
+        let space = Space::new(&campaign, &ontology).map_err(|found| faults.extend(found)).ok();
+        let rules = RuleBook::prepare(&ontology).map_err(|found| faults.extend(found)).ok();
+        match (space, rules) {
+            (Some(space), Some(rules)) if !faults.has_errors() => Ok(Self { campaign, ontology, space, rules }),
+            _ => Err(faults),
+        }
+    }
+
+    /// What the history keeps of the campaign.
+    pub fn record(&self, id: String, name: String, started: String) -> CampaignRecord {
+        let rules = self
+            .ontology
+            .properties
+            .values()
+            .map(|p| (p.iri.clone(), p.rule.path.clone(), self.rules.digest(&p.iri).to_owned()))
+            .collect();
+        let mut models: Vec<(String, String)> =
+            self.campaign.models.values().map(|model| (model.name.clone(), model.digest.clone())).collect();
+        models.push((self.campaign.robot.name.clone(), self.campaign.robot.digest.clone()));
+        models.sort();
+        CampaignRecord {
+            id,
+            name,
+            config_text: self.campaign.source.text.to_string(),
+            config_digest: crate::base::digest_of(&self.campaign.source.text),
+            ontology_digest: self.ontology.digest.clone(),
+            rules,
+            models,
+            seed: self.campaign.seed,
+            planned_runs: self.planned_runs(),
+            started,
+            program_version: env!("CARGO_PKG_VERSION").to_owned(),
+        }
+    }
+
+    /// Runs of all tests together.
+    pub fn planned_runs(&self) -> u64 {
+        self.campaign.tests.len() as u64 * u64::from(self.campaign.test_count)
+    }
+
+    /// Which test a run performs: all runs of the first one come first.
+    pub fn test_of(&self, index: u64) -> usize {
+        usize::try_from(index / u64::from(self.campaign.test_count.max(1))).unwrap_or(usize::MAX)
+    }
+}
+
+fn check_launcher(campaign: &Campaign, faults: &mut Diagnostics) {
+    if let Launcher::Program(text) = &campaign.launcher {
+        let place = campaign.source.text.find(text.as_str()).map_or(0..0, |start| start..start + text.len());
+        faults.push(
+            Diagnostic::error("S020", format!("`test_launcher = \"{text}\"` names a program, and none can be started yet"))
+                .at(&campaign.source, place)
+                .help("use `test_launcher = \"reference\"`: the skills that come with the program"),
+        );
+    }
+}
+
+/// An action that the ontology has and no skill performs; names that the ontology lacks are the scene space's matter.
+fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnostics) {
+    let mut told: Vec<&str> = Vec::new();
+    for action in campaign.tests.iter().flatten().filter(|action| ontology.actions.contains_key(*action)) {
+        if let Err(unknown) = actions::known_skill(action)
+            && !told.contains(&action.as_str())
+        {
+            told.push(action);
+            let quoted = format!("\"{action}\"");
+            let place = campaign.source.text.find(&quoted).map_or(0..0, |start| start..start + quoted.len());
+            faults.push(Diagnostic::error("S021", unknown.to_string()).at(&campaign.source, place).help(unknown.help()));
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! The line, once, top to bottom: choices → scene → world → trace → facts → findings → verdict.
+
+use std::collections::BTreeMap;
+
+use crate::actions::{self, ActionCall, ActionEnd, Trace};
+use crate::base::Choices;
+use crate::campaign::Env;
+use crate::facts::{self, RunFacts};
+use crate::history::{RunRecord, RunStatus};
+use crate::rules::{Budget, Findings, RuleFault};
+use crate::scenario::{self, Scene};
+use crate::verdict::{Fate, Judgement, action_score, judge, run_score};
+use crate::world;
+
+/// Time as the caller measures it: the stages have no clock.
+#[derive(Debug, Clone, Copy)]
+pub struct Clock {
+    /// Now, as RFC 3339.
+    pub now: fn() -> String,
+    /// Seconds since any fixed moment, never going back.
+    pub secs: fn() -> f64,
+}
+
+/// Why a scene gave no run.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Failure {
+    /// The scene could not be generated, or does not stand still by itself; another one may.
+    #[error("{0}")]
+    Discard(String),
+}
+
+/// Takes one run down the line.
+///
+/// The same `choices` give the same record but for times. `campaign` is the campaign's id.
+///
+/// # Errors
+/// A scene that could not be generated or did not settle. Faults of simulation are no error: they end the run as
+/// broken, as data.
+pub fn run_line(
+    env: &Env,
+    campaign: &str,
+    index: u64,
+    mut choices: Choices,
+    clock: &Clock,
+) -> Result<RunRecord, Failure> {
+    let (started, start_secs) = ((clock.now)(), (clock.secs)());
+    let test = env.test_of(index);
+    let scene = scenario::draw(&env.space, test, &mut choices).map_err(|discard| Failure::Discard(discard.to_string()))?;
+    let trace = perform(env, &env.campaign.tests[test], &scene, &mut choices)?;
+    let mut record = record(env, campaign, index, scene, trace);
+    record.choices = choices.into_made();
+    record.started = started;
+    record.wall_secs = (clock.secs)() - start_secs;
+    Ok(record)
+}
+
+/// The record of a run whose simulation crashed: every property is broken, for the reason given.
+///
+/// Nothing where the scene can't be drawn a second time.
+pub(super) fn crashed(env: &Env, campaign: &str, index: u64, mut choices: Choices, reason: &str) -> Option<RunRecord> {
+    let test = env.test_of(index);
+    let scene = scenario::draw(&env.space, test, &mut choices).ok()?;
+    let trace = never_performed(&env.campaign.tests[test], &scene, reason);
+    let mut record = record(env, campaign, index, scene, trace);
+    record.choices = choices.into_made();
+    Some(record)
+}
+
+/// From a trace to the record: facts, findings, verdicts, scores. Choices and times are left to the caller.
+fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> RunRecord {
+    let facts = facts::extract(&trace);
+    let judgements = judge_all(env, &trace, &facts);
+    let action_scores: Vec<f64> = judgements.iter().map(|list| action_score(list.iter().map(|j| j.outcome))).collect();
+    let (status, reason) = status_of(&trace);
+    RunRecord {
+        id: format!("{campaign}-{}", index + 1),
+        campaign: campaign.to_owned(),
+        index,
+        test: env.campaign.tests[env.test_of(index)].join(" "),
+        seed: env.campaign.seed,
+        status,
+        reason,
+        score: run_score(&action_scores),
+        action_scores,
+        choices: Vec::new(),
+        scene,
+        actions: trace.actions.iter().map(|action| env.ontology.actions[&action.action].iri.clone()).collect(),
+        trace,
+        facts,
+        judgements,
+        started: String::new(),
+        wall_secs: 0.0,
+    }
+}
+
+/// Builds the scene, lets it settle and performs the test in it.
+fn perform(env: &Env, test: &[String], scene: &Scene, choices: &mut Choices) -> Result<Trace, Failure> {
+    let mut world = match world::build(scene) {
+        Ok(world) => world,
+        Err(error) => return Ok(never_performed(test, scene, &error.to_string())),
+    };
+    let settling = world.settle();
+    if !settling.left.is_empty() {
+        return Err(Failure::Discard(format!("fell from where it was put: {}", settling.left.join(", "))));
+    }
+    if !settling.settled {
+        return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
+    }
+    Ok(actions::perform(&calls(test, scene), &mut world, choices, &env.campaign.budget))
+}
+
+fn calls(test: &[String], scene: &Scene) -> Vec<ActionCall> {
+    test.iter().map(|action| ActionCall { action: action.clone(), parameters: scene.designators.clone() }).collect()
+}
+
+/// The trace of a run that a fault ended before its first action.
+fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
+    let actions = calls(test, scene)
+        .into_iter()
+        .map(|call| actions::ActionTrace {
+            action: call.action,
+            parameters: call.parameters,
+            end: ActionEnd::Broken(reason.to_owned()),
+            report: None,
+            duration_secs: 0.0,
+            contacts: Vec::new(),
+            percepts: Vec::new(),
+            extremes: Vec::new(),
+            phases: Vec::new(),
+        })
+        .collect();
+    Trace { snapshots: Vec::new(), actions, frames: actions::Frames::default(), hash: String::new() }
+}
+
+/// Outcomes of every action of a trace: one list for each.
+fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Vec<Vec<Judgement>> {
+    trace
+        .actions
+        .iter()
+        .enumerate()
+        .map(|(step, performed)| {
+            let action = &env.ontology.actions[&performed.action];
+            let fate = match &performed.end {
+                ActionEnd::Completed => Fate::Completed,
+                ActionEnd::Broken(reason) => Fate::Broken(reason.clone()),
+                ActionEnd::Timeout(reason) => Fate::Timeout(reason.clone()),
+                ActionEnd::NotReached => Fate::NotReached,
+            };
+            let findings = match (&fate, facts.action(step)) {
+                (Fate::Completed, Some(facts)) => {
+                    let asked: Vec<String> =
+                        action.success_properties.iter().chain(&action.preconditions).cloned().collect();
+                    env.rules.judge(&facts, &asked, &Budget::default())
+                }
+                _ => BTreeMap::<String, Result<Findings, RuleFault>>::new(),
+            };
+            judge(&env.ontology, action, &findings, &fate, |property| env.rules.digest(property).to_owned())
+        })
+        .collect()
+}
+
+/// The run's own status: the first action that did not complete decides.
+fn status_of(trace: &Trace) -> (RunStatus, Option<String>) {
+    for action in &trace.actions {
+        match &action.end {
+            ActionEnd::Broken(reason) => return (RunStatus::Broken, Some(reason.clone())),
+            ActionEnd::Timeout(reason) => return (RunStatus::Timeout, Some(reason.clone())),
+            ActionEnd::Completed | ActionEnd::NotReached => {}
+        }
+    }
+    (RunStatus::Completed, None)
+}

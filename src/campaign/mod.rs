@@ -1,0 +1,13 @@
+//! The conductor: prepares a campaign, takes each run down the line, and hands it to the history.
+//!
+//! Never: prints, reads the command line or a clock of its own, or knows how any stage does its work.
+
+mod environment;
+mod line;
+mod outcome;
+mod run_all;
+
+pub use environment::Env;
+pub use line::{Clock, Failure, run_line};
+pub use outcome::{CampaignEnd, Ending};
+pub use run_all::{Options, run_all};

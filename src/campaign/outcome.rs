@@ -1,0 +1,25 @@
+//! How a campaign ended.
+
+use crate::base::Diagnostics;
+
+/// What there is to say when no more runs come.
+#[derive(Debug)]
+pub struct CampaignEnd {
+    /// Why there are no more.
+    pub ending: Ending,
+    /// Runs that are in the history.
+    pub committed: u64,
+    /// Scenes that could not be built, with the reason, in the order of the runs that they were drawn for.
+    pub discards: Vec<(u64, String)>,
+}
+
+/// Why a campaign ended.
+#[derive(Debug)]
+pub enum Ending {
+    /// Every planned run was made.
+    Finished,
+    /// Somebody asked it to stop.
+    Interrupted,
+    /// The history could not be written, or no scene could be built.
+    Stopped(Diagnostics),
+}

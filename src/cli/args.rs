@@ -1,0 +1,161 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::report::TableFormat;
+
+/// QuickCheck for robot actions: generated scenes, physics simulation, verdicts by rules that you edit.
+#[derive(Debug, Parser)]
+#[command(name = "actcheck", version, max_term_width = 100, disable_help_subcommand = true)]
+#[command(after_help = "Example:\n  actcheck run configs/pick.toml")]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a campaign: generate scenes, perform the actions, judge them, keep every run
+    ///
+    /// Exit code: 0 everything passed, 1 a property failed, 2 it could not run or nothing could be judged,
+    /// 130 stopped by Ctrl-C (what was done is kept).
+    #[command(after_help = "Example:\n  actcheck run configs/pick.toml --runs 5 --history /tmp/try")]
+    Run(RunArgs),
+    /// Check configuration, ontology, rules and models without simulating; every mistake at once
+    #[command(after_help = "Example:\n  actcheck check configs/pick.toml")]
+    Check(CheckArgs),
+    /// List the runs of a history
+    #[command(after_help = "Example:\n  actcheck list --format csv")]
+    List(ListArgs),
+    /// Show one run: its scene, and every property's outcome with margin and witness
+    #[command(after_help = "Example:\n  actcheck show k7f3-3    (an id that `actcheck list` prints; its beginning is enough)")]
+    Show(ShowArgs),
+    /// Ask a history in SPARQL 1.1
+    ///
+    /// The prefixes act, w, obj, run, campaign, rdf, rdfs, owl, xsd, earl and prov are known. Facts about the world
+    /// lie in named graphs, one for each moment: `?execution act:before ?g . GRAPH ?g { … }`.
+    #[command(after_help = "Example:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'")]
+    Query(QueryArgs),
+}
+
+/// `actcheck run`
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// The campaign's configuration (TOML)
+    pub config: PathBuf,
+    /// Runs of each test, instead of the configuration's `test_count`
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub runs: Option<u32>,
+    /// Seed of all randomness, instead of the configuration's `seed`
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Workers, one simulation each; results don't depend on it [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Folder of the history [default: `.actcheck` beside the configuration]
+    #[arg(long, value_name = "DIR")]
+    pub history: Option<PathBuf>,
+    /// How results are printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// `actcheck check`
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The campaign's configuration (TOML)
+    #[arg(default_value = "configs/pick.toml")]
+    pub config: PathBuf,
+}
+
+/// Where a history lies.
+#[derive(Debug, Args)]
+pub struct HistoryArgs {
+    /// Folder of the history [default: `.actcheck` here, or the only one in a folder of this folder]
+    #[arg(long, value_name = "DIR")]
+    pub history: Option<PathBuf>,
+}
+
+/// `actcheck list`
+#[derive(Debug, Args)]
+pub struct ListArgs {
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// Only the runs of this campaign
+    #[arg(long, value_name = "ID")]
+    pub campaign: Option<String>,
+    /// How the table is printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// `actcheck show`
+#[derive(Debug, Args)]
+pub struct ShowArgs {
+    /// Id of the run, or its beginning
+    pub run: String,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How it is printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// `actcheck query`
+#[derive(Debug, Args)]
+pub struct QueryArgs {
+    /// The query's text
+    #[arg(value_name = "SPARQL", required_unless_present = "file", conflicts_with = "file")]
+    pub text: Option<String>,
+    /// A file with the query
+    #[arg(short, long, value_name = "FILE")]
+    pub file: Option<PathBuf>,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How the answer is printed (turtle: for CONSTRUCT and DESCRIBE)
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: QueryFormat,
+}
+
+/// Formats of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Format {
+    /// For people
+    #[default]
+    Table,
+    /// Comma-separated values
+    Csv,
+    /// For programs
+    Json,
+}
+
+/// Formats of a query's answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum QueryFormat {
+    /// For people
+    #[default]
+    Table,
+    /// Comma-separated values
+    Csv,
+    /// For programs
+    Json,
+    /// RDF, for queries whose answer is a graph
+    Turtle,
+}
+
+impl From<Format> for TableFormat {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::Table => Self::Table,
+            Format::Csv => Self::Csv,
+            Format::Json => Self::Json,
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! The clock that the campaign is given.
+
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use crate::campaign::Clock;
+
+/// The machine's clock.
+pub fn system() -> Clock {
+    Clock { now, secs }
+}
+
+fn now() -> String {
+    // Seconds are enough for people, and shorter in the history.
+    let now = jiff::Timestamp::now();
+    now.round(jiff::Unit::Second).unwrap_or(now).to_string()
+}
+
+fn secs() -> f64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_secs_f64()
+}

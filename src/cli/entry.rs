@@ -1,0 +1,30 @@
+//! From arguments to an exit code.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::cli::args::{Arguments, Command};
+use crate::cli::{check, list, output, query, run, show};
+
+/// Parses the process's arguments and does what they ask.
+///
+/// Exit codes: 0 done (for `run`: everything passed), 1 a property failed, 2 it could not be done, 130 interrupted.
+pub fn run() -> ExitCode {
+    // clap prints help, version and its own errors; for the last it exits with 2.
+    let arguments = Arguments::parse();
+    let done = match arguments.command {
+        Command::Run(args) => run::run(&args),
+        Command::Check(args) => check::check(&args).map(|()| 0),
+        Command::List(args) => list::list(&args).map(|()| 0),
+        Command::Show(args) => show::show(&args).map(|()| 0),
+        Command::Query(args) => query::query(&args).map(|()| 0),
+    };
+    match done {
+        Ok(code) => ExitCode::from(code),
+        Err(faults) => {
+            output::print_diagnostics(&faults);
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! Which history is meant when none is named.
+
+use std::path::{Path, PathBuf};
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::args::HistoryArgs;
+use crate::history::History;
+
+/// Opens the history that was named, or the one that is found.
+///
+/// # Errors
+/// None is found, several are, or it can't be opened.
+pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
+    let folder = match &args.history {
+        Some(folder) => folder.clone(),
+        None => find(Path::new("."))?,
+    };
+    History::open_existing(&folder)
+}
+
+fn find(here: &Path) -> Result<PathBuf, Diagnostics> {
+    const NAME: &str = ".actcheck";
+    if here.join(NAME).is_dir() {
+        return Ok(PathBuf::from(NAME));
+    }
+    let mut found: Vec<PathBuf> = std::fs::read_dir(here)
+        .into_iter()
+        .flatten()
+        .filter_map(Result::ok)
+        .map(|entry| PathBuf::from(entry.file_name()).join(NAME))
+        .filter(|path| here.join(path).is_dir())
+        .collect();
+    found.sort();
+    match found.as_slice() {
+        [only] => Ok(only.clone()),
+        [] => Err(Diagnostic::error("X002", "no history was named, and there is none in this folder")
+            .help("name one with `--history DIR`; a campaign writes `.actcheck` beside its configuration")
+            .into()),
+        several => {
+            let names: Vec<String> = several.iter().map(|path| path.display().to_string()).collect();
+            Err(Diagnostic::error("X003", "no history was named, and there are several")
+                .help(format!("name one with `--history DIR`: {}", names.join(", ")))
+                .into())
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! Arguments, exit codes, progress, and the one place that prints errors.
+//!
+//! Never: does a stage's work.
+
+mod args;
+mod check;
+mod clock;
+mod entry;
+mod history_dir;
+mod list;
+mod output;
+mod progress;
+mod query;
+mod run;
+mod show;
+mod stop;
+
+pub use args::Arguments;
+pub use entry::run;

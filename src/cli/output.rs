@@ -1,0 +1,60 @@
+//! Results to the output stream, diagnostics to the error stream.
+
+use std::io::{IsTerminal, Write};
+
+use miette::{GraphicalReportHandler, GraphicalTheme};
+
+use crate::base::{Diagnostic, Diagnostics, Severity};
+
+/// Writes results. A reader that has gone away (`| head`) ends the process quietly.
+pub fn print(text: &str) {
+    let mut out = std::io::stdout().lock();
+    if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        if error.kind() == std::io::ErrorKind::BrokenPipe {
+            std::process::exit(0);
+        }
+        print_diagnostics(&Diagnostic::error("X001", format!("results could not be written: {error}")).into());
+        std::process::exit(2);
+    }
+}
+
+/// Whether results may be coloured.
+pub fn colour() -> bool {
+    std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
+}
+
+/// Writes all faults with their places, and how many there were.
+pub fn print_diagnostics(faults: &Diagnostics) {
+    let mut text = String::new();
+    let handler = handler();
+    for fault in faults.iter() {
+        let fault = with_file_in_message(fault);
+        if handler.render_report(&mut text, &fault).is_err() {
+            text.push_str(&fault.to_string());
+        }
+        text.push('\n');
+    }
+    let errors = faults.iter().filter(|fault| fault.severity == Severity::Error).count();
+    if errors > 1 {
+        text.push_str(&format!("{errors} errors\n"));
+    }
+    // Nobody is left to tell when the error stream itself fails.
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
+
+/// A fault of a whole file has no excerpt that would name it: the message does.
+fn with_file_in_message(fault: &Diagnostic) -> Diagnostic {
+    match (&fault.source, &fault.span) {
+        (Some(source), None) => Diagnostic { message: format!("{}: {}", source.name, fault.message), ..fault.clone() },
+        _ => fault.clone(),
+    }
+}
+
+fn handler() -> GraphicalReportHandler {
+    let terminal = std::io::stderr().is_terminal();
+    let theme = match (terminal, std::env::var_os("NO_COLOR").is_some()) {
+        (true, false) => GraphicalTheme::unicode(),
+        _ => GraphicalTheme::unicode_nocolor(),
+    };
+    GraphicalReportHandler::new_themed(theme).with_width(100).with_links(false)
+}

@@ -1,0 +1,44 @@
+//! The live progress of a campaign. Quiet where the error stream is no terminal.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::report::RunSummary;
+
+/// A bar on the error stream: runs done, rate, time left, failures so far.
+pub struct Progress {
+    bar: ProgressBar,
+    failed: u64,
+    spoilt: u64,
+}
+
+impl Progress {
+    /// A bar for so many runs.
+    pub fn new(runs: u64) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(runs), ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template("{bar:32} {pos}/{len} runs  {per_sec}  {eta} left  {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        bar.set_style(style);
+        bar.set_message("0 failed");
+        bar.enable_steady_tick(std::time::Duration::from_millis(200));
+        Self { bar, failed: 0, spoilt: 0 }
+    }
+
+    /// A handle to print above the bar from elsewhere.
+    pub fn bar(&self) -> ProgressBar {
+        self.bar.clone()
+    }
+
+    /// One more run is in the history.
+    pub fn run(&mut self, run: &RunSummary) {
+        self.failed += u64::from(run.failed());
+        self.spoilt += u64::from(run.reason.is_some());
+        let spoilt = if self.spoilt > 0 { format!(", {} did not complete", self.spoilt) } else { String::new() };
+        self.bar.set_message(format!("{} failed{spoilt}", self.failed));
+        self.bar.inc(1);
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,179 @@
+//! A campaign for people at a terminal.
+
+use std::fmt::Write as _;
+
+use comfy_table::{Attribute, Cell, Color, ContentArrangement, presets};
+
+use crate::analysis::Interval;
+use crate::report::{CampaignSummary, RunSummary};
+use crate::verdict::Outcome;
+
+/// Rows of the table of runs, and failed runs told in words; the rest are a command away.
+const RUNS_SHOWN: usize = 40;
+const FAILURES_TOLD: usize = 20;
+
+/// The table of runs × properties, the scores, and for each failed property its witness in words.
+pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
+    let mut out = String::new();
+    runs_table(&mut out, summary, colour);
+    properties_table(&mut out, summary);
+    scores(&mut out, summary);
+    failures(&mut out, summary);
+    out
+}
+
+fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
+    if summary.runs.is_empty() {
+        return;
+    }
+    let mut table = comfy_table::Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    if colour {
+        table.enforce_styling();
+    } else {
+        table.force_no_tty();
+    }
+    let labels = summary.properties.iter().map(|(_, label, _)| label.clone());
+    table.set_header(["run".to_owned(), "test".to_owned()].into_iter().chain(labels).chain(["S".to_owned()]));
+    // Every run while they fit; then those that did not pass, which are the ones to look at.
+    let fit = summary.runs.len() <= RUNS_SHOWN;
+    let shown: Vec<&RunSummary> = summary.runs.iter().filter(|run| fit || !run.passed()).take(RUNS_SHOWN).collect();
+    for run in &shown {
+        let mut row = vec![Cell::new(&run.id), Cell::new(&run.test)];
+        row.extend(summary.properties.iter().map(|(iri, ..)| outcomes_cell(run, iri)));
+        row.push(Cell::new(format!("{:.2}", run.score)));
+        table.add_row(row);
+    }
+    let _ = writeln!(out, "{table}");
+    let left_out = summary.runs.len() - shown.len();
+    if left_out > 0 {
+        let passed = summary.runs.iter().filter(|run| run.passed()).count();
+        let _ = writeln!(
+            out,
+            "{left_out} more runs ({passed} of all passed): actcheck list --history {}",
+            summary.history
+        );
+    }
+}
+
+/// Outcomes of a property in a run: one for each action that has it.
+fn outcomes_cell(run: &RunSummary, property: &str) -> Cell {
+    let outcomes: Vec<Outcome> = run
+        .actions
+        .iter()
+        .flat_map(|action| &action.judgements)
+        .filter(|judgement| judgement.property == property)
+        .map(|judgement| judgement.outcome)
+        .collect();
+    let words: Vec<&str> = outcomes.iter().map(|outcome| outcome.word()).collect();
+    let worst = outcomes.iter().copied().max_by_key(|outcome| match outcome {
+        Outcome::Failed => 2,
+        Outcome::Passed | Outcome::Inapplicable => 0,
+        _ => 1,
+    });
+    let cell = Cell::new(words.join(" "));
+    match worst {
+        Some(Outcome::Failed) => cell.fg(Color::Red).add_attribute(Attribute::Bold),
+        Some(Outcome::Passed) => cell.fg(Color::Green),
+        Some(Outcome::Inapplicable) | None => cell.fg(Color::DarkGrey),
+        Some(_) => cell.fg(Color::Yellow),
+    }
+}
+
+fn properties_table(out: &mut String, summary: &CampaignSummary) {
+    let mut table = comfy_table::Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table.force_no_tty();
+    let counted = Outcome::ALL.map(|outcome| outcome.word().to_owned());
+    table.set_header(["property".to_owned(), "pass rate [95 % interval]".to_owned()].into_iter().chain(counted));
+    for line in summary.property_lines() {
+        let rate = line.rate.as_ref().map_or_else(|| "nothing decided".to_owned(), percent);
+        let counts = Outcome::ALL.map(|outcome| line.counts.get(outcome).to_string());
+        table.add_row([line.label, rate].into_iter().chain(counts));
+    }
+    let _ = writeln!(out, "{table}");
+}
+
+fn scores(out: &mut String, summary: &CampaignSummary) {
+    let score = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.4}"));
+    let broken = summary.runs.len() - summary.runs.iter().filter(|run| run.reason.is_none()).count();
+    let _ = writeln!(
+        out,
+        "T = {} over {} runs (without broken runs {}); {} did not complete; {} scenes discarded",
+        score(summary.total_score()),
+        summary.runs.len(),
+        score(summary.total_score_without_broken()),
+        broken,
+        summary.discards,
+    );
+    if let Some(rate) = summary.pass_rate() {
+        let _ = writeln!(out, "runs in which everything passed: {}", percent(&rate));
+    }
+    if summary.interrupted {
+        let _ = writeln!(
+            out,
+            "stopped early: {} of {} planned runs; all of these are in the history",
+            summary.runs.len(),
+            summary.planned
+        );
+    }
+    let _ = writeln!(out, "campaign {} in {}", summary.campaign, summary.history);
+}
+
+fn failures(out: &mut String, summary: &CampaignSummary) {
+    let told: Vec<&RunSummary> = summary.runs.iter().filter(|run| run.failed() || run.reason.is_some()).collect();
+    for run in told.iter().take(FAILURES_TOLD) {
+        let _ = writeln!(out, "\n{} ({})", run.id, run.test);
+        if let Some(reason) = &run.reason {
+            let _ = writeln!(out, "  {}: {reason}", run.status.word());
+        }
+        for action in &run.actions {
+            for judgement in action.judgements.iter().filter(|j| j.outcome == Outcome::Failed) {
+                let property = summary.properties.iter().find(|(iri, ..)| *iri == judgement.property);
+                let label = property.map_or(judgement.property.as_str(), |(_, label, _)| label.as_str());
+                let _ = writeln!(out, "  {} failed: {label}: {}", action.name, judgement.witness);
+            }
+        }
+        let _ = writeln!(out, "  more: actcheck show {} --history {}", run.id, summary.history);
+    }
+    if told.len() > FAILURES_TOLD {
+        let _ = writeln!(
+            out,
+            "\n{} more runs did not pass: actcheck list --history {}",
+            told.len() - FAILURES_TOLD,
+            summary.history
+        );
+    }
+}
+
+fn percent(interval: &Interval) -> String {
+    format!(
+        "{:.0} % [{:.0}–{:.0}] ({} of {})",
+        interval.rate * 100.0,
+        interval.low * 100.0,
+        interval.high * 100.0,
+        interval.count,
+        interval.of
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::RunStatus;
+    use crate::report::summary::tests::{campaign, run};
+
+    #[test]
+    fn a_failed_property_is_told_in_words_with_the_command_that_shows_more() {
+        let summary = campaign(vec![
+            run(0, RunStatus::Completed, &[Outcome::Passed, Outcome::Failed]),
+            run(1, RunStatus::Broken, &[Outcome::Broken, Outcome::Broken]),
+        ]);
+        let text = campaign_text(&summary, false);
+        assert!(text.contains("Pick failed: property 1: glass_1 moved 0.4 cm, needs more than 2 cm"), "{text}");
+        assert!(text.contains("actcheck show k7f3-1 --history configs/.actcheck"), "{text}");
+        assert!(text.contains("T = 0.2500 over 2 runs (without broken runs 0.5000); 1 did not complete"), "{text}");
+        assert!(text.contains("broken: body left the world"), "{text}");
+        assert!(!text.contains('\u{1b}'), "no colours where none were asked for");
+    }
+}

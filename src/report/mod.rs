@@ -1,0 +1,15 @@
+//! Verdicts and tables as people and programs read them.
+//!
+//! Never: decides an outcome, computes a statistic of its own, or writes to a stream.
+
+mod campaign_json;
+mod campaign_table;
+mod campaign_text;
+mod summary;
+mod table;
+
+pub use campaign_json::campaign_json;
+pub use campaign_table::campaign_table;
+pub use campaign_text::campaign_text;
+pub use summary::{ActionSummary, CampaignSummary, PropertyLine, RunSummary};
+pub use table::{Table, TableFormat};

@@ -1,0 +1,221 @@
+//! What is said about a campaign when it is over, as plain data.
+
+use crate::analysis::{Interval, wilson};
+use crate::history::{RunRecord, RunStatus};
+use crate::verdict::{Counts, Judgement, Outcome, mean};
+
+/// A campaign in short.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CampaignSummary {
+    /// Its id in the history.
+    pub campaign: String,
+    /// Its configuration, as the user named it.
+    pub config: String,
+    /// Where the history lies, as the user named it.
+    pub history: String,
+    /// Every property that was judged, in order: IRI, label, unit of its margin.
+    pub properties: Vec<(String, String, Option<String>)>,
+    /// The runs, by index.
+    pub runs: Vec<RunSummary>,
+    /// Runs that were asked for.
+    pub planned: u64,
+    /// Scenes that could not be built and were drawn again.
+    pub discards: u64,
+    /// Whether it was stopped before its end.
+    pub interrupted: bool,
+}
+
+/// A run in short.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunSummary {
+    /// Its id in the history.
+    pub id: String,
+    /// Position in the campaign, from 0.
+    pub index: u64,
+    /// Names of its actions.
+    pub test: String,
+    /// How it ended.
+    pub status: RunStatus,
+    /// Why, where it did not complete.
+    pub reason: Option<String>,
+    /// The paper's S.
+    pub score: f64,
+    /// Its actions, in order.
+    pub actions: Vec<ActionSummary>,
+}
+
+/// An action in short.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActionSummary {
+    /// Local name.
+    pub name: String,
+    /// The paper's A.
+    pub score: f64,
+    /// One for each property.
+    pub judgements: Vec<Judgement>,
+}
+
+/// One property over all runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PropertyLine {
+    /// IRI.
+    pub property: String,
+    /// Label.
+    pub label: String,
+    /// All six outcomes.
+    pub counts: Counts,
+    /// Share of passed among the decided, with its 95 % Wilson interval; nothing where none was decided.
+    pub rate: Option<Interval>,
+}
+
+impl RunSummary {
+    /// The short form of a record.
+    pub fn of(record: &RunRecord) -> Self {
+        let actions = record
+            .trace
+            .actions
+            .iter()
+            .zip(&record.judgements)
+            .zip(&record.action_scores)
+            .map(|((action, judgements), score)| ActionSummary {
+                name: action.action.clone(),
+                score: *score,
+                judgements: judgements.clone(),
+            })
+            .collect();
+        Self {
+            id: record.id.clone(),
+            index: record.index,
+            test: record.test.clone(),
+            status: record.status,
+            reason: record.reason.clone(),
+            score: record.score,
+            actions,
+        }
+    }
+
+    /// Outcomes of all properties of all actions.
+    pub fn outcomes(&self) -> impl Iterator<Item = Outcome> + '_ {
+        self.actions.iter().flat_map(|action| action.judgements.iter().map(|j| j.outcome))
+    }
+
+    /// Whether something passed and everything else passed or did not apply.
+    pub fn passed(&self) -> bool {
+        let counts = Counts::of(self.outcomes());
+        counts.passed > 0 && counts.passed + counts.inapplicable == counts.total()
+    }
+
+    /// Whether a property failed.
+    pub fn failed(&self) -> bool {
+        self.outcomes().any(|outcome| outcome == Outcome::Failed)
+    }
+}
+
+impl CampaignSummary {
+    /// The paper's T over all runs.
+    pub fn total_score(&self) -> Option<f64> {
+        mean(self.runs.iter().map(|run| run.score))
+    }
+
+    /// T over the runs that simulation and tool did not spoil.
+    pub fn total_score_without_broken(&self) -> Option<f64> {
+        mean(self.runs.iter().filter(|run| run.status != RunStatus::Broken).map(|run| run.score))
+    }
+
+    /// Runs in which everything passed, among the runs that were not broken, with the interval.
+    pub fn pass_rate(&self) -> Option<Interval> {
+        let judged = self.runs.iter().filter(|run| run.status != RunStatus::Broken).count() as u64;
+        let passed = self.runs.iter().filter(|run| run.passed()).count() as u64;
+        wilson(passed, judged)
+    }
+
+    /// All outcomes of all properties.
+    pub fn counts(&self) -> Counts {
+        Counts::of(self.runs.iter().flat_map(RunSummary::outcomes))
+    }
+
+    /// One line for each property.
+    pub fn property_lines(&self) -> Vec<PropertyLine> {
+        self.properties
+            .iter()
+            .map(|(iri, label, _)| {
+                let judgements = self.runs.iter().flat_map(|run| &run.actions).flat_map(|action| &action.judgements);
+                let counts = Counts::of(judgements.filter(|j| j.property == *iri).map(|j| j.outcome));
+                let rate = wilson(counts.passed, counts.decided());
+                PropertyLine { property: iri.clone(), label: label.clone(), counts, rate }
+            })
+            .collect()
+    }
+
+    /// 0: everything passed. 1: a property failed. 2: something could not be tested and nothing failed.
+    pub fn exit_code(&self) -> u8 {
+        let counts = self.counts();
+        if counts.failed > 0 {
+            1
+        } else if counts.passed > 0 && counts.passed + counts.inapplicable == counts.total() {
+            0
+        } else {
+            2
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub fn run(index: u64, status: RunStatus, outcomes: &[Outcome]) -> RunSummary {
+        let judgements: Vec<Judgement> = outcomes
+            .iter()
+            .enumerate()
+            .map(|(idx, outcome)| Judgement {
+                property: format!("http://actions#P{idx}"),
+                outcome: *outcome,
+                margin: Some(if *outcome == Outcome::Passed { 0.05 } else { -0.016 }),
+                witness: "glass_1 moved 0.4 cm, needs more than 2 cm".into(),
+                rule_digest: "d".into(),
+            })
+            .collect();
+        let score = crate::verdict::action_score(outcomes.iter().copied());
+        RunSummary {
+            id: format!("k7f3-{}", index + 1),
+            index,
+            test: "Pick".into(),
+            status,
+            reason: (status != RunStatus::Completed).then(|| "body left the world".into()),
+            score,
+            actions: vec![ActionSummary { name: "Pick".into(), score, judgements }],
+        }
+    }
+
+    pub fn campaign(runs: Vec<RunSummary>) -> CampaignSummary {
+        CampaignSummary {
+            campaign: "k7f3".into(),
+            config: "configs/pick.toml".into(),
+            history: "configs/.actcheck".into(),
+            properties: (0..2)
+                .map(|i| (format!("http://actions#P{i}"), format!("property {i}"), Some("m".to_owned())))
+                .collect(),
+            planned: runs.len() as u64,
+            runs,
+            discards: 1,
+            interrupted: false,
+        }
+    }
+
+    #[test]
+    fn a_broken_run_is_no_failure_and_no_pass() {
+        use Outcome::{Broken, Failed, Inapplicable, Passed};
+        let broken = run(0, RunStatus::Broken, &[Broken, Broken]);
+        assert!(!broken.passed() && !broken.failed());
+        assert_eq!(campaign(vec![broken.clone()]).exit_code(), 2);
+        assert_eq!(campaign(vec![run(0, RunStatus::Completed, &[Passed, Inapplicable])]).exit_code(), 0);
+        let mixed = campaign(vec![broken, run(1, RunStatus::Completed, &[Passed, Failed])]);
+        assert_eq!(mixed.exit_code(), 1);
+        assert_eq!(mixed.total_score(), Some(0.25));
+        assert_eq!(mixed.total_score_without_broken(), Some(0.5));
+        assert_eq!(mixed.property_lines()[0].counts.broken, 1);
+        assert_eq!(campaign(vec![]).exit_code(), 2);
+        assert_eq!(campaign(vec![run(0, RunStatus::Completed, &[Inapplicable])]).exit_code(), 2);
+    }
+}

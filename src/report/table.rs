@@ -1,0 +1,98 @@
+//! One table, three formats.
+
+use comfy_table::{ContentArrangement, presets};
+use serde_json::{Map, Value};
+
+/// How a table is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum TableFormat {
+    /// Lines and columns for people.
+    #[default]
+    Table,
+    /// Comma-separated values with a header line (RFC 4180, with `\n` as line end).
+    Csv,
+    /// A JSON array of objects.
+    Json,
+}
+
+/// A table with named columns. A cell without a value is `null` in JSON and empty elsewhere.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Table {
+    /// Names of the columns.
+    pub columns: Vec<String>,
+    /// One value a column in every row.
+    pub rows: Vec<Vec<Value>>,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
+        Self { columns: columns.into_iter().map(Into::into).collect(), rows: Vec::new() }
+    }
+
+    /// The table in a format, with a line end at the end.
+    pub fn render(&self, format: TableFormat) -> String {
+        match format {
+            TableFormat::Table => self.text(),
+            TableFormat::Csv => self.csv(),
+            TableFormat::Json => self.json(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut table = comfy_table::Table::new();
+        table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+        table.set_header(&self.columns);
+        for row in &self.rows {
+            table.add_row(row.iter().map(plain));
+        }
+        format!("{table}\n")
+    }
+
+    fn csv(&self) -> String {
+        let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
+        let rows = std::iter::once(self.columns.clone())
+            .chain(self.rows.iter().map(|row| row.iter().map(plain).collect()));
+        for row in rows {
+            writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
+        }
+        let bytes = writer.into_inner().expect("writing to memory does not fail");
+        String::from_utf8(bytes).expect("only text was written")
+    }
+
+    fn json(&self) -> String {
+        let rows: Vec<Value> = self
+            .rows
+            .iter()
+            .map(|row| {
+                let pairs = self.columns.iter().cloned().zip(row.iter().cloned());
+                Value::Object(pairs.collect::<Map<String, Value>>())
+            })
+            .collect();
+        format!("{:#}\n", Value::Array(rows))
+    }
+}
+
+/// A cell as text: strings without quotes, nothing for `null`.
+fn plain(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_table_in_three_formats() {
+        let mut table = Table::new(["run", "score", "note"]);
+        table.rows.push(vec!["k-1".into(), 0.8.into(), Value::Null]);
+        table.rows.push(vec!["k-2".into(), 1.0.into(), "a, \"b\"".into()]);
+        assert_eq!(table.render(TableFormat::Csv), "run,score,note\nk-1,0.8,\nk-2,1.0,\"a, \"\"b\"\"\"\n");
+        assert!(table.render(TableFormat::Json).contains("\"note\": null"));
+        assert!(table.render(TableFormat::Table).contains("k-1"));
+    }
+}

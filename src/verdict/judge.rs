@@ -1,0 +1,160 @@
+//! From findings to outcomes.
+
+use std::collections::BTreeMap;
+
+use crate::base::{Term, names};
+use crate::ontology::{Action, Ontology, Property};
+use crate::rules::{Findings, RuleFault, WitnessRow};
+use crate::verdict::{Judgement, Outcome};
+
+/// How an action came to its end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Fate {
+    /// By its own report: the rules decide.
+    Completed,
+    /// By a fault of simulation, transport or tool.
+    Broken(String),
+    /// By a budget.
+    Timeout(String),
+    /// It was never reached.
+    NotReached,
+}
+
+/// Outcomes of an action's success properties, in the action's order.
+///
+/// `findings` holds what the rules found for them and for the action's preconditions; where the fate is not
+/// `Completed` it is not looked at. A property without findings is `broken`: a verdict is never made up.
+pub fn judge(
+    ontology: &Ontology,
+    action: &Action,
+    findings: &BTreeMap<String, Result<Findings, RuleFault>>,
+    fate: &Fate,
+    rule_digest: impl Fn(&str) -> String,
+) -> Vec<Judgement> {
+    let unmet = unmet_precondition(ontology, action, findings);
+    let decide = |iri: &String| {
+        let property = ontology.properties.get(iri);
+        let (outcome, margin, witness) = match fate {
+            Fate::Broken(reason) => (Outcome::Broken, None, reason.clone()),
+            Fate::Timeout(reason) => (Outcome::Timeout, None, reason.clone()),
+            Fate::NotReached => (Outcome::Untested, None, "the action was never reached".to_owned()),
+            Fate::Completed => match (&unmet, findings.get(iri)) {
+                (Some(unmet), _) => unmet.clone(),
+                (None, Some(result)) => outcome_of(result, property),
+                (None, None) => (Outcome::Broken, None, "no rule was evaluated for it".to_owned()),
+            },
+        };
+        Judgement { property: iri.clone(), outcome, margin, witness, rule_digest: rule_digest(iri) }
+    };
+    action.success_properties.iter().map(decide).collect()
+}
+
+/// The outcome that all success properties share where a precondition does not hold.
+fn unmet_precondition(
+    ontology: &Ontology,
+    action: &Action,
+    findings: &BTreeMap<String, Result<Findings, RuleFault>>,
+) -> Option<(Outcome, Option<f64>, String)> {
+    action.preconditions.iter().find_map(|iri| {
+        let property = ontology.properties.get(iri);
+        let label = property.map_or_else(|| names::local(iri), |p| p.label.as_str());
+        match findings.get(iri).map(|result| outcome_of(result, property)) {
+            Some((Outcome::Passed | Outcome::Inapplicable, ..)) => None,
+            Some((Outcome::Failed, _, words)) => {
+                Some((Outcome::Inapplicable, None, format!("precondition `{label}` does not hold: {words}")))
+            }
+            Some((outcome, _, words)) => Some((outcome, None, format!("precondition `{label}`: {words}"))),
+            None => Some((Outcome::Broken, None, format!("precondition `{label}` was not evaluated"))),
+        }
+    })
+}
+
+fn outcome_of(
+    result: &Result<Findings, RuleFault>,
+    property: Option<&Property>,
+) -> (Outcome, Option<f64>, String) {
+    match result {
+        Err(RuleFault::BudgetSpent(reason)) => (Outcome::Timeout, None, reason.clone()),
+        Err(RuleFault::Value(reason)) => (Outcome::Broken, None, reason.clone()),
+        Ok(found) if !found.applicable => (Outcome::Inapplicable, None, words(found, property)),
+        Ok(found) => {
+            let outcome = if found.holds { Outcome::Passed } else { Outcome::Failed };
+            (outcome, found.margin, words(found, property))
+        }
+    }
+}
+
+/// The rule author's words, or the witness tuples spelt out, or how far it was from holding.
+fn words(found: &Findings, property: Option<&Property>) -> String {
+    if !found.because.is_empty() {
+        return found.because.join("; ");
+    }
+    if !found.applicable {
+        return "it does not apply here".to_owned();
+    }
+    if !found.witness.is_empty() {
+        let mut rows: Vec<String> = found.witness.iter().map(spell).collect();
+        let left_out = found.witness_count.saturating_sub(found.witness.len());
+        if left_out > 0 {
+            rows.push(format!("{left_out} more"));
+        }
+        return rows.join("; ");
+    }
+    let unit = property.and_then(|p| p.unit.as_deref()).unwrap_or("");
+    match (found.holds, found.margin) {
+        (true, _) => "nothing violates it".to_owned(),
+        (false, Some(margin)) => format!("no success was derived; missed by {} {unit}", short(-margin)).trim_end().to_owned(),
+        (false, None) => "no success was derived".to_owned(),
+    }
+}
+
+fn spell(row: &WitnessRow) -> String {
+    let values: Vec<String> = row
+        .values
+        .iter()
+        .map(|(name, term)| if name.is_empty() { readable(term) } else { format!("{name} = {}", readable(term)) })
+        .collect();
+    format!("{}({})", row.predicate, values.join(", "))
+}
+
+fn readable(term: &Term) -> String {
+    match term {
+        Term::Iri(iri) => names::local(iri).to_owned(),
+        Term::Double(value) => short(*value),
+        Term::String(text) => text.to_string(),
+        other => other.to_string(),
+    }
+}
+
+/// A number to four significant digits.
+fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let decimals = (3 - value.abs().log10().floor() as i32).clamp(0, 9);
+    let text = format!("{value:.*}", usize::try_from(decimals).unwrap_or(0));
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(holds: bool) -> Result<Findings, RuleFault> {
+        Ok(Findings { applicable: true, holds, witness: vec![], witness_count: 0, margin: Some(-0.016), because: vec![] })
+    }
+
+    #[test]
+    fn a_fault_of_the_tool_is_not_a_failure_of_the_robot() {
+        assert_eq!(outcome_of(&found(false), None).0, Outcome::Failed);
+        assert_eq!(outcome_of(&Err(RuleFault::BudgetSpent("rule x".into())), None).0, Outcome::Timeout);
+        assert_eq!(outcome_of(&Err(RuleFault::Value("no number".into())), None).0, Outcome::Broken);
+    }
+
+    #[test]
+    fn words_say_how_far_it_was() {
+        assert_eq!(outcome_of(&found(false), None).2, "no success was derived; missed by 0.016");
+        assert_eq!(short(0.000_412_34), "0.0004123");
+        assert_eq!(short(1234.5), "1235");
+    }
+}

@@ -1,0 +1,78 @@
+//! The six outcomes and what stands behind each.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Outcome of one property in one action execution. Never folded into two.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Outcome {
+    /// It holds.
+    Passed,
+    /// It does not hold, and that is the robot's doing.
+    Failed,
+    /// It says nothing about this action.
+    Inapplicable,
+    /// Simulation, transport or the tool was at fault.
+    Broken,
+    /// A budget was spent.
+    Timeout,
+    /// The action was never reached.
+    Untested,
+}
+
+impl Outcome {
+    /// All six, in the order in which reports count them.
+    pub const ALL: [Self; 6] =
+        [Self::Passed, Self::Failed, Self::Inapplicable, Self::Broken, Self::Timeout, Self::Untested];
+
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Failed => "failed",
+            Self::Inapplicable => "inapplicable",
+            Self::Broken => "broken",
+            Self::Timeout => "timeout",
+            Self::Untested => "untested",
+        }
+    }
+
+    /// The outcome of a word.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|outcome| outcome.word() == word)
+    }
+
+    /// Local name of EARL's outcome value.
+    pub fn earl(self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::Failed => "failed",
+            Self::Inapplicable => "inapplicable",
+            Self::Broken | Self::Timeout => "cantTell",
+            Self::Untested => "untested",
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.word())
+    }
+}
+
+/// Outcome of one property with what proves it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Judgement {
+    /// IRI of the property.
+    pub property: String,
+    /// The outcome.
+    pub outcome: Outcome,
+    /// How far from flipping, in the property's unit; positive: passed.
+    pub margin: Option<f64>,
+    /// In words: the rule author's, or made from the witness tuples, or the reason of a fault.
+    pub witness: String,
+    /// Digest of the rule file that decided (empty where none did).
+    pub rule_digest: String,
+}

@@ -1,0 +1,11 @@
+//! Turns what the rules found into outcomes with witness and margin, and outcomes into scores.
+//!
+//! Never: evaluates a rule, looks at a trace, or folds the six outcomes into two.
+
+mod judge;
+mod judgement;
+mod score;
+
+pub use judge::{Fate, judge};
+pub use judgement::{Judgement, Outcome};
+pub use score::{Counts, action_score, mean, run_score};

@@ -1,0 +1,136 @@
+//! The paper's scores: A of an action, S of a test, T of a campaign (equations 1 to 3).
+
+use serde::Serialize;
+
+use crate::verdict::Outcome;
+
+/// How often each outcome occurred.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// It held.
+    pub passed: u64,
+    /// It did not hold.
+    pub failed: u64,
+    /// It said nothing.
+    pub inapplicable: u64,
+    /// Simulation or tool was at fault.
+    pub broken: u64,
+    /// A budget was spent.
+    pub timeout: u64,
+    /// The action was never reached.
+    pub untested: u64,
+}
+
+impl Counts {
+    /// Counts outcomes.
+    pub fn of(outcomes: impl IntoIterator<Item = Outcome>) -> Self {
+        let mut counts = Self::default();
+        for outcome in outcomes {
+            counts.add(outcome);
+        }
+        counts
+    }
+
+    /// Counts one more.
+    pub fn add(&mut self, outcome: Outcome) {
+        *self.slot(outcome) += 1;
+    }
+
+    /// How often one outcome occurred.
+    pub fn get(mut self, outcome: Outcome) -> u64 {
+        *self.slot(outcome)
+    }
+
+    /// All of them together.
+    pub fn total(self) -> u64 {
+        Outcome::ALL.into_iter().map(|outcome| self.get(outcome)).sum()
+    }
+
+    /// Those that say something about the robot: passed and failed. The denominator of a pass rate.
+    pub fn decided(self) -> u64 {
+        self.passed + self.failed
+    }
+
+    fn slot(&mut self, outcome: Outcome) -> &mut u64 {
+        match outcome {
+            Outcome::Passed => &mut self.passed,
+            Outcome::Failed => &mut self.failed,
+            Outcome::Inapplicable => &mut self.inapplicable,
+            Outcome::Broken => &mut self.broken,
+            Outcome::Timeout => &mut self.timeout,
+            Outcome::Untested => &mut self.untested,
+        }
+    }
+}
+
+/// A: the share of an action's properties that passed, in [0, 1].
+///
+/// A property that says nothing about this action (`inapplicable`) leaves the denominator, unless none is left:
+/// an action of which nothing could be shown scores 0, as one whose properties were broken, timed out or untested.
+/// Source: the paper, equation 1.
+pub fn action_score(outcomes: impl IntoIterator<Item = Outcome>) -> f64 {
+    let counts = Counts::of(outcomes);
+    let applicable = counts.total() - counts.inapplicable;
+    if applicable == 0 { 0.0 } else { counts.passed as f64 / applicable as f64 }
+}
+
+/// S: the mean of A over a test's actions, in [0, 1]. Source: the paper, equation 2.
+pub fn run_score(action_scores: &[f64]) -> f64 {
+    mean(action_scores.iter().copied()).unwrap_or(0.0)
+}
+
+/// T is the mean of S over runs (the paper, equation 3); nothing where there are none.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.into_iter().fold((0.0, 0u64), |(sum, count), value| (sum + value, count + 1));
+    (count > 0).then(|| sum / count as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Passed properties of each action (of 5, 3, 5 and 4) in the paper's fifteen runs, Table IV.
+    const TABLE_IV: [[u64; 4]; 15] = [
+        [5, 3, 2, 1],
+        [5, 2, 0, 0],
+        [3, 1, 3, 1],
+        [0, 0, 0, 0],
+        [5, 3, 0, 0],
+        [0, 0, 0, 0],
+        [0, 0, 0, 0],
+        [5, 3, 2, 1],
+        [5, 3, 2, 1],
+        [0, 0, 0, 0],
+        [5, 3, 2, 1],
+        [5, 3, 5, 3],
+        [0, 0, 0, 0],
+        [5, 3, 0, 0],
+        [0, 0, 0, 0],
+    ];
+
+    #[test]
+    fn the_papers_table_gives_its_total() {
+        let runs = TABLE_IV.map(|row| {
+            let scores: Vec<f64> = row
+                .into_iter()
+                .zip([5, 3, 5, 4])
+                .map(|(passed, all)| {
+                    action_score((0..all).map(|i| if i < passed { Outcome::Passed } else { Outcome::Failed }))
+                })
+                .collect();
+            run_score(&scores)
+        });
+        let total = mean(runs).expect("fifteen runs");
+        assert_eq!(format!("{total:.4}"), "0.3633");
+    }
+
+    #[test]
+    fn what_tested_nothing_is_no_pass() {
+        assert_eq!(action_score([Outcome::Inapplicable, Outcome::Inapplicable]), 0.0);
+        assert_eq!(action_score([Outcome::Broken, Outcome::Timeout, Outcome::Untested]), 0.0);
+        assert_eq!(action_score([]), 0.0);
+        assert_eq!(action_score([Outcome::Passed, Outcome::Inapplicable]), 1.0);
+        assert_eq!(action_score([Outcome::Passed, Outcome::Broken]), 0.5);
+        assert_eq!(mean([]), None);
+    }
+}

@@ -1,0 +1,135 @@
+//! Holds the `use` lines under `src/` to the architecture: a module imports only from modules above it, and a library of
+//! the field is used only where the module's charter names it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Each module, the modules that it may import, in the order of the line. `cli` may import all.
+const FLOORS: [(&str, &[&str]); 13] = [
+    ("base", &[]),
+    ("config", &["base"]),
+    ("ontology", &["base"]),
+    ("scenario", &["base", "config", "ontology"]),
+    ("world", &["base", "scenario"]),
+    ("actions", &["base", "scenario", "world"]),
+    ("facts", &["base", "ontology", "actions"]),
+    ("rules", &["base", "ontology", "facts"]),
+    ("verdict", &["base", "ontology", "facts", "rules"]),
+    ("history", &["base", "ontology", "scenario", "facts", "verdict", "actions"]),
+    (
+        "campaign",
+        &["base", "config", "ontology", "scenario", "world", "actions", "facts", "rules", "verdict", "history"],
+    ),
+    ("analysis", &["base", "history", "verdict"]),
+    ("report", &["base", "verdict", "history", "analysis"]),
+];
+
+/// Libraries of the field and where they may be named.
+const FENCES: [(&str, &[&str]); 9] = [
+    ("toml", &["config"]),
+    ("oxigraph", &["ontology", "rules", "history"]),
+    ("rapier3d", &["world"]),
+    ("parry3d", &["world", "scenario"]),
+    ("urdf_rs", &["world"]),
+    ("datafrog", &["rules"]),
+    ("polars", &["analysis"]),
+    ("rayon", &["campaign"]),
+    ("clap", &["cli"]),
+];
+
+fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    let mut entries: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            rust_files(&path, found);
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// Code lines of each module: comments and what is behind them left out.
+fn code() -> BTreeMap<String, Vec<(PathBuf, usize, String)>> {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    rust_files(&src, &mut files);
+    let mut modules: BTreeMap<String, Vec<(PathBuf, usize, String)>> = BTreeMap::new();
+    for file in files {
+        let relative = file.strip_prefix(&src).unwrap().to_path_buf();
+        let module = relative.components().next().unwrap().as_os_str().to_string_lossy().into_owned();
+        let text = std::fs::read_to_string(&file).unwrap();
+        for (idx, line) in text.lines().enumerate() {
+            let line = line.split("//").next().unwrap().to_owned();
+            modules.entry(module.clone()).or_default().push((relative.clone(), idx + 1, line));
+        }
+    }
+    modules
+}
+
+/// Names behind every `crate::` in a line, groups included: `crate::{base, world}` and `crate::base::Pose`.
+fn crate_modules(line: &str) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    for behind in line.split("crate::").skip(1) {
+        let names: Vec<&str> = match behind.strip_prefix('{') {
+            Some(group) => group.split('}').next().unwrap_or("").split(',').collect(),
+            None => vec![behind],
+        };
+        for name in names {
+            let name: String =
+                name.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            if !name.is_empty() {
+                found.insert(name);
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn every_import_points_up_the_table() {
+    let mut wrong = Vec::new();
+    for (module, lines) in code() {
+        let Some((_, allowed)) = FLOORS.iter().find(|(name, _)| *name == module) else { continue };
+        for (file, number, line) in lines {
+            for imported in crate_modules(&line) {
+                if imported != module && !allowed.contains(&imported.as_str()) {
+                    wrong.push(format!("{}:{number} imports `{imported}`", file.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "against the architecture in src/lib.rs:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_library_stays_behind_its_fence() {
+    let mut wrong = Vec::new();
+    for (module, lines) in code() {
+        for (file, number, line) in lines {
+            for (library, allowed) in FENCES {
+                let named = line
+                    .match_indices(&format!("{library}::"))
+                    .any(|(at, _)| !line[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':'));
+                if named && !allowed.contains(&module.as_str()) {
+                    wrong.push(format!("{}:{number} uses `{library}`", file.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "against the fences in src/lib.rs:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_module_has_a_floor() {
+    let known: BTreeSet<&str> = FLOORS.iter().map(|(name, _)| *name).chain(["cli", "lib.rs", "main.rs"]).collect();
+    let unknown: Vec<String> = code().into_keys().filter(|module| !known.contains(module.as_str())).collect();
+    assert!(unknown.is_empty(), "no floor for {unknown:?}");
+}
+
+#[test]
+fn the_reader_of_imports_sees_groups_and_paths() {
+    let names = crate_modules("use crate::{base::Pose, world}; crate::facts::extract(); pub(crate) use crate::rules::x;");
+    assert_eq!(names.into_iter().collect::<Vec<_>>(), ["base", "facts", "rules", "world"]);
+}
