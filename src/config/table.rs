@@ -1,0 +1,517 @@
+//! TOML tables with places: every value that is taken is checked, every key that is not taken is reported.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
+use std::ops::{Bound, RangeBounds, RangeInclusive};
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
+
+/// Beyond this many, syntax errors are echoes of the first ones.
+const MOST_SYNTAX_ERRORS: usize = 5;
+
+/// A value with the place where it is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Located<T> {
+    /// The value.
+    pub value: T,
+    /// Where it is written.
+    pub span: Span,
+}
+
+/// A table that is being read.
+///
+/// Getters take a key and return nothing where it is missing or wrong; a wrong one has then been noted.
+/// [`Table::finish`] notes what nobody asked for.
+#[derive(Debug)]
+pub struct Table {
+    source: Source,
+    /// Dotted path from the root, empty for the root.
+    path: String,
+    /// Where its header or its braces are.
+    span: Span,
+    entries: BTreeMap<String, Entry>,
+    /// Keys that were asked for, whether they were there or not.
+    known: BTreeSet<String>,
+    found: Diagnostics,
+}
+
+#[derive(Debug)]
+struct Entry {
+    key_span: Span,
+    value: Located<Value>,
+}
+
+#[derive(Debug)]
+enum Value {
+    String(String),
+    /// Nothing where it does not fit 64 bits.
+    Integer(Option<i64>),
+    /// Nothing where it is too large for a double.
+    Float(Option<f64>),
+    Boolean(bool),
+    Datetime,
+    Array(Vec<Located<Value>>),
+    Table(BTreeMap<String, Entry>),
+}
+
+impl Table {
+    /// The root table of a text.
+    ///
+    /// # Errors
+    /// C002 for each place where the text is not TOML.
+    pub fn parse(source: &Source) -> Result<Self, Diagnostics> {
+        let (root, errors) = DeTable::parse_recoverable(&source.text);
+        let mut found = Diagnostics::new();
+        for error in errors.iter().take(MOST_SYNTAX_ERRORS) {
+            let span = error.span().unwrap_or(0..0);
+            found.push(
+                Diagnostic::error("C002", format!("this is not TOML: {}", error.message()))
+                    .at(source, span)
+                    .help("see https://toml.io for how tables, strings and lists are written"),
+            );
+        }
+        let entries = entries_of(root.get_ref());
+        found.or(Self::new(source, String::new(), 0..0, entries))
+    }
+
+    fn new(source: &Source, path: String, span: Span, entries: BTreeMap<String, Entry>) -> Self {
+        Self { source: source.clone(), path, span, entries, known: BTreeSet::new(), found: Diagnostics::new() }
+    }
+
+    /// The text that the table is part of.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// Where the table is written.
+    pub fn span(&self) -> Span {
+        self.span.clone()
+    }
+
+    /// Where a key is written, if it is there and was not taken yet.
+    pub fn key_span(&self, key: &str) -> Option<Span> {
+        self.entries.get(key).map(|entry| entry.key_span.clone())
+    }
+
+    /// Whether a key is there and was not taken yet.
+    pub fn has(&self, key: &str) -> bool {
+        self.entries.contains_key(key)
+    }
+
+    /// Keys that were not taken yet and hold tables, sorted.
+    pub fn untaken_tables(&self) -> Vec<String> {
+        let is_table = |entry: &Entry| matches!(entry.value.value, Value::Table(_));
+        self.entries.iter().filter(|(_, entry)| is_table(entry)).map(|(key, _)| key.clone()).collect()
+    }
+
+    /// Notes every key of the list that is missing (C005).
+    pub fn require(&mut self, keys: &[&str]) {
+        for key in keys {
+            self.known.insert((*key).to_owned());
+            if !self.entries.contains_key(*key) {
+                let message = format!("{} is missing", self.name(key));
+                let near = self.entries.keys().map(String::as_str).filter(|name| !keys.contains(name));
+                let help = match crate::base::nearest(key, near) {
+                    Some(found) => format!("is `{found}` meant to be `{key}`?"),
+                    None => format!("add `{key} = …`{}", self.place_in_words()),
+                };
+                self.fault("C005", self.span.clone(), message, help);
+            }
+        }
+    }
+
+    /// Notes a fault of this table's text.
+    pub fn fault(&mut self, code: &'static str, span: Span, message: impl Into<String>, help: impl Into<String>) {
+        self.found.push(Diagnostic::error(code, message).at(&self.source, span).help(help));
+    }
+
+    /// Moves the faults to `diagnostics`, with one (C003) for each key that nobody asked for.
+    pub fn finish(mut self, diagnostics: &mut Diagnostics) {
+        for (key, entry) in std::mem::take(&mut self.entries) {
+            let kind = if matches!(entry.value.value, Value::Table(_)) { "table" } else { "key" };
+            let message = format!("unknown {kind} {}", self.name(&key));
+            let help = did_you_mean(&key, self.known.iter().map(String::as_str));
+            self.fault("C003", entry.key_span, message, help);
+        }
+        diagnostics.extend(self.found);
+    }
+
+    /// A string that is not empty.
+    pub fn string(&mut self, key: &str) -> Option<Located<String>> {
+        let value = self.take(key)?;
+        self.text_of(key, value)
+    }
+
+    /// A list of strings, none of them empty. The list may be empty: see [`Table::some_strings`].
+    pub fn strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
+        let list = self.list(key, "a list of strings")?;
+        Some(list.into_iter().filter_map(|value| self.text_of(key, value)).collect())
+    }
+
+    /// A list of at least one string, with the place of the whole list.
+    pub fn some_strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
+        let span = self.entries.get(key).map(|entry| entry.value.span.clone());
+        let before = self.found.len();
+        let list = self.strings(key)?;
+        if list.is_empty() && self.found.len() == before {
+            self.fault("C007", span?, format!("{} is an empty list", self.name(key)), "name at least one");
+        }
+        (!list.is_empty()).then_some(list)
+    }
+
+    /// A list of lists of strings. Both may be empty; each inner list has its place.
+    pub fn lists_of_strings(&mut self, key: &str) -> Option<Vec<Located<Vec<Located<String>>>>> {
+        let expected = "a list of lists of strings";
+        let outer = self.list(key, expected)?;
+        let mut lists = Vec::new();
+        for Located { value, span } in outer {
+            match value {
+                Value::Array(inner) => {
+                    let value = inner.into_iter().filter_map(|value| self.text_of(key, value)).collect();
+                    lists.push(Located { value, span });
+                }
+                other => self.wrong(key, expected, &Located { value: other, span }),
+            }
+        }
+        Some(lists)
+    }
+
+    /// A whole number within bounds.
+    pub fn integer(&mut self, key: &str, bounds: RangeInclusive<i64>) -> Option<i64> {
+        let value = self.take(key)?;
+        self.integer_of(key, &value, &bounds)
+    }
+
+    /// Two whole numbers `[least, most]` within bounds, the first not above the second.
+    pub fn integer_range(&mut self, key: &str, bounds: RangeInclusive<i64>) -> Option<(i64, i64)> {
+        let expected = "a range of whole numbers `[least, most]`";
+        let span = self.entries.get(key).map(|entry| entry.value.span.clone());
+        let list = self.list(key, expected)?;
+        let [least, most] = list.as_slice() else {
+            self.wrong_length(key, span?, expected, list.len());
+            return None;
+        };
+        let (least, most) = (self.integer_of(key, least, &bounds), self.integer_of(key, most, &bounds));
+        self.in_order(key, span?, least?, most?)
+    }
+
+    /// A finite number within bounds.
+    pub fn number(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<f64> {
+        let value = self.take(key)?;
+        self.number_of(key, &value, &bounds)
+    }
+
+    /// Exactly `N` finite numbers, each within bounds.
+    pub fn numbers<const N: usize>(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<[f64; N]> {
+        let span = self.entries.get(key).map(|entry| entry.value.span.clone());
+        let list = self.number_list(key, bounds)?;
+        let length = list.len();
+        match <[f64; N]>::try_from(list) {
+            Ok(numbers) => Some(numbers),
+            Err(_) => {
+                self.wrong_length(key, span?, &format!("a list of {N} numbers"), length);
+                None
+            }
+        }
+    }
+
+    /// Any number of finite numbers, each within bounds.
+    pub fn number_list(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<Vec<f64>> {
+        let list = self.list(key, "a list of numbers")?;
+        let numbers: Vec<Option<f64>> = list.iter().map(|value| self.number_of(key, value, &bounds)).collect();
+        numbers.into_iter().collect()
+    }
+
+    /// Two finite numbers `[low, high]` within bounds, the first not above the second.
+    pub fn range(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<(f64, f64)> {
+        let expected = "a range of numbers `[low, high]`";
+        let span = self.entries.get(key).map(|entry| entry.value.span.clone());
+        let list = self.list(key, expected)?;
+        let [low, high] = list.as_slice() else {
+            self.wrong_length(key, span?, expected, list.len());
+            return None;
+        };
+        let (low, high) = (self.number_of(key, low, &bounds), self.number_of(key, high, &bounds));
+        self.in_order(key, span?, low?, high?)
+    }
+
+    /// `true` or `false`.
+    pub fn boolean(&mut self, key: &str) -> Option<bool> {
+        let value = self.take(key)?;
+        if let Value::Boolean(boolean) = value.value {
+            return Some(boolean);
+        }
+        self.wrong(key, "`true` or `false`", &value);
+        None
+    }
+
+    /// A table, which has to be finished by itself.
+    pub fn table(&mut self, key: &str) -> Option<Table> {
+        let key_span = self.key_span(key);
+        let value = self.take(key)?;
+        match value.value {
+            Value::Table(entries) => Some(Self::new(&self.source, self.path_of(key), key_span?, entries)),
+            other => {
+                self.wrong(key, "a table", &Located { value: other, span: value.span });
+                None
+            }
+        }
+    }
+
+    /// A list of tables (`[[key]]`), each of which has to be finished by itself; none where the key is missing.
+    pub fn tables(&mut self, key: &str) -> Vec<Table> {
+        let expected = "a list of tables";
+        let mut tables = Vec::new();
+        for Located { value, span } in self.list(key, expected).unwrap_or_default() {
+            match value {
+                Value::Table(entries) => {
+                    let path = format!("{}[{}]", self.path_of(key), tables.len() + 1);
+                    tables.push(Self::new(&self.source, path, span, entries));
+                }
+                other => self.wrong(key, expected, &Located { value: other, span }),
+            }
+        }
+        tables
+    }
+
+    fn take(&mut self, key: &str) -> Option<Located<Value>> {
+        self.known.insert(key.to_owned());
+        self.entries.remove(key).map(|entry| entry.value)
+    }
+
+    fn list(&mut self, key: &str, expected: &str) -> Option<Vec<Located<Value>>> {
+        let value = self.take(key)?;
+        match value.value {
+            Value::Array(list) => Some(list),
+            other => {
+                self.wrong(key, expected, &Located { value: other, span: value.span });
+                None
+            }
+        }
+    }
+
+    fn text_of(&mut self, key: &str, value: Located<Value>) -> Option<Located<String>> {
+        match value.value {
+            Value::String(text) if text.trim().is_empty() => {
+                self.fault("C006", value.span, format!("a string of {} is empty", self.name(key)), "write a name");
+                None
+            }
+            Value::String(text) => Some(Located { value: text, span: value.span }),
+            other => {
+                self.wrong(key, "a string", &Located { value: other, span: value.span });
+                None
+            }
+        }
+    }
+
+    fn integer_of(&mut self, key: &str, value: &Located<Value>, bounds: &RangeInclusive<i64>) -> Option<i64> {
+        let expected = in_words("a whole number", bounds, &i64::MAX);
+        match &value.value {
+            Value::Integer(Some(number)) if bounds.contains(number) => Some(*number),
+            Value::Integer(number) => {
+                let found = number.map_or_else(|| "is too large".to_owned(), |number| format!("is {number}"));
+                let message = format!("{} {found}", self.name(key));
+                self.fault("C006", value.span.clone(), message, format!("it must be {expected}"));
+                None
+            }
+            _ => {
+                self.wrong(key, &expected, value);
+                None
+            }
+        }
+    }
+
+    fn number_of(&mut self, key: &str, value: &Located<Value>, bounds: &impl RangeBounds<f64>) -> Option<f64> {
+        let expected = in_words("a number", bounds, &f64::INFINITY);
+        let number = match &value.value {
+            Value::Float(number) => *number,
+            Value::Integer(number) => number.map(|number| number as f64),
+            _ => {
+                self.wrong(key, &expected, value);
+                return None;
+            }
+        };
+        match number.filter(|number| number.is_finite() && bounds.contains(number)) {
+            Some(number) => Some(number),
+            None => {
+                let found = self.source.text.get(value.span.clone()).unwrap_or("out of range").to_owned();
+                let message = format!("{} is {found}", self.name(key));
+                self.fault("C006", value.span.clone(), message, format!("it must be {expected}"));
+                None
+            }
+        }
+    }
+
+    fn in_order<T: PartialOrd + Display>(&mut self, key: &str, span: Span, low: T, high: T) -> Option<(T, T)> {
+        if low <= high {
+            return Some((low, high));
+        }
+        let message = format!("the range {} begins above its end", self.name(key));
+        self.fault("C009", span, message, format!("write the smaller number first: `[{high}, {low}]`"));
+        None
+    }
+
+    fn wrong(&mut self, key: &str, expected: &str, value: &Located<Value>) {
+        let message = format!("{} must be {expected}, but this is {}", self.name(key), value.value.kind());
+        self.fault("C004", value.span.clone(), message, example(key, expected));
+    }
+
+    fn wrong_length(&mut self, key: &str, span: Span, expected: &str, length: usize) {
+        let message = format!("{} must be {expected}, but this list has {length} elements", self.name(key));
+        self.fault("C004", span, message, example(key, expected));
+    }
+
+    /// A key as messages speak of it.
+    fn name(&self, key: &str) -> String {
+        format!("`{}`", self.path_of(key))
+    }
+
+    fn path_of(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
+    }
+
+    fn place_in_words(&self) -> String {
+        if self.path.is_empty() { " at the top of the file".to_owned() } else { format!(" to [{}]", self.path) }
+    }
+}
+
+impl Value {
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::String(_) => "a string",
+            Self::Integer(_) => "a whole number",
+            Self::Float(_) => "a number",
+            Self::Boolean(_) => "a boolean",
+            Self::Datetime => "a date or time",
+            Self::Array(_) => "a list",
+            Self::Table(_) => "a table",
+        }
+    }
+}
+
+fn entries_of(table: &DeTable<'_>) -> BTreeMap<String, Entry> {
+    table
+        .iter()
+        .map(|(key, value)| (key.get_ref().to_string(), Entry { key_span: key.span(), value: located(value) }))
+        .collect()
+}
+
+fn located(value: &Spanned<DeValue<'_>>) -> Located<Value> {
+    let span = value.span();
+    let value = match value.get_ref() {
+        DeValue::String(text) => Value::String(text.to_string()),
+        DeValue::Integer(number) => Value::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok()),
+        DeValue::Float(number) => Value::Float(number.as_str().parse().ok()),
+        DeValue::Boolean(boolean) => Value::Boolean(*boolean),
+        DeValue::Datetime(_) => Value::Datetime,
+        DeValue::Array(list) => Value::Array(list.iter().map(located).collect()),
+        DeValue::Table(table) => Value::Table(entries_of(table)),
+    };
+    Located { value, span }
+}
+
+/// "a number of at least 0 and at most 1": bounds at or beyond `unlimited` are left out.
+fn in_words<T: PartialOrd + Display>(what: &str, bounds: &impl RangeBounds<T>, unlimited: &T) -> String {
+    let low = match bounds.start_bound() {
+        Bound::Included(low) => Some(format!("of at least {low}")),
+        Bound::Excluded(low) => Some(format!("above {low}")),
+        Bound::Unbounded => None,
+    };
+    let high = match bounds.end_bound() {
+        Bound::Included(high) | Bound::Excluded(high) if high >= unlimited => None,
+        Bound::Included(high) => Some(format!("at most {high}")),
+        Bound::Excluded(high) => Some(format!("below {high}")),
+        Bound::Unbounded => None,
+    };
+    match (low, high) {
+        (Some(low), Some(high)) => format!("{what} {low} and {high}"),
+        (Some(one), None) | (None, Some(one)) => format!("{what} {one}"),
+        (None, None) => what.to_owned(),
+    }
+}
+
+fn example(key: &str, expected: &str) -> String {
+    let value = match expected {
+        text if text.contains("list of lists") => "[[\"…\"], [\"…\", \"…\"]]",
+        text if text.contains("list of strings") => "[\"…\", \"…\"]",
+        text if text.contains("list of tables") => return format!("write one `[[{key}]]` header for each"),
+        text if text.contains("range of whole") => "[1, 4]",
+        text if text.contains("range of") => "[0.8, 1.2]",
+        text if text.contains("list of") => "[0.1, 0.2]",
+        text if text.contains("whole number") => "3",
+        text if text.contains("number") => "0.5",
+        text if text.contains("table") => return format!("write it as a table: `[{key}]`"),
+        text if text.contains("true") => "true",
+        _ => "\"…\"",
+    };
+    format!("write it like `{key} = {value}`")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn faults(text: &str, read: impl FnOnce(&mut Table)) -> Vec<String> {
+        let source = Source::new("t.toml", text);
+        let mut found = Diagnostics::new();
+        match Table::parse(&source) {
+            Ok(mut table) => {
+                read(&mut table);
+                table.finish(&mut found);
+            }
+            Err(diagnostics) => found = diagnostics,
+        }
+        found.iter().map(|d| format!("{} {}: {d}", d.code, d.place().unwrap_or_default())).collect()
+    }
+
+    #[test]
+    fn values_come_with_their_places() {
+        let text = "name = \"glass\"\nsize = [1, 2.5, 3]\n[part]\nround = true\n";
+        let found = faults(text, |table| {
+            table.require(&["name", "size"]);
+            assert_eq!(table.string("name").map(|name| (name.value, name.span)), Some(("glass".to_owned(), 7..14)));
+            assert_eq!(table.numbers("size", 0.0..), Some([1.0, 2.5, 3.0]));
+            let mut part = table.table("part").expect("it is there");
+            assert_eq!(part.boolean("round"), Some(true));
+            let mut none = Diagnostics::new();
+            part.finish(&mut none);
+            assert!(none.is_empty());
+        });
+        assert_eq!(found, [""; 0]);
+    }
+
+    #[test]
+    fn each_fault_is_noted_with_its_place() {
+        let text = "count = -1\nmass = \"x\"\nrange = [3, 1]\nfrction = 1\nbig = 99999999999999999999\nlist = []\n";
+        let found = faults(text, |table| {
+            table.require(&["friction"]);
+            table.integer("count", 0..=i64::MAX);
+            table.number("mass", (Bound::Excluded(0.0), Bound::Unbounded));
+            table.range("range", ..);
+            table.integer("big", 0..=10);
+            table.some_strings("list");
+        });
+        assert_eq!(
+            found,
+            [
+                "C005 t.toml:1:1: `friction` is missing",
+                "C006 t.toml:1:9: `count` is -1",
+                "C004 t.toml:2:8: `mass` must be a number above 0, but this is a string",
+                "C009 t.toml:3:9: the range `range` begins above its end",
+                "C006 t.toml:5:7: `big` is too large",
+                "C007 t.toml:6:8: `list` is an empty list",
+                "C003 t.toml:4:1: unknown key `frction`",
+            ]
+        );
+    }
+
+    #[test]
+    fn text_that_is_not_toml_has_its_places() {
+        let found = faults("a = \nb = [1,\n", |_| {});
+        assert!(found.len() >= 2, "{found:?}");
+        assert!(found.iter().all(|fault| fault.starts_with("C002 t.toml:")), "{found:?}");
+    }
+}
