@@ -4,12 +4,25 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::base::Source;
 
+/// One carried folder each: taking the whole checkout and leaving out the rest would walk through a target folder.
 #[derive(rust_embed::RustEmbed)]
-#[folder = "."]
-#[include = "ontology/**"]
-#[include = "rules/**"]
-#[include = "models/**"]
-struct Carried;
+#[folder = "ontology/"]
+#[prefix = "ontology/"]
+struct Ontology;
+
+#[derive(rust_embed::RustEmbed)]
+#[folder = "rules/"]
+#[prefix = "rules/"]
+struct Rules;
+
+#[derive(rust_embed::RustEmbed)]
+#[folder = "models/"]
+#[prefix = "models/"]
+struct Models;
+
+fn carried(key: &str) -> Option<rust_embed::EmbeddedFile> {
+    Ontology::get(key).or_else(|| Rules::get(key)).or_else(|| Models::get(key))
+}
 
 /// A place that files are read from, by path.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,7 +42,7 @@ impl Files {
         match self {
             Self::Shipped => {
                 let key = slashed(&normalised(path));
-                let file = Carried::get(&key).ok_or("the program carries no such file")?;
+                let file = carried(&key).ok_or("the program carries no such file")?;
                 let text = String::from_utf8(file.data.into_owned()).map_err(|_| "it is not UTF-8 text")?;
                 Ok(Source::new(format!("built-in:{key}"), text))
             }
@@ -46,7 +59,9 @@ impl Files {
         let mut paths: Vec<PathBuf> = match self {
             Self::Shipped => {
                 let folder = normalised(folder);
-                Carried::iter()
+                Ontology::iter()
+                    .chain(Rules::iter())
+                    .chain(Models::iter())
                     .map(|name| PathBuf::from(name.as_ref()))
                     .filter(|path| path.parent() == Some(&folder))
                     .collect()

@@ -10,7 +10,7 @@ use crate::history::{RunRecord, RunStatus};
 use crate::rules::{Budget, Findings, RuleFault};
 use crate::scenario::{self, Scene};
 use crate::verdict::{Fate, Judgement, action_score, judge, run_score};
-use crate::world;
+use crate::world::{self, World};
 
 /// Time as the caller measures it: the stages have no clock.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +19,18 @@ pub struct Clock {
     pub now: fn() -> String,
     /// Seconds since any fixed moment, never going back.
     pub secs: fn() -> f64,
+}
+
+/// Puts a fault into the world of the run with this index, once it has settled. For tests of what notices faults.
+pub type Disturbance = fn(u64, &mut World);
+
+/// How runs are made, apart from their choices.
+#[derive(Debug, Clone, Copy)]
+pub struct Manner {
+    /// The caller's clock.
+    pub clock: Clock,
+    /// A fault to put into worlds.
+    pub disturb: Option<Disturbance>,
 }
 
 /// Why a scene gave no run.
@@ -41,16 +53,21 @@ pub fn run_line(
     campaign: &str,
     index: u64,
     mut choices: Choices,
-    clock: &Clock,
+    manner: &Manner,
 ) -> Result<RunRecord, Failure> {
-    let (started, start_secs) = ((clock.now)(), (clock.secs)());
+    let (started, start_secs) = ((manner.clock.now)(), (manner.clock.secs)());
     let test = env.test_of(index);
     let scene = scenario::draw(&env.space, test, &mut choices).map_err(|discard| Failure::Discard(discard.to_string()))?;
-    let trace = perform(env, &env.campaign.tests[test], &scene, &mut choices)?;
+    let disturb = |world: &mut World| {
+        if let Some(disturb) = manner.disturb {
+            disturb(index, world);
+        }
+    };
+    let trace = perform(env, &env.campaign.tests[test], &scene, &mut choices, disturb)?;
     let mut record = record(env, campaign, index, scene, trace);
     record.choices = choices.into_made();
     record.started = started;
-    record.wall_secs = (clock.secs)() - start_secs;
+    record.wall_secs = (manner.clock.secs)() - start_secs;
     Ok(record)
 }
 
@@ -94,7 +111,13 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
 }
 
 /// Builds the scene, lets it settle and performs the test in it.
-fn perform(env: &Env, test: &[String], scene: &Scene, choices: &mut Choices) -> Result<Trace, Failure> {
+fn perform(
+    env: &Env,
+    test: &[String],
+    scene: &Scene,
+    choices: &mut Choices,
+    disturb: impl FnOnce(&mut World),
+) -> Result<Trace, Failure> {
     let mut world = match world::build(scene) {
         Ok(world) => world,
         Err(error) => return Ok(never_performed(test, scene, &error.to_string())),
@@ -106,6 +129,7 @@ fn perform(env: &Env, test: &[String], scene: &Scene, choices: &mut Choices) -> 
     if !settling.settled {
         return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
     }
+    disturb(&mut world);
     Ok(actions::perform(&calls(test, scene), &mut world, choices, &env.campaign.budget))
 }
 

@@ -8,6 +8,6 @@ mod outcome;
 mod run_all;
 
 pub use environment::Env;
-pub use line::{Clock, Failure, run_line};
+pub use line::{Clock, Disturbance, Failure, Manner, run_line};
 pub use outcome::{CampaignEnd, Ending};
 pub use run_all::{Options, run_all};

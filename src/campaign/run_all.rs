@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use crate::base::{Choices, Diagnostic, Diagnostics};
 use crate::campaign::line::crashed;
-use crate::campaign::{CampaignEnd, Clock, Ending, Env, Failure, run_line};
+use crate::campaign::{CampaignEnd, Ending, Env, Failure, Manner, run_line};
 use crate::history::{History, RunRecord};
 
 /// Scenes drawn for one run before the campaign is given up.
@@ -17,13 +17,13 @@ const SCENES_PER_RUN: u64 = 50;
 /// The store is brought to the disk at least this often. Unit: seconds.
 const FLUSH_SECS: f64 = 1.0;
 
-/// How a campaign is run; none of it changes what comes out.
+/// How a campaign is run. The number of workers and the clock change nothing of what comes out.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// Workers, one simulation each.
     pub jobs: usize,
-    /// The caller's clock.
-    pub clock: Clock,
+    /// How each run is made.
+    pub manner: Manner,
 }
 
 /// What a worker sends.
@@ -102,7 +102,7 @@ fn make_run(env: &Env, campaign: &str, index: u64, options: &Options) -> Vec<Mes
     for attempt in 0..SCENES_PER_RUN {
         // Attempts have streams of their own, so that a discard moves no other run's decisions.
         let choices = || Choices::random(env.campaign.seed, index | (attempt << 48));
-        let made = catch_unwind(AssertUnwindSafe(|| run_line(env, campaign, index, choices(), &options.clock)));
+        let made = catch_unwind(AssertUnwindSafe(|| run_line(env, campaign, index, choices(), &options.manner)));
         match made {
             Ok(Ok(record)) => {
                 messages.push(Message::Run(Box::new(record)));
@@ -151,7 +151,7 @@ fn collect(
     on_run: &mut dyn FnMut(&RunRecord),
 ) -> CampaignEnd {
     let mut end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new() };
-    let mut flushed_at = (options.clock.secs)();
+    let mut flushed_at = (options.manner.clock.secs)();
     for message in receiver {
         let result = match message {
             Message::Discard(index, reason) => {
@@ -167,7 +167,7 @@ fn collect(
             }),
         };
         let result = result.and_then(|()| {
-            let now = (options.clock.secs)();
+            let now = (options.manner.clock.secs)();
             if now - flushed_at < FLUSH_SECS || halt.load(Ordering::Relaxed) {
                 return Ok(());
             }

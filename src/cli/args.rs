@@ -102,6 +102,9 @@ pub struct ShowArgs {
     /// Where the history lies.
     #[command(flatten)]
     pub history: HistoryArgs,
+    /// Draw the scene before and after into this file (SVG)
+    #[arg(long, value_name = "FILE.svg")]
+    pub picture: Option<PathBuf>,
     /// How it is printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,

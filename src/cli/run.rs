@@ -3,14 +3,16 @@
 use std::num::NonZero;
 use std::path::Path;
 
+use crate::analysis;
 use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::{CampaignEnd, Ending, Env, Options, run_all};
+use crate::campaign::{CampaignEnd, Ending, Env, Manner, Options, run_all};
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
 use crate::cli::{clock, output, stop};
 use crate::config::Overrides;
-use crate::history::History;
+use crate::history::{self, History, RunFilter};
 use crate::report::{CampaignSummary, RunSummary, campaign_json, campaign_table, campaign_text};
+use crate::verdict::{Counts, Outcome, mean};
 
 /// Runs a campaign and prints what came of it. Returns the exit code.
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
@@ -25,7 +27,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let mut progress = Progress::new(env.planned_runs());
     let bar = progress.bar();
     let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; Ctrl-C again stops at once"));
-    let options = Options { jobs: args.jobs.map_or_else(all_cores, usize::from), clock };
+    let options = Options { jobs: args.jobs.map_or_else(all_cores, usize::from), manner: Manner { clock, disturb: None } };
     let mut runs = Vec::new();
     let end = quietly(|| {
         run_all(&env, &history, &id, &options, &stop, |record| {
@@ -35,8 +37,11 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         })
     });
     progress.finish();
-    history.finish_campaign(&id, &(clock.now)(), end.discards.len() as u64)?;
-    let summary = summarise(&env, &args.config, id, runs, &end);
+    let finished = finish(&history, &id, &runs, &end, (clock.now)());
+    let mut summary = summarise(&env, &args.config, id.clone(), runs, &end);
+    if finished.is_ok() {
+        summary.failure_modes = failure_modes(&history, id)?;
+    }
     output::print(&match args.format {
         Format::Table => campaign_text(&summary, output::colour()),
         Format::Csv => campaign_table(&summary).render(args.format.into()),
@@ -44,9 +49,9 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     });
     warn_of_discards(&end);
     match end.ending {
-        Ending::Finished => Ok(summary.exit_code()),
-        Ending::Interrupted => Ok(stop::INTERRUPTED),
         Ending::Stopped(faults) => Err(faults),
+        Ending::Finished => finished.map(|()| summary.exit_code()),
+        Ending::Interrupted => finished.map(|()| stop::INTERRUPTED),
     }
 }
 
@@ -61,6 +66,33 @@ fn quietly<T>(work: impl FnOnce() -> T) -> T {
     let result = work();
     std::panic::set_hook(before);
     result
+}
+
+/// Writes the campaign's end into the history. The runs are there already.
+fn finish(
+    history: &History,
+    id: &str,
+    runs: &[RunSummary],
+    end: &CampaignEnd,
+    ended: String,
+) -> Result<(), Diagnostics> {
+    let whole = runs.iter().filter(|run| run.status != history::RunStatus::Broken);
+    let counts = Counts::of(runs.iter().flat_map(RunSummary::outcomes));
+    let record = history::CampaignEnd {
+        ended,
+        score: mean(runs.iter().map(|run| run.score)),
+        score_without_broken: mean(whole.map(|run| run.score)),
+        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
+        discards: end.discards.len() as u64,
+        interrupted: !matches!(end.ending, Ending::Finished),
+    };
+    history.finish_campaign(id, &record)
+}
+
+fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureMode>, Diagnostics> {
+    let rows = history.outcomes(&RunFilter { campaign: Some(id), ..RunFilter::default() })?;
+    analysis::failure_modes(&rows)
+        .map_err(|error| Diagnostic::error("X020", format!("failure modes could not be computed: {error}")).into())
 }
 
 fn summarise(env: &Env, config: &Path, campaign: String, mut runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
@@ -80,6 +112,7 @@ fn summarise(env: &Env, config: &Path, campaign: String, mut runs: Vec<RunSummar
         config: config.display().to_string(),
         history: env.campaign.history.display().to_string(),
         properties,
+        failure_modes: Vec::new(),
         runs,
         planned: env.planned_runs(),
         discards: end.discards.len() as u64,

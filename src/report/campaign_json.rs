@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::analysis::Interval;
-use crate::report::{CampaignSummary, RunSummary};
+use crate::analysis::FailureMode;
+use crate::report::{CampaignSummary, RunSummary, Share};
 use crate::verdict::Judgement;
 
 /// The same that [`crate::report::campaign_text`] says, as one JSON object.
@@ -15,7 +15,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         .map(|(line, (_, _, unit))| {
             json!({
                 "property": line.property, "label": line.label, "unit": unit,
-                "counts": line.counts, "pass_rate": line.rate.as_ref().map(interval),
+                "counts": line.counts, "pass_rate": line.rate.as_ref().map(share),
             })
         })
         .collect();
@@ -30,10 +30,18 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         "counts": summary.counts(),
         "score": summary.total_score(),
         "score_without_broken": summary.total_score_without_broken(),
-        "runs_passed": summary.pass_rate().as_ref().map(interval),
+        "runs_passed": summary.pass_rate().as_ref().map(share),
         "exit_code": summary.exit_code(),
         "properties": properties,
+        "failure_modes": summary.failure_modes.iter().map(failure_mode).collect::<Vec<_>>(),
         "runs": summary.runs.iter().map(run).collect::<Vec<_>>(),
+    })
+}
+
+fn failure_mode(mode: &FailureMode) -> Value {
+    json!({
+        "failed": mode.failed, "runs": mode.runs,
+        "share": mode.share.rate, "low": mode.share.low, "high": mode.share.high,
     })
 }
 
@@ -61,9 +69,9 @@ fn judgement(judgement: &Judgement) -> Value {
     })
 }
 
-fn interval(interval: &Interval) -> Value {
+fn share(share: &Share) -> Value {
     json!({
-        "count": interval.count, "of": interval.of,
-        "rate": interval.rate, "low": interval.low, "high": interval.high,
+        "count": share.count, "of": share.of,
+        "rate": share.interval.rate, "low": share.interval.low, "high": share.interval.high,
     })
 }

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use comfy_table::{Attribute, Cell, Color, ContentArrangement, presets};
 
-use crate::analysis::Interval;
-use crate::report::{CampaignSummary, RunSummary};
+use crate::base::names;
+use crate::report::{CampaignSummary, RunSummary, Share};
 use crate::verdict::Outcome;
 
 /// Rows of the table of runs, and failed runs told in words; the rest are a command away.
@@ -18,6 +18,7 @@ pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
     runs_table(&mut out, summary, colour);
     properties_table(&mut out, summary);
     scores(&mut out, summary);
+    failure_modes(&mut out, summary);
     failures(&mut out, summary);
     out
 }
@@ -120,6 +121,22 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
     let _ = writeln!(out, "campaign {} in {}", summary.campaign, summary.history);
 }
 
+/// Which properties fail together, and how often.
+fn failure_modes(out: &mut String, summary: &CampaignSummary) {
+    let modes = summary.failure_modes.iter().filter(|mode| !mode.failed.is_empty());
+    for mode in modes {
+        let failed: Vec<&str> = mode.failed.iter().map(|iri| names::local(iri)).collect();
+        let example = mode.runs.first().map_or("", String::as_str);
+        let (rate, low, high) = (mode.share.rate * 100.0, mode.share.low * 100.0, mode.share.high * 100.0);
+        let _ = writeln!(
+            out,
+            "  {rate:.0} % [{low:.0}–{high:.0}] of the runs ({}, such as {example}) fail {}",
+            mode.runs.len(),
+            failed.join(" + ")
+        );
+    }
+}
+
 fn failures(out: &mut String, summary: &CampaignSummary) {
     let told: Vec<&RunSummary> = summary.runs.iter().filter(|run| run.failed() || run.reason.is_some()).collect();
     for run in told.iter().take(FAILURES_TOLD) {
@@ -146,15 +163,10 @@ fn failures(out: &mut String, summary: &CampaignSummary) {
     }
 }
 
-fn percent(interval: &Interval) -> String {
-    format!(
-        "{:.0} % [{:.0}–{:.0}] ({} of {})",
-        interval.rate * 100.0,
-        interval.low * 100.0,
-        interval.high * 100.0,
-        interval.count,
-        interval.of
-    )
+fn percent(share: &Share) -> String {
+    let interval = &share.interval;
+    let (rate, low, high) = (interval.rate * 100.0, interval.low * 100.0, interval.high * 100.0);
+    format!("{rate:.0} % [{low:.0}–{high:.0}] ({} of {})", share.count, share.of)
 }
 
 #[cfg(test)]

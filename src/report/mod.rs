@@ -5,11 +5,17 @@
 mod campaign_json;
 mod campaign_table;
 mod campaign_text;
+mod picture;
+mod run_text;
+mod answer;
 mod summary;
 mod table;
 
 pub use campaign_json::campaign_json;
 pub use campaign_table::campaign_table;
 pub use campaign_text::campaign_text;
-pub use summary::{ActionSummary, CampaignSummary, PropertyLine, RunSummary};
+pub use answer::answer_table;
+pub use picture::run_picture;
+pub use run_text::{run_json, run_text};
+pub use summary::{ActionSummary, CampaignSummary, PropertyLine, RunSummary, Share};
 pub use table::{Table, TableFormat};

@@ -1,6 +1,6 @@
 //! What is said about a campaign when it is over, as plain data.
 
-use crate::analysis::{Interval, wilson};
+use crate::analysis::{FailureMode, Interval, wilson};
 use crate::history::{RunRecord, RunStatus};
 use crate::verdict::{Counts, Judgement, Outcome, mean};
 
@@ -17,6 +17,8 @@ pub struct CampaignSummary {
     pub properties: Vec<(String, String, Option<String>)>,
     /// The runs, by index.
     pub runs: Vec<RunSummary>,
+    /// Runs that share the same set of failed properties, most frequent first.
+    pub failure_modes: Vec<FailureMode>,
     /// Runs that were asked for.
     pub planned: u64,
     /// Scenes that could not be built and were drawn again.
@@ -55,6 +57,24 @@ pub struct ActionSummary {
     pub judgements: Vec<Judgement>,
 }
 
+/// A share of things counted, with its 95 % Wilson interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Share {
+    /// How many.
+    pub count: u64,
+    /// Of how many.
+    pub of: u64,
+    /// The share and its interval.
+    pub interval: Interval,
+}
+
+impl Share {
+    /// The share of `count` in `of`; nothing where `of` is 0.
+    pub fn new(count: u64, of: u64) -> Option<Self> {
+        Some(Self { count, of, interval: wilson(count, of)? })
+    }
+}
+
 /// One property over all runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PropertyLine {
@@ -65,7 +85,7 @@ pub struct PropertyLine {
     /// All six outcomes.
     pub counts: Counts,
     /// Share of passed among the decided, with its 95 % Wilson interval; nothing where none was decided.
-    pub rate: Option<Interval>,
+    pub rate: Option<Share>,
 }
 
 impl RunSummary {
@@ -123,10 +143,10 @@ impl CampaignSummary {
     }
 
     /// Runs in which everything passed, among the runs that were not broken, with the interval.
-    pub fn pass_rate(&self) -> Option<Interval> {
+    pub fn pass_rate(&self) -> Option<Share> {
         let judged = self.runs.iter().filter(|run| run.status != RunStatus::Broken).count() as u64;
         let passed = self.runs.iter().filter(|run| run.passed()).count() as u64;
-        wilson(passed, judged)
+        Share::new(passed, judged)
     }
 
     /// All outcomes of all properties.
@@ -141,7 +161,7 @@ impl CampaignSummary {
             .map(|(iri, label, _)| {
                 let judgements = self.runs.iter().flat_map(|run| &run.actions).flat_map(|action| &action.judgements);
                 let counts = Counts::of(judgements.filter(|j| j.property == *iri).map(|j| j.outcome));
-                let rate = wilson(counts.passed, counts.decided());
+                let rate = Share::new(counts.passed, counts.decided());
                 PropertyLine { property: iri.clone(), label: label.clone(), counts, rate }
             })
             .collect()
@@ -196,6 +216,7 @@ pub(super) mod tests {
             properties: (0..2)
                 .map(|i| (format!("http://actions#P{i}"), format!("property {i}"), Some("m".to_owned())))
                 .collect(),
+            failure_modes: vec![],
             planned: runs.len() as u64,
             runs,
             discards: 1,

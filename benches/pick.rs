@@ -1,0 +1,109 @@
+//! What does a pick run cost, by stage; how fast is simulation against real time; how large is its history?
+//!
+//! Shares and ratios of one process, because machines are noisy: everything but physics should take at most 15 % of the
+//! wall time, judging one action at most 2 ms, simulation at least 20 times real time on one core, a run at most 150 KB.
+
+use std::path::Path;
+use std::time::Instant;
+
+use actcheck::actions::{self, ActionCall};
+use actcheck::base::Choices;
+use actcheck::campaign::{Clock, Env, Manner, run_line};
+use actcheck::config::Overrides;
+use actcheck::history::History;
+use actcheck::rules::Budget;
+use actcheck::{facts, scenario, world};
+
+const RUNS: u64 = 40;
+
+/// Stages in the order of the line, with what each took in all. Unit: seconds.
+#[derive(Default)]
+struct Costs {
+    stages: Vec<(&'static str, f64)>,
+}
+
+impl Costs {
+    fn time<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        let secs = start.elapsed().as_secs_f64();
+        match self.stages.iter_mut().find(|(name, _)| *name == stage) {
+            Some((_, total)) => *total += secs,
+            None => self.stages.push((stage, secs)),
+        }
+        result
+    }
+
+    fn of(&self, stage: &str) -> f64 {
+        self.stages.iter().find(|(name, _)| *name == stage).map_or(0.0, |(_, secs)| *secs)
+    }
+}
+
+fn main() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/five_others.toml");
+    let history_dir = folder.path().join("history");
+    let overrides = Overrides { history: Some(history_dir.clone()), ..Overrides::default() };
+    let env = Env::prepare(&config, &overrides).expect("the benchmark's configuration is sound");
+    let history = History::open(&history_dir).expect("a fresh history");
+    let clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
+    history.begin_campaign(&env.record("bench".into(), "bench".into(), (clock.now)())).expect("a fresh history");
+    let mut costs = Costs::default();
+    let mut simulated_secs = 0.0;
+    let mut made = 0;
+    for index in 0..RUNS {
+        let Some(secs) = by_stage(&env, index, &mut costs) else { continue };
+        simulated_secs += secs;
+        made += 1;
+        let manner = Manner { clock, disturb: None };
+        let record = run_line(&env, "bench", index, Choices::random(env.campaign.seed, index), &manner);
+        let record = record.expect("the same scene can be built again");
+        costs.time("history", || history.commit(&record)).expect("room on the disk");
+    }
+    costs.time("history", || history.flush()).expect("room on the disk");
+    drop(history);
+    print_costs(&costs, made, simulated_secs, folder_bytes(&history_dir));
+}
+
+/// Takes one run down the line by hand. Returns the simulated seconds of its actions.
+fn by_stage(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
+    let mut choices = Choices::random(env.campaign.seed, index);
+    let scene = costs.time("scene", || scenario::draw(&env.space, 0, &mut choices)).ok()?;
+    let mut built = costs.time("build", || world::build(&scene)).expect("the shipped models are sound");
+    let settling = costs.time("physics", || built.settle());
+    if !settling.settled || !settling.left.is_empty() {
+        return None;
+    }
+    let calls = [ActionCall { action: "Pick".into(), parameters: scene.designators.clone() }];
+    let trace =
+        costs.time("physics", || actions::perform(&calls, &mut built, &mut choices, &env.campaign.budget));
+    let run_facts = costs.time("facts", || facts::extract(&trace));
+    let properties = &env.ontology.actions["Pick"].success_properties;
+    let seen = run_facts.action(0)?;
+    costs.time("rules", || env.rules.judge(&seen, properties, &Budget::default()));
+    Some(settling.secs + trace.actions.iter().map(|action| action.duration_secs).sum::<f64>())
+}
+
+fn print_costs(costs: &Costs, runs: u64, simulated_secs: f64, history_bytes: u64) {
+    let total: f64 = costs.stages.iter().map(|(_, secs)| secs).sum();
+    println!("{runs} pick runs with five other objects, one core");
+    println!("{:10} {:>12} {:>8}", "stage", "ms a run", "share");
+    for (stage, secs) in &costs.stages {
+        println!("{stage:10} {:12.3} {:7.2}%", secs * 1e3 / runs as f64, secs / total * 100.0);
+    }
+    println!("not physics: {:.2} % of the wall time (at most 15 %)", (1.0 - costs.of("physics") / total) * 100.0);
+    println!("facts and outcomes of one action: {:.3} ms (at most 2 ms)", (costs.of("facts") + costs.of("rules")) * 1e3 / runs as f64);
+    println!("simulation: {:.1} × real time (at least 20 ×)", simulated_secs / costs.of("physics"));
+    println!("history: {:.1} KB a run (at most 150 KB)", history_bytes as f64 / 1e3 / runs as f64);
+}
+
+fn folder_bytes(folder: &Path) -> u64 {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    entries
+        .map(|entry| match entry.metadata() {
+            Ok(metadata) if metadata.is_dir() => folder_bytes(&entry.path()),
+            Ok(metadata) => metadata.len(),
+            Err(_) => 0,
+        })
+        .sum()
+}

@@ -1,0 +1,80 @@
+//! `actcheck query`
+
+use std::io::Read as _;
+
+use crate::base::{Diagnostic, Diagnostics, Files, Source, Term, names};
+use crate::cli::args::{QueryArgs, QueryFormat};
+use crate::cli::{history_dir, output, stop};
+use crate::history::{Cancel, QueryAnswer};
+use crate::report::{TableFormat, answer_table};
+
+/// Asks and prints the answer. Ctrl-C stops a query that takes long.
+pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
+    let text = text(args)?;
+    let history = history_dir::open(&args.history)?;
+    let cancel = Cancel::new();
+    let asked = cancel.clone();
+    let _flag = stop::on_interrupt(move || asked.cancel());
+    let answer = history.query_from(&text, &cancel)?;
+    let format = match (args.format, &answer) {
+        (QueryFormat::Turtle, QueryAnswer::Graph(triples)) => {
+            output::print(&turtle(triples));
+            return Ok(());
+        }
+        (QueryFormat::Turtle, _) => {
+            return Err(Diagnostic::error("X004", "this query's answer is a table, and Turtle is for graphs")
+                .help("ask with CONSTRUCT or DESCRIBE, or use `--format table`, `csv` or `json`")
+                .into());
+        }
+        (QueryFormat::Table, _) => TableFormat::Table,
+        (QueryFormat::Csv, _) => TableFormat::Csv,
+        (QueryFormat::Json, _) => TableFormat::Json,
+    };
+    output::print(&answer_table(&answer, format == TableFormat::Table).render(format));
+    Ok(())
+}
+
+/// The query's text, from the command line, a file, or (`-f -`) the input stream.
+fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
+    match (&args.text, &args.file) {
+        (Some(text), _) => Ok(Source::new("query", text.as_str())),
+        (None, Some(file)) if file.as_os_str() == "-" => {
+            let mut text = String::new();
+            let read = std::io::stdin().read_to_string(&mut text);
+            read.map_err(|error| Diagnostic::error("X005", format!("the input stream can't be read: {error}")))?;
+            Ok(Source::new("standard input", text))
+        }
+        (None, Some(file)) => Files::Disk.read(file).map_err(|why| {
+            Diagnostic::error("X005", format!("{}: {why}", file.display())).help("name a file with a SPARQL query").into()
+        }),
+        (None, None) => Err(Diagnostic::error("X005", "no query was given").help("give its text, or a file with -f").into()),
+    }
+}
+
+/// Triples in Turtle, one a line.
+fn turtle(triples: &[[Term; 3]]) -> String {
+    let mut out = String::new();
+    for (prefix, namespace) in names::PREFIXES {
+        out.push_str(&format!("@prefix {prefix}: <{namespace}> .\n"));
+    }
+    for [s, p, o] in triples {
+        out.push_str(&format!("{} {} {} .\n", turtle_term(s), turtle_term(p), turtle_term(o)));
+    }
+    out
+}
+
+/// A term as Turtle reads it back: literals that have no shorthand of the same type carry their datatype.
+fn turtle_term(term: &Term) -> String {
+    let quoted = |text: &str| {
+        let text = text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n").replace('\r', "\\r");
+        format!("\"{text}\"")
+    };
+    match term {
+        Term::Double(value) => format!("\"{value}\"^^xsd:double"),
+        Term::Decimal(text) => format!("\"{text}\"^^xsd:decimal"),
+        Term::String(text) => quoted(text),
+        Term::LangString(text, tag) => format!("{}@{tag}", quoted(text)),
+        Term::Literal(text, datatype) => format!("{}^^{}", quoted(text), names::shorten(datatype)),
+        Term::Iri(_) | Term::Blank(_) | Term::Integer(_) | Term::Boolean(_) => term.to_string(),
+    }
+}

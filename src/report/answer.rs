@@ -1,0 +1,63 @@
+//! The answer to a query as a table.
+
+use serde_json::Value;
+
+use crate::base::{Term, names};
+use crate::history::QueryAnswer;
+use crate::report::Table;
+
+/// The table of an answer: of its rows, of `true` or `false`, or of triples.
+///
+/// With `short`, IRIs are shortened by the known prefixes, for people; otherwise they stand whole, for programs.
+pub fn answer_table(answer: &QueryAnswer, short: bool) -> Table {
+    match answer {
+        QueryAnswer::Boolean(value) => {
+            Table { columns: vec!["answer".to_owned()], rows: vec![vec![Value::Bool(*value)]] }
+        }
+        QueryAnswer::Table { columns, rows } => Table {
+            columns: columns.clone(),
+            rows: rows
+                .iter()
+                .map(|row| row.iter().map(|cell| cell.as_ref().map_or(Value::Null, |term| value(term, short))).collect())
+                .collect(),
+        },
+        QueryAnswer::Graph(triples) => Table {
+            columns: ["subject", "predicate", "object"].map(str::to_owned).to_vec(),
+            rows: triples.iter().map(|triple| triple.iter().map(|term| value(term, short)).collect()).collect(),
+        },
+    }
+}
+
+fn value(term: &Term, short: bool) -> Value {
+    match term {
+        Term::Iri(iri) if short => names::shorten(iri).into(),
+        Term::Iri(iri) => iri.as_ref().into(),
+        Term::Blank(label) => format!("_:{label}").into(),
+        Term::String(text) | Term::LangString(text, _) | Term::Literal(text, _) => text.as_ref().into(),
+        Term::Integer(value) => (*value).into(),
+        // A decimal's digits must not pass through a binary fraction.
+        Term::Decimal(text) => text.as_ref().into(),
+        Term::Double(value) if value.is_finite() => (*value).into(),
+        Term::Double(value) => value.to_string().into(),
+        Term::Boolean(value) => (*value).into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::TableFormat;
+
+    #[test]
+    fn programs_get_whole_iris_and_people_short_ones() {
+        let answer = QueryAnswer::Table {
+            columns: vec!["run".into(), "n".into()],
+            rows: vec![vec![Some(Term::iri("https://w3id.org/actcheck/run/k7f3-1")), None]],
+        };
+        assert_eq!(answer_table(&answer, true).render(TableFormat::Csv), "run,n\nrun:k7f3-1,\n");
+        assert_eq!(
+            answer_table(&answer, false).render(TableFormat::Csv),
+            "run,n\nhttps://w3id.org/actcheck/run/k7f3-1,\n"
+        );
+    }
+}

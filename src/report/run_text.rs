@@ -1,0 +1,144 @@
+//! One stored run for people and for programs.
+
+use std::fmt::Write as _;
+
+use comfy_table::{ContentArrangement, presets};
+use serde_json::{Value, json};
+
+use crate::base::names;
+use crate::history::{ActionDetail, ObjectDetail, RunDetail};
+
+/// Everything about a run: its scene, what the actions reported, every outcome with margin and witness.
+///
+pub fn run_text(run: &RunDetail) -> String {
+    let mut out = String::new();
+    let row = &run.row;
+    let _ = writeln!(out, "run {} ({}), {}, S = {:.2}", row.run, row.test, row.status.word(), row.score);
+    if let Some(reason) = &run.reason {
+        let _ = writeln!(out, "{}: {reason}", row.status.word());
+    }
+    let _ = writeln!(
+        out,
+        "campaign {}, run {} of it, seed {}, started {}, {:.2} s of wall time, actcheck {}",
+        row.campaign,
+        row.index + 1,
+        run.seed,
+        row.started,
+        run.wall_secs,
+        run.program_version
+    );
+    let _ = writeln!(out, "trace {}", row.trace_hash);
+    for (designator, values) in &run.designators {
+        let _ = writeln!(out, "{designator} = {}", values.join(", "));
+    }
+    out.push('\n');
+    scene(&mut out, run);
+    for action in &run.actions {
+        action_text(&mut out, action);
+    }
+    out
+}
+
+fn scene(out: &mut String, run: &RunDetail) {
+    let mut table = plain_table();
+    table.set_header(["object", "category", "role", "x m", "y m", "yaw °", "mass kg", "friction", "moved cm", "max tilt °"]);
+    for object in &run.objects {
+        table.add_row(object_row(object));
+    }
+    let _ = writeln!(out, "{table}");
+    let [x, y, heading] = run.robot_base;
+    let _ = writeln!(out, "robot at x {x:.3} m, y {y:.3} m, heading {:.1}°", heading.to_degrees());
+}
+
+fn object_row(object: &ObjectDetail) -> Vec<String> {
+    let number = |value: Option<f64>, factor: f64, decimals: usize| {
+        value.map_or_else(String::new, |value| format!("{:.decimals$}", value * factor))
+    };
+    vec![
+        object.id.clone(),
+        names::local(&object.category).to_owned(),
+        format!("{:?}", object.role).to_lowercase(),
+        format!("{:.3}", object.x),
+        format!("{:.3}", object.y),
+        format!("{:.1}", object.yaw.to_degrees()),
+        format!("{:.3}", object.mass_kg),
+        format!("{:.2}", object.friction),
+        number(object.displacement_m, 100.0, 2),
+        number(object.max_tilt_rad, 180.0 / std::f64::consts::PI, 1),
+    ]
+}
+
+fn action_text(out: &mut String, action: &ActionDetail) {
+    let reported = match action.reported {
+        Some(true) => "reported success",
+        Some(false) => "reported failure",
+        None => "reported nothing",
+    };
+    let message = action.message.as_deref().map_or_else(String::new, |message| format!(": {message}"));
+    let _ = writeln!(
+        out,
+        "\n{}. {}: {}, {:.1} s simulated, A = {:.2}, {reported}{message}",
+        action.step,
+        names::local(&action.action),
+        action.end,
+        action.duration_secs,
+        action.score
+    );
+    let mut table = plain_table();
+    table.set_header(["property", "outcome", "margin", "witness"]);
+    for judgement in &action.judgements {
+        let margin = judgement.margin.map_or_else(String::new, |margin| format!("{margin:+.4}"));
+        table.add_row([
+            names::local(&judgement.property).to_owned(),
+            judgement.outcome.word().to_owned(),
+            margin,
+            judgement.witness.clone(),
+        ]);
+    }
+    let _ = writeln!(out, "{table}");
+}
+
+fn plain_table() -> comfy_table::Table {
+    let mut table = comfy_table::Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table
+}
+
+/// The same for programs.
+pub fn run_json(run: &RunDetail) -> Value {
+    let row = &run.row;
+    let objects: Vec<Value> = run
+        .objects
+        .iter()
+        .map(|o| {
+            json!({
+                "id": o.id, "model": o.model, "category": o.category, "role": format!("{:?}", o.role).to_lowercase(),
+                "x": o.x, "y": o.y, "z": o.z, "yaw": o.yaw, "mass_kg": o.mass_kg, "friction": o.friction,
+                "restitution": o.restitution, "robot_distance_m": o.robot_distance_m,
+                "neighbour_distance_m": o.neighbour_distance_m, "target_distance_m": o.target_distance_m,
+                "displacement_m": o.displacement_m, "max_tilt_rad": o.max_tilt_rad,
+            })
+        })
+        .collect();
+    let actions: Vec<Value> = run
+        .actions
+        .iter()
+        .map(|a| {
+            json!({
+                "step": a.step, "action": a.action, "score": a.score, "end": a.end, "reported": a.reported,
+                "message": a.message, "duration_secs": a.duration_secs, "parameters": a.parameters,
+                "outcomes": a.judgements.iter().map(|j| json!({
+                    "property": j.property, "outcome": j.outcome, "margin": j.margin, "witness": j.witness,
+                    "rule_digest": j.rule_digest,
+                })).collect::<Vec<_>>(),
+            })
+        })
+        .collect();
+    json!({
+        "run": row.run, "campaign": row.campaign, "index": row.index, "test": row.test, "status": row.status.word(),
+        "reason": run.reason, "score": row.score, "trace_hash": row.trace_hash, "seed": run.seed,
+        "started": row.started, "wall_secs": run.wall_secs, "program_version": run.program_version,
+        "world": run.world, "robot_base": run.robot_base, "noise": run.noise, "designators": run.designators,
+        "objects": objects, "actions": actions,
+    })
+}

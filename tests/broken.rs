@@ -1,0 +1,54 @@
+//! A fault of simulation ends its run as broken, with the reason, and never the campaign.
+
+use std::sync::atomic::AtomicBool;
+
+use actcheck::campaign::{Clock, Ending, Env, Manner, Options, run_all};
+use actcheck::config::Overrides;
+use actcheck::history::{History, RunFilter, RunStatus};
+use actcheck::report::RunSummary;
+use actcheck::verdict::Outcome;
+use actcheck::world::{Poison, World};
+
+use crate::support::root;
+
+/// Run 1 gets a pose that is not a number, run 2 a body far outside, run 3 a crash; the others are left alone.
+fn disturb(index: u64, world: &mut World) {
+    match index {
+        1 => assert!(world.poison("glass_1", Poison::NotFinite)),
+        2 => assert!(world.poison("glass_1", Poison::Teleport([0.0, 0.0, -500.0]))),
+        3 => panic!("a fault in the engine"),
+        _ => {}
+    }
+}
+
+#[test]
+fn faults_of_simulation_are_broken_runs_and_the_campaign_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let overrides = Overrides { runs: Some(5), history: Some(folder.path().join("h")), ..Overrides::default() };
+    let env = Env::prepare(&root().join("configs/pick.toml"), &overrides).unwrap();
+    let history = History::open(&env.campaign.history).unwrap();
+    let clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
+    history.begin_campaign(&env.record("test".into(), "pick".into(), (clock.now)())).unwrap();
+    let options = Options { jobs: 2, manner: Manner { clock, disturb: Some(disturb) } };
+    let mut runs = Vec::new();
+    let end = run_all(&env, &history, "test", &options, &AtomicBool::new(false), |record| {
+        runs.push(RunSummary::of(record));
+    });
+    assert!(matches!(end.ending, Ending::Finished), "{:?}", end.ending);
+    runs.sort_by_key(|run| run.index);
+    assert_eq!(runs.len(), 5);
+    let reasons = [(1, "not finite"), (2, "left the world"), (3, "a fault in the engine")];
+    for (idx, words) in reasons {
+        let run = &runs[idx];
+        assert_eq!(run.status, RunStatus::Broken, "run {idx}: {run:?}");
+        assert!(run.reason.as_ref().unwrap().contains(words), "run {idx}: {:?}", run.reason);
+        assert!(run.outcomes().all(|outcome| outcome == Outcome::Broken), "run {idx}: {run:?}");
+        assert!(!run.failed() && !run.passed());
+    }
+    assert_eq!([runs[0].status, runs[4].status], [RunStatus::Completed; 2]);
+    let kept = history.runs(&RunFilter::default()).unwrap();
+    assert_eq!(kept.iter().filter(|row| row.status == RunStatus::Broken).count(), 3);
+    for row in kept {
+        assert_eq!(history.run(&row.run).unwrap().reason.is_some(), row.status == RunStatus::Broken);
+    }
+}

@@ -1,0 +1,267 @@
+//! The main job with the built program: campaigns, their exit codes, and what they leave behind.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::support::{actcheck, edit, project, stderr, stdout};
+
+const COUNT: &str = "PREFIX act: <http://actions#> SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }";
+
+fn run_json(folder: &Path, arguments: &[&str]) -> (i32, Value) {
+    let mut all = vec!["run", "configs/pick.toml", "--format", "json"];
+    all.extend(arguments);
+    let output = actcheck(folder, &all);
+    let code = output.status.code().unwrap();
+    let text = stdout(&output);
+    let json = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}\n{}", stderr(&output)));
+    (code, json)
+}
+
+/// The columns of `actcheck list` that must not depend on how or when the runs were made: all but the campaign's id.
+fn listed(folder: &Path, history: &str) -> Vec<String> {
+    let output = actcheck(folder, &["list", "--history", history, "--format", "csv"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = stdout(&output);
+    assert_eq!(text.lines().next(), Some("run,index,test,status,score,trace_hash"));
+    text.lines().skip(1).map(|line| line.split_once(',').unwrap().1.to_owned()).collect()
+}
+
+fn outcomes(json: &Value) -> Vec<(u64, String, f64)> {
+    let runs = json["runs"].as_array().unwrap();
+    runs.iter()
+        .map(|run| {
+            let actions = run["actions"].to_string();
+            (run["index"].as_u64().unwrap(), actions, run["score"].as_f64().unwrap())
+        })
+        .collect()
+}
+
+#[test]
+fn the_shipped_pick_has_passed_and_failed_runs_and_exits_with_one() {
+    let project = project();
+    let output = actcheck(project.path(), &["run", "configs/pick.toml", "--history", "h"]);
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(1), "{text}\n{}", stderr(&output));
+    for property in ["CloseObject", "ObjectGrasped", "NoGraspCollisions", "MovedObject", "ObjectInGripper"] {
+        assert!(text.contains(property), "{property} is not in the table:\n{text}");
+    }
+    assert!(text.contains("over 15 runs"), "{text}");
+    assert!(text.contains("actcheck show "), "no command that shows more:\n{text}");
+    let count = actcheck(project.path(), &["query", "--history", "h", "--format", "csv", COUNT]);
+    assert_eq!(stdout(&count), "n\n15\n", "{}", stderr(&count));
+    let json = actcheck(project.path(), &["list", "--history", "h", "--format", "json"]);
+    let rows: Vec<Value> = serde_json::from_str(&stdout(&json)).unwrap();
+    assert!(rows.iter().any(|row| row["score"] == 1.0), "no run passed fully");
+    assert!(rows.iter().any(|row| row["score"].as_f64().unwrap() < 1.0), "no run failed");
+}
+
+#[test]
+fn a_hundred_runs_show_several_ways_to_fail() {
+    let project = project();
+    let (code, json) = run_json(project.path(), &["--runs", "100", "--history", "h"]);
+    assert_eq!(code, 1);
+    assert_eq!(json["finished_runs"], 100);
+    let passed = json["runs_passed"]["count"].as_u64().unwrap();
+    assert!((30..=95).contains(&passed), "{passed} of 100 runs passed fully");
+    let mut modes: Vec<Vec<&str>> = Vec::new();
+    for run in json["runs"].as_array().unwrap() {
+        let failed: Vec<&str> = run["actions"][0]["outcomes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|outcome| outcome["outcome"] == "failed")
+            .map(|outcome| outcome["property"].as_str().unwrap())
+            .collect();
+        if !failed.is_empty() && !modes.contains(&failed) {
+            modes.push(failed);
+        }
+    }
+    assert!(modes.len() >= 3, "only these failure modes: {modes:?}");
+    assert_eq!(json["counts"]["broken"], 0, "a broken run in a sound simulation");
+    assert_eq!(json["counts"]["timeout"], 0, "a timeout in a sound simulation");
+}
+
+#[test]
+fn a_lone_glass_and_perfect_senses_make_a_pick_that_works() {
+    let project = project();
+    let (code, json) = run_json(project.path(), &["--runs", "1", "--history", "warm"]);
+    assert!(code <= 1 && json["finished_runs"] == 1);
+    let output = actcheck(project.path(), &["run", "configs/lone_glass.toml", "--runs", "60", "--history", "h", "--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    let passed = json["runs_passed"]["count"].as_u64().unwrap();
+    assert!(passed >= 57, "{passed} of 60 runs passed fully with a lone object and no noise");
+}
+
+#[test]
+fn the_number_of_workers_and_the_day_change_nothing() {
+    let project = project();
+    let one = run_json(project.path(), &["--runs", "8", "--jobs", "1", "--history", "one"]);
+    let two = run_json(project.path(), &["--runs", "8", "--jobs", "2", "--history", "two"]);
+    let again = run_json(project.path(), &["--runs", "8", "--jobs", "2", "--history", "again"]);
+    assert_eq!(outcomes(&one.1), outcomes(&two.1));
+    assert_eq!(outcomes(&one.1), outcomes(&again.1));
+    let lists = ["one", "two", "again"].map(|history| listed(project.path(), history));
+    assert_eq!(lists[0].len(), 8);
+    assert_eq!(lists[0], lists[1]);
+    assert_eq!(lists[0], lists[2]);
+    let other = run_json(project.path(), &["--runs", "2", "--seed", "99", "--history", "other"]);
+    assert_ne!(outcomes(&one.1)[..2], outcomes(&other.1)[..]);
+    assert_ne!(lists[0][..2], listed(project.path(), "other")[..]);
+}
+
+#[test]
+fn a_new_rule_file_is_judged_by_the_next_run_without_recompiling() {
+    let project = project();
+    std::fs::write(
+        project.path().join("rules/short_pick.rls"),
+        "@prefix w: <https://w3id.org/actcheck/world#> .\n\
+         % The pick takes less than a tenth of a second. (No robot is that fast: it must fail.)\n\
+         success(?d) :- during(w:action, w:duration, ?d), ?d < 0.1 .\n\
+         margin(?m) :- during(w:action, w:duration, ?d), ?m = 0.1 - ?d .\n",
+    )
+    .unwrap();
+    let ontology = project.path().join("ontology/actions.ttl");
+    let text = std::fs::read_to_string(&ontology).unwrap();
+    std::fs::write(
+        &ontology,
+        format!(
+            "{text}\nact:ShortPick a act:Property ; rdfs:label \"short pick\" ; act:unit \"s\" ; \
+             act:verifiedBy <../rules/short_pick.rls> .\nact:Pick act:successProperty act:ShortPick .\n"
+        ),
+    )
+    .unwrap();
+    let (code, json) = run_json(project.path(), &["--runs", "2", "--history", "h"]);
+    assert_eq!(code, 1);
+    let properties: Vec<&str> =
+        json["properties"].as_array().unwrap().iter().map(|p| p["property"].as_str().unwrap()).collect();
+    assert_eq!(properties.len(), 6, "{properties:?}");
+    let new = json["properties"].as_array().unwrap().iter().find(|p| p["property"] == "http://actions#ShortPick");
+    assert_eq!(new.unwrap()["counts"]["failed"], 2);
+}
+
+#[test]
+fn killing_a_campaign_loses_no_reported_run_and_leaves_no_half_one() {
+    let project = project();
+    for round in 0..3 {
+        let history = format!("h{round}");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+            .args(["run", "configs/pick.toml", "--runs", "400", "--history", &history])
+            .current_dir(project.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // A run is reported once its trace lies in its place: wait for some, then kill without warning.
+        let traces = project.path().join(&history).join("traces");
+        let start = Instant::now();
+        let reported = loop {
+            let seen = std::fs::read_dir(&traces).map_or(0, Iterator::count);
+            if seen > 3 + round {
+                break seen;
+            }
+            assert!(start.elapsed() < Duration::from_secs(120), "no runs in two minutes");
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let rows = listed(project.path(), &history);
+        // One trace may lie there whose transaction had not begun.
+        assert!(rows.len() + 2 >= reported, "{} of {reported} runs", rows.len());
+        let halves = "SELECT ?r WHERE { ?r a act:Run . FILTER NOT EXISTS { ?r act:score ?s ; act:traceHash ?h . \
+                      ?e act:ofRun ?r ; act:before ?b ; act:after ?a ; act:during ?d . \
+                      GRAPH ?a { ?x ?y ?z } ?assertion earl:subject ?e ; earl:result ?result } }";
+        let output = actcheck(project.path(), &["query", "--history", &history, "--format", "csv", halves]);
+        assert_eq!(stdout(&output), "r\n", "half-written runs\n{}", stderr(&output));
+    }
+}
+
+#[test]
+fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
+    let project = project();
+    let child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(["run", "configs/pick.toml", "--runs", "400", "--history", "h", "--format", "json"])
+        .current_dir(project.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(4));
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(json["interrupted"], true);
+    let finished = json["finished_runs"].as_u64().unwrap();
+    assert!(finished < 400);
+    assert_eq!(listed(project.path(), "h").len() as u64, finished);
+}
+
+#[test]
+fn a_second_process_on_the_same_history_is_told_so() {
+    let project = project();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(["run", "configs/pick.toml", "--runs", "400", "--history", "h"])
+        .current_dir(project.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while std::fs::read_dir(project.path().join("h/traces")).map_or(0, Iterator::count) == 0 {
+        assert!(start.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let second = actcheck(project.path(), &["list", "--history", "h"]);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(second.status.code(), Some(2));
+    assert!(stderr(&second).contains("another process"), "{}", stderr(&second));
+    assert!(!listed(project.path(), "h").is_empty());
+}
+
+#[test]
+fn away_from_the_repository_the_carried_files_serve() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("mine.toml"),
+        "tests = [[\"Pick\"]]\ntest_count = 2\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
+         [pickObject]\nmodel_list = [\"glass\"]\n",
+    )
+    .unwrap();
+    let output = actcheck(folder.path(), &["run", "mine.toml", "--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(json["finished_runs"], 2);
+    assert!(folder.path().join(".actcheck").is_dir(), "the history lies beside the configuration");
+    let found = actcheck(folder.path(), &["list", "--format", "csv"]);
+    assert_eq!(stdout(&found).lines().count(), 3, "{}", stderr(&found));
+}
+
+#[test]
+fn what_cannot_run_exits_with_two_and_says_where() {
+    let project = project();
+    edit(&project.path().join("configs/pick.toml"), "test_count", "test_cuont");
+    let output = actcheck(project.path(), &["run", "configs/pick.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    let text = stderr(&output);
+    assert!(text.contains("configs/pick.toml") && text.contains("did you mean `test_count`"), "{text}");
+    let missing = actcheck(project.path(), &["run", "configs/pcik.toml"]);
+    assert_eq!(missing.status.code(), Some(2));
+    assert!(stderr(&missing).contains("configs/pcik.toml"), "{}", stderr(&missing));
+    assert!(!project.path().join("configs/.actcheck").exists(), "a refused campaign leaves no history");
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_panic() {
+    let project = project();
+    let (_, _) = run_json(project.path(), &["--runs", "1", "--history", "h"]);
+    let output = Command::new("sh")
+        .args(["-c", "\"$0\" list --history h | true", env!("CARGO_BIN_EXE_actcheck")])
+        .current_dir(project.path())
+        .output()
+        .unwrap();
+    assert_eq!(stderr(&output), "");
+}

@@ -1,0 +1,54 @@
+//! Every command of the README is run, block by block, in a folder like a fresh checkout.
+
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::Command;
+
+use crate::support::{project, root};
+
+/// The texts of the fenced blocks in a language.
+fn blocks(text: &str, language: &str) -> Vec<String> {
+    let open = format!("```{language}\n");
+    text.split(&open).skip(1).map(|rest| rest.split("\n```").next().unwrap().to_owned()).collect()
+}
+
+fn script(path: &Path, text: &str) {
+    std::fs::write(path, text).unwrap();
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+#[test]
+fn every_command_of_the_readme_works() {
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let project = project();
+    let folder = project.path();
+    std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
+    // The program as the README calls it, with its exit codes written down.
+    let program = env!("CARGO_BIN_EXE_actcheck");
+    script(&folder.join("actcheck"), &format!("#!/bin/sh\n{program} \"$@\"\ncode=$?\necho \"$code $*\" >> codes\nexit $code\n"));
+    // `make` compiles for half an hour; here it only shows that the target exists.
+    std::fs::create_dir(folder.join("bin")).unwrap();
+    script(&folder.join("bin/make"), "#!/bin/sh\nPATH=${PATH#*:}\nmake -n \"$@\" > /dev/null; code=$?; echo \"$code make $*\" >> codes; exit $code\n");
+    let path = format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap());
+    let blocks = blocks(&readme, "sh");
+    assert!(blocks.len() >= 4, "the README shows too little");
+    for block in &blocks {
+        let output = Command::new("sh")
+            .args(["-c", block])
+            .current_dir(folder)
+            .env("PATH", &path)
+            .env("NO_COLOR", "1")
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code().is_some_and(|code| code <= 1), "{block}\n{text}");
+    }
+    let codes = std::fs::read_to_string(folder.join("codes")).unwrap();
+    let wrong: Vec<&str> = codes
+        .lines()
+        // 1 is what a campaign with a failed property says.
+        .filter(|line| !(line.starts_with("0 ") || line.starts_with("1 run ")))
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(codes.lines().count() >= 6, "{codes}");
+}
