@@ -1,13 +1,18 @@
 //! TOML text to a `Campaign` in which nothing is left to check; models and robots are read here too.
 //!
-//! Never: draws a choice, knows an action's meaning, or reads the ontology.
+//! Never: draws a choice, knows what an action means, or reads the ontology.
 
 mod campaign;
+mod designators;
+mod load;
 pub mod model;
+mod ranges;
 pub mod robot;
+mod shelf;
 mod table;
 
-pub use campaign::{Budget, Campaign, Launcher, Physics, Range, Sensing};
+pub use campaign::{Budget, Campaign, Launcher, Overrides, Physics, Range, Sensing};
+pub use load::load;
 pub use model::{ObjectModel, Part, Shape, Surface};
 pub use robot::RobotProfile;
 pub use table::{Located, Table};

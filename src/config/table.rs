@@ -101,6 +101,21 @@ impl Table {
         self.entries.contains_key(key)
     }
 
+    /// Whether a key that was not taken yet holds a list.
+    pub fn is_list(&self, key: &str) -> bool {
+        self.entries.get(key).is_some_and(|entry| matches!(entry.value.value, Value::Array(_)))
+    }
+
+    /// The only key of an untaken sub-table, where there is just one and it holds a list.
+    pub fn only_list_of(&self, table: &str) -> Option<String> {
+        let Value::Table(entries) = &self.entries.get(table)?.value.value else { return None };
+        let mut entries = entries.iter();
+        match (entries.next(), entries.next()) {
+            (Some((key, entry)), None) if matches!(entry.value.value, Value::Array(_)) => Some(key.clone()),
+            _ => None,
+        }
+    }
+
     /// Keys that were not taken yet and hold tables, sorted.
     pub fn untaken_tables(&self) -> Vec<String> {
         let is_table = |entry: &Entry| matches!(entry.value.value, Value::Table(_));

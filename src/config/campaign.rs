@@ -1,0 +1,125 @@
+//! What a configuration file asks for, with nothing left to check.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::base::{Diagnostic, Files, Source, Span};
+use crate::config::{ObjectModel, RobotProfile};
+
+/// One campaign: every test, `test_count` times, each time in another scene.
+#[derive(Debug, Clone)]
+pub struct Campaign {
+    /// The text that it was read from.
+    pub source: Source,
+    /// Lists of action names, performed in order (`tests`).
+    pub tests: Vec<Vec<String>>,
+    /// Runs of each test (`test_count`).
+    pub test_count: u32,
+    /// What performs the actions (`test_launcher`).
+    pub launcher: Launcher,
+    /// Seed of all randomness (`seed`); without one, 0.
+    pub seed: u64,
+    /// The ontology's root file (`ontology`) and where it is read from.
+    pub ontology: (Files, PathBuf),
+    /// Models by name: all that `model_dir` (or the shipped folder) holds and the campaign can speak of.
+    pub models: BTreeMap<String, Arc<ObjectModel>>,
+    /// The robot (`[robot]`).
+    pub robot: Arc<RobotProfile>,
+    /// Names of obstacle models in the way of the base (`nav_obstacle_list`).
+    pub nav_obstacles: Vec<String>,
+    /// How many obstacles stand in the way (`nav_obstacle_count`).
+    pub nav_obstacle_count: u32,
+    /// Candidate values by designator table: `world` → `worlds`, `pickObject` → `model_list`, and so on.
+    ///
+    /// A table named after a designator that has no special meaning gives its candidates under its own name.
+    pub candidates: BTreeMap<String, Vec<String>>,
+    /// How many other objects stand on the surface (`[surfaceObjects] count = [least, most]`).
+    pub other_count: (u32, u32),
+    /// Ranges of what physics draws (`[physics]`).
+    pub physics: Physics,
+    /// What the sensors get wrong (`[sensing]`).
+    pub sensing: Sensing,
+    /// Budgets of one action (`[budget]`).
+    pub budget: Budget,
+    /// History folder (`[history] dir`), `.actcheck` beside the configuration by default.
+    pub history: PathBuf,
+    /// Where things are written, for faults that only a later stage can see: `tests.0.1` is the second action of
+    /// the first test, `pickObject` the table's header, `pickObject.2` its third candidate.
+    pub places: BTreeMap<String, Span>,
+}
+
+impl Campaign {
+    /// A fault of the configuration that a later stage found, at the place of `key` (see [`Campaign::places`]).
+    pub fn fault(&self, code: &'static str, key: &str, message: impl Into<String>) -> Diagnostic {
+        let fault = Diagnostic::error(code, message);
+        match self.places.get(key) {
+            Some(span) => fault.at(&self.source, span.clone()),
+            None => fault.in_source(&self.source),
+        }
+    }
+}
+
+/// What the command line says instead of the file.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Overrides {
+    /// Instead of `test_count`; at least 1.
+    pub runs: Option<u32>,
+    /// Instead of `seed`.
+    pub seed: Option<u64>,
+    /// Instead of `[history] dir`; relative to where the program runs.
+    pub history: Option<PathBuf>,
+}
+
+/// What performs the actions.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Launcher {
+    /// Our own skills, in process.
+    Reference,
+    /// A program, with the text as the user gave it.
+    Program(String),
+}
+
+/// A range to draw from, both ends included.
+pub type Range = (f64, f64);
+
+/// What physics draws for each object, and what it is stepped with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Physics {
+    /// Factor on the model's mass.
+    pub mass_scale: Range,
+    /// Factor on the model's friction.
+    pub friction_scale: Range,
+    /// Coefficient of restitution.
+    pub restitution: Range,
+    /// Physics steps in a second.
+    pub steps_per_second: u32,
+    /// Solver iterations in a step.
+    pub iterations: u32,
+}
+
+/// Standard deviations of what the robot senses and where it starts; 0 is perfect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensing {
+    /// Of a perceived object's position, horizontally. Unit: metres.
+    pub position_noise_m: f64,
+    /// Of a perceived object's height. Unit: metres.
+    pub height_noise_m: f64,
+    /// Of a perceived object's heading. Unit: radians.
+    pub yaw_noise_rad: f64,
+    /// Of a perceived object's dimensions. Unit: metres.
+    pub size_noise_m: f64,
+    /// Of where the base believes that it stands. Unit: metres.
+    pub localisation_noise_m: f64,
+    /// Of where the base believes that it heads. Unit: radians.
+    pub heading_noise_rad: f64,
+    /// Of a measured finger opening. Unit: metres.
+    pub gripper_noise_m: f64,
+}
+
+/// Limits on one action. Beyond them it ends as `timeout`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// Simulated time of one action. Unit: seconds.
+    pub action_secs: f64,
+}

@@ -1,0 +1,114 @@
+//! Tables named after designators: the candidate values that scenes are made from.
+
+use std::collections::BTreeMap;
+
+use crate::base::{Diagnostics, Span};
+use crate::config::shelf::Shelf;
+use crate::config::{Located, Table};
+
+/// The paper's tables with the key that holds their candidates, and whether these are names of models.
+const PAPER_TABLES: [(&str, &str, bool); 6] = [
+    ("world", "worlds", false),
+    ("objectLocation", "location_list", false),
+    ("objectSurface", "object_surfaces", true),
+    ("placeSurface", "place_object_surfaces", true),
+    ("pickObject", "model_list", true),
+    ("surfaceObjects", "model_list", true),
+];
+
+/// More things than this on one table are a slip of the finger.
+const MOST_OBJECTS: i64 = 100;
+/// How many other objects stand around where `[surfaceObjects]` does not say.
+const DEFAULT_COUNT: (u32, u32) = (1, 4);
+
+/// What the configuration offers scene generation to choose from.
+pub(crate) struct Designators {
+    pub(crate) candidates: BTreeMap<String, Vec<String>>,
+    pub(crate) other_count: (u32, u32),
+    pub(crate) nav_obstacles: Vec<String>,
+    pub(crate) nav_obstacle_count: u32,
+}
+
+/// Reads the tables of designators, those of the paper and any other that has one list of strings. Whether there is
+/// a designator of such a name only the ontology knows, so the place is kept for later.
+pub(crate) fn read(
+    root: &mut Table,
+    shelf: &Shelf,
+    places: &mut BTreeMap<String, Span>,
+    found: &mut Diagnostics,
+) -> Designators {
+    let mut candidates = BTreeMap::new();
+    let mut other_count = (0, 0);
+    for (name, key, are_models) in PAPER_TABLES {
+        let Some(mut table) = root.table(name) else { continue };
+        table.require(&[key]);
+        let values = table.some_strings(key).unwrap_or_default();
+        if are_models {
+            values.iter().for_each(|value| shelf.check_name(&mut table, value));
+        }
+        if name == "surfaceObjects" {
+            other_count = read_count(&mut table);
+        }
+        keep(name, table.span(), values, &mut candidates, places);
+        table.finish(found);
+    }
+    for name in root.untaken_tables() {
+        read_own_table(root, &name, &mut candidates, places, found);
+    }
+    let (nav_obstacles, nav_obstacle_count) = read_obstacles(root, shelf);
+    Designators { candidates, other_count, nav_obstacles, nav_obstacle_count }
+}
+
+fn keep(
+    name: &str,
+    header: Span,
+    values: Vec<Located<String>>,
+    candidates: &mut BTreeMap<String, Vec<String>>,
+    places: &mut BTreeMap<String, Span>,
+) {
+    places.insert(name.to_owned(), header);
+    for (idx, value) in values.iter().enumerate() {
+        places.insert(format!("{name}.{idx}"), value.span.clone());
+    }
+    candidates.insert(name.to_owned(), values.into_iter().map(|value| value.value).collect());
+}
+
+/// A table with nothing but one list may be named after a designator of the user's ontology. Any other stays untaken
+/// and so becomes an unknown table.
+fn read_own_table(
+    root: &mut Table,
+    name: &str,
+    candidates: &mut BTreeMap<String, Vec<String>>,
+    places: &mut BTreeMap<String, Span>,
+    found: &mut Diagnostics,
+) {
+    let Some(key) = root.only_list_of(name) else { return };
+    let Some(mut table) = root.table(name) else { return };
+    let values = table.some_strings(&key).unwrap_or_default();
+    keep(name, table.span(), values, candidates, places);
+    table.finish(found);
+}
+
+/// `count = [least, most]`, or one number for exactly that many.
+fn read_count(table: &mut Table) -> (u32, u32) {
+    let bounds = 0..=MOST_OBJECTS;
+    let range = if table.is_list("count") {
+        table.integer_range("count", bounds)
+    } else {
+        table.integer("count", bounds).map(|count| (count, count))
+    };
+    let both = |(least, most)| Some((u32::try_from(least).ok()?, u32::try_from(most).ok()?));
+    range.and_then(both).unwrap_or(DEFAULT_COUNT)
+}
+
+fn read_obstacles(root: &mut Table, shelf: &Shelf) -> (Vec<String>, u32) {
+    let names = root.strings("nav_obstacle_list").unwrap_or_default();
+    names.iter().for_each(|name| shelf.check_name(root, name));
+    let place = root.key_span("nav_obstacle_count");
+    let count = root.integer("nav_obstacle_count", 0..=MOST_OBJECTS).unwrap_or(0);
+    if count > 0 && names.is_empty() {
+        let message = format!("`nav_obstacle_count` is {count}, but there is no obstacle to choose");
+        root.fault("C007", place.unwrap_or(0..0), message, "name models in `nav_obstacle_list`, or set the count to 0");
+    }
+    (names.into_iter().map(|name| name.value).collect(), u32::try_from(count).unwrap_or(0))
+}

@@ -1,0 +1,162 @@
+//! A configuration file, from its path to a checked campaign.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::base::{Diagnostic, Diagnostics, Files, Span};
+use crate::config::designators::{self, Designators};
+use crate::config::{Campaign, Launcher, Overrides, Table, ranges, shelf};
+
+/// The ontology that the program carries.
+const SHIPPED_ONTOLOGY: &str = "ontology/actions.ttl";
+/// Folder of the history, beside the configuration.
+const HISTORY_DIR: &str = ".actcheck";
+/// More runs of one test than anybody waits for; a larger number is a slip of the finger.
+const MOST_RUNS: i64 = 10_000_000;
+
+/// Reads a configuration with the models and the robot that it names. Paths in it are relative to it.
+///
+/// # Errors
+/// Every fault at once: the file can't be read (C001), is not TOML (C002), has unknown, missing or wrong keys
+/// (C003 to C009), names models, robots or files that are not there (C010 to C014), or a model or robot is wrong (W…).
+pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics> {
+    let source = Files::Disk.read(path).map_err(|reason| {
+        Diagnostic::error("C001", format!("cannot read the configuration {}: {reason}", path.display()))
+            .help("name a TOML file, such as configs/pick.toml")
+    })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut table = Table::parse(&source)?;
+    let mut found = Diagnostics::new();
+
+    table.require(&["tests", "test_count"]);
+    let (tests, mut places) = read_tests(&mut table);
+    let test_count = table.integer("test_count", 1..=MOST_RUNS).and_then(|count| u32::try_from(count).ok());
+    let launcher = read_launcher(&mut table);
+    let seed = table.integer("seed", 0..=i64::MAX).map_or(0, i64::unsigned_abs);
+    let ontology = read_ontology_path(&mut table, folder);
+    let shelf = shelf::read(&mut table, folder, &mut found);
+    let robot = shelf.read_robot(&mut table, folder, &mut found);
+    let physics = ranges::read_physics(&mut table, &mut found);
+    let sensing = ranges::read_sensing(&mut table, &mut found);
+    let budget = ranges::read_budget(&mut table, &mut found);
+    let history = read_history(&mut table, folder, &mut found);
+    let Designators { candidates, other_count, nav_obstacles, nav_obstacle_count } =
+        designators::read(&mut table, &shelf, &mut places, &mut found);
+    table.finish(&mut found);
+
+    let robot = match robot {
+        Some(robot) if !found.has_errors() => robot,
+        _ => return Err(in_order_of_place(found)),
+    };
+    Ok(Campaign {
+        source,
+        tests,
+        test_count: overrides.runs.or(test_count).unwrap_or(1).max(1),
+        launcher,
+        seed: overrides.seed.unwrap_or(seed),
+        ontology,
+        models: shelf.models,
+        robot,
+        nav_obstacles,
+        nav_obstacle_count,
+        candidates,
+        other_count,
+        physics,
+        sensing,
+        budget,
+        history: overrides.history.clone().unwrap_or(history),
+        places,
+    })
+}
+
+/// Faults of one text in the order of their places; texts in the order in which they were read.
+fn in_order_of_place(found: Diagnostics) -> Diagnostics {
+    let mut names: Vec<String> = Vec::new();
+    let mut faults: Vec<(usize, usize, Diagnostic)> = Vec::new();
+    for fault in found {
+        let name = fault.source.as_ref().map_or(String::new(), |source| source.name.to_string());
+        let rank = names.iter().position(|known| *known == name).unwrap_or_else(|| {
+            names.push(name);
+            names.len() - 1
+        });
+        faults.push((rank, fault.span.as_ref().map_or(0, |span| span.start), fault));
+    }
+    faults.sort_by_key(|(rank, start, _)| (*rank, *start));
+    let mut sorted = Diagnostics::new();
+    faults.into_iter().for_each(|(.., fault)| sorted.push(fault));
+    sorted
+}
+
+fn read_tests(table: &mut Table) -> (Vec<Vec<String>>, BTreeMap<String, Span>) {
+    let mut places = BTreeMap::new();
+    let header = table.key_span("tests").unwrap_or(0..0);
+    let Some(lists) = table.lists_of_strings("tests") else { return (Vec::new(), places) };
+    if lists.is_empty() {
+        table.fault("C007", header, "`tests` is an empty list", "write it like `tests = [[\"Pick\"]]`");
+    }
+    let mut tests = Vec::new();
+    for (idx, list) in lists.into_iter().enumerate() {
+        if list.value.is_empty() {
+            table.fault("C007", list.span.clone(), "this test has no action", "name at least one, such as `[\"Pick\"]`");
+        }
+        for (step, action) in list.value.iter().enumerate() {
+            places.insert(format!("tests.{idx}.{step}"), action.span.clone());
+        }
+        tests.push(list.value.into_iter().map(|action| action.value).collect());
+    }
+    (tests, places)
+}
+
+fn read_launcher(table: &mut Table) -> Launcher {
+    match table.string("test_launcher").map(|launcher| launcher.value) {
+        Some(program) if program != "reference" => Launcher::Program(program),
+        _ => Launcher::Reference,
+    }
+}
+
+fn read_ontology_path(table: &mut Table, folder: &Path) -> (Files, PathBuf) {
+    let Some(written) = table.string("ontology") else { return (Files::Shipped, PathBuf::from(SHIPPED_ONTOLOGY)) };
+    let path = beside(folder, &written.value);
+    if let Err(reason) = Files::Disk.read(&path) {
+        let message = format!("cannot read the ontology {}: {reason}", path.display());
+        table.fault("C012", written.span, message, "the path is relative to the configuration; without it the shipped one serves");
+    }
+    (Files::Disk, path)
+}
+
+fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> PathBuf {
+    let mut dir = folder.join(HISTORY_DIR);
+    if let Some(mut history) = table.table("history") {
+        if let Some(written) = history.string("dir") {
+            dir = beside(folder, &written.value);
+        }
+        history.finish(found);
+    }
+    dir
+}
+
+/// A path of a configuration, seen from where the program runs: without `..` where that changes nothing.
+pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
+    let (mut base, mut rest) = (folder.to_path_buf(), Path::new(written));
+    while let Ok(shorter) = rest.strip_prefix("..") {
+        let plain = base.file_name().is_some() && !base.is_symlink();
+        if !plain || !base.pop() {
+            break;
+        }
+        rest = shorter;
+    }
+    base.join(rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_relative_to_the_configuration() {
+        assert_eq!(beside(Path::new("configs"), "../models"), Path::new("models"));
+        assert_eq!(beside(Path::new(""), "../models"), Path::new("../models"));
+        assert_eq!(beside(Path::new("a/b"), "../../../m"), Path::new("../m"));
+        assert_eq!(beside(Path::new("a"), "/m"), Path::new("/m"));
+    }
+}

@@ -1,0 +1,91 @@
+//! The tables of numbers: physics, sensing, budget.
+
+use std::ops::Bound;
+
+use crate::base::Diagnostics;
+use crate::config::{Budget, Physics, Sensing, Table};
+
+const ABOVE_ZERO: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(100.0));
+
+/// Control commands and contact records in a second of simulated time. Every physics rate is a multiple of it, so that
+/// a control period is a whole number of physics steps.
+pub const CONTROL_HZ: u32 = 60;
+
+/// `[physics]`: what each object's mass, friction and restitution are drawn from, and how time is stepped.
+pub(crate) fn read_physics(root: &mut Table, found: &mut Diagnostics) -> Physics {
+    let mut physics = Physics {
+        mass_scale: (0.9, 1.1),
+        friction_scale: (0.8, 1.2),
+        restitution: (0.0, 0.1),
+        // 240 Hz with 4 iterations holds a friction grasp to 0.01 mm.
+        steps_per_second: 240,
+        iterations: 4,
+    };
+    let Some(mut table) = root.table("physics") else { return physics };
+    set(&mut physics.mass_scale, table.range("mass_scale", ABOVE_ZERO));
+    set(&mut physics.friction_scale, table.range("friction_scale", 0.0..=100.0));
+    set(&mut physics.restitution, table.range("restitution", 0.0..=1.0));
+    set(&mut physics.steps_per_second, read_steps(&mut table));
+    set(&mut physics.iterations, table.integer("iterations", 1..=64).and_then(|n| u32::try_from(n).ok()));
+    table.finish(found);
+    physics
+}
+
+fn read_steps(table: &mut Table) -> Option<u32> {
+    let span = table.key_span("steps_per_second");
+    let steps = u32::try_from(table.integer("steps_per_second", 60..=10_000)?).ok()?;
+    if steps % CONTROL_HZ != 0 {
+        let message = format!("`physics.steps_per_second` is {steps}, which is no multiple of {CONTROL_HZ}");
+        let help = format!(
+            "the robot is controlled {CONTROL_HZ} times a second, so that many must divide it: {} or {} would do",
+            steps / CONTROL_HZ * CONTROL_HZ,
+            (steps / CONTROL_HZ + 1) * CONTROL_HZ
+        );
+        table.fault("C013", span?, message, help);
+    }
+    Some(steps)
+}
+
+/// `[sensing]`: standard deviations of what the robot senses; 0, the default, is perfect.
+pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing {
+    let mut sensing = Sensing {
+        position_noise_m: 0.0,
+        height_noise_m: 0.0,
+        yaw_noise_rad: 0.0,
+        size_noise_m: 0.0,
+        localisation_noise_m: 0.0,
+        heading_noise_rad: 0.0,
+        gripper_noise_m: 0.0,
+    };
+    let Some(mut table) = root.table("sensing") else { return sensing };
+    // Half a metre or half a turn of noise already makes sensing worthless.
+    for (key, value, most) in [
+        ("position_noise_m", &mut sensing.position_noise_m, 0.5),
+        ("height_noise_m", &mut sensing.height_noise_m, 0.5),
+        ("yaw_noise_rad", &mut sensing.yaw_noise_rad, std::f64::consts::PI),
+        ("size_noise_m", &mut sensing.size_noise_m, 0.5),
+        ("localisation_noise_m", &mut sensing.localisation_noise_m, 0.5),
+        ("heading_noise_rad", &mut sensing.heading_noise_rad, std::f64::consts::PI),
+        ("gripper_noise_m", &mut sensing.gripper_noise_m, 0.5),
+    ] {
+        set(value, table.number(key, 0.0..=most));
+    }
+    table.finish(found);
+    sensing
+}
+
+/// `[budget]`: limits on one action.
+pub(crate) fn read_budget(root: &mut Table, found: &mut Diagnostics) -> Budget {
+    // A pick takes some ten seconds; one that is not done in a minute is lost.
+    let mut budget = Budget { action_secs: 60.0 };
+    let Some(mut table) = root.table("budget") else { return budget };
+    set(&mut budget.action_secs, table.number("action_secs", (Bound::Excluded(0.0), Bound::Included(3600.0))));
+    table.finish(found);
+    budget
+}
+
+fn set<T>(place: &mut T, value: Option<T>) {
+    if let Some(value) = value {
+        *place = value;
+    }
+}
