@@ -1,0 +1,77 @@
+//! What happened during one action, as facts.
+
+use std::collections::BTreeMap;
+
+use crate::actions::{ActionTrace, ContactEpisode, Extremes, Percept};
+use crate::base::names;
+use crate::facts::writer::Writer;
+
+/// Contact episodes of one pair that are kept in facts: the strongest ones.
+///
+/// A body that chatters on a surface makes and breaks contact many times a second. The pair, the first contact of some
+/// force and the largest force are what rules ask for; all episodes stay in the trace.
+const EPISODES_OF_A_PAIR: usize = 3;
+
+/// Writes the report, contacts, extremes and percepts of one action.
+pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
+    let subject = writer.w("action");
+    if let Some(report) = &action.report {
+        writer.text(subject, "reported", if report.succeeded { "succeeded" } else { "failed" });
+        writer.text(subject, "message", &report.message);
+    }
+    writer.number(subject, "duration", action.duration_secs);
+    for (idx, contact) in kept(&action.contacts).into_iter().enumerate() {
+        write_contact(idx + 1, contact, writer);
+    }
+    for extremes in &action.extremes {
+        write_extremes(extremes, writer);
+    }
+    for (idx, percept) in action.percepts.iter().enumerate() {
+        write_percept(idx + 1, percept, writer);
+    }
+}
+
+/// The strongest episodes of each pair, in the order of their start (then of their pair).
+fn kept(contacts: &[ContactEpisode]) -> Vec<&ContactEpisode> {
+    let mut by_pair: BTreeMap<&[String; 2], Vec<&ContactEpisode>> = BTreeMap::new();
+    for contact in contacts {
+        by_pair.entry(&contact.pair).or_default().push(contact);
+    }
+    let mut kept = Vec::new();
+    for mut episodes in by_pair.into_values() {
+        episodes.sort_by(|a, b| b.max_force_n.total_cmp(&a.max_force_n).then(a.start_secs.total_cmp(&b.start_secs)));
+        episodes.truncate(EPISODES_OF_A_PAIR);
+        kept.extend(episodes);
+    }
+    kept.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs).then_with(|| a.pair.cmp(&b.pair)));
+    kept
+}
+
+fn write_contact(number: usize, contact: &ContactEpisode, writer: &mut Writer) {
+    let subject = writer.named("contact", &number.to_string());
+    writer.class(subject, &names::w("Contact"));
+    for (property, id) in ["first", "second"].into_iter().zip(&contact.pair) {
+        let thing = writer.thing(id);
+        writer.state(subject, property, thing);
+    }
+    writer.numbers(subject, ["start", "end", "maxForce"], [contact.start_secs, contact.end_secs, contact.max_force_n]);
+}
+
+fn write_extremes(extremes: &Extremes, writer: &mut Writer) {
+    let subject = writer.thing(&extremes.id);
+    writer.numbers(
+        subject,
+        ["maxTilt", "maxSpeed", "maxRise", "maxDisplacement"],
+        [extremes.max_tilt_rad, extremes.max_speed, extremes.max_rise_m, extremes.max_displacement_m],
+    );
+}
+
+fn write_percept(number: usize, percept: &Percept, writer: &mut Writer) {
+    let subject = writer.named("percept", &number.to_string());
+    writer.class(subject, &names::w("Percept"));
+    let seen = writer.thing(&percept.id);
+    writer.state(subject, "ofObject", seen);
+    writer.numbers(subject, ["x", "y", "z"], percept.pose.position);
+    writer.number(subject, "yaw", percept.pose.yaw());
+    writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], percept.size_m);
+}

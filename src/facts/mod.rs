@@ -1,0 +1,13 @@
+//! Turns a trace into RDF facts: raw quantities with their units, interned once.
+//!
+//! Never: steps the simulation, holds a threshold, knows a rule, or decides a verdict.
+
+mod during;
+mod extract;
+mod run_facts;
+mod snapshot;
+mod writer;
+
+pub use extract::extract;
+pub use run_facts::{ActionFacts, RunFacts, Triple};
+pub use writer::thing_iri;

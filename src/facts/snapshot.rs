@@ -1,0 +1,65 @@
+//! One moment as facts.
+
+use crate::actions::{BodyState, JointState, RobotState, Snapshot};
+use crate::base::{Pose, TermId, names};
+use crate::facts::writer::Writer;
+
+const POSITION: [&str; 3] = ["x", "y", "z"];
+const ROTATION: [&str; 4] = ["qx", "qy", "qz", "qw"];
+
+/// Writes everything that is true at one moment.
+pub(super) fn write(snapshot: &Snapshot, writer: &mut Writer) {
+    for body in &snapshot.bodies {
+        write_body(body, writer);
+    }
+    write_robot(&snapshot.robot, writer);
+}
+
+/// A body. What sleeps or is fixed does not move, so its velocities (all zero) are left out.
+fn write_body(body: &BodyState, writer: &mut Writer) {
+    let subject = writer.thing(&body.id);
+    writer.class(subject, &body.category);
+    write_pose(subject, &body.pose, writer);
+    writer.number(subject, "yaw", body.pose.yaw());
+    writer.number(subject, "tilt", body.pose.tilt());
+    if !body.asleep && !body.fixed {
+        writer.numbers(subject, ["vx", "vy", "vz"], body.linear_velocity);
+        writer.numbers(subject, ["wx", "wy", "wz"], body.angular_velocity);
+    }
+    writer.numbers(subject, ["minX", "minY", "minZ"], body.aabb_min);
+    writer.numbers(subject, ["maxX", "maxY", "maxZ"], body.aabb_max);
+    writer.numbers(subject, ["mass", "friction", "restitution"], [body.mass_kg, body.friction, body.restitution]);
+    writer.things(subject, "touches", &body.touches);
+    writer.things(subject, "restsOn", &body.rests_on);
+    writer.boolean(subject, "asleep", body.asleep);
+    writer.boolean(subject, "fixed", body.fixed);
+}
+
+fn write_robot(robot: &RobotState, writer: &mut Writer) {
+    let subject = writer.w("robot");
+    writer.numbers(subject, ["baseX", "baseY", "baseYaw"], robot.base_true);
+    writer.numbers(subject, ["believedX", "believedY", "believedYaw"], robot.base_believed);
+    let gripper = writer.w("gripper");
+    write_pose(gripper, &robot.gripper, writer);
+    writer.number(gripper, "opening", robot.gripper_opening_m);
+    writer.things(gripper, "leftTouches", &robot.left_touches);
+    writer.things(gripper, "rightTouches", &robot.right_touches);
+    for joint in &robot.joints {
+        write_joint(joint, writer);
+    }
+}
+
+fn write_joint(joint: &JointState, writer: &mut Writer) {
+    let subject = writer.named("joint", &joint.name);
+    writer.class(subject, &names::w("Joint"));
+    writer.numbers(
+        subject,
+        ["position", "velocity", "lower", "upper", "maxVelocity", "maxEffort"],
+        [joint.position, joint.velocity, joint.lower, joint.upper, joint.max_velocity, joint.max_effort],
+    );
+}
+
+fn write_pose(subject: TermId, pose: &Pose, writer: &mut Writer) {
+    writer.numbers(subject, POSITION, pose.position);
+    writer.numbers(subject, ROTATION, pose.rotation);
+}
