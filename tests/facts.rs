@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use actcheck::actions::{
-    ActionEnd, ActionReport, ActionTrace, BodyState, ContactEpisode, Extremes, Frames, JointState, Percept, Phase,
-    RobotState, Snapshot, Trace,
+    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace,
 };
 use actcheck::base::{Choices, Pose, Term, TermId, names};
 use actcheck::facts::{RunFacts, extract};
+use actcheck::world::{BodyState, JointState, RobotState, Snapshot};
 
 /// A number as physics has it.
 fn single(choices: &mut Choices, low: f64, high: f64) -> f64 {
