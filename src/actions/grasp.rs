@@ -1,0 +1,122 @@
+//! How a thing could be taken: hand poses, by what is seen of its size.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use crate::world::Sighting;
+
+/// Where the hand comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Approach {
+    /// Level, for tall things.
+    Side,
+    /// From above, for low things.
+    Top,
+}
+
+/// One way to take a thing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grasp {
+    /// Where the hand comes from.
+    pub approach: Approach,
+    /// Pose of the grasp link when the fingers close. Frame: world, by the base's belief.
+    pub pose: Isometry3<f64>,
+    /// Heading of the base meanwhile. Unit: radians.
+    pub heading: f64,
+    /// Gap between the fingers on the way. Unit: metres.
+    pub opening_m: f64,
+}
+
+/// Things at least so high are taken from the side: the hand, 6 cm across, then clears what they stand on. Unit: metres.
+const TALL_M: f64 = 0.1;
+/// Lowest and highest place for a level hand above the foot: clear of the surface, below what is seldom as wide as the
+/// foot. Unit: metres.
+const SIDE_HEIGHT_M: (f64, f64) = (0.055, 0.11);
+/// How far below the top the hand goes from above. Unit: metres.
+const TOP_DEPTH_M: f64 = 0.03;
+/// Lowest place of the grasp link from above: its fingers reach 2.5 cm further. Unit: metres.
+const TOP_LOWEST_M: f64 = 0.03;
+/// Room that the widest opening has to leave beside a thing, both sides together. Unit: metres.
+const LEAST_ROOM_M: f64 = 0.012;
+/// Sides that differ by less are taken for a round body. Unit: metres. Sensing gets sizes wrong by some millimetres.
+const ROUND_M: f64 = 0.015;
+/// Directions that are tried around a thing.
+const N_HEADINGS: u32 = 24;
+
+/// All ways to take a thing with a gripper that opens so wide. None: it is too wide every way.
+pub fn grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
+    let [x, y, z] = thing.pose.position;
+    let height = thing.size_m[2];
+    let tall = height >= TALL_M;
+    let mut found = Vec::new();
+    for idx in 0..N_HEADINGS {
+        let heading = std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS);
+        if tall {
+            if width_across(thing, heading) + LEAST_ROOM_M <= max_opening_m {
+                let at = Vector3::new(x, y, z + (height / 2.0).clamp(SIDE_HEIGHT_M.0, SIDE_HEIGHT_M.1));
+                let pose = Isometry3::from_parts(Translation3::from(at), level(heading));
+                found.push(Grasp { approach: Approach::Side, pose, heading, opening_m: max_opening_m });
+            }
+        } else {
+            let at = Vector3::new(x, y, z + (height - TOP_DEPTH_M).max(TOP_LOWEST_M));
+            for quarter in 0..4 {
+                let turn = heading + std::f64::consts::FRAC_PI_4 * f64::from(quarter);
+                if width_across(thing, turn) + LEAST_ROOM_M <= max_opening_m {
+                    let pose = Isometry3::from_parts(Translation3::from(at), downward(turn));
+                    found.push(Grasp { approach: Approach::Top, pose, heading, opening_m: max_opening_m });
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Width of a thing across the fingers of a hand that heads somewhere. Unit: metres.
+fn width_across(thing: &Sighting, heading: f64) -> f64 {
+    let [width, depth, _] = thing.size_m;
+    if (width - depth).abs() < ROUND_M {
+        return width.max(depth);
+    }
+    let turn = heading - thing.pose.yaw();
+    width * libm::sin(turn).abs() + depth * libm::cos(turn).abs()
+}
+
+/// A hand that points level: x forward, y across to the left, z up.
+fn level(heading: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading)
+}
+
+/// A hand that points down, its back towards where a base of this heading stands.
+fn downward(heading: f64) -> UnitQuaternion<f64> {
+    let forward = Vector3::new(libm::cos(heading), libm::sin(heading), 0.0);
+    let down = -Vector3::z();
+    let axes = Matrix3::from_columns(&[down, forward.cross(&down), forward]);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Pose;
+
+    fn thing(size_m: [f64; 3]) -> Sighting {
+        Sighting { id: "t".to_owned(), pose: Pose::upright([1.0, 0.0, 0.7], 0.4), size_m, furniture: false }
+    }
+
+    #[test]
+    fn low_things_are_taken_from_above_and_tall_ones_from_the_side() {
+        assert!(grasps(&thing([0.08, 0.08, 0.146]), 0.135).iter().all(|g| g.approach == Approach::Side));
+        assert!(grasps(&thing([0.099, 0.077, 0.085]), 0.135).iter().all(|g| g.approach == Approach::Top));
+        assert_eq!(grasps(&thing([0.16, 0.16, 0.065]), 0.135), []);
+    }
+
+    #[test]
+    fn a_flat_box_is_taken_across_its_narrow_side() {
+        let found = grasps(&thing([0.2, 0.05, 0.15]), 0.135);
+        assert!(!found.is_empty());
+        for grasp in found {
+            let across = grasp.pose.rotation * Vector3::y();
+            let along = Vector3::new(libm::cos(0.4), libm::sin(0.4), 0.0);
+            assert!(across.dot(&along).abs() < 0.5, "the fingers would have to span the long side");
+        }
+    }
+}

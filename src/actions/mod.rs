@@ -1,0 +1,17 @@
+//! The robot's actions over commands and observations: our reference skills, and the trace of what happened.
+//!
+//! Never: reads the simulation's truth inside a skill, judges an action, or knows a property.
+
+mod call;
+mod grasp;
+mod operator;
+mod perform;
+mod pick;
+mod plan;
+mod trace;
+
+pub use call::{ActionCall, UnknownSkill, known_skill, reference_skills};
+pub use perform::perform;
+pub use trace::{
+    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace,
+};

@@ -1,0 +1,162 @@
+//! What a skill has in hand: joint commands, measurements and noisy sight. The world's truth stays behind it.
+
+use crate::actions::{Percept, Phase};
+use crate::base::Choices;
+use crate::config::RobotProfile;
+use crate::world::{Command, Kinematics, Layout, Observation, Sighting, World};
+
+/// Why a skill has to stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interrupt {
+    /// Simulation is at fault.
+    Fault,
+    /// The action's time is up.
+    Budget,
+}
+
+/// Share of a joint's velocity limit that skills use: room for the controller to catch up.
+const SPEED_SHARE: f64 = 0.9;
+/// Peak over mean speed of a motion that starts and ends at rest (of 3s² − 2s³).
+const PEAK_OVER_MEAN: f64 = 1.5;
+
+/// The robot as a skill sees it, for the time of one action.
+pub struct Operator<'a> {
+    world: &'a mut World,
+    choices: &'a mut Choices,
+    command: Command,
+    start_secs: f64,
+    budget_secs: f64,
+    /// Phases begun so far.
+    pub phases: Vec<Phase>,
+    /// What was seen so far.
+    pub percepts: Vec<Percept>,
+}
+
+impl<'a> Operator<'a> {
+    /// The robot at the beginning of an action that may take `budget_secs` of simulated time.
+    pub fn new(world: &'a mut World, choices: &'a mut Choices, budget_secs: f64) -> Self {
+        let (command, start_secs) = (world.hold(), world.time_secs());
+        Self { world, choices, command, start_secs, budget_secs, phases: Vec::new(), percepts: Vec::new() }
+    }
+
+    /// Names what follows.
+    pub fn begin(&mut self, phase: &str) {
+        self.phases.push(Phase { name: phase.to_owned(), start_secs: self.elapsed_secs() });
+    }
+
+    /// Simulated time since the action began. Unit: seconds.
+    pub fn elapsed_secs(&self) -> f64 {
+        self.world.time_secs() - self.start_secs
+    }
+
+    /// The robot's geometry.
+    pub fn kinematics(&self) -> &Kinematics {
+        self.world.kinematics()
+    }
+
+    /// Which joints are what.
+    pub fn layout(&self) -> &Layout {
+        self.world.layout()
+    }
+
+    /// What the robot knows of itself.
+    pub fn profile(&self) -> &RobotProfile {
+        self.world.profile()
+    }
+
+    /// What the robot measures of itself.
+    pub fn observe(&self) -> Observation {
+        self.world.observe()
+    }
+
+    /// Joint positions that the controllers were last told.
+    pub fn commanded(&self) -> &[f64] {
+        &self.command.positions
+    }
+
+    /// Looks at one object.
+    pub fn see(&mut self, id: &str) -> Option<Sighting> {
+        let seen = self.world.perceive(id, self.choices)?;
+        self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
+        Some(seen)
+    }
+
+    /// Looks at everything but one object.
+    pub fn see_others(&mut self, but: &str) -> Vec<Sighting> {
+        let ids = self.world.visible();
+        ids.iter().filter(|id| id.as_str() != but).filter_map(|id| self.see(id)).collect()
+    }
+
+    /// Feels the gap between the fingers. Unit: metres.
+    pub fn feel_opening(&mut self) -> f64 {
+        self.world.feel_opening(self.choices)
+    }
+
+    /// Moves along joint positions, at rest at both ends, no faster than the joints allow and no shorter than `secs`.
+    ///
+    /// # Errors
+    /// [`Interrupt`] if the action has to end.
+    pub fn follow(&mut self, path: &[Vec<f64>], least_secs: f64) -> Result<(), Interrupt> {
+        let mut course = vec![self.command.positions.clone()];
+        course.extend_from_slice(path);
+        let legs: Vec<f64> = course.windows(2).map(|pair| self.leg_secs(&pair[0], &pair[1])).collect();
+        let shortest: f64 = legs.iter().sum();
+        let secs = (shortest * PEAK_OVER_MEAN / SPEED_SHARE).max(least_secs);
+        let tick = self.world.tick_secs();
+        let mut time = 0.0;
+        while time < secs {
+            time += tick;
+            let s = (time / secs).min(1.0);
+            self.command.positions = along(&course, &legs, shortest * s * s * (3.0 - 2.0 * s));
+            self.tick()?;
+        }
+        Ok(())
+    }
+
+    /// Sets the finger gap that the fingers go to from now on, with the profile's grip force.
+    pub fn set_opening(&mut self, opening_m: f64) {
+        self.command.gripper_opening_m = opening_m;
+        self.command.grip_force_n = self.profile().grip_force_n;
+    }
+
+    /// Waits.
+    ///
+    /// # Errors
+    /// [`Interrupt`] if the action has to end.
+    pub fn wait(&mut self, secs: f64) -> Result<(), Interrupt> {
+        let until = self.world.time_secs() + secs;
+        while self.world.time_secs() < until {
+            self.tick()?;
+        }
+        Ok(())
+    }
+
+    fn tick(&mut self) -> Result<(), Interrupt> {
+        self.world.step(&self.command);
+        if self.world.fault().is_some() {
+            return Err(Interrupt::Fault);
+        }
+        if self.elapsed_secs() > self.budget_secs {
+            return Err(Interrupt::Budget);
+        }
+        Ok(())
+    }
+
+    /// Shortest time between two postures at the joints' velocity limits. Unit: seconds.
+    fn leg_secs(&self, from: &[f64], to: &[f64]) -> f64 {
+        let joints = self.kinematics().joints().iter().zip(from.iter().zip(to));
+        joints.map(|(joint, (a, b))| (b - a).abs() / joint.velocity.max(1e-3)).fold(0.0, f64::max)
+    }
+}
+
+/// The posture at a time along a course whose legs take the given times at full speed.
+fn along(course: &[Vec<f64>], legs: &[f64], mut time: f64) -> Vec<f64> {
+    for (pair, leg) in course.windows(2).zip(legs) {
+        if time <= *leg && *leg > 0.0 {
+            let share = time / leg;
+            return pair[0].iter().zip(&pair[1]).map(|(a, b)| a + (b - a) * share).collect();
+        }
+        time -= leg;
+    }
+    course.last().cloned().unwrap_or_default()
+}

@@ -1,0 +1,99 @@
+//! Performs a list of actions and keeps what happened.
+
+use crate::actions::operator::{Interrupt, Operator};
+use crate::actions::{
+    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Trace, known_skill, pick,
+};
+use crate::base::Choices;
+use crate::config::Budget;
+use crate::world::World;
+
+/// Performs the actions in order with the reference skills.
+///
+/// Faults and spent budgets end the run as data: later actions are there as not reached. An action whose own report is
+/// "failed" does not end the run, as with a real robot.
+pub fn perform(calls: &[ActionCall], world: &mut World, choices: &mut Choices, budget: &Budget) -> Trace {
+    world.localise(choices);
+    let mut snapshots = vec![world.snapshot()];
+    let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
+    for call in calls {
+        let stopped = actions.last().is_some_and(|last| last.end != ActionEnd::Completed);
+        if stopped {
+            actions.push(unreached(call));
+            continue;
+        }
+        actions.push(perform_one(call, world, choices, budget));
+        snapshots.push(world.snapshot());
+    }
+    let tracks = world.tracks();
+    let frames = Frames { period_secs: tracks.period_secs, names: tracks.names, rows: tracks.rows };
+    Trace { snapshots, actions, frames, hash: world.state_digest() }
+}
+
+fn perform_one(call: &ActionCall, world: &mut World, choices: &mut Choices, budget: &Budget) -> ActionTrace {
+    let began = world.time_secs();
+    world.begin_record();
+    let mut operator = Operator::new(world, choices, budget.action_secs);
+    let outcome = match known_skill(&call.action) {
+        Ok(()) => pick::pick(call, &mut operator),
+        Err(unknown) => {
+            return ActionTrace { end: ActionEnd::Broken(unknown.to_string()), ..unreached(call) };
+        }
+    };
+    let (phases, percepts) = (operator.phases, operator.percepts);
+    let (end, report) = ended(outcome, world, budget);
+    let record = world.end_record();
+    let contacts = record.contacts.into_iter().map(|contact| ContactEpisode {
+        pair: contact.pair,
+        start_secs: contact.start_secs,
+        end_secs: contact.end_secs,
+        max_force_n: contact.max_force_n,
+    });
+    let extremes = record.courses.into_iter().map(|course| Extremes {
+        id: course.id,
+        max_tilt_rad: course.max_tilt_rad,
+        max_speed: course.max_speed,
+        max_rise_m: course.max_rise_m,
+        max_displacement_m: course.max_displacement_m,
+    });
+    ActionTrace {
+        action: call.action.clone(),
+        parameters: call.parameters.clone(),
+        end,
+        report,
+        duration_secs: world.time_secs() - began,
+        contacts: contacts.collect(),
+        percepts,
+        extremes: extremes.collect(),
+        phases,
+    }
+}
+
+fn ended(
+    outcome: Result<ActionReport, Interrupt>,
+    world: &World,
+    budget: &Budget,
+) -> (ActionEnd, Option<ActionReport>) {
+    match (outcome, world.fault()) {
+        (_, Some(fault)) => (ActionEnd::Broken(fault.to_string()), None),
+        (Ok(report), None) => (ActionEnd::Completed, Some(report)),
+        (Err(_), None) => {
+            let reason = format!("the action took longer than its budget of {} s", budget.action_secs);
+            (ActionEnd::Timeout(reason), None)
+        }
+    }
+}
+
+fn unreached(call: &ActionCall) -> ActionTrace {
+    ActionTrace {
+        action: call.action.clone(),
+        parameters: call.parameters.clone(),
+        end: ActionEnd::NotReached,
+        report: None,
+        duration_secs: 0.0,
+        contacts: Vec::new(),
+        percepts: Vec::new(),
+        extremes: Vec::new(),
+        phases: Vec::new(),
+    }
+}

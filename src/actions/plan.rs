@@ -1,0 +1,285 @@
+//! A way to a grasp and back that the robot can reach and that keeps clear of what it sees.
+
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
+
+use crate::actions::grasp::{Approach, Grasp};
+use crate::actions::operator::Operator;
+use crate::world::{Kinematics, Layout, Sighting, ik};
+
+/// Joint positions for each leg of a pick.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Base beside the furniture, arm as it is for driving.
+    pub drive: Vec<f64>,
+    /// The same place with the arm as it will take the thing.
+    pub reach: Vec<f64>,
+    /// To where the hand is a little before the thing.
+    pub near: Vec<Vec<f64>>,
+    /// From there to the thing, straight.
+    pub approach: Vec<Vec<f64>>,
+    /// Straight up from there.
+    pub lift: Vec<Vec<f64>>,
+    /// Back out with it.
+    pub retreat: Vec<Vec<f64>>,
+    /// What makes other plans better. No unit.
+    cost: f64,
+}
+
+/// How far the hand lifts. Unit: metres.
+const LIFT_M: f64 = 0.17;
+/// Length of the slow last part of the way. Unit: metres.
+const APPROACH_M: f64 = 0.12;
+/// How far in front of the furniture's edge the hand stays while the arm unfolds. Unit: metres.
+const OFF_EDGE_M: f64 = 0.1;
+/// Longest way from there to the thing. Unit: metres.
+const LONGEST_WAY_M: f64 = 1.2;
+/// Clearance to furniture that a plan must have; what is seen of it is as noisy as anything. Unit: metres.
+const FURNITURE_CLEAR_M: f64 = 0.01;
+/// Clearance to other things that is as good as any more. Unit: metres.
+const AMPLE_CLEAR_M: f64 = 0.04;
+/// Clearance to other things without which a plan is hopeless: the hand would go through their middle. Unit: metres.
+const LEAST_CLEAR_M: f64 = -0.025;
+/// Distance between points and between postures that are checked for clearance. Unit: metres.
+const CHECK_M: f64 = 0.03;
+/// Postures that are checked on the way of an unfolding arm.
+const N_CHECKS: usize = 12;
+
+/// The best plan among all grasps, or why there is none.
+///
+/// # Errors
+/// A sentence for the action's report.
+pub fn plan(operator: &Operator<'_>, grasps: &[Grasp], others: &[Sighting]) -> Result<Plan, String> {
+    let planner = Planner::new(operator, others);
+    let mut best: Option<Plan> = None;
+    for grasp in grasps {
+        for posture in &planner.postures {
+            if let Some(plan) = planner.plan(grasp, posture)
+                && best.as_ref().is_none_or(|best| plan.cost < best.cost)
+            {
+                best = Some(plan);
+            }
+        }
+    }
+    best.ok_or_else(|| "no reachable and free way to it was found".to_owned())
+}
+
+struct Planner<'a> {
+    kinematics: &'a Kinematics,
+    layout: &'a Layout,
+    /// Joint positions to begin with.
+    start: Vec<f64>,
+    postures: Vec<Vec<f64>>,
+    points: Vec<(usize, Point3<f64>)>,
+    furniture: Vec<Block>,
+    things: Vec<Pillar>,
+}
+
+/// Furniture: a box on the floor. Nothing goes below a table.
+struct Block {
+    from_world: Isometry3<f64>,
+    half: [f64; 2],
+    height: f64,
+}
+
+/// A thing as the upright cylinder around it.
+struct Pillar {
+    centre: Point2<f64>,
+    radius: f64,
+    foot: f64,
+    top: f64,
+}
+
+impl<'a> Planner<'a> {
+    fn new(operator: &'a Operator<'_>, others: &[Sighting]) -> Self {
+        let (kinematics, layout) = (operator.kinematics(), operator.layout());
+        let block = |seen: &Sighting| {
+            let [width, depth, height] = seen.size_m;
+            let half = [width / 2.0, depth / 2.0];
+            Block { from_world: seen.pose.to_isometry().inverse(), half, height: seen.pose.position[2] + height }
+        };
+        let pillar = |seen: &Sighting| {
+            let [x, y, foot] = seen.pose.position;
+            let [width, depth, height] = seen.size_m;
+            // Between the circle inside and the one around: corners seldom point at the hand.
+            let radius = (width.max(depth) + width.hypot(depth)) / 4.0;
+            Pillar { centre: Point2::new(x, y), radius, foot, top: foot + height }
+        };
+        let mut postures = operator.profile().postures.clone();
+        postures.push(operator.profile().home.clone());
+        Self {
+            kinematics,
+            layout,
+            start: operator.commanded().to_vec(),
+            postures,
+            points: kinematics.surface_points(CHECK_M),
+            furniture: others.iter().filter(|seen| seen.furniture).map(block).collect(),
+            things: others.iter().filter(|seen| !seen.furniture).map(pillar).collect(),
+        }
+    }
+
+    fn plan(&self, grasp: &Grasp, posture: &[f64]) -> Option<Plan> {
+        let at_thing = self.solve(&self.seed(grasp, posture), &grasp.pose, 1.0)?;
+        let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
+        let way = self.way_out(&grasp.pose.translation.vector, &back)?;
+        let lift = self.vertically(&at_thing, LIFT_M)?;
+        let lifted = lift.last()?.clone();
+        let (near, approach) = match grasp.approach {
+            Approach::Side => {
+                let before = self.moved(&at_thing, &(back * APPROACH_M.min(way)));
+                (vec![before], vec![at_thing.clone()])
+            }
+            // Above it, which is where it will be lifted to.
+            Approach::Top => (vec![lifted.clone()], lift.iter().rev().skip(1).cloned().chain([at_thing.clone()]).collect()),
+        };
+        let reach = self.moved(near.last()?, &(back * (way - if grasp.approach == Approach::Side { APPROACH_M.min(way) } else { 0.0 })));
+        let drive = self.with_start_arm(&reach);
+        let retreat = vec![self.moved(&lifted, &(back * way))];
+        let mut plan = Plan { drive, reach, near, approach, lift, retreat, cost: 0.0 };
+        plan.cost = self.cost(&plan)?;
+        Some(plan)
+    }
+
+    /// The posture with the base put so that the hand is over the thing, heading as the grasp wants it.
+    fn seed(&self, grasp: &Grasp, posture: &[f64]) -> Vec<f64> {
+        let mut positions = self.start.clone();
+        for (idx, value) in self.layout.arm.iter().zip(posture) {
+            positions[*idx] = *value;
+        }
+        for idx in self.layout.fingers {
+            positions[idx] = grasp.opening_m / 2.0;
+        }
+        if let Some([x, y, heading]) = self.layout.base {
+            positions[heading] += wrapped(grasp.heading - positions[heading]);
+            let miss = grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;
+            positions[x] += miss.x;
+            positions[y] += miss.y;
+        }
+        positions
+    }
+
+    fn solve(&self, seed: &[f64], target: &Isometry3<f64>, base_mobility: f64) -> Option<Vec<f64>> {
+        let mut mobility = vec![0.0; seed.len()];
+        for idx in &self.layout.arm {
+            mobility[*idx] = 1.0;
+        }
+        for idx in self.layout.base.iter().flatten() {
+            mobility[*idx] = base_mobility;
+        }
+        ik::solve(self.kinematics, seed, &ik::Reach { target: *target, mobility })
+    }
+
+    /// Distance back from the thing at which the hand is in front of all furniture. Unit: metres.
+    fn way_out(&self, from: &Vector3<f64>, back: &Vector3<f64>) -> Option<f64> {
+        if self.layout.base.is_none() {
+            return Some(APPROACH_M);
+        }
+        let mut way = APPROACH_M;
+        while way < LONGEST_WAY_M {
+            let point = Point3::from(from + back * way);
+            if self.furniture.iter().all(|block| block.beside(&point) >= OFF_EDGE_M) {
+                return Some(way);
+            }
+            way += 0.02;
+        }
+        None
+    }
+
+    /// The same posture moved level: by the base where there is one, otherwise by the arm.
+    fn moved(&self, positions: &[f64], by: &Vector3<f64>) -> Vec<f64> {
+        let mut positions = positions.to_vec();
+        if let Some([x, y, _]) = self.layout.base {
+            positions[x] += by.x;
+            positions[y] += by.y;
+            return positions;
+        }
+        let mut target = self.kinematics.grasp(&positions);
+        target.translation.vector += by;
+        self.solve(&positions, &target, 0.0).unwrap_or(positions)
+    }
+
+    /// Postures on a straight way up, a few centimetres apart, with the base where it is.
+    fn vertically(&self, positions: &[f64], height: f64) -> Option<Vec<Vec<f64>>> {
+        let from = self.kinematics.grasp(positions);
+        let mut path: Vec<Vec<f64>> = Vec::new();
+        for step in 1..=6 {
+            let mut target = from;
+            target.translation.vector.z += height * f64::from(step) / 6.0;
+            let seed = path.last().map_or(positions, Vec::as_slice);
+            path.push(self.solve(seed, &target, 0.0)?);
+        }
+        Some(path)
+    }
+
+    /// The base of one posture with the arm of the start.
+    fn with_start_arm(&self, positions: &[f64]) -> Vec<f64> {
+        let mut out = self.start.clone();
+        for idx in self.layout.base.iter().flatten() {
+            out[*idx] = positions[*idx];
+        }
+        out
+    }
+
+    /// What speaks against a plan: closeness to things, then length of the way; nothing if it is not free.
+    fn cost(&self, plan: &Plan) -> Option<f64> {
+        let travel = self.layout.base.map_or(0.0, |[x, y, heading]| {
+            let way = (plan.drive[x] - self.start[x]).hypot(plan.drive[y] - self.start[y]);
+            way + 0.3 * (plan.drive[heading] - self.start[heading]).abs()
+        });
+        let grasp = plan.approach.last()?;
+        let course = [&self.start, &plan.drive, &plan.reach, &plan.near[0], grasp, plan.lift.last()?];
+        let mut clear = f64::INFINITY;
+        for pair in course.windows(2) {
+            let (furniture, things) = self.clearance(pair[0], pair[1]);
+            if furniture < FURNITURE_CLEAR_M || things < LEAST_CLEAR_M {
+                return None;
+            }
+            clear = clear.min(things);
+        }
+        Some((AMPLE_CLEAR_M - clear).max(0.0) * 50.0 + 0.4 * travel)
+    }
+
+    /// Least distances to furniture and to things on the way between two postures. Unit: metres; negative inside.
+    fn clearance(&self, from: &[f64], to: &[f64]) -> (f64, f64) {
+        let mut least = (f64::INFINITY, f64::INFINITY);
+        for step in 0..=N_CHECKS {
+            let share = step as f64 / N_CHECKS as f64;
+            let positions: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
+            let links = self.kinematics.links(&positions);
+            for (link, point) in &self.points {
+                let point = links[*link] * point;
+                for block in &self.furniture {
+                    least.0 = least.0.min(block.distance(&point));
+                }
+                for pillar in &self.things {
+                    least.1 = least.1.min(pillar.distance(&point));
+                }
+            }
+        }
+        least
+    }
+}
+
+impl Block {
+    /// Level distance to the outline, negative inside. Unit: metres.
+    fn beside(&self, point: &Point3<f64>) -> f64 {
+        let local = self.from_world * point;
+        let (dx, dy) = (local.x.abs() - self.half[0], local.y.abs() - self.half[1]);
+        if dx > 0.0 && dy > 0.0 { dx.hypot(dy) } else { dx.max(dy) }
+    }
+
+    fn distance(&self, point: &Point3<f64>) -> f64 {
+        self.beside(point).max(point.z - self.height)
+    }
+}
+
+impl Pillar {
+    fn distance(&self, point: &Point3<f64>) -> f64 {
+        let beside = (point.xy() - self.centre).norm() - self.radius;
+        beside.max(point.z - self.top).max(self.foot - point.z)
+    }
+}
+
+/// An angle brought into (−π, π]. Unit: radians.
+fn wrapped(angle: f64) -> f64 {
+    libm::atan2(libm::sin(angle), libm::cos(angle))
+}

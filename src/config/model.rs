@@ -1,0 +1,346 @@
+//! Models of objects: what stands on tables, and the tables.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::base::{Diagnostic, Diagnostics, Pose, Source, digest_of, names};
+use crate::config::Table;
+
+/// A rigid object that a scene can hold, made of primitive shapes.
+///
+/// Frame: the model's own; its origin is on the ground below its middle, z up, as it stands by itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ObjectModel {
+    /// Name by which configurations know it; the file's name without its ending.
+    pub name: String,
+    /// Its class in the ontology: an IRI.
+    pub category: String,
+    /// Unit: kilograms.
+    pub mass_kg: f64,
+    /// Sliding friction coefficient against a surface of the same friction.
+    pub friction: f64,
+    /// Coefficient of restitution in [0, 1].
+    pub restitution: f64,
+    /// Outer dimensions as it stands. Unit: metres. Shape: x, y, z.
+    pub size_m: [f64; 3],
+    /// What it is made of. Their volumes share the mass.
+    pub parts: Vec<Part>,
+    /// For platforms: the flat rectangle on top where things can stand.
+    pub surface: Option<Surface>,
+    /// Digest of the file it was read from.
+    pub digest: String,
+}
+
+/// One shape of a model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// Pose of the shape's centre. Frame: the model's.
+    pub pose: Pose,
+    /// Its form.
+    pub shape: Shape,
+}
+
+/// Primitive shapes. Unit: metres.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Shape {
+    /// A box by its full extents.
+    Box {
+        /// x, y, z.
+        size: [f64; 3],
+    },
+    /// A cylinder about z.
+    Cylinder {
+        /// Radius.
+        radius: f64,
+        /// Full height.
+        height: f64,
+    },
+    /// A sphere.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+    /// A hollow wall about z, open above and below: what makes a glass a glass. Built from `staves` boxes.
+    Tube {
+        /// Outer radius at the lower rim.
+        radius_low: f64,
+        /// Outer radius at the upper rim.
+        radius_high: f64,
+        /// Thickness of the wall.
+        wall: f64,
+        /// Full height.
+        height: f64,
+        /// How many boxes approximate the round.
+        staves: u32,
+    },
+}
+
+/// A horizontal rectangle where objects can stand. Frame: the model's, centred on its origin.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Surface {
+    /// Height above the ground. Unit: metres.
+    pub height_m: f64,
+    /// Extent. Unit: metres. Shape: x, y.
+    pub size_m: [f64; 2],
+}
+
+impl Shape {
+    /// Volume of the material. Unit: cubic metres.
+    pub fn volume(&self) -> f64 {
+        use std::f64::consts::PI;
+        match self {
+            Self::Box { size: [x, y, z] } => x * y * z,
+            Self::Cylinder { radius, height } => PI * radius * radius * height,
+            Self::Sphere { radius } => 4.0 / 3.0 * PI * radius * radius * radius,
+            Self::Tube { .. } => self.staves().iter().map(|stave| stave.shape.volume()).sum(),
+        }
+    }
+
+    /// The boxes that a tube is built from, in its own frame; nothing for other shapes.
+    ///
+    /// The outer edges of the boxes lie on the tube's outer radius, so the whole never exceeds it.
+    fn staves(&self) -> Vec<Part> {
+        let Self::Tube { radius_low, radius_high, wall, height, staves } = *self else { return Vec::new() };
+        let half_angle = std::f64::consts::PI / f64::from(staves);
+        let slant = libm::atan2(radius_high - radius_low, height);
+        let middle = (radius_low + radius_high) / 2.0;
+        let width = 2.0 * middle * libm::sin(half_angle);
+        let reach = middle * libm::cos(half_angle) - wall / 2.0;
+        let size = [wall, width, height / libm::cos(slant)];
+        let leaning = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), slant);
+        (0..staves)
+            .map(|idx| {
+                let turned =
+                    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * half_angle * f64::from(idx));
+                let at = Isometry3::from_parts(Translation3::from(turned * Vector3::new(reach, 0.0, 0.0)), turned * leaning);
+                Part { pose: Pose::from_isometry(&at), shape: Self::Box { size } }
+            })
+            .collect()
+    }
+
+    /// Half the extents of the box around the shape in its own frame. Unit: metres.
+    fn half_extents(&self) -> [f64; 3] {
+        match *self {
+            Self::Box { size } => size.map(|extent| extent / 2.0),
+            Self::Cylinder { radius, height } => [radius, radius, height / 2.0],
+            Self::Sphere { radius } => [radius; 3],
+            Self::Tube { radius_low, radius_high, height, .. } => {
+                let radius = radius_low.max(radius_high);
+                [radius, radius, height / 2.0]
+            }
+        }
+    }
+}
+
+impl ObjectModel {
+    /// The convex solids that the model is made of: every part, with tubes taken apart into their boxes.
+    /// Frame: the model's.
+    pub fn solids(&self) -> Vec<Part> {
+        let mut solids = Vec::new();
+        for part in &self.parts {
+            if let Shape::Tube { .. } = part.shape {
+                let outer = part.pose.to_isometry();
+                solids.extend(part.shape.staves().into_iter().map(|stave| Part {
+                    pose: Pose::from_isometry(&(outer * stave.pose.to_isometry())),
+                    shape: stave.shape,
+                }));
+            } else {
+                solids.push(part.clone());
+            }
+        }
+        solids
+    }
+
+    /// Volume of the material. Unit: cubic metres.
+    pub fn volume(&self) -> f64 {
+        self.parts.iter().map(|part| part.shape.volume()).sum()
+    }
+}
+
+/// How far the parts may miss the stated size. Staves of a round wall lie a few millimetres inside of it.
+const SIZE_TOLERANCE_M: f64 = 0.006;
+
+/// Reads one model. Its name is the file's name without ending.
+///
+/// # Errors
+/// Every fault of the text: the table reader's own (`C…`), an unknown shape (W001), parts that do not fill
+/// the stated size (W002), and a category that is no IRI (W003).
+pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
+    let mut table = Table::parse(source)?;
+    let mut found = Diagnostics::new();
+    table.require(&["category", "mass_kg", "friction", "size_m", "parts"]);
+    let category = table.string("category").and_then(|written| {
+        let iri = full_iri(&written.value);
+        if iri.is_none() {
+            let message = format!("the category `{}` is no IRI", written.value);
+            table.fault("W003", written.span, message, "write it like `category = \"act:Glass\"`");
+        }
+        iri
+    });
+    let mass_kg = table.number("mass_kg", POSITIVE);
+    let friction = table.number("friction", 0.0..=2.0);
+    let restitution = table.number("restitution", 0.0..=1.0).unwrap_or(0.0);
+    let size_m = table.numbers("size_m", POSITIVE);
+    let parts: Vec<Part> =
+        table.tables("parts").into_iter().filter_map(|part| read_part(part, &mut found)).collect();
+    let surface = table.table("surface").and_then(|surface| read_surface(surface, &mut found));
+    table.finish(&mut found);
+    let (Some(category), Some(mass_kg), Some(friction), Some(size_m)) = (category, mass_kg, friction, size_m) else {
+        return Err(found);
+    };
+    let digest = digest_of(&source.text);
+    let model =
+        ObjectModel { name: stem(&source.name), category, mass_kg, friction, restitution, size_m, parts, surface, digest };
+    if !found.has_errors() {
+        found.extend(check_size(&model, source));
+    }
+    found.or(model)
+}
+
+const POSITIVE: (std::ops::Bound<f64>, std::ops::Bound<f64>) =
+    (std::ops::Bound::Excluded(0.0), std::ops::Bound::Unbounded);
+
+/// `act:Glass` and other known prefixes in full; an IRI as it is.
+fn full_iri(text: &str) -> Option<String> {
+    if text.contains("://") {
+        return Some(text.to_owned());
+    }
+    let (prefix, local) = text.split_once(':')?;
+    let (_, namespace) = names::PREFIXES.iter().find(|(known, _)| *known == prefix)?;
+    Some(format!("{namespace}{local}"))
+}
+
+fn stem(path: &str) -> String {
+    let file = path.rsplit(['/', '\\', ':']).next().unwrap_or(path);
+    file.strip_suffix(".toml").unwrap_or(file).to_owned()
+}
+
+fn read_part(mut table: Table, found: &mut Diagnostics) -> Option<Part> {
+    table.require(&["shape", "at_m"]);
+    let at = table.numbers::<3>("at_m", ..);
+    let turned = table.numbers::<3>("turned_rad", ..).unwrap_or([0.0; 3]);
+    let shape = read_shape(&mut table);
+    table.finish(found);
+    let rotation = UnitQuaternion::from_euler_angles(turned[0], turned[1], turned[2]);
+    let pose = Isometry3::from_parts(Translation3::from(Vector3::from(at?)), rotation);
+    Some(Part { pose: Pose::from_isometry(&pose), shape: shape? })
+}
+
+fn read_shape(table: &mut Table) -> Option<Shape> {
+    let kind = table.string("shape")?;
+    match kind.value.as_str() {
+        "box" => {
+            table.require(&["size_m"]);
+            Some(Shape::Box { size: table.numbers("size_m", POSITIVE)? })
+        }
+        "cylinder" => {
+            table.require(&["radius_m", "height_m"]);
+            let (radius, height) = (table.number("radius_m", POSITIVE), table.number("height_m", POSITIVE));
+            Some(Shape::Cylinder { radius: radius?, height: height? })
+        }
+        "sphere" => {
+            table.require(&["radius_m"]);
+            Some(Shape::Sphere { radius: table.number("radius_m", POSITIVE)? })
+        }
+        "tube" => read_tube(table),
+        other => {
+            let message = format!("unknown shape `{other}`");
+            let help = crate::base::did_you_mean(other, ["box", "cylinder", "sphere", "tube"]);
+            table.fault("W001", kind.span, message, help);
+            None
+        }
+    }
+}
+
+fn read_tube(table: &mut Table) -> Option<Shape> {
+    table.require(&["radius_low_m", "radius_high_m", "wall_m", "height_m", "staves"]);
+    let (radius_low, radius_high) = (table.number("radius_low_m", POSITIVE), table.number("radius_high_m", POSITIVE));
+    let (wall, height) = (table.number("wall_m", POSITIVE), table.number("height_m", POSITIVE));
+    let staves = table.integer("staves", 3..=64).and_then(|count| u32::try_from(count).ok());
+    Some(Shape::Tube {
+        radius_low: radius_low?,
+        radius_high: radius_high?,
+        wall: wall?,
+        height: height?,
+        staves: staves?,
+    })
+}
+
+fn read_surface(mut table: Table, found: &mut Diagnostics) -> Option<Surface> {
+    table.require(&["height_m", "size_m"]);
+    let (height_m, size_m) = (table.number("height_m", POSITIVE), table.numbers("size_m", POSITIVE));
+    table.finish(found);
+    Some(Surface { height_m: height_m?, size_m: size_m? })
+}
+
+/// The box around all parts must be the stated size, standing on the ground and centred over the origin.
+fn check_size(model: &ObjectModel, source: &Source) -> Diagnostics {
+    let mut low = Vector3::repeat(f64::INFINITY);
+    let mut high = Vector3::repeat(f64::NEG_INFINITY);
+    for part in &model.parts {
+        let turned = part.pose.to_isometry().rotation.to_rotation_matrix();
+        let reach = turned.matrix().abs() * Vector3::from(part.shape.half_extents());
+        let centre = Vector3::from(part.pose.position);
+        low = low.inf(&(centre - reach));
+        high = high.sup(&(centre + reach));
+    }
+    let [x, y, z] = model.size_m;
+    let expected = (Vector3::new(-x / 2.0, -y / 2.0, 0.0), Vector3::new(x / 2.0, y / 2.0, z));
+    let miss = (low - expected.0).amax().max((high - expected.1).amax());
+    if miss <= SIZE_TOLERANCE_M {
+        return Diagnostics::new();
+    }
+    let message = format!(
+        "the parts reach from {} to {}, which is not the stated size about the origin",
+        triple(&low),
+        triple(&high)
+    );
+    Diagnostic::error("W002", message)
+        .in_source(source)
+        .help("`size_m` is the outer size; the origin is on the ground below the middle")
+        .into()
+}
+
+fn triple(v: &Vector3<f64>) -> String {
+    format!("[{:.3}, {:.3}, {:.3}]", v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GLASS: &str = "category = \"act:Glass\"\nmass_kg = 0.3\nfriction = 0.4\nsize_m = [0.08, 0.08, 0.1]\n\
+        [[parts]]\nshape = \"tube\"\nat_m = [0, 0, 0.05]\nradius_low_m = 0.04\nradius_high_m = 0.04\n\
+        wall_m = 0.004\nheight_m = 0.1\nstaves = 12\n";
+
+    fn codes(text: &str) -> Vec<String> {
+        match read(&Source::new("models/objects/glass.toml", text)) {
+            Ok(_) => Vec::new(),
+            Err(found) => found.iter().map(|d| d.code.to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn a_tube_is_taken_apart_into_staves_inside_its_radius() {
+        let model = read(&Source::new("models/objects/glass.toml", GLASS)).expect("it is right");
+        assert_eq!((model.name.as_str(), model.category.as_str()), ("glass", "http://actions#Glass"));
+        let solids = model.solids();
+        assert_eq!(solids.len(), 12);
+        for solid in &solids {
+            let Shape::Box { size } = solid.shape else { panic!("staves are boxes") };
+            let corner = solid.pose.to_isometry() * nalgebra::Point3::new(size[0] / 2.0, size[1] / 2.0, 0.0);
+            assert!(corner.x.hypot(corner.y) <= 0.04 + 1e-9, "{corner}");
+        }
+        // The material of a thin ring: its circumference times its wall times its height, less the chords.
+        assert!((model.volume() / (std::f64::consts::TAU * 0.038 * 0.004 * 0.1) - 1.0).abs() < 0.06);
+    }
+
+    #[test]
+    fn wrong_models_are_refused_with_their_codes() {
+        assert_eq!(codes(GLASS), Vec::<String>::new());
+        assert_eq!(codes(&GLASS.replace("tube", "tubes")), ["W001", "C003", "C003", "C003", "C003", "C003"]);
+        assert_eq!(codes(&GLASS.replace("[0.08, 0.08, 0.1]", "[0.08, 0.08, 0.2]")), ["W002"]);
+        assert_eq!(codes(&GLASS.replace("act:Glass", "Glass")), ["W003"]);
+        assert_eq!(codes(&GLASS.replace("mass_kg = 0.3", "mass_kg = 0")), ["C006"]);
+    }
+}

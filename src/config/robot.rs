@@ -1,0 +1,170 @@
+//! Which joints of a URDF do what.
+
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics, Digest, Files, Source};
+use crate::config::{Located, Table};
+
+/// A robot: its URDF and the parts that the skills need to know. Read from a profile beside the URDF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotProfile {
+    /// Name for people.
+    pub name: String,
+    /// The URDF's text.
+    pub urdf: Source,
+    /// Joints of an omnidirectional base in the order x, y, heading; `None` where the base is fixed.
+    pub base_joints: Option<[String; 3]>,
+    /// Joints that position the hand (lift and arm), from the base outwards.
+    pub arm_joints: Vec<String>,
+    /// Finger joints, left then right; they move the same distance.
+    pub finger_joints: [String; 2],
+    /// Head joints, pan then tilt, where there is a head that moves.
+    pub head_joints: Vec<String>,
+    /// Link between the fingertips; its x axis points where the fingers point, its y axis across them.
+    pub grasp_link: String,
+    /// Links that are the fingers, left then right.
+    pub finger_links: [String; 2],
+    /// Link of the camera.
+    pub camera_link: String,
+    /// Widest gap between the fingers. Unit: metres.
+    pub max_opening_m: f64,
+    /// Arm posture for driving, in the order of `arm_joints`. Units: metres or radians.
+    pub home: Vec<f64>,
+    /// Arm postures near which inverse kinematics looks first, in the order of `arm_joints`.
+    pub postures: Vec<Vec<f64>>,
+    /// Friction coefficient of the fingertips.
+    pub finger_friction: f64,
+    /// Force with which one finger closes. Unit: newtons.
+    pub grip_force_n: f64,
+    /// Digest of profile and URDF.
+    pub digest: String,
+}
+
+/// Reads a profile and the URDF that it names (relative to the profile).
+///
+/// # Errors
+/// Every fault of the text: the table reader's own (`C…`), a file that can't be read (W010), and a list of the
+/// wrong length (W011). Whether the URDF holds what the profile names is for [`crate::world`] to check.
+pub fn read(files: &Files, path: &Path) -> Result<RobotProfile, Diagnostics> {
+    let source = files.read(path).map_err(|reason| {
+        Diagnostic::error("W010", format!("cannot read the robot profile {}: {reason}", path.display()))
+            .help("a profile is a TOML file that names a URDF and its joints")
+    })?;
+    let mut table = Table::parse(&source)?;
+    let mut found = Diagnostics::new();
+    let profile = read_table(&mut table, &source, &mut found, |urdf| {
+        let beside = path.parent().unwrap_or(Path::new("")).join(urdf);
+        files.read(&beside).map_err(|reason| format!("cannot read the URDF {}: {reason}", beside.display()))
+    });
+    table.finish(&mut found);
+    found.or(())?;
+    // Every missing or wrong key was noted above, so something is missing only beside a fault.
+    profile.ok_or_else(|| Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into())
+}
+
+fn read_table(
+    table: &mut Table,
+    source: &Source,
+    found: &mut Diagnostics,
+    read_urdf: impl FnOnce(&str) -> Result<Source, String>,
+) -> Option<RobotProfile> {
+    table.require(&["name", "urdf", "arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link"]);
+    table.require(&["max_opening_m", "finger_friction", "grip_force_n", "home"]);
+    let name = table.string("name");
+    let urdf = table.string("urdf").and_then(|written| match read_urdf(&written.value) {
+        Ok(urdf) => Some(urdf),
+        Err(reason) => {
+            table.fault("W010", written.span, reason, "the path is relative to the profile");
+            None
+        }
+    });
+    let base_joints = if table.has("base_joints") { Some(names(table, "base_joints")?) } else { None };
+    let arm_joints = table.some_strings("arm_joints");
+    let finger_joints = names(table, "finger_joints");
+    let finger_links = names(table, "finger_links");
+    let head_joints = table.strings("head_joints").unwrap_or_default();
+    let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
+    let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
+    let finger_friction = table.number("finger_friction", 0.0..=2.0);
+    let grip_force_n = table.number("grip_force_n", 0.1..=1000.0);
+    let n_arm_joints = arm_joints.as_ref().map_or(0, Vec::len);
+    let home = posture(table, "home", n_arm_joints);
+    let postures = table.tables("postures").into_iter().filter_map(|mut posture_table| {
+        let arm = posture(&mut posture_table, "arm", n_arm_joints);
+        posture_table.finish(found);
+        arm
+    });
+    let postures: Vec<Vec<f64>> = postures.collect();
+    let urdf = urdf?;
+    let mut digest = Digest::new();
+    digest.update(source.text.as_bytes());
+    digest.update(urdf.text.as_bytes());
+    Some(RobotProfile {
+        name: name?.value,
+        urdf,
+        base_joints,
+        arm_joints: values(arm_joints?),
+        finger_joints: finger_joints?,
+        head_joints: values(head_joints),
+        grasp_link: grasp_link?.value,
+        finger_links: finger_links?,
+        camera_link: camera_link?.value,
+        max_opening_m: max_opening_m?,
+        home: home?,
+        postures,
+        finger_friction: finger_friction?,
+        grip_force_n: grip_force_n?,
+        digest: digest.finish(),
+    })
+}
+
+fn values(list: Vec<Located<String>>) -> Vec<String> {
+    list.into_iter().map(|name| name.value).collect()
+}
+
+/// A list of exactly `N` names.
+fn names<const N: usize>(table: &mut Table, key: &str) -> Option<[String; N]> {
+    let span = table.key_span(key)?;
+    let list = values(table.strings(key)?);
+    let length = list.len();
+    let names = <[String; N]>::try_from(list).ok();
+    if names.is_none() {
+        let message = format!("`{key}` must name {N} things, but this list has {length}");
+        table.fault("W011", span, message, "see models/robots/mobile_manipulator.toml for an example");
+    }
+    names
+}
+
+/// Positions of all arm joints.
+fn posture(table: &mut Table, key: &str, n_arm_joints: usize) -> Option<Vec<f64>> {
+    let span = table.key_span(key)?;
+    let positions = table.number_list(key, ..)?;
+    if positions.len() != n_arm_joints && n_arm_joints > 0 {
+        let message = format!("`{key}` has {} positions for {n_arm_joints} arm joints", positions.len());
+        table.fault("W011", span, message, "give one position for each joint of `arm_joints`");
+        return None;
+    }
+    Some(positions)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_profile_that_is_not_there_or_incomplete_is_refused() {
+        let found = read(&Files::Disk, Path::new("no/such/robot.toml")).expect_err("there is no such file");
+        assert_eq!(found.iter().map(|d| d.code).collect::<Vec<_>>(), ["W010"]);
+        let source = Source::new("r.toml", "name = \"r\"\nurdf = \"r.urdf\"\narm_joints = [\"a\", \"b\"]\nhome = [0]\n\
+            finger_joints = [\"left\"]\n");
+        let mut table = Table::parse(&source).expect("it is TOML");
+        let mut found = Diagnostics::new();
+        let profile = read_table(&mut table, &source, &mut found, |_| Err("cannot read it".to_owned()));
+        assert!(profile.is_none());
+        table.finish(&mut found);
+        let codes: Vec<&str> = found.iter().map(|d| d.code).collect();
+        assert_eq!(codes.iter().filter(|code| **code == "W011").count(), 2, "{found}");
+        assert_eq!(codes.iter().filter(|code| **code == "W010").count(), 1, "{found}");
+        assert_eq!(codes.iter().filter(|code| **code == "C005").count(), 6, "{found}");
+    }
+}

@@ -1,0 +1,48 @@
+//! Which things touch, and with what force.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use rapier3d::prelude::PhysicsWorld;
+
+use crate::world::convert::from_vector;
+use crate::world::engine::Owner;
+
+/// Contact forces under this are solver noise: the lightest object of the shipped models weighs ten times as much.
+/// Unit: newtons.
+pub const CONTACT_FLOOR_NEWTONS: f64 = 0.05;
+
+/// The contact of two things at one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Sum of the normal forces' sizes. Unit: newtons.
+    pub normal_n: f64,
+    /// Sum of normal and friction forces on the second of the pair. Unit: newtons. Frame: world.
+    pub force_n: Vector3<f64>,
+}
+
+/// All contacts above the floor, by the pair of things in order.
+pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
+    let mut found: BTreeMap<(Owner, Owner), Touch> = BTreeMap::new();
+    let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
+    for pair in engine.narrow_phase.contact_pairs() {
+        let owner = |handle| engine.colliders.get(handle).map(|collider| Owner::from_tag(collider.user_data));
+        let (Some(first), Some(second)) = (owner(pair.collider1), owner(pair.collider2)) else { continue };
+        let (key, sign) = if first <= second { ((first, second), 1.0) } else { ((second, first), -1.0) };
+        for manifold in pair.solver_manifolds() {
+            let normal = from_vector(manifold.data.normal);
+            for point in &manifold.points {
+                let impulse = f64::from(point.data.impulse);
+                if impulse <= 0.0 {
+                    continue;
+                }
+                let friction = from_vector(point.data.warmstart_tangent_world);
+                let touch = found.entry(key).or_insert(Touch { normal_n: 0.0, force_n: Vector3::zeros() });
+                touch.normal_n += impulse * per_second;
+                touch.force_n += (normal * impulse + friction) * (sign * per_second);
+            }
+        }
+    }
+    found.retain(|_, touch| touch.normal_n > CONTACT_FLOOR_NEWTONS);
+    found
+}

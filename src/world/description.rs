@@ -1,0 +1,299 @@
+//! A URDF as the tree that is simulated: links that move against each other, with fixed ones folded in.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
+
+use crate::base::{Pose, did_you_mean};
+use crate::config::{Part, RobotProfile, Shape};
+use crate::world::WorldError;
+
+/// How a joint moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    /// Along its axis; metres and newtons.
+    Prismatic,
+    /// About its axis; radians and newton metres.
+    Revolute,
+}
+
+/// A movable joint. The joint with index `i` moves the link with index `i + 1`.
+#[derive(Debug, Clone)]
+pub struct Joint {
+    /// Name in the URDF.
+    pub name: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// Index of the link that it sits on.
+    pub parent: usize,
+    /// Pose of the joint on its parent, at position 0.
+    pub origin: Isometry3<f64>,
+    /// Direction in the joint's frame.
+    pub axis: Unit<Vector3<f64>>,
+    /// Lower limit of the position.
+    pub lower: f64,
+    /// Upper limit of the position.
+    pub upper: f64,
+    /// Largest force or torque.
+    pub effort: f64,
+    /// Largest velocity.
+    pub velocity: f64,
+    /// Viscous friction.
+    pub damping: f64,
+    /// Joint that this one follows, with factor and offset.
+    pub mimic: Option<(usize, f64, f64)>,
+}
+
+/// A link with everything that is fixed to it.
+#[derive(Debug, Clone)]
+pub struct Link {
+    /// Name of the outermost of the links that were folded together.
+    pub name: String,
+    /// Unit: kilograms.
+    pub mass: f64,
+    /// Centre of mass in the link's frame.
+    pub com: Vector3<f64>,
+    /// About the centre of mass, along the link's axes. Unit: kg·m².
+    pub inertia: Matrix3<f64>,
+    /// Collision shapes in the link's frame.
+    pub solids: Vec<Part>,
+}
+
+/// The whole robot. Parents come before their children.
+#[derive(Debug, Clone)]
+pub struct RobotModel {
+    /// `links[0]` is the root.
+    pub links: Vec<Link>,
+    /// One fewer than links.
+    pub joints: Vec<Joint>,
+    /// Every link of the URDF: the link that it was folded into, and where.
+    frames: BTreeMap<String, (usize, Isometry3<f64>)>,
+    /// The URDF's name, for messages.
+    name: String,
+}
+
+/// Mass of links that have none in the URDF, such as the stages of a base. Unit: kilograms. Small beside any real
+/// link, large enough for 32-bit arithmetic.
+const LEAST_MASS: f64 = 0.01;
+/// Their inertia: a ball of that mass and 1 cm. Unit: kg·m².
+const LEAST_INERTIA: f64 = 4e-7;
+
+impl RobotModel {
+    /// The robot of a profile's URDF.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the text is no URDF, not one tree, or uses what can't be simulated.
+    pub fn read(profile: &RobotProfile) -> Result<Self, WorldError> {
+        let name = profile.urdf.name.to_string();
+        let robot = urdf_rs::read_from_string(&profile.urdf.text)
+            .map_err(|error| WorldError::Urdf { name: name.clone(), reason: one_line(&error.to_string()) })?;
+        if robot.links.is_empty() {
+            return Err(WorldError::Urdf { name, reason: "it has no links".to_owned() });
+        }
+        Folding::new(&robot, name)?.fold()
+    }
+
+    /// Index of a joint by its name.
+    ///
+    /// # Errors
+    /// [`WorldError::Missing`] with the nearest name.
+    pub fn joint(&self, joint: &str) -> Result<usize, WorldError> {
+        self.joints.iter().position(|known| known.name == joint).ok_or_else(|| WorldError::Missing {
+            name: self.name.clone(),
+            kind: "movable joint",
+            missing: joint.to_owned(),
+            help: did_you_mean(joint, self.joints.iter().map(|known| known.name.as_str())),
+        })
+    }
+
+    /// Where a link of the URDF went: index of the folded link and pose on it.
+    ///
+    /// # Errors
+    /// [`WorldError::Missing`] with the nearest name.
+    pub fn frame(&self, link: &str) -> Result<(usize, Isometry3<f64>), WorldError> {
+        self.frames.get(link).copied().ok_or_else(|| WorldError::Missing {
+            name: self.name.clone(),
+            kind: "link",
+            missing: link.to_owned(),
+            help: did_you_mean(link, self.frames.keys().map(String::as_str)),
+        })
+    }
+}
+
+/// The state of folding a URDF's links together.
+struct Folding<'a> {
+    robot: &'a urdf_rs::Robot,
+    links: BTreeMap<&'a str, &'a urdf_rs::Link>,
+    children: BTreeMap<&'a str, Vec<&'a urdf_rs::Joint>>,
+    out: RobotModel,
+}
+
+impl<'a> Folding<'a> {
+    fn new(robot: &'a urdf_rs::Robot, name: String) -> Result<Self, WorldError> {
+        let links = robot.links.iter().map(|link| (link.name.as_str(), link)).collect();
+        let mut children: BTreeMap<&str, Vec<&urdf_rs::Joint>> = BTreeMap::new();
+        let mut parents: BTreeMap<&str, &str> = BTreeMap::new();
+        for joint in &robot.joints {
+            if parents.insert(joint.child.link.as_str(), joint.parent.link.as_str()).is_some() {
+                let reason = format!("the link `{}` has two parents", joint.child.link);
+                return Err(WorldError::Urdf { name, reason });
+            }
+            children.entry(joint.parent.link.as_str()).or_default().push(joint);
+        }
+        let out = RobotModel { links: Vec::new(), joints: Vec::new(), frames: BTreeMap::new(), name };
+        Ok(Self { robot, links, children, out })
+    }
+
+    fn fold(mut self) -> Result<RobotModel, WorldError> {
+        let is_child = |name: &str| self.robot.joints.iter().any(|joint| joint.child.link == name);
+        let roots: Vec<&str> =
+            self.robot.links.iter().map(|link| link.name.as_str()).filter(|name| !is_child(name)).collect();
+        let [root] = roots.as_slice() else {
+            let reason = format!("it has {} roots instead of one", roots.len());
+            return Err(WorldError::Urdf { name: self.out.name, reason });
+        };
+        self.out.links.push(empty_link(root));
+        // Links whose children are still to be visited, with the folded link that they belong to.
+        let mut open: Vec<(&str, usize, Isometry3<f64>)> = vec![(root, 0, Isometry3::identity())];
+        while let Some((name, into, at)) = open.pop() {
+            self.merge(name, into, &at)?;
+            for joint in self.children.get(name).cloned().unwrap_or_default().into_iter().rev() {
+                let origin = at * isometry(&joint.origin);
+                if joint.joint_type == urdf_rs::JointType::Fixed {
+                    open.push((&joint.child.link, into, origin));
+                } else {
+                    self.out.joints.push(self.movable(joint, into, origin)?);
+                    self.out.links.push(empty_link(&joint.child.link));
+                    open.push((&joint.child.link, self.out.links.len() - 1, Isometry3::identity()));
+                }
+            }
+        }
+        self.resolve_mimics()?;
+        for link in &mut self.out.links {
+            if link.mass < LEAST_MASS {
+                link.mass = LEAST_MASS;
+                link.inertia = Matrix3::identity() * LEAST_INERTIA;
+            }
+        }
+        Ok(self.out)
+    }
+
+    /// Adds one link of the URDF to a folded one: mass, inertia (by the parallel axis theorem) and shapes.
+    fn merge(&mut self, name: &str, into: usize, at: &Isometry3<f64>) -> Result<(), WorldError> {
+        self.out.frames.insert(name.to_owned(), (into, *at));
+        let Some(source) = self.links.get(name) else {
+            let reason = format!("a joint speaks of the link `{name}`, which is not there");
+            return Err(WorldError::Urdf { name: self.out.name.clone(), reason });
+        };
+        let inertial = at * isometry(&source.inertial.origin);
+        let added = Mass { mass: source.inertial.mass.value, com: inertial.translation.vector, inertia: {
+            let turned = inertial.rotation.to_rotation_matrix();
+            turned.matrix() * matrix(&source.inertial.inertia) * turned.matrix().transpose()
+        } };
+        let solids: Vec<Part> = source
+            .collision
+            .iter()
+            .map(|collision| {
+                let pose = Pose::from_isometry(&(at * isometry(&collision.origin)));
+                Ok(Part { pose, shape: self.shape(&collision.geometry, name)? })
+            })
+            .collect::<Result<_, WorldError>>()?;
+        let link = &mut self.out.links[into];
+        let sum = Mass { mass: link.mass, com: link.com, inertia: link.inertia }.plus(&added);
+        (link.mass, link.com, link.inertia) = (sum.mass, sum.com, sum.inertia);
+        link.solids.extend(solids);
+        Ok(())
+    }
+
+    fn shape(&self, geometry: &urdf_rs::Geometry, link: &str) -> Result<Shape, WorldError> {
+        match *geometry {
+            urdf_rs::Geometry::Box { size } => Ok(Shape::Box { size: size.0 }),
+            urdf_rs::Geometry::Cylinder { radius, length } => Ok(Shape::Cylinder { radius, height: length }),
+            urdf_rs::Geometry::Sphere { radius } => Ok(Shape::Sphere { radius }),
+            urdf_rs::Geometry::Capsule { .. } | urdf_rs::Geometry::Mesh { .. } => Err(WorldError::Unsupported {
+                name: self.out.name.clone(),
+                what: format!("the collision shape of `{link}`"),
+            }),
+        }
+    }
+
+    fn movable(&self, joint: &urdf_rs::Joint, parent: usize, origin: Isometry3<f64>) -> Result<Joint, WorldError> {
+        let kind = match joint.joint_type {
+            urdf_rs::JointType::Prismatic => JointKind::Prismatic,
+            urdf_rs::JointType::Revolute | urdf_rs::JointType::Continuous => JointKind::Revolute,
+            _ => {
+                let what = format!("the type of joint `{}`", joint.name);
+                return Err(WorldError::Unsupported { name: self.out.name.clone(), what });
+            }
+        };
+        let limited = joint.joint_type != urdf_rs::JointType::Continuous;
+        let (lower, upper) =
+            if limited { (joint.limit.lower, joint.limit.upper) } else { (f64::NEG_INFINITY, f64::INFINITY) };
+        Ok(Joint {
+            name: joint.name.clone(),
+            kind,
+            parent,
+            origin,
+            axis: Unit::try_new(Vector3::from(joint.axis.xyz.0), 1e-9).unwrap_or(Vector3::x_axis()),
+            lower,
+            upper,
+            effort: joint.limit.effort,
+            velocity: joint.limit.velocity,
+            damping: joint.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.damping),
+            mimic: None,
+        })
+    }
+
+    fn resolve_mimics(&mut self) -> Result<(), WorldError> {
+        for joint in &self.robot.joints {
+            let Some(mimic) = &joint.mimic else { continue };
+            let (follower, leader) = (self.out.joint(&joint.name)?, self.out.joint(&mimic.joint)?);
+            let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
+            self.out.joints[follower].mimic = Some((leader, factor, offset));
+        }
+        Ok(())
+    }
+}
+
+/// Mass, its centre, and its inertia about that.
+struct Mass {
+    mass: f64,
+    com: Vector3<f64>,
+    inertia: Matrix3<f64>,
+}
+
+impl Mass {
+    fn plus(&self, other: &Self) -> Self {
+        let mass = self.mass + other.mass;
+        if mass <= 0.0 {
+            return Self { mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros() };
+        }
+        let com = (self.com * self.mass + other.com * other.mass) / mass;
+        Self { mass, com, inertia: self.about(&com) + other.about(&com) }
+    }
+
+    fn about(&self, point: &Vector3<f64>) -> Matrix3<f64> {
+        let d = self.com - point;
+        self.inertia + (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * self.mass
+    }
+}
+
+fn empty_link(name: &str) -> Link {
+    Link { name: name.to_owned(), mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros(), solids: Vec::new() }
+}
+
+fn isometry(pose: &urdf_rs::Pose) -> Isometry3<f64> {
+    let [roll, pitch, yaw] = pose.rpy.0;
+    Isometry3::from_parts(
+        Translation3::from(Vector3::from(pose.xyz.0)),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    )
+}
+
+fn matrix(i: &urdf_rs::Inertia) -> Matrix3<f64> {
+    Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz)
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

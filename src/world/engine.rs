@@ -1,0 +1,118 @@
+//! The engine, set up once: gravity, solver, shapes, who owns which collider.
+
+use nalgebra::Vector3;
+use rapier3d::prelude::{
+    ColliderBuilder, CoefficientCombineRule, IntegrationParameters, PhysicsWorld, SpringCoefficients,
+};
+
+use crate::config::{Part, Physics, Shape};
+use crate::world::convert::{to_pose, to_real, to_vector};
+use crate::world::kinematics::GRAVITY;
+use crate::world::{WorldError, fault};
+
+/// Whom a collider belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Owner {
+    /// The ground.
+    Floor,
+    /// Object by its index in the scene.
+    Object(usize),
+    /// Link of the robot by its index.
+    Link(usize),
+}
+
+impl Owner {
+    /// The number that the engine keeps with each collider.
+    pub fn to_tag(self) -> u128 {
+        match self {
+            Self::Floor => 0,
+            Self::Object(idx) => 2 * (idx as u128) + 2,
+            Self::Link(idx) => 2 * (idx as u128) + 1,
+        }
+    }
+
+    /// Back from the number.
+    pub fn from_tag(tag: u128) -> Self {
+        let idx = usize::try_from(tag.saturating_sub(1) / 2).unwrap_or(usize::MAX);
+        match tag {
+            0 => Self::Floor,
+            tag if tag % 2 == 1 => Self::Link(idx),
+            _ => Self::Object(idx),
+        }
+    }
+}
+
+/// Natural frequency of contacts. Unit: hertz. Cuts the depth of a grasp's contacts from 1.8 mm (30 Hz, the engine's
+/// default) to a few tenths.
+const CONTACT_FREQUENCY_HZ: f32 = 90.0;
+/// Damping ratio of contacts: the engine's default, which keeps piles still.
+const CONTACT_DAMPING: f32 = 10.0;
+/// Friction of the floor: that of a wooden one.
+const FLOOR_FRICTION: f32 = 0.5;
+
+/// An engine without bodies.
+///
+/// # Errors
+/// [`WorldError::Scene`] for rates that can't be stepped with.
+pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
+    if physics.steps_per_second < 30 || physics.iterations == 0 {
+        let what = format!(
+            "physics can't run with {} steps per second and {} iterations",
+            physics.steps_per_second, physics.iterations
+        );
+        return Err(WorldError::Scene { what });
+    }
+    let softness = SpringCoefficients { natural_frequency: CONTACT_FREQUENCY_HZ, damping_ratio: CONTACT_DAMPING };
+    let parameters = IntegrationParameters {
+        dt: 1.0 / to_real(f64::from(physics.steps_per_second)),
+        num_solver_iterations: physics.iterations as usize,
+        // Without it every grasp creeps: friction would only act in the second of the solver's two passes.
+        friction_in_bias_pass: true,
+        contact_softness: softness,
+        static_contact_softness: softness,
+        // Kept contacts may be centimetres old; ours decide verdicts.
+        contact_recycling: false,
+        ..IntegrationParameters::default()
+    };
+    let gravity = to_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
+    Ok(PhysicsWorld { gravity, integration_parameters: parameters, ..PhysicsWorld::default() })
+}
+
+/// Adds the floor: a slab with its top at 0.
+pub fn add_floor(engine: &mut PhysicsWorld) {
+    let half = to_real(fault::WORLD_RADIUS_M + 1.0);
+    let floor = ColliderBuilder::cuboid(half, half, 0.5)
+        .position(to_pose(&nalgebra::Isometry3::translation(0.0, 0.0, -0.5)))
+        .friction(FLOOR_FRICTION)
+        .friction_combine_rule(CoefficientCombineRule::GeometricMean)
+        .user_data(Owner::Floor.to_tag());
+    engine.insert_collider(floor, None);
+}
+
+/// A convex solid as a collider in its body's frame; nothing for tubes, which have to be taken apart before.
+///
+/// Two surfaces share the geometric mean of their frictions: what the scene says holds against the same material.
+pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> Option<ColliderBuilder> {
+    let mut pose = solid.pose.to_isometry();
+    let builder = match solid.shape {
+        Shape::Box { size: [x, y, z] } => {
+            ColliderBuilder::cuboid(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0))
+        }
+        Shape::Cylinder { radius, height } => {
+            // The engine's cylinders stand along y.
+            pose.rotation *=
+                nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+            ColliderBuilder::cylinder(to_real(height / 2.0), to_real(radius))
+        }
+        Shape::Sphere { radius } => ColliderBuilder::ball(to_real(radius)),
+        Shape::Tube { .. } => return None,
+    };
+    Some(
+        builder
+            .position(to_pose(&pose))
+            .friction(to_real(friction))
+            .restitution(to_real(restitution))
+            .friction_combine_rule(CoefficientCombineRule::GeometricMean)
+            .user_data(owner.to_tag()),
+    )
+}

@@ -1,0 +1,100 @@
+//! Inverse kinematics: joint positions that bring the grasp link to a pose, within the joints' limits.
+
+use nalgebra::{DMatrix, DVector, Isometry3, Vector6};
+
+use crate::world::Kinematics;
+
+/// What is asked of the solver.
+#[derive(Debug, Clone)]
+pub struct Reach {
+    /// Where the grasp link shall be. Frame: that of the kinematics' root.
+    pub target: Isometry3<f64>,
+    /// How readily each joint moves, from 0 (held where it is) to 1. Shape: one per joint.
+    pub mobility: Vec<f64>,
+}
+
+/// Position error that counts as reached. Unit: metres. A tenth of what sensing gets wrong.
+const REACHED_M: f64 = 5e-4;
+/// Angle error that counts as reached. Unit: radians.
+const REACHED_RAD: f64 = 2e-3;
+/// Damping of the least squares: keeps steps small near singular postures.
+const DAMPING: f64 = 0.03;
+const MOST_ITERATIONS: usize = 80;
+/// Largest change of a joint in one iteration. Units: metres or radians.
+const LARGEST_STEP: f64 = 0.3;
+
+/// Joint positions near `seed` that reach the target, or nothing if the solver finds none.
+///
+/// Damped least squares; a joint that meets its limit is held there and the rest is solved again.
+pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
+    let mut positions = seed.to_vec();
+    for (position, joint) in positions.iter_mut().zip(kinematics.joints()) {
+        *position = position.clamp(joint.lower, joint.upper);
+    }
+    for _ in 0..MOST_ITERATIONS {
+        let (grasp, jacobian) = kinematics.grasp_jacobian(&positions);
+        let error = pose_error(&grasp, &reach.target);
+        if error.fixed_rows::<3>(0).norm() < REACHED_M && error.fixed_rows::<3>(3).norm() < REACHED_RAD {
+            return Some(positions);
+        }
+        let jacobian = DMatrix::from_iterator(6, positions.len(), jacobian.iter().copied());
+        step(kinematics, &mut positions, &jacobian, &error, &reach.mobility);
+    }
+    None
+}
+
+/// One iteration. Joints that would pass a limit stop at it, and the others make up for them.
+fn step(
+    kinematics: &Kinematics,
+    positions: &mut [f64],
+    jacobian: &DMatrix<f64>,
+    error: &Vector6<f64>,
+    mobility: &[f64],
+) {
+    let mut free = mobility.to_vec();
+    for _ in 0..positions.len() {
+        let change = least_squares(jacobian, error, &free);
+        let mut held_one = false;
+        for (idx, joint) in kinematics.joints().iter().enumerate() {
+            let wanted = positions[idx] + change[idx];
+            let outside = wanted < joint.lower - 1e-9 || wanted > joint.upper + 1e-9;
+            if free[idx] > 0.0 && outside && at_limit(positions[idx], wanted, joint.lower, joint.upper) {
+                free[idx] = 0.0;
+                held_one = true;
+            }
+        }
+        if !held_one {
+            for (idx, joint) in kinematics.joints().iter().enumerate() {
+                positions[idx] = (positions[idx] + change[idx]).clamp(joint.lower, joint.upper);
+            }
+            return;
+        }
+    }
+}
+
+/// Whether the joint is already at the limit that it wants to pass (to a millionth of a radian or metre).
+fn at_limit(position: f64, wanted: f64, lower: f64, upper: f64) -> bool {
+    (wanted < lower && position <= lower + 1e-6) || (wanted > upper && position >= upper - 1e-6)
+}
+
+/// W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, no component larger than the largest step.
+fn least_squares(jacobian: &DMatrix<f64>, error: &Vector6<f64>, mobility: &[f64]) -> DVector<f64> {
+    let weights = DMatrix::from_diagonal(&DVector::from_column_slice(mobility));
+    let weighted = &weights * jacobian.transpose();
+    let square = jacobian * &weighted + DMatrix::identity(6, 6) * (DAMPING * DAMPING);
+    let error = DVector::from_column_slice(error.as_slice());
+    let Some(inverse) = square.try_inverse() else { return DVector::zeros(mobility.len()) };
+    let mut change = weighted * (inverse * error);
+    let largest = change.amax();
+    if largest > LARGEST_STEP {
+        change *= LARGEST_STEP / largest;
+    }
+    change
+}
+
+/// What is missing from one pose to another: metres above radians.
+fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
+    let linear = to.translation.vector - from.translation.vector;
+    let angular = (to.rotation * from.rotation.inverse()).scaled_axis();
+    Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+}

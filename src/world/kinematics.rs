@@ -1,0 +1,155 @@
+//! Where the robot's links are for given joint positions, and which forces hold it against gravity.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector3};
+
+use crate::config::Shape;
+use crate::world::description::{Joint, JointKind, RobotModel};
+
+/// Earth's pull. Unit: m/s².
+pub const GRAVITY: f64 = 9.81;
+
+/// A robot's geometry as skills see it: no physics, no truth about the world.
+#[derive(Debug, Clone)]
+pub struct Kinematics {
+    model: Arc<RobotModel>,
+    /// Pose of the root. Frame: world.
+    root: Isometry3<f64>,
+    grasp: (usize, Isometry3<f64>),
+}
+
+impl Kinematics {
+    /// The geometry of a robot whose root stands at `root`; `grasp` is the grasp link and where it was folded to.
+    pub(crate) fn new(model: Arc<RobotModel>, root: Isometry3<f64>, grasp: (usize, Isometry3<f64>)) -> Self {
+        Self { model, root, grasp }
+    }
+
+    /// The joints, in the order of positions.
+    pub fn joints(&self) -> &[Joint] {
+        &self.model.joints
+    }
+
+    /// Points spread over the robot's collision shapes, at most about `spacing` apart: index of the link and the point in
+    /// its frame. Units: metres.
+    pub fn surface_points(&self, spacing: f64) -> Vec<(usize, Point3<f64>)> {
+        let mut points = Vec::new();
+        for (idx, link) in self.model.links.iter().enumerate() {
+            for solid in &link.solids {
+                let pose = solid.pose.to_isometry();
+                points.extend(spread(&solid.shape, spacing).into_iter().map(|point| (idx, pose * point)));
+            }
+        }
+        points
+    }
+
+    /// Poses of all links. Shape: one more than positions.
+    pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
+        let mut poses = Vec::with_capacity(self.model.links.len());
+        poses.push(self.root);
+        for (joint, position) in self.model.joints.iter().zip(positions) {
+            poses.push(poses[joint.parent] * joint.origin * motion(joint, *position));
+        }
+        poses
+    }
+
+    /// Pose of the grasp link.
+    pub fn grasp(&self, positions: &[f64]) -> Isometry3<f64> {
+        self.links(positions)[self.grasp.0] * self.grasp.1
+    }
+
+    /// Pose of the grasp link, and how it moves with each joint. Shape: 6 × joints, linear above angular.
+    pub fn grasp_jacobian(&self, positions: &[f64]) -> (Isometry3<f64>, Matrix6xX<f64>) {
+        let poses = self.links(positions);
+        let grasp = poses[self.grasp.0] * self.grasp.1;
+        let mut jacobian = Matrix6xX::zeros(self.model.joints.len());
+        let mut link = self.grasp.0;
+        while link > 0 {
+            let joint = &self.model.joints[link - 1];
+            let (axis, point) = axis_in_world(joint, &poses);
+            let (linear, angular) = match joint.kind {
+                JointKind::Prismatic => (axis, Vector3::zeros()),
+                JointKind::Revolute => (axis.cross(&(grasp.translation.vector - point)), axis),
+            };
+            jacobian.fixed_view_mut::<3, 1>(0, link - 1).copy_from(&linear);
+            jacobian.fixed_view_mut::<3, 1>(3, link - 1).copy_from(&angular);
+            link = joint.parent;
+        }
+        (grasp, jacobian)
+    }
+
+    /// Forces and torques that hold the robot's own weight. Units: newtons or newton metres. Shape: one per joint.
+    pub fn holding_efforts(&self, positions: &[f64]) -> Vec<f64> {
+        let poses = self.links(positions);
+        // Weight of each subtree and its moment, gathered from the leaves inwards: children come after their parents.
+        let mut weights: Vec<(f64, Vector3<f64>)> = self
+            .model
+            .links
+            .iter()
+            .zip(&poses)
+            .map(|(link, pose)| (link.mass, (pose * Point3::from(link.com)).coords * link.mass))
+            .collect();
+        let mut efforts = vec![0.0; self.model.joints.len()];
+        for (idx, joint) in self.model.joints.iter().enumerate().rev() {
+            let (mass, moment) = weights[idx + 1];
+            let (axis, point) = axis_in_world(joint, &poses);
+            let up = Vector3::z() * GRAVITY;
+            efforts[idx] = match joint.kind {
+                JointKind::Prismatic => axis.dot(&up) * mass,
+                JointKind::Revolute => axis.dot(&(moment - point * mass).cross(&up)),
+            };
+            weights[joint.parent].0 += mass;
+            weights[joint.parent].1 += moment;
+        }
+        efforts
+    }
+}
+
+fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
+    match joint.kind {
+        JointKind::Prismatic => {
+            Isometry3::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())
+        }
+        JointKind::Revolute => Isometry3::from_parts(
+            Translation3::identity(),
+            UnitQuaternion::from_axis_angle(&joint.axis, position),
+        ),
+    }
+}
+
+/// Direction of a joint's axis and a point on it. Frame: world.
+fn axis_in_world(joint: &Joint, poses: &[Isometry3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
+    let frame = poses[joint.parent] * joint.origin;
+    (frame.rotation * joint.axis.into_inner(), frame.translation.vector)
+}
+
+/// Points on a shape in its own frame. Tubes have none: robots are not made of them.
+fn spread(shape: &Shape, spacing: f64) -> Vec<Point3<f64>> {
+    match *shape {
+        Shape::Box { size } => {
+            let [xs, ys, zs] = size.map(|extent| steps(extent, spacing));
+            let grid = |x: f64| ys.iter().flat_map(|y| zs.iter().map(|z| Point3::new(x, *y, *z))).collect::<Vec<_>>();
+            xs.iter().flat_map(|x| grid(*x)).collect()
+        }
+        Shape::Cylinder { radius, height } => {
+            let around = steps(std::f64::consts::TAU, spacing / radius.max(1e-6));
+            let rings = steps(height, spacing);
+            let ring = |z: f64| around.iter().map(move |a| Point3::new(radius * libm::cos(*a), radius * libm::sin(*a), z));
+            rings.iter().flat_map(|z| ring(*z)).collect()
+        }
+        Shape::Sphere { radius } => {
+            let ends = [-radius, radius];
+            ends.iter()
+                .flat_map(|r| [Point3::new(*r, 0.0, 0.0), Point3::new(0.0, *r, 0.0), Point3::new(0.0, 0.0, *r)])
+                .collect()
+        }
+        Shape::Tube { .. } => Vec::new(),
+    }
+}
+
+/// Numbers from −extent/2 to extent/2, both included, at most `spacing` apart.
+fn steps(extent: f64, spacing: f64) -> Vec<f64> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen steps")]
+    let n_steps = (extent / spacing).ceil().clamp(1.0, 200.0) as usize;
+    (0..=n_steps).map(|idx| extent * (idx as f64 / n_steps as f64 - 0.5)).collect()
+}

@@ -1,0 +1,31 @@
+//! A `Scene` to a stepping simulation: the only place that knows the physics engine.
+//!
+//! Never: decides what the robot does, calls anything a success, or attaches a thing to the hand by a constraint.
+
+mod contacts;
+mod convert;
+mod description;
+mod engine;
+mod error;
+mod fault;
+pub mod ik;
+mod kinematics;
+mod observe;
+mod recorder;
+mod robot;
+mod sense;
+mod settle;
+mod simulation;
+mod snapshot;
+
+pub use contacts::CONTACT_FLOOR_NEWTONS;
+pub use description::{Joint, JointKind};
+pub use error::WorldError;
+pub use fault::{Fault, Poison};
+pub use kinematics::{GRAVITY, Kinematics};
+pub use recorder::{Contact, Course, Record, Tracks};
+pub use robot::{Layout, check_robot};
+pub use sense::Sighting;
+pub use settle::Settling;
+pub use simulation::{Command, Observation, World, build};
+pub use snapshot::{BodyState, JointState, RobotState, Snapshot};

@@ -1,0 +1,130 @@
+//! The truth at one moment, with names.
+
+use std::collections::BTreeSet;
+
+use crate::base::Pose;
+use crate::scenario::Role;
+use crate::world::contacts::touches;
+use crate::world::convert::from_vector;
+use crate::world::engine::Owner;
+use crate::world::simulation::Object;
+use crate::world::{BodyState, RobotState, Snapshot, World};
+
+/// Share of a body's weight that a contact has to carry for the body to rest on it. Two supports share at least so much.
+const CARRIED_SHARE: f64 = 0.1;
+
+impl World {
+    /// All that is true now.
+    pub fn snapshot(&self) -> Snapshot {
+        let pairs = self.pairs();
+        let bodies = self.objects.iter().enumerate().map(|(idx, object)| self.body(idx, object, &pairs)).collect();
+        Snapshot { time_secs: self.time_secs(), bodies, robot: self.robot_state(&pairs) }
+    }
+
+    fn pairs(&self) -> Vec<Pair> {
+        touches(&self.engine)
+            .into_iter()
+            .map(|((first, second), touch)| Pair { first, second, lift_on_second_n: touch.force_n.z })
+            .collect()
+    }
+
+    fn body(&self, idx: usize, object: &Object, pairs: &[Pair]) -> BodyState {
+        let pose = self.pose_of(object);
+        let mut touching = BTreeSet::new();
+        let mut carriers = BTreeSet::new();
+        let enough = CARRIED_SHARE * object.mass_kg * crate::world::kinematics::GRAVITY;
+        for pair in pairs {
+            let (other, lift) = match (pair.first, pair.second) {
+                (other, Owner::Object(own)) if own == idx => (other, pair.lift_on_second_n),
+                (Owner::Object(own), other) if own == idx => (other, -pair.lift_on_second_n),
+                _ => continue,
+            };
+            let name = self.thing(other);
+            if lift > enough {
+                carriers.insert(name.clone());
+            }
+            touching.insert(name);
+        }
+        let (aabb_min, aabb_max) = self.aabb(object);
+        let body = self.engine.bodies.get(object.body);
+        let velocities = body.map(|body| {
+            let linear = from_vector(body.velocity_at_point(body.translation()));
+            (linear.into(), from_vector(body.angvel()).into())
+        });
+        let (linear_velocity, angular_velocity) = velocities.unwrap_or_default();
+        BodyState {
+            id: object.id.clone(),
+            model: object.model.name.clone(),
+            category: object.model.category.clone(),
+            fixed: object.role == Role::Platform,
+            pose: Pose::from_isometry(&pose),
+            linear_velocity,
+            angular_velocity,
+            aabb_min,
+            aabb_max,
+            mass_kg: object.mass_kg,
+            friction: object.friction,
+            restitution: object.restitution,
+            touches: touching.into_iter().collect(),
+            rests_on: carriers.into_iter().collect(),
+            asleep: body.is_some_and(rapier3d::prelude::RigidBody::is_sleeping),
+        }
+    }
+
+    /// The box around an object's shapes. Unit: metres. Frame: world.
+    pub(super) fn aabb(&self, object: &Object) -> ([f64; 3], [f64; 3]) {
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        let colliders = self.engine.bodies.get(object.body).map(rapier3d::prelude::RigidBody::colliders);
+        for handle in colliders.unwrap_or_default() {
+            let Some(collider) = self.engine.colliders.get(*handle) else { continue };
+            let aabb = collider.compute_aabb();
+            let (mins, maxs) = (aabb.mins.to_array(), aabb.maxs.to_array());
+            for axis in 0..3 {
+                low[axis] = low[axis].min(f64::from(mins[axis]));
+                high[axis] = high[axis].max(f64::from(maxs[axis]));
+            }
+        }
+        (low, high)
+    }
+
+    fn robot_state(&self, pairs: &[Pair]) -> RobotState {
+        let joints = self.robot.joint_states(&self.engine);
+        let positions: Vec<f64> = joints.iter().map(|joint| joint.position).collect();
+        let touched_by = |link: usize| -> Vec<String> {
+            let objects = pairs.iter().filter_map(|pair| match (pair.first, pair.second) {
+                (Owner::Object(idx), Owner::Link(own)) if own == link => Some(self.thing(Owner::Object(idx))),
+                _ => None,
+            });
+            let sorted: BTreeSet<String> = objects.collect();
+            sorted.into_iter().collect()
+        };
+        let base_true = self.base_true();
+        let [left, right] = self.robot.finger_links;
+        RobotState {
+            base_true,
+            base_believed: self.believed(base_true),
+            gripper: Pose::from_isometry(&self.robot.kinematics.grasp(&positions)),
+            gripper_opening_m: self.robot.layout.fingers.iter().map(|idx| positions[*idx]).sum(),
+            left_touches: touched_by(left),
+            right_touches: touched_by(right),
+            joints,
+        }
+    }
+
+    /// Name of a thing in snapshots: the robot is one thing.
+    fn thing(&self, owner: Owner) -> String {
+        match owner {
+            Owner::Link(_) => "robot".to_owned(),
+            other => self.name_of(other),
+        }
+    }
+}
+
+/// Two things that touch. Owners are in order: floor, objects, links.
+struct Pair {
+    first: Owner,
+    second: Owner,
+    /// Upward force that the first gives the second. Unit: newtons.
+    lift_on_second_n: f64,
+}

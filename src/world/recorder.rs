@@ -1,0 +1,259 @@
+//! What happened, tick by tick: digest, frames, contact episodes, extremes.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Vector3};
+use rapier3d::prelude::RigidBodyHandle;
+
+use crate::base::{Digest, Pose};
+use crate::world::World;
+use crate::world::contacts::touches;
+use crate::world::convert::{from_pose, from_vector};
+use crate::world::engine::Owner;
+
+/// Time between two frames. Unit: seconds. Pictures and replays need no more, and a trace stays small.
+const FRAME_SECS: f64 = 0.1;
+/// Gaps of a contact shorter than this are one contact. Unit: seconds.
+const SAME_CONTACT_SECS: f64 = 0.05;
+/// Positions in frames are whole multiples of this, which compresses. Unit: metres.
+const FRAME_GRAIN_M: f64 = 1e-4;
+/// The same for the components of quaternions.
+const FRAME_GRAIN_TURN: f64 = 2e-4;
+
+/// One uninterrupted contact. Times since the record began. Unit: seconds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contact {
+    /// The pair, sorted.
+    pub pair: [String; 2],
+    /// When it began.
+    pub start_secs: f64,
+    /// When it ended, or the record.
+    pub end_secs: f64,
+    /// Largest normal force. Unit: newtons.
+    pub max_force_n: f64,
+}
+
+/// What one object went through. See the fields of the same names in a trace.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    /// Id of the object.
+    pub id: String,
+    /// Largest angle from the vertical. Unit: radians.
+    pub max_tilt_rad: f64,
+    /// Largest speed of its origin. Unit: m/s.
+    pub max_speed: f64,
+    /// Largest height gained. Unit: metres.
+    pub max_rise_m: f64,
+    /// Largest distance from where it began. Unit: metres.
+    pub max_displacement_m: f64,
+}
+
+/// What was recorded since [`World::begin_record`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Contacts, by start and pair.
+    pub contacts: Vec<Contact>,
+    /// One for each object, in scene order.
+    pub courses: Vec<Course>,
+}
+
+/// Poses over time; see the fields of the same names in a trace.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tracks {
+    /// Unit: seconds.
+    pub period_secs: f64,
+    /// What has a track.
+    pub names: Vec<String>,
+    /// Shape: frames × (7 · names).
+    pub rows: Vec<Vec<f32>>,
+}
+
+/// An open contact: tick of its start and of its latest sight, and its largest force.
+#[derive(Debug, Clone, Copy)]
+struct Episode {
+    start: u64,
+    latest: u64,
+    max_force_n: f64,
+}
+
+/// The memory of a world.
+pub struct Recorder {
+    digest: Digest,
+    tick_secs: f64,
+    ticks_per_frame: u64,
+    n_ticks: u64,
+    began: u64,
+    tracked: Vec<(String, RigidBodyHandle)>,
+    rows: Vec<Vec<f32>>,
+    begin_poses: Vec<Isometry3<f64>>,
+    extremes: Vec<[f64; 4]>,
+    open: BTreeMap<(Owner, Owner), Episode>,
+    closed: Vec<((Owner, Owner), Episode)>,
+}
+
+impl Recorder {
+    /// An empty memory for `n_objects` objects and the named bodies.
+    pub fn new(n_objects: usize, tracked: Vec<(String, RigidBodyHandle)>, tick_secs: f64) -> Self {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a handful of ticks")]
+        let ticks_per_frame = (FRAME_SECS / tick_secs).round().max(1.0) as u64;
+        Self {
+            digest: Digest::new(),
+            tick_secs,
+            ticks_per_frame,
+            n_ticks: 0,
+            began: 0,
+            tracked,
+            rows: Vec::new(),
+            begin_poses: Vec::new(),
+            extremes: vec![[0.0; 4]; n_objects],
+            open: BTreeMap::new(),
+            closed: Vec::new(),
+        }
+    }
+}
+
+impl World {
+    /// Begins a record: contacts and extremes count from here, frames go on.
+    pub fn begin_record(&mut self) {
+        let poses = self.objects.iter().map(|object| self.pose_of(object)).collect();
+        let recorder = &mut self.recorder;
+        recorder.began = recorder.n_ticks;
+        recorder.begin_poses = poses;
+        recorder.extremes = vec![[0.0; 4]; self.objects.len()];
+        recorder.open.clear();
+        recorder.closed.clear();
+        if recorder.rows.is_empty() {
+            self.frame();
+        }
+    }
+
+    /// Ends a record and hands it out.
+    pub fn end_record(&mut self) -> Record {
+        let mut closed = std::mem::take(&mut self.recorder.closed);
+        closed.extend(std::mem::take(&mut self.recorder.open));
+        let (began, tick_secs) = (self.recorder.began, self.recorder.tick_secs);
+        let secs = |tick: u64| tick.saturating_sub(began) as f64 * tick_secs;
+        let mut contacts: Vec<Contact> = closed
+            .iter()
+            .map(|((first, second), episode)| {
+                let mut pair = [self.name_of(*first), self.name_of(*second)];
+                pair.sort();
+                // A contact is seen at the end of its tick.
+                let start_secs = secs(episode.start.saturating_sub(1));
+                Contact { pair, start_secs, end_secs: secs(episode.latest), max_force_n: episode.max_force_n }
+            })
+            .collect();
+        contacts.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs).then_with(|| a.pair.cmp(&b.pair)));
+        let courses = self.objects.iter().zip(&self.recorder.extremes);
+        let courses = courses
+            .map(|(object, [max_tilt_rad, max_speed, max_rise_m, max_displacement_m])| Course {
+                id: object.id.clone(),
+                max_tilt_rad: *max_tilt_rad,
+                max_speed: *max_speed,
+                max_rise_m: *max_rise_m,
+                max_displacement_m: *max_displacement_m,
+            })
+            .collect();
+        Record { contacts, courses }
+    }
+
+    /// The course of everything that moves since the first record began.
+    pub fn tracks(&self) -> Tracks {
+        Tracks {
+            period_secs: self.recorder.ticks_per_frame as f64 * self.recorder.tick_secs,
+            names: self.recorder.tracked.iter().map(|(name, _)| name.clone()).collect(),
+            rows: self.recorder.rows.clone(),
+        }
+    }
+
+    /// Digest over the bits of all states up to now.
+    pub fn state_digest(&self) -> String {
+        self.recorder.digest.clone().finish()
+    }
+
+    /// Name of a thing in contacts.
+    pub(super) fn name_of(&self, owner: Owner) -> String {
+        match owner {
+            Owner::Floor => "floor".to_owned(),
+            Owner::Object(idx) => self.objects.get(idx).map_or_else(String::new, |object| object.id.clone()),
+            Owner::Link(idx) => {
+                let link = self.robot.model.links.get(idx).map_or("", |link| link.name.as_str());
+                format!("robot/{link}")
+            }
+        }
+    }
+
+    /// Looks at the state after a tick.
+    pub(super) fn record(&mut self) {
+        self.recorder.n_ticks += 1;
+        self.digest_state();
+        let recording = !self.recorder.begin_poses.is_empty();
+        if recording {
+            self.record_extremes();
+            self.record_contacts();
+            if (self.recorder.n_ticks - self.recorder.began).is_multiple_of(self.recorder.ticks_per_frame) {
+                self.frame();
+            }
+        }
+    }
+
+    fn digest_state(&mut self) {
+        let handles = self.objects.iter().map(|object| object.body).chain(self.robot.bodies.iter().copied());
+        let mut bits: Vec<f32> = Vec::with_capacity(13 * (self.objects.len() + self.robot.bodies.len()));
+        for handle in handles {
+            let Some(body) = self.engine.bodies.get(handle) else { continue };
+            bits.extend(body.translation().to_array());
+            bits.extend(body.rotation().to_array());
+            bits.extend(body.linvel().to_array());
+            bits.extend(body.angvel().to_array());
+        }
+        self.recorder.digest.update_bits(&bits);
+    }
+
+    fn record_extremes(&mut self) {
+        for (idx, object) in self.objects.iter().enumerate() {
+            let Some(body) = self.engine.bodies.get(object.body) else { continue };
+            if body.is_fixed() {
+                continue;
+            }
+            let pose = from_pose(body.position());
+            let way: Vector3<f64> = pose.translation.vector - self.recorder.begin_poses[idx].translation.vector;
+            let speed = from_vector(body.velocity_at_point(body.translation())).norm();
+            let now = [Pose::from_isometry(&pose).tilt(), speed, way.z, way.norm()];
+            for (extreme, value) in self.recorder.extremes[idx].iter_mut().zip(now) {
+                *extreme = extreme.max(value);
+            }
+        }
+    }
+
+    fn record_contacts(&mut self) {
+        let now = self.recorder.n_ticks;
+        let patience = SAME_CONTACT_SECS / self.recorder.tick_secs;
+        for (pair, touch) in touches(&self.engine) {
+            let episode =
+                self.recorder.open.entry(pair).or_insert(Episode { start: now, latest: now, max_force_n: 0.0 });
+            if (now - episode.latest) as f64 > patience {
+                self.recorder.closed.push((pair, *episode));
+                *episode = Episode { start: now, latest: now, max_force_n: 0.0 };
+            }
+            episode.latest = now;
+            episode.max_force_n = episode.max_force_n.max(touch.normal_n);
+        }
+    }
+
+    fn frame(&mut self) {
+        let mut row = Vec::with_capacity(7 * self.recorder.tracked.len());
+        for (_, handle) in &self.recorder.tracked {
+            let Some(body) = self.engine.bodies.get(*handle) else { continue };
+            let Pose { position, rotation } = Pose::from_isometry(&from_pose(body.position()));
+            row.extend(position.map(|value| grain(value, FRAME_GRAIN_M)));
+            row.extend(rotation.map(|value| grain(value, FRAME_GRAIN_TURN)));
+        }
+        self.recorder.rows.push(row);
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "frames are kept in 32 bits")]
+fn grain(value: f64, grain: f64) -> f32 {
+    ((value / grain).round() * grain) as f32
+}

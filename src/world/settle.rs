@@ -1,0 +1,68 @@
+//! Letting a new scene come to rest.
+
+use crate::scenario::Role;
+use crate::world::World;
+use crate::world::convert::from_vector;
+
+/// Longest time that a scene gets. Unit: seconds. Objects fall a few millimetres; a rolling one needs no longer to show.
+const MOST_SECS: f64 = 3.0;
+/// Speed below which a body is at rest. Units: m/s, and rad/s tenfold.
+const REST_SPEED: f64 = 0.01;
+/// Time for which all have to be at rest. Unit: seconds.
+const REST_SECS: f64 = 0.25;
+/// Distance from where the scene put it beyond which an object has left its place. Unit: metres.
+const LEFT_M: f64 = 0.05;
+
+/// How a scene came to rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settling {
+    /// Whether everything came to rest in its place.
+    pub settled: bool,
+    /// Simulated time that it took. Unit: seconds.
+    pub secs: f64,
+    /// Ids of objects that still moved when time was up.
+    pub unsettled: Vec<String>,
+    /// Ids of objects that came to rest elsewhere than where the scene put them.
+    pub left: Vec<String>,
+}
+
+impl World {
+    /// Steps, with the robot holding its posture, until every object rests or time is up.
+    pub fn settle(&mut self) -> Settling {
+        let start = self.time_secs();
+        let mut rests_since = start;
+        while self.time_secs() - start < MOST_SECS && self.fault().is_none() {
+            self.tick();
+            if !self.moving().is_empty() {
+                rests_since = self.time_secs();
+            }
+            if self.time_secs() - rests_since >= REST_SECS {
+                break;
+            }
+        }
+        let unsettled = self.moving();
+        let left = self.left();
+        let settled = unsettled.is_empty() && left.is_empty() && self.fault().is_none();
+        Settling { settled, secs: self.time_secs() - start, unsettled, left }
+    }
+
+    fn moving(&self) -> Vec<String> {
+        let moves = |object: &&super::simulation::Object| {
+            self.engine.bodies.get(object.body).is_some_and(|body| {
+                !body.is_sleeping()
+                    && (from_vector(body.linvel()).norm() > REST_SPEED
+                        || from_vector(body.angvel()).norm() > 10.0 * REST_SPEED)
+            })
+        };
+        self.objects.iter().filter(|o| o.role != Role::Platform).filter(moves).map(|o| o.id.clone()).collect()
+    }
+
+    fn left(&self) -> Vec<String> {
+        let gone = |object: &&super::simulation::Object| {
+            let way = self.pose_of(object).translation.vector - object.placed.translation.vector;
+            // A NaN distance counts as gone.
+            !(way.norm() <= LEFT_M)
+        };
+        self.objects.iter().filter(gone).map(|o| o.id.clone()).collect()
+    }
+}

@@ -1,0 +1,316 @@
+//! A scene that steps: the robot acts by commands, physics does the rest.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+use rapier3d::prelude::{CoefficientCombineRule, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+
+use crate::base::Pose;
+use crate::config::{ObjectModel, RobotProfile, Sensing};
+use crate::scenario::{Role, Scene, SceneObject};
+use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
+use crate::world::engine::{Owner, add_floor, collider, engine};
+use crate::world::recorder::Recorder;
+use crate::world::robot::{Layout, Robot};
+use crate::world::{Fault, Kinematics, Poison, WorldError, fault};
+
+/// Control ticks in a second are as near to this as whole physics steps allow. A usual rate of arm controllers' inputs.
+const CONTROL_RATE_HZ: u32 = 60;
+/// A body slower than this may fall asleep. Unit: m/s of its farthest point.
+const SLEEP_SPEED: f32 = 0.02;
+/// Time below that speed until it does. Unit: seconds.
+const SLEEP_AFTER_SECS: f32 = 0.3;
+
+/// What the robot's controllers are told. Positions beyond limits are brought back to them; speeds are limited anyway.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Command {
+    /// Where each joint shall go, in the order of [`Kinematics::joints`]; the base's by its own belief of where it is.
+    /// Units: metres or radians. Finger joints go by `gripper_opening_m` instead.
+    pub positions: Vec<f64>,
+    /// Gap between the fingers. Unit: metres.
+    pub gripper_opening_m: f64,
+    /// Largest force of one finger. Unit: newtons.
+    pub grip_force_n: f64,
+}
+
+/// What the robot measures of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observation {
+    /// Simulated time since the scene was built. Unit: seconds.
+    pub time_secs: f64,
+    /// Joint positions, the base's by its own belief. Units: metres or radians.
+    pub positions: Vec<f64>,
+    /// Joint velocities.
+    pub velocities: Vec<f64>,
+    /// Gap between the fingers by their encoders. Unit: metres.
+    pub gripper_opening_m: f64,
+    /// Force that each finger's motor gives, left and right. Unit: newtons, positive closes.
+    pub finger_efforts_n: [f64; 2],
+}
+
+/// One object of the scene in the engine.
+pub(super) struct Object {
+    pub(super) id: String,
+    pub(super) model: Arc<ObjectModel>,
+    pub(super) role: Role,
+    pub(super) body: RigidBodyHandle,
+    pub(super) mass_kg: f64,
+    pub(super) friction: f64,
+    pub(super) restitution: f64,
+    /// Where the scene put it.
+    pub(super) placed: Isometry3<f64>,
+}
+
+/// A simulation of one scene. Each worker has one of its own.
+pub struct World {
+    pub(super) engine: PhysicsWorld,
+    pub(super) objects: Vec<Object>,
+    pub(super) robot: Robot,
+    pub(super) sensing: Sensing,
+    /// Where the base believes that it is, from where it is. Frame: world.
+    pub(super) believed_from_true: Isometry3<f64>,
+    pub(super) recorder: Recorder,
+    pub(super) fault: Option<Fault>,
+    n_steps: u64,
+    steps_per_tick: u32,
+    steps_per_second: u32,
+}
+
+/// Builds the simulation of a scene. Nothing has moved yet: see [`World::settle`].
+///
+/// # Errors
+/// [`WorldError`] where the robot's files or the rates of physics are unusable.
+pub fn build(scene: &Scene) -> Result<World, WorldError> {
+    let mut engine = engine(&scene.physics)?;
+    add_floor(&mut engine);
+    let robot = Robot::insert(&mut engine, &scene.robot)?;
+    let objects: Vec<Object> =
+        scene.objects.iter().enumerate().map(|(idx, object)| insert(&mut engine, idx, object)).collect();
+    let steps_per_second = scene.physics.steps_per_second;
+    let steps_per_tick = (steps_per_second / CONTROL_RATE_HZ).max(1);
+    let tick_secs = f64::from(steps_per_tick) / f64::from(steps_per_second);
+    let tracks = tracks(&objects, &robot);
+    Ok(World {
+        engine,
+        recorder: Recorder::new(objects.len(), tracks, tick_secs),
+        objects,
+        robot,
+        sensing: scene.sensing.clone(),
+        believed_from_true: Isometry3::identity(),
+        fault: None,
+        n_steps: 0,
+        steps_per_tick,
+        steps_per_second,
+    })
+}
+
+/// Adds one object with the shapes of its model.
+fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object {
+    let placed = object.pose.to_isometry();
+    let fixed = object.role == Role::Platform;
+    let builder = if fixed { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
+    let body = engine.insert_body(builder.pose(to_pose(&placed)));
+    if let Some(body) = engine.bodies.get_mut(body) {
+        let activation = body.activation_mut();
+        activation.normalized_linear_threshold = SLEEP_SPEED;
+        activation.time_until_sleep = SLEEP_AFTER_SECS;
+    }
+    let density = object.mass_kg / object.model.volume().max(1e-9);
+    for solid in object.model.solids() {
+        if let Some(collider) = collider(&solid, Owner::Object(idx), object.friction, object.restitution) {
+            let collider =
+                collider.density(to_real(density)).restitution_combine_rule(CoefficientCombineRule::Average);
+            engine.insert_collider(collider, Some(body));
+        }
+    }
+    Object {
+        id: object.id.clone(),
+        model: object.model.clone(),
+        role: object.role,
+        body,
+        mass_kg: object.mass_kg,
+        friction: object.friction,
+        restitution: object.restitution,
+        placed,
+    }
+}
+
+/// What moves, with its name in traces: objects, then links that can be seen.
+fn tracks(objects: &[Object], robot: &Robot) -> Vec<(String, RigidBodyHandle)> {
+    let objects = objects.iter().filter(|object| object.role != Role::Platform).map(|o| (o.id.clone(), o.body));
+    let links = robot.model.links.iter().zip(&robot.bodies).skip(1).filter(|(link, _)| !link.solids.is_empty());
+    objects.chain(links.map(|(link, body)| (format!("robot/{}", link.name), *body))).collect()
+}
+
+impl World {
+    /// Simulated time since the scene was built. Unit: seconds.
+    pub fn time_secs(&self) -> f64 {
+        self.n_steps as f64 / f64::from(self.steps_per_second)
+    }
+
+    /// Length of a control tick. Unit: seconds.
+    pub fn tick_secs(&self) -> f64 {
+        f64::from(self.steps_per_tick) / f64::from(self.steps_per_second)
+    }
+
+    /// What is wrong with simulation, if anything is. It stays wrong.
+    pub fn fault(&self) -> Option<&Fault> {
+        self.fault.as_ref()
+    }
+
+    /// The robot's geometry. Its root is the robot's own idea of the world's origin.
+    pub fn kinematics(&self) -> &Kinematics {
+        &self.robot.kinematics
+    }
+
+    /// Which of its joints are what.
+    pub fn layout(&self) -> &Layout {
+        &self.robot.layout
+    }
+
+    /// The profile that the robot was built from.
+    pub fn profile(&self) -> &RobotProfile {
+        &self.robot.profile
+    }
+
+    /// One control tick: the controllers take the command, physics takes its steps, the recorder looks.
+    ///
+    /// After a fault nothing moves any more.
+    pub fn step(&mut self, command: &Command) {
+        self.take(command);
+        self.tick();
+    }
+
+    /// One control tick with the commands as they were.
+    pub(super) fn tick(&mut self) {
+        if self.fault.is_some() {
+            return;
+        }
+        let holding = self.robot.kinematics.holding_efforts(&self.robot.state(&self.engine).0);
+        let dt = 1.0 / f64::from(self.steps_per_second);
+        for _ in 0..self.steps_per_tick {
+            self.robot.control(&mut self.engine, &holding, dt);
+            self.engine.step();
+            self.n_steps += 1;
+        }
+        self.fault = self.find_fault();
+        if self.fault.is_none() {
+            self.record();
+        }
+    }
+
+    /// What the robot measures of itself now.
+    pub fn observe(&self) -> Observation {
+        let (mut positions, velocities) = self.robot.state(&self.engine);
+        let gripper_opening_m = self.robot.layout.fingers.iter().map(|idx| positions[*idx]).sum();
+        if let Some(base) = self.robot.layout.base {
+            let believed = self.believed(base.map(|idx| positions[idx]));
+            for (idx, value) in base.into_iter().zip(believed) {
+                positions[idx] = value;
+            }
+        }
+        Observation {
+            time_secs: self.time_secs(),
+            positions,
+            velocities,
+            gripper_opening_m,
+            finger_efforts_n: self.robot.finger_efforts(&self.engine),
+        }
+    }
+
+    /// The command that keeps everything where its controllers want it now.
+    pub fn hold(&self) -> Command {
+        let observed = self.observe();
+        Command {
+            positions: observed.positions,
+            gripper_opening_m: observed.gripper_opening_m,
+            grip_force_n: self.robot.profile.grip_force_n,
+        }
+    }
+
+    /// Breaks the state of an object, for tests of what happens then. False if there is no such object.
+    pub fn poison(&mut self, id: &str, poison: Poison) -> bool {
+        let Some(object) = self.objects.iter().find(|object| object.id == id) else { return false };
+        let Some(body) = self.engine.bodies.get_mut(object.body) else { return false };
+        match poison {
+            Poison::NotFinite => body.set_linvel(to_vector(&Vector3::repeat(f64::NAN)), true),
+            Poison::Teleport(position) => body.set_translation(to_vector(&Vector3::from(position)), true),
+        }
+        true
+    }
+
+    fn take(&mut self, command: &Command) {
+        let n_joints = self.robot.model.joints.len();
+        for (idx, position) in command.positions.iter().enumerate().take(n_joints) {
+            let of_base = self.robot.layout.base.is_some_and(|base| base.contains(&idx));
+            if !of_base && !self.robot.layout.fingers.contains(&idx) {
+                self.robot.aim(idx, *position);
+            }
+        }
+        if let Some(base) = self.robot.layout.base
+            && base.iter().all(|idx| command.positions.get(*idx).is_some_and(|value| value.is_finite()))
+        {
+            let truly = self.truly(base.map(|idx| command.positions[idx]));
+            for (idx, value) in base.into_iter().zip(truly) {
+                self.robot.aim(idx, value);
+            }
+        }
+        for idx in self.robot.layout.fingers {
+            self.robot.aim(idx, command.gripper_opening_m / 2.0);
+        }
+        self.robot.limit_grip(command.grip_force_n);
+    }
+
+    /// A base pose as the robot believes it, from the true one. Headings keep counting beyond a full turn.
+    pub(super) fn believed(&self, base: [f64; 3]) -> [f64; 3] {
+        moved(&self.believed_from_true, base)
+    }
+
+    /// A true base pose, from the believed one.
+    fn truly(&self, base: [f64; 3]) -> [f64; 3] {
+        moved(&self.believed_from_true.inverse(), base)
+    }
+
+    /// True base pose: x, y, heading.
+    pub(super) fn base_true(&self) -> [f64; 3] {
+        match self.robot.layout.base {
+            Some(base) => {
+                let positions = self.robot.state(&self.engine).0;
+                base.map(|idx| positions[idx])
+            }
+            None => {
+                let pose = Pose::from_isometry(&self.robot.kinematics.links(&[])[0]);
+                [pose.position[0], pose.position[1], pose.yaw()]
+            }
+        }
+    }
+
+    fn find_fault(&self) -> Option<Fault> {
+        let objects = self.objects.iter().map(|object| (object.id.as_str(), object.body));
+        let links = self.robot.model.links.iter().zip(&self.robot.bodies).map(|(link, body)| (link.name.as_str(), *body));
+        let quarantined = self.engine.quarantine().bodies();
+        for (id, handle) in objects.chain(links) {
+            let Some(body) = self.engine.bodies.get(handle) else { continue };
+            let finite = body.position().is_finite() && body.linvel().is_finite() && body.angvel().is_finite();
+            if !finite || quarantined.contains(&handle) {
+                return Some(Fault::NotFinite(id.to_owned()));
+            }
+            let position = from_vector(body.translation());
+            let outside = position.xy().norm() > fault::WORLD_RADIUS_M || position.z < -fault::WORLD_DEPTH_M;
+            if outside || position.z > fault::WORLD_RADIUS_M {
+                return Some(Fault::LeftWorld { id: id.to_owned(), position: position.into() });
+            }
+        }
+        None
+    }
+
+    /// True pose of an object.
+    pub(super) fn pose_of(&self, object: &Object) -> Isometry3<f64> {
+        self.engine.bodies.get(object.body).map_or(object.placed, |body| from_pose(body.position()))
+    }
+}
+
+fn moved(by: &Isometry3<f64>, [x, y, heading]: [f64; 3]) -> [f64; 3] {
+    let point = by * nalgebra::Point3::new(x, y, 0.0);
+    [point.x, point.y, heading + Pose::from_isometry(by).yaw()]
+}
