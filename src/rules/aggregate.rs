@@ -1,0 +1,109 @@
+//! Groups of a body's matches to rows of a head.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Term, TermId};
+use crate::rules::builtins;
+use crate::rules::plan::operand_value;
+use crate::rules::program::{AggregateKind, Aggregation, Operand, Rule, Variable};
+use crate::rules::universe::Universe;
+use crate::rules::values::{Number, double_term};
+
+/// What of a match an aggregation looks at: the group, then each aggregate's input and distinct variables.
+pub(crate) fn projection(aggregation: &Aggregation) -> Vec<Operand> {
+    let inputs = aggregation.aggregates.iter().flat_map(|a| std::iter::once(&a.input).chain(&a.distinct));
+    aggregation.group.iter().chain(inputs).map(|variable| Operand::Variable(*variable)).collect()
+}
+
+/// The head rows of an aggregating rule. `matches`: rows of the projection.
+pub(crate) fn aggregate(
+    rule: &Rule,
+    aggregation: &Aggregation,
+    matches: &[TermId],
+    universe: &mut Universe<'_>,
+) -> Vec<TermId> {
+    let width = projection(aggregation).len();
+    let keys = aggregation.group.len();
+    let mut groups: BTreeMap<&[TermId], Vec<&[TermId]>> = BTreeMap::new();
+    for row in matches.chunks_exact(width.max(1)) {
+        groups.entry(&row[..keys]).or_default().push(&row[keys..]);
+    }
+    let mut out = Vec::new();
+    let mut binding = vec![0; rule.variables.len()];
+    for (key, rows) in groups {
+        bind(&mut binding, &aggregation.group, key);
+        if fill(aggregation, &rows, &mut binding, universe).is_some() {
+            out.extend(rule.head.args.iter().map(|arg| operand_value(*arg, &binding)));
+        }
+    }
+    out
+}
+
+fn bind(binding: &mut [TermId], variables: &[Variable], values: &[TermId]) {
+    for (variable, value) in variables.iter().zip(values) {
+        binding[*variable] = *value;
+    }
+}
+
+/// Computes the aggregates of a group and what depends on them.
+fn fill(
+    aggregation: &Aggregation,
+    rows: &[&[TermId]],
+    binding: &mut [TermId],
+    universe: &mut Universe<'_>,
+) -> Option<()> {
+    let mut start = 0;
+    for part in &aggregation.aggregates {
+        let end = start + 1 + part.distinct.len();
+        let distinct: BTreeSet<&[TermId]> = rows.iter().map(|row| &row[start..end]).collect();
+        let inputs = distinct.iter().map(|row| universe.term(row[0]));
+        let value = combine(part.kind, inputs)?;
+        binding[part.output] = universe.intern(value);
+        start = end;
+    }
+    for (variable, value) in &aggregation.after {
+        let value = value.value(binding, universe)?.into_owned();
+        binding[*variable] = universe.intern(value);
+    }
+    Some(())
+}
+
+/// The value of an aggregate; nothing where none of its inputs is a number that it needs.
+fn combine<'a>(kind: AggregateKind, inputs: impl Iterator<Item = &'a Term>) -> Option<Term> {
+    match kind {
+        AggregateKind::Count => Some(Term::Integer(i64::try_from(inputs.count()).ok()?)),
+        AggregateKind::Min => extreme(inputs, std::cmp::Ordering::is_lt),
+        AggregateKind::Max => extreme(inputs, std::cmp::Ordering::is_gt),
+        AggregateKind::Sum => sum(inputs),
+    }
+}
+
+fn extreme<'a>(inputs: impl Iterator<Item = &'a Term>, better: fn(std::cmp::Ordering) -> bool) -> Option<Term> {
+    let mut best: Option<&Term> = None;
+    for term in inputs.filter(|term| Number::of(term).is_some()) {
+        if best.is_none_or(|best| builtins::compare(term, best).is_some_and(better)) {
+            best = Some(term);
+        }
+    }
+    best.cloned()
+}
+
+/// Integers add up to an integer; a double among them makes a double. Doubles are added in order of size, so that
+/// the sum does not depend on the order in which tuples were found.
+fn sum<'a>(inputs: impl Iterator<Item = &'a Term>) -> Option<Term> {
+    let (mut whole, mut parts, mut any) = (0i64, Vec::new(), false);
+    for term in inputs {
+        match Number::of(term) {
+            Some(Number::Integer(value)) => whole = whole.checked_add(value)?,
+            Some(number) => parts.push(number.double()),
+            None => continue,
+        }
+        any = true;
+    }
+    if parts.is_empty() {
+        return any.then_some(Term::Integer(whole));
+    }
+    parts.sort_by(f64::total_cmp);
+    let total = parts.iter().sum::<f64>() + whole as f64;
+    total.is_finite().then(|| double_term(total))
+}

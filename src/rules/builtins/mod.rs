@@ -1,0 +1,15 @@
+//! The built-in functions of the rule language, by name.
+//!
+//! Never: knows a predicate, a rule or a fact; a function sees its arguments and nothing else.
+
+mod bits;
+mod geometry;
+mod numeric;
+mod table;
+mod text;
+mod types;
+
+pub(crate) use geometry::GEO3D;
+pub(crate) use numeric::{compare, equal};
+pub(crate) use table::{Builtin, Value, builtin, builtin_in_words, builtin_names};
+pub(crate) use text::compile_pattern;

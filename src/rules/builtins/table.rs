@@ -1,0 +1,142 @@
+//! Names of the built-ins, how many arguments they take, and where they are.
+
+use std::borrow::Cow;
+
+use crate::base::Term;
+use crate::rules::builtins::{bits, geometry, numeric, text, types};
+
+/// An argument or result: borrowed where it is an interned term.
+pub(crate) type Value<'a> = Cow<'a, Term>;
+
+/// A built-in function. It has no result (`None`) where its arguments are not of its domain.
+pub(crate) struct Builtin {
+    /// As it is written in messages.
+    pub(crate) name: &'static str,
+    /// Fewest arguments.
+    pub(crate) least: usize,
+    /// Most arguments.
+    pub(crate) most: usize,
+    /// The function.
+    pub(crate) apply: fn(&[Value<'_>]) -> Option<Term>,
+}
+
+impl std::fmt::Debug for Builtin {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+const MANY: usize = usize::MAX;
+
+const fn entry(name: &'static str, least: usize, most: usize, apply: fn(&[Value<'_>]) -> Option<Term>) -> Builtin {
+    Builtin { name, least, most, apply }
+}
+
+/// Every built-in. The first six have operators, too.
+static BUILTINS: [Builtin; 87] = [
+    entry("SUM", 1, MANY, numeric::sum),
+    entry("MINUS", 2, 2, numeric::minus),
+    entry("PRODUCT", 1, MANY, numeric::product),
+    entry("DIVISION", 2, 2, numeric::division),
+    entry("INVERSE", 1, 1, numeric::inverse),
+    entry("NEGATIVE", 1, 1, numeric::inverse),
+    entry("ABS", 1, 1, numeric::abs),
+    entry("SQRT", 1, 1, numeric::sqrt),
+    entry("POW", 2, 2, numeric::pow),
+    entry("LOG", 2, 2, numeric::log),
+    entry("SIN", 1, 1, numeric::sin),
+    entry("COS", 1, 1, numeric::cos),
+    entry("TAN", 1, 1, numeric::tan),
+    entry("ASIN", 1, 1, numeric::asin),
+    entry("ACOS", 1, 1, numeric::acos),
+    entry("ATAN2", 2, 2, numeric::atan2),
+    entry("ROUND", 1, 1, numeric::round),
+    entry("CEIL", 1, 1, numeric::ceil),
+    entry("FLOOR", 1, 1, numeric::floor),
+    entry("REM", 2, 2, numeric::rem),
+    entry("MIN", 1, MANY, numeric::min),
+    entry("MAX", 1, MANY, numeric::max),
+    entry("LUKA", 1, MANY, numeric::lukasiewicz),
+    entry("NUMGREATER", 2, 2, |a| numeric::ordered(a, |o| o.is_gt())),
+    entry("NUMGREATEREQ", 2, 2, |a| numeric::ordered(a, |o| o.is_ge())),
+    entry("NUMLESS", 2, 2, |a| numeric::ordered(a, |o| o.is_lt())),
+    entry("NUMLESSEQ", 2, 2, |a| numeric::ordered(a, |o| o.is_le())),
+    entry("EQUALITY", 2, 2, |a| Some(Term::Boolean(numeric::equal(&a[0], &a[1])))),
+    entry("UNEQUALITY", 2, 2, |a| Some(Term::Boolean(!numeric::equal(&a[0], &a[1])))),
+    entry("AND", 1, MANY, types::and),
+    entry("OR", 1, MANY, types::or),
+    entry("NOT", 1, 1, types::not),
+    entry("BITAND", 1, MANY, bits::and),
+    entry("BITOR", 1, MANY, bits::or),
+    entry("BITXOR", 1, MANY, bits::xor),
+    entry("BITSHL", 2, 2, bits::shl),
+    entry("BITSHR", 2, 2, bits::shr),
+    entry("BITSHRU", 2, 2, bits::shru),
+    entry("STR", 1, 1, types::str),
+    entry("FULLSTR", 1, 1, types::full_str),
+    entry("CONCAT", 1, MANY, text::concat),
+    entry("CONTAINS", 2, 2, text::contains),
+    entry("COMPARE", 2, 2, text::compare),
+    entry("SUBSTR", 2, 3, text::substr),
+    entry("STRLEN", 1, 1, text::strlen),
+    entry("STRREV", 1, 1, text::strrev),
+    entry("STRSTARTS", 2, 2, text::starts),
+    entry("STRENDS", 2, 2, text::ends),
+    entry("STRBEFORE", 2, 2, text::before),
+    entry("STRAFTER", 2, 2, text::after),
+    entry("REGEX", 2, 2, text::regex),
+    entry("LEVENSHTEIN", 2, 2, text::levenshtein),
+    entry("UCASE", 1, 1, text::ucase),
+    entry("LCASE", 1, 1, text::lcase),
+    entry("URIENCODE", 1, 1, text::uri_encode),
+    entry("URIDECODE", 1, 1, text::uri_decode),
+    entry("INT", 1, 1, types::int),
+    entry("DOUBLE", 1, 1, types::double),
+    entry("FLOAT", 1, 1, types::float),
+    entry("IRI", 1, 1, types::iri),
+    entry("DATATYPE", 1, 1, types::datatype),
+    entry("LANG", 1, 1, types::lang),
+    entry("STRLANG", 2, 2, types::str_lang),
+    entry("isNumeric", 1, 1, types::is_numeric),
+    entry("isInteger", 1, 1, types::is_integer),
+    entry("isFloat", 1, 1, types::is_float),
+    entry("isDouble", 1, 1, types::is_double),
+    entry("isString", 1, 1, types::is_string),
+    entry("isIri", 1, 1, types::is_iri),
+    entry("isNull", 1, 1, types::is_null),
+    entry("isBlank", 1, 1, types::is_null),
+    entry("isBoolean", 1, 1, types::is_boolean),
+    entry("isLiteral", 1, 1, types::is_literal),
+    entry("geo3d:distance", 6, 6, geometry::distance),
+    entry("geo3d:distance2d", 4, 4, geometry::distance2d),
+    entry("geo3d:norm", 3, 3, geometry::norm),
+    entry("geo3d:dot", 6, 6, geometry::dot),
+    entry("geo3d:angle", 6, 6, geometry::angle),
+    entry("geo3d:angleDifference", 2, 2, geometry::angle_difference),
+    entry("geo3d:rotation", 8, 8, geometry::rotation),
+    entry("geo3d:yaw", 4, 4, geometry::yaw),
+    entry("geo3d:tilt", 4, 4, geometry::tilt),
+    entry("geo3d:insideBox", 9, 9, geometry::inside_box),
+    entry("geo3d:boxDistance", 12, 12, geometry::box_distance),
+    entry("geo3d:boxesOverlap", 12, 12, geometry::boxes_overlap),
+    entry("geo3d:overlapArea", 8, 8, geometry::overlap_area),
+    entry("geo3d:degrees", 1, 1, geometry::degrees),
+];
+
+/// The built-in of a name, whatever the case of its letters; geometry by its full IRI.
+pub(crate) fn builtin(name: &str) -> Option<&'static Builtin> {
+    if let Some(local) = name.strip_prefix(geometry::GEO3D) {
+        return BUILTINS.iter().find(|b| b.name.strip_prefix("geo3d:") == Some(local));
+    }
+    BUILTINS.iter().find(|b| b.name.eq_ignore_ascii_case(name) && !b.name.contains(':'))
+}
+
+/// All names, for "did you mean".
+pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> + Clone {
+    BUILTINS.iter().map(|b| b.name)
+}
+
+/// The built-in of a name as [`builtin_names`] gives it.
+pub(crate) fn builtin_in_words(name: &str) -> Option<&'static Builtin> {
+    BUILTINS.iter().find(|b| b.name == name)
+}

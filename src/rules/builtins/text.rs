@@ -1,0 +1,152 @@
+//! Strings. Positions count characters from 1; a language tag is kept where it can be.
+
+use std::sync::Arc;
+
+use crate::base::Term;
+use crate::rules::builtins::Value;
+
+/// A pattern's compiled program is kept under this. Unit: bytes.
+const PATTERN_LIMIT: usize = 1 << 20;
+
+/// Text and language of a string.
+fn parts(term: &Term) -> Option<(&str, Option<&Arc<str>>)> {
+    match term {
+        Term::String(text) => Some((text, None)),
+        Term::LangString(text, tag) => Some((text, Some(tag))),
+        _ => None,
+    }
+}
+
+/// Two strings that may be compared: the second has no language, or the same.
+fn pair<'a>(args: &'a [Value<'_>]) -> Option<(&'a str, &'a str)> {
+    let (a, tag_a) = parts(&args[0])?;
+    let (b, tag_b) = parts(&args[1])?;
+    (tag_b.is_none() || tag_a == tag_b).then_some((a, b))
+}
+
+fn tagged(text: impl Into<Arc<str>>, tag: Option<&Arc<str>>) -> Term {
+    match tag {
+        Some(tag) => Term::LangString(text.into(), tag.clone()),
+        None => Term::String(text.into()),
+    }
+}
+
+fn map(args: &[Value<'_>], change: impl Fn(&str) -> String) -> Option<Term> {
+    let (text, tag) = parts(&args[0])?;
+    Some(tagged(change(text), tag))
+}
+
+fn count(number: usize) -> Term {
+    Term::Integer(i64::try_from(number).unwrap_or(i64::MAX))
+}
+
+pub(super) fn concat(args: &[Value<'_>]) -> Option<Term> {
+    let strings: Vec<_> = args.iter().map(|a| parts(a)).collect::<Option<_>>()?;
+    let first = strings.first()?.1;
+    let tag = if strings.iter().all(|(_, tag)| *tag == first) { first } else { None };
+    Some(tagged(strings.iter().map(|(text, _)| *text).collect::<String>(), tag))
+}
+
+pub(super) fn contains(args: &[Value<'_>]) -> Option<Term> {
+    pair(args).map(|(a, b)| Term::Boolean(a.contains(b)))
+}
+
+pub(super) fn starts(args: &[Value<'_>]) -> Option<Term> {
+    pair(args).map(|(a, b)| Term::Boolean(a.starts_with(b)))
+}
+
+pub(super) fn ends(args: &[Value<'_>]) -> Option<Term> {
+    pair(args).map(|(a, b)| Term::Boolean(a.ends_with(b)))
+}
+
+pub(super) fn compare(args: &[Value<'_>]) -> Option<Term> {
+    pair(args).map(|(a, b)| Term::Integer(a.cmp(b) as i64))
+}
+
+pub(super) fn before(args: &[Value<'_>]) -> Option<Term> {
+    let (a, b) = pair(args)?;
+    Some(match a.find(b) {
+        Some(at) => tagged(&a[..at], parts(&args[0])?.1),
+        None => Term::string(""),
+    })
+}
+
+pub(super) fn after(args: &[Value<'_>]) -> Option<Term> {
+    let (a, b) = pair(args)?;
+    Some(match a.find(b) {
+        Some(at) => tagged(&a[at + b.len()..], parts(&args[0])?.1),
+        None => Term::string(""),
+    })
+}
+
+pub(super) fn substr(args: &[Value<'_>]) -> Option<Term> {
+    let (text, tag) = parts(&args[0])?;
+    let Term::Integer(start) = *args[1].as_ref() else { return None };
+    let length = match args.get(2).map(AsRef::as_ref) {
+        Some(Term::Integer(length)) => usize::try_from(*length).ok()?,
+        Some(_) => return None,
+        None => usize::MAX,
+    };
+    let skipped = usize::try_from(start.max(1) - 1).ok()?;
+    let found: String = text.chars().skip(skipped).take(length).collect();
+    Some(tagged(found, tag))
+}
+
+pub(super) fn strlen(args: &[Value<'_>]) -> Option<Term> {
+    parts(&args[0]).map(|(text, _)| count(text.chars().count()))
+}
+
+pub(super) fn strrev(args: &[Value<'_>]) -> Option<Term> {
+    map(args, |text| text.chars().rev().collect())
+}
+
+pub(super) fn ucase(args: &[Value<'_>]) -> Option<Term> {
+    map(args, str::to_uppercase)
+}
+
+pub(super) fn lcase(args: &[Value<'_>]) -> Option<Term> {
+    map(args, str::to_lowercase)
+}
+
+pub(super) fn regex(args: &[Value<'_>]) -> Option<Term> {
+    let (text, pattern) = pair(args)?;
+    Some(Term::Boolean(compile_pattern(pattern).ok()?.is_match(text)))
+}
+
+/// A pattern, ready to match; matching takes time linear in the text.
+///
+/// # Errors
+/// Why it is no pattern.
+pub(crate) fn compile_pattern(pattern: &str) -> Result<regex::Regex, String> {
+    regex::RegexBuilder::new(pattern).size_limit(PATTERN_LIMIT).build().map_err(|error| {
+        error.to_string().lines().last().unwrap_or("it can't be read").trim_start_matches("error: ").to_owned()
+    })
+}
+
+pub(super) fn levenshtein(args: &[Value<'_>]) -> Option<Term> {
+    pair(args).map(|(a, b)| count(strsim::levenshtein(a, b)))
+}
+
+pub(super) fn uri_encode(args: &[Value<'_>]) -> Option<Term> {
+    map(args, |text| {
+        text.bytes()
+            .map(|byte| match byte {
+                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'~' => char::from(byte).to_string(),
+                _ => format!("%{byte:02X}"),
+            })
+            .collect()
+    })
+}
+
+pub(super) fn uri_decode(args: &[Value<'_>]) -> Option<Term> {
+    let (text, tag) = parts(&args[0])?;
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let Some((first, tail)) = rest.split_first() {
+        let escaped = (*first == b'%').then(|| tail.get(..2)).flatten();
+        let decoded = escaped.and_then(|hex| u8::from_str_radix(std::str::from_utf8(hex).ok()?, 16).ok());
+        bytes.push(decoded.unwrap_or(*first));
+        rest = if decoded.is_some() { &tail[2..] } else { tail };
+    }
+    String::from_utf8(bytes).ok().map(|text| tagged(text, tag))
+}

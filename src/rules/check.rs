@@ -1,0 +1,315 @@
+//! Syntax to checked rules: names, arities, safety, vocabulary, what a property must define.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, Terms, did_you_mean, names};
+use crate::ontology::Vocabulary;
+use crate::rules::builtins;
+use crate::rules::given::{GIVEN, VERDICT};
+use crate::rules::program::{MAX_ARITY, Predicate, Predicates, Program, Scope};
+use crate::rules::syntax::{AtomSyntax, LiteralSyntax, Statement, Syntax};
+use crate::rules::translate::translate;
+
+/// What a file is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Its predicates serve every rule.
+    Library,
+    /// It verifies a property; its predicates are its own.
+    Property(Scope),
+    /// A program of its own, without anything given.
+    Standalone,
+}
+
+impl Role {
+    /// Where this file's predicates are known.
+    pub(crate) fn scope(self) -> Scope {
+        match self {
+            Self::Library | Self::Standalone => 0,
+            Self::Property(scope) => scope,
+        }
+    }
+}
+
+/// What all files share while they are checked.
+pub(crate) struct Checking<'a> {
+    pub(crate) terms: &'a mut Terms,
+    pub(crate) predicates: Predicates,
+    pub(crate) vocabulary: Option<&'a Vocabulary>,
+    /// Whether a constant property counts as part of the predicate: not where a rule derives `state` for a variable property.
+    pub(crate) split: bool,
+    /// Properties that some library derives: known to all rules like the vocabulary's own.
+    pub(crate) derived_terms: BTreeSet<String>,
+    /// Where each predicate was first defined, and whether by a head (otherwise by an import or a use).
+    pub(crate) defined: BTreeMap<(Scope, String), Definition>,
+    pub(crate) diagnostics: Diagnostics,
+}
+
+/// First definition of a predicate.
+#[derive(Debug, Clone)]
+pub(crate) struct Definition {
+    pub(crate) arity: usize,
+    pub(crate) place: String,
+}
+
+/// The most that one file or one rule may hold: everything behind the parser stays fast and shallow.
+const RULE_LIMIT: usize = 20_000;
+const LITERAL_LIMIT: usize = 256;
+
+impl<'a> Checking<'a> {
+    pub(crate) fn new(terms: &'a mut Terms, vocabulary: Option<&'a Vocabulary>) -> Self {
+        Self {
+            terms,
+            predicates: Predicates::default(),
+            vocabulary,
+            split: true,
+            derived_terms: BTreeSet::new(),
+            defined: BTreeMap::new(),
+            diagnostics: Diagnostics::new(),
+        }
+    }
+
+    pub(crate) fn error(
+        &mut self,
+        code: &'static str,
+        source: &Source,
+        span: &Span,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) {
+        self.diagnostics.push(Diagnostic::error(code, message).at(source, span.clone()).help(help));
+    }
+
+    pub(crate) fn warning(
+        &mut self,
+        code: &'static str,
+        source: &Source,
+        span: &Span,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) {
+        self.diagnostics.push(Diagnostic::warning(code, message).at(source, span.clone()).help(help));
+    }
+
+    /// First pass: which predicates the heads of a file define.
+    pub(crate) fn define(&mut self, syntax: &Syntax, role: Role) {
+        let source = &syntax.source;
+        let mut rules = 0;
+        for statement in &syntax.statements {
+            match statement {
+                Statement::Rule(rule) => {
+                    rules += 1;
+                    if rules == RULE_LIMIT + 1 && role != Role::Standalone {
+                        let help = "keep tables of facts outside rule files";
+                        self.error("R006", source, &rule.span, format!("more than {RULE_LIMIT} rules in one file"), help);
+                    }
+                    if rule.body.len() > LITERAL_LIMIT {
+                        let message = format!("rule with more than {LITERAL_LIMIT} conditions");
+                        self.error("R006", source, &rule.span, message, "split it into several rules");
+                    }
+                    for head in &rule.heads {
+                        self.define_head(source, head, role);
+                    }
+                }
+                Statement::Transfer(transfer) if role != Role::Standalone => {
+                    let word = if transfer.import { "@import" } else { "@export" };
+                    let help = "facts come from the run; `actcheck datalog` runs programs with imports and exports";
+                    let message = format!("`{word}` is not possible in the rules of a property");
+                    self.error("R030", source, &transfer.span, message, help);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn define_head(&mut self, source: &Source, head: &AtomSyntax, role: Role) {
+        let name = head.predicate.as_str();
+        if role != Role::Standalone && GIVEN.iter().any(|(given, ..)| *given == name) {
+            return self.define_given(source, head, role);
+        }
+        if role == Role::Library && VERDICT.iter().any(|(verdict, _)| *verdict == name) {
+            let help = "define it in the file of one property, which `act:verifiedBy` links";
+            return self.error("R034", source, &head.name_span, format!("a library can't define `{name}`"), help);
+        }
+        if role != Role::Standalone && builtins::builtin(name).is_some() {
+            let help = "choose another name";
+            return self.error("R038", source, &head.name_span, format!("`{name}` is a built-in function"), help);
+        }
+        let elsewhere = self.defined.get(&(0, name.to_owned())).filter(|_| role.scope() != 0);
+        if let Some(definition) = elsewhere {
+            let message = format!("`{name}` is defined by a library already ({})", definition.place);
+            return self.error("R038", source, &head.name_span, message, "choose another name, or use the library's");
+        }
+        self.define_predicate(source, name, head.args.len(), &head.span, role);
+    }
+
+    /// Notes a predicate with its arity.
+    pub(crate) fn define_predicate(&mut self, source: &Source, name: &str, arity: usize, span: &Span, role: Role) {
+        let key = (role.scope(), name.to_owned());
+        if let Some(known) = self.defined.get(&key) {
+            if known.arity != arity {
+                let message = format!("`{name}` has {arity} arguments here and {} in {}", known.arity, known.place);
+                self.error("R022", source, span, message, "give it the same number everywhere, or another name");
+            }
+            return;
+        }
+        if arity > MAX_ARITY {
+            let help = "split the tuple over several predicates that share a key";
+            return self.error("R024", source, span, format!("`{name}` has more than {MAX_ARITY} arguments"), help);
+        }
+        let (line, _) = source.line_and_column(span.start);
+        self.defined.insert(key, Definition { arity, place: format!("{}:{line}", source.name) });
+        self.predicates.add(Predicate {
+            name: name.to_owned(),
+            scope: role.scope(),
+            property: None,
+            arity,
+            width: arity.max(1),
+            given: false,
+        });
+    }
+
+    /// A head that adds to the snapshots.
+    fn define_given(&mut self, source: &Source, head: &AtomSyntax, role: Role) {
+        let name = head.predicate.as_str();
+        let addable = matches!(name, "state" | "before" | "after" | "during");
+        if !addable || role != Role::Library {
+            let (message, help) = if addable {
+                (
+                    format!("only a library may derive `{name}`"),
+                    "put this rule in a file that the ontology names with `act:ruleLibrary`, or derive a predicate of your own",
+                )
+            } else {
+                (format!("`{name}` is given and can't be derived"), "derive a predicate of your own")
+            };
+            return self.error("R031", source, &head.name_span, message, help);
+        }
+        let place = if name == "state" { 2 } else { 1 };
+        match head.args.get(place).map(|arg| &arg.kind) {
+            Some(crate::rules::syntax::ExpressionKind::Constant(Term::Iri(iri))) => {
+                self.derived_terms.insert(iri.to_string());
+            }
+            Some(_) => self.split = false,
+            None => {}
+        }
+    }
+
+    /// Second pass: the rules of a file, checked.
+    pub(crate) fn rules(&mut self, syntax: &Syntax, role: Role) -> Program {
+        let program = translate(self, syntax, role);
+        if let Role::Property(scope) = role {
+            self.verdict(syntax, scope);
+        }
+        program
+    }
+
+    /// A property's file says what success is, in one of two ways.
+    fn verdict(&mut self, syntax: &Syntax, scope: Scope) {
+        let has = |name: &str| self.defined.contains_key(&(scope, name.to_owned()));
+        let (success, violation) = (has("success"), has("violation"));
+        let source = &syntax.source;
+        if success && violation {
+            let help = "keep one: `success` for \"there is\", `violation` for \"for all\"";
+            let span = place_of(syntax, "violation");
+            self.error("R025", source, &span, "the file defines both `success` and `violation`", help);
+        } else if !success && !violation {
+            let own: Vec<String> =
+                self.defined.keys().filter(|(known, _)| *known == scope).map(|(_, name)| name.clone()).collect();
+            let near = own.iter().find(|name| {
+                crate::base::nearest(name, ["success", "violation"]).is_some()
+            });
+            let help = match near {
+                Some(name) => format!(
+                    "`{name}` is none of them: {}",
+                    did_you_mean(name, ["success", "violation"])
+                ),
+                None => "add a rule such as `success(?o) :- parameter(act:pickObject, ?o), … .`".to_owned(),
+            };
+            self.diagnostics.push(
+                Diagnostic::error("R026", "the file defines neither `success` nor `violation`").in_source(source).help(help),
+            );
+        }
+        for (name, columns) in [("margin", 1), ("because", 1)] {
+            if let Some(definition) = self.defined.get(&(scope, name.to_owned()))
+                && definition.arity != columns
+            {
+                let message = format!("`{name}` has {} arguments, needs one", definition.arity);
+                let help = format!("write `{name}(?value) :- … .`");
+                self.error("R022", source, &place_of(syntax, name), message, help);
+            }
+        }
+    }
+
+    /// An IRI of a namespace that the ontology describes must be one that it describes.
+    pub(crate) fn vocabulary(&mut self, source: &Source, iri: &str, span: &Span, as_property: bool) {
+        let Some(vocabulary) = self.vocabulary else { return };
+        if self.derived_terms.contains(iri) || is_phase(iri) {
+            return;
+        }
+        match vocabulary.terms.get(iri) {
+            Some(term) if as_property && !term.is_property => {
+                let help = "a property stands between subject and object, such as `w:mass`";
+                let message = format!("`{}` is no property", names::shorten(iri));
+                self.error("R029", source, span, message, help);
+            }
+            Some(_) => {}
+            None => {
+                let Some(namespace) = [names::W, names::ACT].into_iter().find(|n| iri.starts_with(n)) else { return };
+                let locals: Vec<&str> = vocabulary
+                    .terms
+                    .iter()
+                    .filter(|(_, term)| !as_property || term.is_property)
+                    .filter_map(|(known, _)| known.strip_prefix(namespace))
+                    .chain(self.derived_terms.iter().filter_map(|known| known.strip_prefix(namespace)))
+                    .collect();
+                let local = &iri[namespace.len()..];
+                let help = match crate::base::nearest(local, locals.iter().copied()) {
+                    Some(found) => format!("did you mean `{}`?", names::shorten(&format!("{namespace}{found}"))),
+                    None => "describe it in the ontology, or derive it in a library".to_owned(),
+                };
+                let message = format!("the ontology has no term `{}`", names::shorten(iri));
+                self.error("R028", source, span, message, help);
+            }
+        }
+    }
+
+    /// Names that an atom may have in a file, for "did you mean".
+    pub(crate) fn known_names(&self, role: Role) -> Vec<String> {
+        let own = self.defined.keys().filter(|(scope, _)| *scope == 0 || *scope == role.scope()).map(|(_, name)| name.clone());
+        let given = GIVEN.iter().filter(|_| role != Role::Standalone).map(|(name, ..)| (*name).to_owned());
+        own.chain(given).collect()
+    }
+}
+
+/// The graphs of an action are named by terms that need no description.
+fn is_phase(iri: &str) -> bool {
+    iri.strip_prefix(names::ACT)
+        .is_some_and(|local| matches!(local, "before" | "after" | "during" | "parameters" | "ontology"))
+}
+
+/// The first head with a name, or the start of the file.
+fn place_of(syntax: &Syntax, name: &str) -> Span {
+    syntax
+        .statements
+        .iter()
+        .find_map(|statement| match statement {
+            Statement::Rule(rule) => rule.heads.iter().find(|head| head.predicate == name).map(|head| head.span.clone()),
+            _ => None,
+        })
+        .unwrap_or(0..0)
+}
+
+/// Predicates that the bodies of a file use.
+pub(crate) fn used_names(syntax: &Syntax) -> BTreeSet<&str> {
+    let mut used = BTreeSet::new();
+    for statement in &syntax.statements {
+        if let Statement::Rule(rule) = statement {
+            for literal in &rule.body {
+                if let LiteralSyntax::Atom(atom) | LiteralSyntax::Negated(atom) = literal {
+                    used.insert(atom.predicate.as_str());
+                }
+            }
+        }
+    }
+    used
+}

@@ -1,0 +1,217 @@
+//! One action's facts as a SPARQL dataset: sorted numbers, looked up in place, nothing copied from the ontology.
+
+use std::cell::Cell;
+use std::time::Instant;
+
+use oxigraph::model::{BlankNode, Literal, NamedNode, Term as RdfTerm};
+use spareval::{InternalQuad, QueryableDataset};
+
+use crate::base::{Term, TermId, Terms, names};
+use crate::rules::universe::Universe;
+use crate::rules::values;
+
+/// Statements in the two orders that lookups need.
+#[derive(Debug, Default)]
+pub(crate) struct Graph {
+    by_subject: Vec<[TermId; 3]>,
+    /// Property, object, subject.
+    by_property: Vec<[TermId; 3]>,
+}
+
+impl Graph {
+    pub(crate) fn new(mut triples: Vec<[TermId; 3]>) -> Self {
+        triples.sort_unstable();
+        triples.dedup();
+        let mut by_property: Vec<[TermId; 3]> = triples.iter().map(|[s, p, o]| [*p, *o, *s]).collect();
+        by_property.sort_unstable();
+        Self { by_subject: triples, by_property }
+    }
+
+    /// Statements with the given parts.
+    fn find(&self, s: Option<TermId>, p: Option<TermId>, o: Option<TermId>) -> Vec<[TermId; 3]> {
+        let fits = |[a, b, c]: &[TermId; 3]| {
+            s.is_none_or(|s| s == *a) && p.is_none_or(|p| p == *b) && o.is_none_or(|o| o == *c)
+        };
+        match (s, p) {
+            (Some(s), _) => range(&self.by_subject, s, p).iter().filter(|t| fits(t)).copied().collect(),
+            (None, Some(p)) => {
+                range(&self.by_property, p, o).iter().map(|[p, o, s]| [*s, *p, *o]).filter(fits).collect()
+            }
+            (None, None) => self.by_subject.iter().filter(|t| fits(t)).copied().collect(),
+        }
+    }
+}
+
+/// Rows that begin with one or two numbers.
+fn range(rows: &[[TermId; 3]], first: TermId, second: Option<TermId>) -> &[[TermId; 3]] {
+    let key = |row: &[TermId; 3]| (row[0], second.map_or(0, |_| row[1]));
+    let wanted = (first, second.unwrap_or(0));
+    let start = rows.partition_point(|row| key(row) < wanted);
+    let length = rows[start..].partition_point(|row| key(row) <= wanted);
+    &rows[start..start + length]
+}
+
+/// The named graphs of one action. The default graph is all of them together.
+#[derive(Debug)]
+pub(crate) struct Snapshot {
+    /// Name and statements.
+    pub(crate) graphs: Vec<(TermId, Graph)>,
+}
+
+/// What never changes: the ontology's statements and the name of their graph.
+#[derive(Debug)]
+pub(crate) struct Statements {
+    pub(crate) name: TermId,
+    pub(crate) graph: Graph,
+    /// Name of the graph of designators.
+    pub(crate) parameters: TermId,
+    /// Property between a designator and its value.
+    pub(crate) value: TermId,
+}
+
+impl Statements {
+    pub(crate) fn new(triples: &[[TermId; 3]], terms: &mut Terms) -> Self {
+        Self {
+            name: terms.intern(Term::iri(names::act("ontology"))),
+            graph: Graph::new(triples.to_vec()),
+            parameters: terms.intern(Term::iri(names::act("parameters"))),
+            value: terms.intern(Term::iri(names::act("value"))),
+        }
+    }
+}
+
+/// A view of both, with a time after which it gives nothing more.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'a> {
+    pub(crate) snapshot: &'a Snapshot,
+    pub(crate) statements: &'a Statements,
+    pub(crate) universe: &'a Universe<'a>,
+    pub(crate) deadline: Option<Instant>,
+    pub(crate) lookups: &'a Cell<usize>,
+}
+
+/// The query took too long.
+#[derive(Debug, thiserror::Error)]
+#[error("the query took too long")]
+pub(crate) struct TimeSpent;
+
+/// A term of the dataset by its number, or one that the query made.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) enum ViewTerm {
+    Known(TermId),
+    Made(RdfTerm),
+}
+
+impl ViewTerm {
+    /// The number, where a pattern can match at all.
+    fn id(&self) -> Option<TermId> {
+        match self {
+            Self::Known(id) => Some(*id),
+            Self::Made(_) => None,
+        }
+    }
+}
+
+/// Lookups between two looks at the clock.
+const LOOKUPS_PER_LOOK: usize = 256;
+
+impl<'a> View<'a> {
+    fn graphs(&self) -> impl Iterator<Item = (TermId, &'a Graph)> + use<'a> {
+        let statements = self.statements;
+        self.snapshot.graphs.iter().map(|(name, graph)| (*name, graph)).chain([(statements.name, &statements.graph)])
+    }
+
+    fn look(&self) -> Result<(), TimeSpent> {
+        let count = self.lookups.get() + 1;
+        self.lookups.set(count);
+        match self.deadline {
+            Some(deadline) if count.is_multiple_of(LOOKUPS_PER_LOOK) && Instant::now() > deadline => Err(TimeSpent),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl<'a> QueryableDataset<'a> for View<'a> {
+    type InternalTerm = ViewTerm;
+    type Error = TimeSpent;
+
+    fn internal_quads_for_pattern(
+        &self,
+        subject: Option<&ViewTerm>,
+        predicate: Option<&ViewTerm>,
+        object: Option<&ViewTerm>,
+        graph_name: Option<Option<&ViewTerm>>,
+    ) -> impl Iterator<Item = Result<InternalQuad<ViewTerm>, TimeSpent>> + use<'a> {
+        let mut found = Vec::new();
+        if let Err(spent) = self.look() {
+            found.push(Err(spent));
+            return found.into_iter();
+        }
+        let parts = [subject, predicate, object];
+        if parts.iter().flatten().all(|term| term.id().is_some()) {
+            let [s, p, o] = parts.map(|part| part.and_then(ViewTerm::id));
+            for (name, graph) in self.graphs() {
+                let named = match graph_name {
+                    None => true,
+                    Some(None) => false,
+                    Some(Some(wanted)) if wanted.id() == Some(name) => true,
+                    Some(Some(_)) => continue,
+                };
+                found.extend(graph.find(s, p, o).into_iter().map(|[s, p, o]| {
+                    let [subject, predicate, object] = [s, p, o].map(ViewTerm::Known);
+                    Ok(InternalQuad { subject, predicate, object, graph_name: named.then_some(ViewTerm::Known(name)) })
+                }));
+            }
+        }
+        found.into_iter()
+    }
+
+    fn internal_named_graphs(&self) -> impl Iterator<Item = Result<ViewTerm, TimeSpent>> + use<'a> {
+        self.graphs().map(|(name, _)| Ok(ViewTerm::Known(name)))
+    }
+
+    fn contains_internal_graph_name(&self, graph_name: &ViewTerm) -> Result<bool, TimeSpent> {
+        Ok(self.graphs().any(|(name, _)| graph_name.id() == Some(name)))
+    }
+
+    fn internalize_term(&self, term: RdfTerm) -> Result<ViewTerm, TimeSpent> {
+        Ok(self.universe.id(&from_rdf(&term)).map_or(ViewTerm::Made(term), ViewTerm::Known))
+    }
+
+    fn externalize_term(&self, term: ViewTerm) -> Result<RdfTerm, TimeSpent> {
+        Ok(match term {
+            ViewTerm::Known(id) => to_rdf(self.universe.term(id)),
+            ViewTerm::Made(term) => term,
+        })
+    }
+}
+
+/// oxigraph's form of a term.
+pub(crate) fn to_rdf(term: &Term) -> RdfTerm {
+    let iri = |iri: &str| NamedNode::new_unchecked(iri);
+    match term {
+        Term::Iri(text) => iri(text).into(),
+        Term::Blank(label) => BlankNode::new_unchecked(label.as_ref()).into(),
+        Term::String(text) => Literal::new_simple_literal(text.as_ref()).into(),
+        Term::LangString(text, tag) => Literal::new_language_tagged_literal_unchecked(text.as_ref(), tag.as_ref()).into(),
+        Term::Integer(value) => Literal::from(*value).into(),
+        Term::Double(value) => Literal::from(*value).into(),
+        Term::Boolean(value) => Literal::from(*value).into(),
+        Term::Decimal(text) => {
+            Literal::new_typed_literal(text.as_ref(), iri(&format!("{}decimal", names::XSD))).into()
+        }
+        Term::Literal(text, datatype) => Literal::new_typed_literal(text.as_ref(), iri(datatype)).into(),
+    }
+}
+
+/// Our form of one of oxigraph's terms.
+pub(crate) fn from_rdf(term: &RdfTerm) -> Term {
+    match term {
+        RdfTerm::NamedNode(node) => Term::iri(node.as_str()),
+        RdfTerm::BlankNode(node) => Term::Blank(node.as_str().into()),
+        RdfTerm::Literal(literal) => match literal.language() {
+            Some(tag) => Term::LangString(literal.value().into(), tag.into()),
+            None => values::literal(literal.value(), literal.datatype().as_str()),
+        },
+    }
+}

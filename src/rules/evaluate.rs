@@ -1,0 +1,300 @@
+//! Semi-naive evaluation, stratum by stratum, on datafrog relations.
+
+use crate::base::TermId;
+use crate::rules::aggregate::{aggregate, projection};
+use crate::rules::join::{Join, Sink};
+use crate::rules::meter::{Meter, Stop};
+use crate::rules::plan::{Indexes, Op, RulePlan, Sizes, Variant, plan_rule};
+use crate::rules::program::{PredicateId, Predicates, Program, Rule};
+use crate::rules::relation::{Batch, Finished, Growing, finished, growing};
+use crate::rules::stratify::Stratum;
+use crate::rules::universe::Universe;
+
+/// Finished tuples by predicate.
+#[derive(Default)]
+pub(crate) struct Tables {
+    list: Vec<Option<Box<dyn Finished>>>,
+}
+
+impl Tables {
+    pub(crate) fn new(predicates: usize) -> Self {
+        let mut list = Vec::new();
+        list.resize_with(predicates, || None);
+        Self { list }
+    }
+
+    pub(crate) fn get(&self, predicate: PredicateId) -> Option<&dyn Finished> {
+        self.list.get(predicate)?.as_deref()
+    }
+
+    pub(crate) fn set(&mut self, predicate: PredicateId, table: Box<dyn Finished>) {
+        if self.list.len() <= predicate {
+            self.list.resize_with(predicate + 1, || None);
+        }
+        self.list[predicate] = Some(table);
+    }
+}
+
+/// Finished tuples in layers: what is not in the own tables is looked up in those below.
+pub(crate) struct Layers<'a> {
+    pub(crate) own: Tables,
+    /// The nearest first.
+    pub(crate) below: Vec<&'a Tables>,
+}
+
+impl Layers<'_> {
+    pub(crate) fn get(&self, predicate: PredicateId) -> Option<&dyn Finished> {
+        self.own.get(predicate).or_else(|| self.below.iter().find_map(|tables| tables.get(predicate)))
+    }
+
+    /// The rows of a predicate, sorted; none where it has no tuples.
+    pub(crate) fn rows(&self, predicate: PredicateId) -> &[TermId] {
+        self.get(predicate).map_or(&[], |table| table.index(0))
+    }
+}
+
+/// A checked program with its strata and the plan of each rule.
+#[derive(Debug, Clone)]
+pub(crate) struct Planned {
+    pub(crate) rules: Vec<Rule>,
+    pub(crate) strata: Vec<Stratum>,
+    /// Facts of the text: rows by predicate.
+    pub(crate) facts: Vec<(PredicateId, Vec<TermId>)>,
+    plans: Vec<Option<RulePlan>>,
+}
+
+impl Planned {
+    /// Plans every rule of a stratified program.
+    pub(crate) fn new(program: Program, strata: Vec<Stratum>, indexes: &mut Indexes, sizes: Sizes<'_>) -> Self {
+        let mut plans: Vec<Option<RulePlan>> = vec![None; program.rules.len()];
+        for stratum in &strata {
+            for rule in &stratum.rules {
+                plans[*rule] = Some(plan_rule(&program.rules[*rule], stratum, indexes, sizes));
+            }
+        }
+        let facts = program.facts.into_iter().map(|(predicate, row, _)| (predicate, row)).collect();
+        Self { rules: program.rules, strata, facts, plans }
+    }
+}
+
+/// Why and where an evaluation stopped.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stopped {
+    pub(crate) stop: Stop,
+    /// Index of the rule, where it was one's doing.
+    pub(crate) rule: Option<usize>,
+}
+
+/// Evaluates a program over what is in the layers; its results go to the layers' own tables.
+pub(crate) fn evaluate(
+    planned: &Planned,
+    predicates: &Predicates,
+    indexes: &Indexes,
+    layers: &mut Layers<'_>,
+    universe: &mut Universe<'_>,
+    meter: &mut Meter,
+) -> Result<(), Stopped> {
+    let mut run = Run { planned, predicates, indexes, universe, meter };
+    run.facts(layers);
+    for stratum in &planned.strata {
+        run.meter.look().map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
+        if stratum.recursive {
+            run.recursive(stratum, layers)?;
+        } else {
+            run.once(stratum, layers)?;
+        }
+    }
+    Ok(())
+}
+
+struct Run<'a, 'u, 't> {
+    planned: &'a Planned,
+    predicates: &'a Predicates,
+    indexes: &'a Indexes,
+    universe: &'u mut Universe<'t>,
+    meter: &'u mut Meter,
+}
+
+/// The growing tuples of a stratum, in the order of its predicates.
+type Grown = Vec<Box<dyn Growing>>;
+
+impl Run<'_, '_, '_> {
+    /// Facts of the text join what is there already.
+    fn facts(&mut self, layers: &mut Layers<'_>) {
+        let mut facts = self.planned.facts.as_slice();
+        while let Some((predicate, _)) = facts.first() {
+            let count = facts.iter().take_while(|(other, _)| other == predicate).count();
+            let mut rows = layers.rows(*predicate).to_vec();
+            rows.extend(facts[..count].iter().flat_map(|(_, row)| row));
+            self.finish(*predicate, rows, layers);
+            facts = &facts[count..];
+        }
+    }
+
+    fn finish(&self, predicate: PredicateId, rows: Vec<TermId>, layers: &mut Layers<'_>) {
+        let width = self.predicates.get(predicate).width;
+        layers.own.set(predicate, finished(width, rows, self.indexes.of(predicate).clone()));
+    }
+
+    /// A stratum that does not read itself: each rule once.
+    fn once(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
+        let Some(predicate) = stratum.predicates.first().copied() else { return Ok(()) };
+        let mut rows = layers.rows(predicate).to_vec();
+        for rule in &stratum.rules {
+            let stopped = |stop| Stopped { stop, rule: Some(*rule) };
+            let Some(plan) = &self.planned.plans[*rule] else { continue };
+            for variant in &plan.variants {
+                let made = self.variant(*rule, variant, layers, None, &mut |_, _| Ok(())).map_err(stopped)?;
+                self.meter.derived(made.len() / self.predicates.get(predicate).width).map_err(stopped)?;
+                rows.extend(made);
+            }
+        }
+        self.finish(predicate, rows, layers);
+        Ok(())
+    }
+
+    /// A stratum that reads itself: rounds, each with what the one before found.
+    fn recursive(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
+        let mut grown = self.grow(stratum, layers);
+        for rule in &stratum.rules {
+            self.insert_all(*rule, false, stratum, layers, &grown)?;
+        }
+        loop {
+            let mut changed = false;
+            for growing in &mut grown {
+                changed |= growing.changed();
+            }
+            if !changed {
+                break;
+            }
+            let found = grown.iter().map(|growing| growing.recent_len()).sum();
+            let culprit = || stratum.rules.iter().copied().find(|rule| self.is_recursive(*rule));
+            let rule = culprit();
+            self.meter.derived(found).map_err(|stop| Stopped { stop, rule })?;
+            self.meter.look().map_err(|stop| Stopped { stop, rule })?;
+            for rule in &stratum.rules {
+                self.insert_all(*rule, true, stratum, layers, &grown)?;
+            }
+        }
+        for (predicate, growing) in stratum.predicates.iter().zip(grown) {
+            layers.own.set(*predicate, growing.complete());
+        }
+        Ok(())
+    }
+
+    fn is_recursive(&self, rule: usize) -> bool {
+        self.planned.plans[rule].as_ref().is_some_and(|plan| plan.variants.iter().any(|variant| variant.recent))
+    }
+
+    /// The stratum's predicates with what is known of them, ready to grow.
+    fn grow(&self, stratum: &Stratum, layers: &Layers<'_>) -> Grown {
+        let mut wanted: Vec<Vec<bool>> =
+            stratum.predicates.iter().map(|p| vec![false; self.indexes.of(*p).len()]).collect();
+        for rule in &stratum.rules {
+            for op in self.planned.plans[*rule].iter().flat_map(|plan| &plan.variants).flat_map(|v| &v.ops) {
+                if let Op::Scan { predicate, index, .. } = op
+                    && let Ok(place) = stratum.predicates.binary_search(predicate)
+                {
+                    wanted[place][*index] = true;
+                }
+            }
+        }
+        let mut grown = Vec::new();
+        for (predicate, wanted) in stratum.predicates.iter().zip(&wanted) {
+            let growing = growing(self.predicates.get(*predicate).width, self.indexes.of(*predicate).clone(), wanted);
+            let known = layers.rows(*predicate).to_vec();
+            if !known.is_empty() {
+                growing.insert(known);
+            }
+            grown.push(growing);
+        }
+        grown
+    }
+
+    /// Adds what one rule finds: with recent tuples, or before there are any.
+    fn insert_all(
+        &mut self,
+        rule: usize,
+        recent: bool,
+        stratum: &Stratum,
+        layers: &Layers<'_>,
+        grown: &Grown,
+    ) -> Result<(), Stopped> {
+        let Some(plan) = &self.planned.plans[rule] else { return Ok(()) };
+        let Ok(place) = stratum.predicates.binary_search(&self.planned.rules[rule].head.predicate) else {
+            return Ok(());
+        };
+        let target = &grown[place];
+        let mut flushed = 0;
+        for variant in plan.variants.iter().filter(|variant| variant.recent == recent) {
+            let mut flush = |sink: &mut Sink, left: usize| {
+                flushed += target.insert(std::mem::take(&mut sink.rows));
+                if flushed > left { Err(Stop::Tuples) } else { Ok(()) }
+            };
+            let rows = self
+                .variant(rule, variant, layers, Some((stratum, grown)), &mut flush)
+                .map_err(|stop| Stopped { stop, rule: Some(rule) })?;
+            target.insert(rows);
+        }
+        Ok(())
+    }
+
+    /// The head rows that one variant finds.
+    fn variant(
+        &mut self,
+        rule: usize,
+        variant: &Variant,
+        layers: &Layers<'_>,
+        grown: Option<(&Stratum, &Grown)>,
+        flush: &mut dyn FnMut(&mut Sink, usize) -> Result<(), Stop>,
+    ) -> Result<Vec<TermId>, Stop> {
+        let rule = &self.planned.rules[rule];
+        let mut batches = Vec::with_capacity(variant.ops.len());
+        let mut widths = Vec::with_capacity(variant.ops.len());
+        for op in &variant.ops {
+            let (predicate, part, index) = match op {
+                Op::Scan { predicate, part, index, .. } => (*predicate, *part, *index),
+                Op::Absent { predicate, index, .. } => (*predicate, crate::rules::plan::Part::All, *index),
+                _ => {
+                    batches.push(Vec::new());
+                    widths.push(1);
+                    continue;
+                }
+            };
+            let mut found = Vec::new();
+            let place = grown.and_then(|(stratum, grown)| Some((stratum.predicates.binary_search(&predicate).ok()?, grown)));
+            match place {
+                Some((place, grown)) => grown[place].batches(part, index, &mut found),
+                None => found.extend(layers.get(predicate).map(|table| Batch::Plain(table.index(index)))),
+            }
+            // A rule that must match something that is not there can't hold.
+            if matches!(op, Op::Scan { .. }) && found.iter().all(|batch| batch.is_empty()) {
+                return Ok(Vec::new());
+            }
+            batches.push(found);
+            widths.push(self.predicates.get(predicate).width);
+        }
+        let operands = match &rule.aggregation {
+            Some(aggregation) => projection(aggregation),
+            None => rule.head.args.clone(),
+        };
+        let mut sink = Sink { operands, rows: Vec::new() };
+        let left = self.meter.tuples_left();
+        let aggregating = rule.aggregation.is_some();
+        Join {
+            ops: &variant.ops,
+            batches: &batches,
+            widths: &widths,
+            binding: vec![0; rule.variables.len()],
+            universe: self.universe,
+            meter: self.meter,
+            sink: &mut sink,
+            flush: &mut |sink| if aggregating { Ok(()) } else { flush(sink, left) },
+        }
+        .run(0)?;
+        Ok(match &rule.aggregation {
+            Some(aggregation) => aggregate(rule, aggregation, &sink.rows, self.universe),
+            None => sink.rows,
+        })
+    }
+}

@@ -1,0 +1,60 @@
+//! The predicates that rules are given: the snapshots, the designators, the ontology.
+
+use crate::base::{TermId, Terms, names};
+use crate::base::Term;
+use crate::rules::program::{Predicate, PredicateId, Predicates};
+
+/// Given predicates with their arguments, as people read them.
+pub(crate) const GIVEN: [(&str, &str, usize); 6] = [
+    ("state", "state(phase, subject, property, object)", 4),
+    ("before", "before(subject, property, object)", 3),
+    ("after", "after(subject, property, object)", 3),
+    ("during", "during(subject, property, object)", 3),
+    ("ontology", "ontology(subject, property, object)", 3),
+    ("parameter", "parameter(designator, value)", 2),
+];
+
+/// What a property's file may define for the verdict: name and meaning.
+pub(crate) const VERDICT: [(&str, &str); 5] = [
+    ("success", "its tuples prove that the property holds"),
+    ("violation", "its tuples prove that the property does not hold"),
+    ("margin", "how far the outcome is from flipping, in the property's unit"),
+    ("applicable", "where it is defined and empty, the property is inapplicable"),
+    ("because", "the author's words for the outcome"),
+];
+
+/// The place of the property among the arguments, for predicates that are split by it.
+pub(crate) fn property_place(name: &str) -> Option<usize> {
+    match name {
+        "state" => Some(2),
+        "ontology" => Some(1),
+        _ => None,
+    }
+}
+
+/// IRI of the phase that a shorthand stands for.
+pub(crate) fn phase_of(shorthand: &str) -> Option<String> {
+    matches!(shorthand, "before" | "after" | "during").then(|| names::act(shorthand))
+}
+
+/// Numbers of the three phases.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Phases {
+    pub(crate) before: TermId,
+    pub(crate) after: TermId,
+    pub(crate) during: TermId,
+}
+
+impl Phases {
+    pub(crate) fn intern(terms: &mut Terms) -> Self {
+        let mut id = |name: &str| terms.intern(Term::iri(names::act(name)));
+        Self { before: id("before"), after: id("after"), during: id("during") }
+    }
+}
+
+/// The predicate of a given name, for one property or for all.
+pub(crate) fn add_given(predicates: &mut Predicates, name: &str, property: Option<TermId>) -> PredicateId {
+    let arity = GIVEN.iter().find(|(given, ..)| *given == name).map_or(0, |(_, _, arity)| *arity);
+    let width = arity - usize::from(property.is_some());
+    predicates.add(Predicate { name: name.to_owned(), scope: 0, property, arity, width, given: true })
+}

@@ -1,0 +1,432 @@
+//! Rule text to tokens with their places.
+
+use crate::base::{Diagnostic, Diagnostics, Source, Span};
+
+/// What a token is. Texts are decoded already: no quotes, no indicators.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Token {
+    /// A bare name: predicate, constant, built-in, format.
+    Name(String),
+    /// `prefix:local`, either part possibly empty.
+    Prefixed(String, String),
+    /// `<…>`, as written.
+    Iri(String),
+    /// `?x`.
+    Variable(String),
+    /// `!x`: a variable that stands for something new.
+    Existential(String),
+    /// `$x`: a parameter of the program.
+    Global(String),
+    /// `_`.
+    Anonymous,
+    /// `_:label`.
+    Blank(String),
+    /// A string, with escapes resolved.
+    String(String),
+    /// `@en` right behind a string.
+    Language(String),
+    /// The pieces of an f-string.
+    Format(Vec<FormatPiece>),
+    /// A number as written, without sign.
+    Number(String),
+    /// `@import` and the like.
+    Directive(String),
+    /// `#count` and the like.
+    Aggregate(String),
+    /// `#[`.
+    AttributeOpen,
+    /// Punctuation and operators.
+    Symbol(&'static str),
+    /// The end of the text.
+    End,
+}
+
+/// One piece of an f-string.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FormatPiece {
+    /// Text that stands for itself.
+    Text(String),
+    /// An expression: its tokens, closed by [`Token::End`].
+    Code(Vec<Spanned>),
+}
+
+/// A token and its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spanned {
+    /// What it is.
+    pub token: Token,
+    /// Where it is. Unit: bytes of the source.
+    pub span: Span,
+}
+
+/// F-strings in f-strings deeper than this are refused.
+const FORMAT_DEPTH: usize = 8;
+
+/// Cuts a text into tokens. Faults are noted and skipped; the last token is always [`Token::End`].
+pub fn lex(source: &Source, diagnostics: &mut Diagnostics) -> Vec<Spanned> {
+    Lexer { source, text: &source.text, at: 0, end: source.text.len(), depth: 0, diagnostics }.run()
+}
+
+struct Lexer<'a> {
+    source: &'a Source,
+    text: &'a str,
+    at: usize,
+    end: usize,
+    depth: usize,
+    diagnostics: &'a mut Diagnostics,
+}
+
+/// Longest first where one begins another.
+const SYMBOLS: [&str; 25] = [
+    ":-", ">=", "<=", "!=", "^^", "(", ")", "{", "}", "[", "]", ",", ".", "~", "=", "<", ">", "+", "-", "*", "/", ":",
+    "|", ";", "&",
+];
+
+impl Lexer<'_> {
+    fn run(mut self) -> Vec<Spanned> {
+        let mut tokens = Vec::new();
+        loop {
+            self.skip_blank();
+            let start = self.at;
+            if self.at >= self.end {
+                tokens.push(Spanned { token: Token::End, span: start..start });
+                return tokens;
+            }
+            if let Some(token) = self.next(tokens.last()) {
+                tokens.push(Spanned { token, span: start..self.at });
+            }
+        }
+    }
+
+    fn rest(&self) -> &str {
+        &self.text[self.at..self.end]
+    }
+
+    fn peek(&self) -> Option<char> {
+        self.rest().chars().next()
+    }
+
+    fn peek_second(&self) -> Option<char> {
+        self.rest().chars().nth(1)
+    }
+
+    fn take_while(&mut self, mut keep: impl FnMut(char) -> bool) -> String {
+        let taken: String = self.rest().chars().take_while(|c| keep(*c)).collect();
+        self.at += taken.len();
+        taken
+    }
+
+    fn error(&mut self, code: &'static str, span: Span, message: String, help: &str) {
+        self.diagnostics.push(Diagnostic::error(code, message).at(self.source, span).help(help));
+    }
+
+    /// White space and comments of every form.
+    fn skip_blank(&mut self) {
+        loop {
+            self.take_while(char::is_whitespace);
+            if self.rest().starts_with('%') {
+                self.take_while(|c| c != '\n');
+            } else if self.rest().starts_with("/*") {
+                let start = self.at;
+                match self.rest().find("*/") {
+                    Some(length) => self.at += length + 2,
+                    None => {
+                        self.at = self.end;
+                        self.error("R001", start..start + 2, "comment has no end".into(), "close it with `*/`");
+                    }
+                }
+            } else {
+                return;
+            }
+        }
+    }
+
+    fn next(&mut self, before: Option<&Spanned>) -> Option<Token> {
+        let start = self.at;
+        let first = self.peek()?;
+        match first {
+            '?' | '!' | '$' if self.peek_second().is_some_and(starts_name) => {
+                self.at += 1;
+                let name = self.take_while(continues_name);
+                Some(match first {
+                    '?' => Token::Variable(name),
+                    '!' => Token::Existential(name),
+                    _ => Token::Global(name),
+                })
+            }
+            '"' => self.string(),
+            'f' if self.rest().starts_with("f\"") => self.format(),
+            '<' => self.iri_or_less(),
+            '#' => self.hash(),
+            '@' => {
+                self.at += 1;
+                let tag = before.is_some_and(|b| matches!(b.token, Token::String(_)) && b.span.end == start);
+                let name = self.take_while(|c| c.is_ascii_alphanumeric() || c == '_' || (tag && c == '-'));
+                Some(if tag { Token::Language(name) } else { Token::Directive(name) })
+            }
+            '_' if self.rest().starts_with("_:") => {
+                self.at += 2;
+                Some(Token::Blank(self.take_while(|c| continues_name(c) || c == '-')))
+            }
+            '_' => {
+                self.at += 1;
+                if self.peek().is_some_and(continues_name) {
+                    self.take_while(continues_name);
+                    self.error("R002", start..self.at, "a name can't begin with `_`".into(), "write `_` alone for any value");
+                }
+                Some(Token::Anonymous)
+            }
+            c if c.is_ascii_digit() => Some(self.number()),
+            c if starts_name(c) => Some(self.name()),
+            ':' if self.peek_second().is_some_and(starts_name) => {
+                self.at += 1;
+                Some(Token::Prefixed(String::new(), self.take_while(continues_name)))
+            }
+            _ => self.symbol(),
+        }
+    }
+
+    fn symbol(&mut self) -> Option<Token> {
+        if let Some(symbol) = SYMBOLS.into_iter().find(|symbol| self.rest().starts_with(symbol)) {
+            self.at += symbol.len();
+            return Some(Token::Symbol(symbol));
+        }
+        let start = self.at;
+        let c = self.peek()?;
+        self.at += c.len_utf8();
+        let help = match c {
+            '\'' => "strings stand in double quotes",
+            '!' => "write `~` before an atom for \"not\", `!=` for \"differs from\"",
+            _ => "remove it, or put it in a string",
+        };
+        self.error("R002", start..self.at, format!("unexpected character `{c}`"), help);
+        None
+    }
+
+    fn name(&mut self) -> Token {
+        let name = self.name_with_escapes();
+        // `p:local` and `p:`, but not the arrow of `p:-`.
+        if self.peek() == Some(':') && self.peek_second() != Some('-') {
+            self.at += 1;
+            let local = self.name_with_escapes();
+            return Token::Prefixed(name, local);
+        }
+        Token::Name(name)
+    }
+
+    /// A name in which `%20` and the like may stand. (Any other `%` begins a comment.)
+    fn name_with_escapes(&mut self) -> String {
+        let mut name = self.take_while(continues_name);
+        while self.rest().starts_with('%') && self.rest().chars().skip(1).take(2).filter(char::is_ascii_hexdigit).count() == 2 {
+            self.at += 1;
+            name.push('%');
+            name.push_str(&self.take_while(continues_name));
+        }
+        name
+    }
+
+    /// `<` opens an IRI when its `>` comes before any blank; otherwise it compares.
+    fn iri_or_less(&mut self) -> Option<Token> {
+        let inside = &self.rest()[1..];
+        let length = inside.find(|c: char| c == '>' || c.is_whitespace() || "<\"{}|^`".contains(c));
+        match length {
+            Some(length) if inside[length..].starts_with('>') && !inside.starts_with(['=', '?', '(', '$']) => {
+                let iri = inside[..length].to_owned();
+                self.at += length + 2;
+                Some(Token::Iri(iri))
+            }
+            _ => self.symbol(),
+        }
+    }
+
+    fn hash(&mut self) -> Option<Token> {
+        let start = self.at;
+        self.at += 1;
+        if self.peek() == Some('[') {
+            self.at += 1;
+            return Some(Token::AttributeOpen);
+        }
+        let name = self.take_while(continues_name);
+        if name.is_empty() {
+            self.error(
+                "R002",
+                start..self.at,
+                "unexpected character `#`".into(),
+                "comments begin with `%`, aggregates are `#count`, `#sum`, `#min`, `#max`",
+            );
+            return None;
+        }
+        Some(Token::Aggregate(name))
+    }
+
+    /// Digits, fraction, exponent and type mark; or `0b`, `0o`, `0x`.
+    fn number(&mut self) -> Token {
+        let start = self.at;
+        for (prefix, radix) in [("0b", 2), ("0o", 8), ("0x", 16)] {
+            if self.rest().starts_with(prefix) && self.rest()[2..].starts_with(|c: char| c.is_digit(radix)) {
+                self.at += 2;
+                self.take_while(|c| c.is_digit(radix));
+                return Token::Number(self.text[start..self.at].to_owned());
+            }
+        }
+        self.take_while(|c| c.is_ascii_digit());
+        if self.peek() == Some('.') && self.peek_second().is_some_and(|c| c.is_ascii_digit()) {
+            self.at += 1;
+            self.take_while(|c| c.is_ascii_digit());
+        }
+        if self.peek().is_some_and(|c| c == 'e' || c == 'E') {
+            let sign = usize::from(self.peek_second().is_some_and(|c| c == '+' || c == '-'));
+            if self.rest()[1 + sign..].starts_with(|c: char| c.is_ascii_digit()) {
+                self.at += 1 + sign;
+                self.take_while(|c| c.is_ascii_digit());
+            }
+        }
+        if self.peek().is_some_and(|c| c == 'f' || c == 'd') && !self.peek_second().is_some_and(continues_name) {
+            self.at += 1;
+        }
+        Token::Number(self.text[start..self.at].to_owned())
+    }
+
+    fn string(&mut self) -> Option<Token> {
+        let start = self.at;
+        let triple = self.rest().starts_with("\"\"\"");
+        self.at += if triple { 3 } else { 1 };
+        let mut out = String::new();
+        loop {
+            if triple && self.rest().starts_with("\"\"\"") {
+                self.at += 3;
+                return Some(Token::String(out));
+            }
+            match self.peek() {
+                Some('"') if !triple => {
+                    self.at += 1;
+                    return Some(Token::String(out));
+                }
+                None => break,
+                Some('\n') if !triple => break,
+                Some('\\') => self.escape(&mut out),
+                Some(c) => {
+                    out.push(c);
+                    self.at += c.len_utf8();
+                }
+            }
+        }
+        let help = "close it with `\"`; a string over several lines stands in `\"\"\"`";
+        self.error("R003", start..start + 1, "string has no end".into(), help);
+        Some(Token::String(out))
+    }
+
+    fn escape(&mut self, out: &mut String) {
+        let start = self.at;
+        self.at += 1;
+        let Some(c) = self.peek() else { return };
+        self.at += c.len_utf8();
+        let digits = match c {
+            'n' => return out.push('\n'),
+            't' => return out.push('\t'),
+            'r' => return out.push('\r'),
+            'b' => return out.push('\u{8}'),
+            'f' => return out.push('\u{c}'),
+            '"' | '\\' | '\'' => return out.push(c),
+            'u' => 4,
+            'U' => 8,
+            _ => {
+                let help = "known escapes: \\n \\t \\r \\b \\f \\\" \\' \\\\ \\uXXXX \\UXXXXXXXX";
+                return self.error("R004", start..self.at, format!("unknown escape `\\{c}`"), help);
+            }
+        };
+        let hex: String = self.rest().chars().take(digits).take_while(char::is_ascii_hexdigit).collect();
+        self.at += hex.len();
+        match u32::from_str_radix(&hex, 16).ok().filter(|_| hex.len() == digits).and_then(char::from_u32) {
+            Some(c) => out.push(c),
+            None => {
+                let help = "give the number of a Unicode character in 4 (\\u) or 8 (\\U) hexadecimal digits";
+                self.error("R004", start..self.at, "no such character".into(), help);
+            }
+        }
+    }
+
+    /// `f"…{code}…"`; `{{` and `}}` stand for braces.
+    fn format(&mut self) -> Option<Token> {
+        let start = self.at;
+        let triple = self.rest().starts_with("f\"\"\"");
+        let close = if triple { "\"\"\"" } else { "\"" };
+        self.at += 1 + close.len();
+        let mut pieces = Vec::new();
+        let mut text = String::new();
+        loop {
+            if self.rest().starts_with(close) {
+                self.at += close.len();
+                pieces.push(FormatPiece::Text(text));
+                return Some(Token::Format(pieces));
+            }
+            if self.rest().starts_with("{{") || self.rest().starts_with("}}") {
+                text.push_str(&self.rest()[..1].to_owned());
+                self.at += 2;
+                continue;
+            }
+            match self.peek() {
+                None => break,
+                Some('\n') if !triple => break,
+                Some('{') => {
+                    pieces.push(FormatPiece::Text(std::mem::take(&mut text)));
+                    pieces.push(FormatPiece::Code(self.format_code()?));
+                }
+                Some('\\') => self.escape(&mut text),
+                Some(c) => {
+                    text.push(c);
+                    self.at += c.len_utf8();
+                }
+            }
+        }
+        self.error("R003", start..start + 2, "string has no end".into(), "close it with `\"`");
+        pieces.push(FormatPiece::Text(text));
+        Some(Token::Format(pieces))
+    }
+
+    /// The tokens between `{` and its `}`.
+    fn format_code(&mut self) -> Option<Vec<Spanned>> {
+        let start = self.at;
+        self.at += 1;
+        if self.depth >= FORMAT_DEPTH {
+            self.at = self.end;
+            let help = "compute the inner text in an assignment of its own";
+            self.error("R005", start..start + 1, "f-strings are nested too deeply".into(), help);
+            return None;
+        }
+        self.depth += 1;
+        let mut tokens: Vec<Spanned> = Vec::new();
+        let mut open = 0usize;
+        loop {
+            self.skip_blank();
+            let at = self.at;
+            if self.at >= self.end || self.peek() == Some('\n') {
+                self.error("R003", start..start + 1, "`{` has no end".into(), "close it with `}`, or write `{{` for a brace");
+                break;
+            }
+            if self.peek() == Some('}') && open == 0 {
+                self.at += 1;
+                break;
+            }
+            if let Some(token) = self.next(tokens.last()) {
+                match token {
+                    Token::Symbol("{") => open += 1,
+                    Token::Symbol("}") => open = open.saturating_sub(1),
+                    _ => {}
+                }
+                tokens.push(Spanned { token, span: at..self.at });
+            }
+        }
+        self.depth -= 1;
+        tokens.push(Spanned { token: Token::End, span: self.at.saturating_sub(1)..self.at });
+        Some(tokens)
+    }
+}
+
+fn starts_name(c: char) -> bool {
+    c.is_alphabetic()
+}
+
+fn continues_name(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}

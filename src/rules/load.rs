@@ -1,0 +1,143 @@
+//! The facts of one action as rows of the given predicates, with no detour through an RDF store.
+
+use std::collections::HashMap;
+
+use crate::base::{TermId, Terms};
+use crate::facts::{ActionFacts, Triple};
+use crate::rules::evaluate::Tables;
+use crate::rules::given::{Phases, property_place};
+use crate::rules::plan::Indexes;
+use crate::rules::program::{PredicateId, Predicates};
+use crate::rules::relation::finished;
+use crate::rules::universe::Universe;
+
+/// Which predicates some rules read facts from.
+#[derive(Debug, Clone)]
+pub(crate) struct Given {
+    phases: Phases,
+    /// `state` of one property.
+    state: HashMap<TermId, PredicateId>,
+    /// `state` of all properties.
+    any_state: Option<PredicateId>,
+    parameter: Option<PredicateId>,
+    /// `ontology` of one property.
+    ontology: HashMap<TermId, PredicateId>,
+    any_ontology: Option<PredicateId>,
+}
+
+impl Given {
+    pub(crate) fn new(predicates: &Predicates, phases: Phases) -> Self {
+        let mut given = Self {
+            phases,
+            state: HashMap::new(),
+            any_state: None,
+            parameter: None,
+            ontology: HashMap::new(),
+            any_ontology: None,
+        };
+        for (id, predicate) in predicates.list.iter().enumerate().filter(|(_, predicate)| predicate.given) {
+            match (predicate.name.as_str(), predicate.property) {
+                ("state", Some(property)) => {
+                    given.state.insert(property, id);
+                }
+                ("state", None) => given.any_state = Some(id),
+                ("ontology", Some(property)) => {
+                    given.ontology.insert(property, id);
+                }
+                ("ontology", None) => given.any_ontology = Some(id),
+                _ => given.parameter = Some(id),
+            }
+        }
+        debug_assert!(property_place("state").is_some());
+        given
+    }
+
+    /// Rows of the ontology's statements.
+    pub(crate) fn load_ontology(&self, triples: &[[TermId; 3]], predicates: &Predicates, indexes: &Indexes) -> Tables {
+        let mut rows: HashMap<PredicateId, Vec<TermId>> = HashMap::new();
+        for [s, p, o] in triples {
+            if let Some(predicate) = self.ontology.get(p) {
+                rows.entry(*predicate).or_default().extend([*s, *o]);
+            }
+            if let Some(predicate) = self.any_ontology {
+                rows.entry(predicate).or_default().extend([*s, *p, *o]);
+            }
+        }
+        tables(rows, predicates, indexes)
+    }
+
+    /// Rows of an action's facts, of those predicates only that somebody reads.
+    pub(crate) fn load(
+        &self,
+        facts: &ActionFacts<'_>,
+        universe: &mut Universe<'_>,
+        predicates: &Predicates,
+        indexes: &Indexes,
+    ) -> Tables {
+        let mut rows: Vec<Vec<TermId>> = vec![Vec::new(); predicates.len()];
+        let mut readers = Readers { given: self, of_property: vec![None; facts.terms.len()] };
+        for (phase, triples) in self.graphs(facts) {
+            for [s, p, o] in triples {
+                let reader = readers.of(*p, facts.terms, universe);
+                if let Some(predicate) = reader {
+                    let (s, o) = (universe.of_run(*s), universe.of_run(*o));
+                    rows[predicate].extend([phase, s, o]);
+                }
+                if let Some(predicate) = self.any_state {
+                    let (s, p, o) = (universe.of_run(*s), universe.of_run(*p), universe.of_run(*o));
+                    rows[predicate].extend([phase, s, p, o]);
+                }
+            }
+        }
+        if let Some(predicate) = self.parameter {
+            for [designator, value] in facts.parameters {
+                rows[predicate].extend([universe.of_run(*designator), universe.of_run(*value)]);
+            }
+        }
+        let mut tables = Tables::new(predicates.len());
+        for (predicate, rows) in rows.into_iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
+            tables.set(predicate, finished(predicates.get(predicate).width, rows, indexes.of(predicate).clone()));
+        }
+        tables
+    }
+
+    /// The three snapshots with the number of their phase.
+    pub(crate) fn graphs<'a>(&self, facts: &ActionFacts<'a>) -> [(TermId, &'a [Triple]); 3] {
+        [(self.phases.before, facts.before), (self.phases.after, facts.after), (self.phases.during, facts.during)]
+    }
+
+    /// `state` predicates of single properties, with their property.
+    pub(crate) fn states(&self) -> impl Iterator<Item = (TermId, PredicateId)> + '_ {
+        self.state.iter().map(|(property, predicate)| (*property, *predicate))
+    }
+
+    /// `state` of all properties, where some rule reads or derives it.
+    pub(crate) fn any_state(&self) -> Option<PredicateId> {
+        self.any_state
+    }
+
+    pub(crate) fn phases(&self) -> Phases {
+        self.phases
+    }
+}
+
+/// Which predicate reads the facts of a property; looked up once for each property of a run.
+struct Readers<'a> {
+    given: &'a Given,
+    of_property: Vec<Option<Option<PredicateId>>>,
+}
+
+impl Readers<'_> {
+    fn of(&mut self, property: TermId, _terms: &Terms, universe: &mut Universe<'_>) -> Option<PredicateId> {
+        let slot = &mut self.of_property[property as usize];
+        *slot.get_or_insert_with(|| self.given.state.get(&universe.of_run(property)).copied())
+    }
+}
+
+fn tables(rows: HashMap<PredicateId, Vec<TermId>>, predicates: &Predicates, indexes: &Indexes) -> Tables {
+    let mut tables = Tables::new(predicates.len());
+    for (predicate, rows) in rows {
+        tables.set(predicate, finished(predicates.get(predicate).width, rows, indexes.of(predicate).clone()));
+    }
+    tables
+}

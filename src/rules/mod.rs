@@ -1,0 +1,39 @@
+//! Rules, from their text to what they find: parsed, checked, stratified, planned, closed over the facts of an action.
+//!
+//! Two languages see the same facts: Datalog in `.rls` files (the language of Nemo) and SPARQL in `.rq` files.
+//! The stages in order: [`lex`] and [`parse`], [`check`] with `translate` and `safety`, `stratify`, `plan`, `evaluate`
+//! (and `naive`, its oracle), `reading`.
+//!
+//! Never: decides an outcome, steps the simulation, writes to a history, or prints.
+
+mod aggregate;
+mod book;
+mod builtins;
+mod check;
+mod dataset;
+mod evaluate;
+mod expression;
+mod findings;
+mod given;
+mod join;
+mod lex;
+mod load;
+mod meter;
+mod naive;
+mod parse;
+mod parse_expression;
+mod plan;
+mod program;
+mod reading;
+mod relation;
+mod safety;
+mod sparql;
+mod stratify;
+mod syntax;
+mod translate;
+mod universe;
+mod values;
+mod vocabulary_scan;
+
+pub use book::RuleBook;
+pub use findings::{Budget, Findings, RuleFault, WitnessRow};

@@ -1,0 +1,134 @@
+//! The evaluator that is obviously right: nested loops over sets, again and again until nothing is new.
+//!
+//! It reads the checked rules and nothing of their plans, and serves as the oracle of the fast one.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Term, TermId};
+use crate::rules::aggregate::{aggregate, projection};
+use crate::rules::expression::holds;
+use crate::rules::meter::{Meter, Stop};
+use crate::rules::plan::operand_value;
+use crate::rules::program::{Atom, Literal, Operand, PredicateId, Rule};
+use crate::rules::stratify::Stratum;
+use crate::rules::universe::Universe;
+
+/// Tuples by predicate.
+pub(crate) type Sets = BTreeMap<PredicateId, BTreeSet<Vec<TermId>>>;
+
+/// Adds to `sets` all that the rules derive from it.
+pub(crate) fn close(
+    rules: &[Rule],
+    strata: &[Stratum],
+    sets: &mut Sets,
+    universe: &mut Universe<'_>,
+    meter: &mut Meter,
+) -> Result<(), Stop> {
+    for stratum in strata {
+        loop {
+            let mut new = Vec::new();
+            for rule in stratum.rules.iter().map(|idx| &rules[*idx]) {
+                for row in derive(rule, sets, universe, meter)? {
+                    if !sets.get(&rule.head.predicate).is_some_and(|set| set.contains(&row)) {
+                        new.push((rule.head.predicate, row));
+                    }
+                }
+            }
+            if new.is_empty() {
+                break;
+            }
+            meter.derived(new.len())?;
+            for (predicate, row) in new {
+                sets.entry(predicate).or_default().insert(row);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// All head rows of one rule.
+fn derive(rule: &Rule, sets: &Sets, universe: &mut Universe<'_>, meter: &mut Meter) -> Result<Vec<Vec<TermId>>, Stop> {
+    let mut bindings = Vec::new();
+    let mut binding = vec![None; rule.variables.len()];
+    matches(&rule.body, sets, universe, &mut binding, &mut bindings, meter)?;
+    let complete = |binding: &[Option<TermId>]| binding.iter().map(|id| id.unwrap_or(0)).collect::<Vec<_>>();
+    let width = rule.head.args.len();
+    Ok(match &rule.aggregation {
+        None => bindings
+            .iter()
+            .map(|binding| rule.head.args.iter().map(|arg| operand_value(*arg, &complete(binding))).collect())
+            .collect(),
+        Some(aggregation) => {
+            let operands = projection(aggregation);
+            let rows: Vec<TermId> = bindings
+                .iter()
+                .flat_map(|binding| {
+                    let binding = complete(binding);
+                    operands.iter().map(|arg| operand_value(*arg, &binding)).collect::<Vec<_>>()
+                })
+                .collect();
+            aggregate(rule, aggregation, &rows, universe).chunks(width).map(<[TermId]>::to_vec).collect()
+        }
+    })
+}
+
+/// Every binding that satisfies the conditions, which stand in an order in which each can be looked at.
+fn matches(
+    body: &[Literal],
+    sets: &Sets,
+    universe: &mut Universe<'_>,
+    binding: &mut Vec<Option<TermId>>,
+    found: &mut Vec<Vec<Option<TermId>>>,
+    meter: &mut Meter,
+) -> Result<(), Stop> {
+    meter.step()?;
+    let Some((first, rest)) = body.split_first() else {
+        found.push(binding.clone());
+        return Ok(());
+    };
+    let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
+    match first {
+        Literal::Positive(atom) => {
+            for row in sets.get(&atom.predicate).into_iter().flatten() {
+                let before = binding.clone();
+                if unify(atom, row, binding) {
+                    matches(rest, sets, universe, binding, found, meter)?;
+                }
+                *binding = before;
+            }
+            return Ok(());
+        }
+        Literal::Negative(atom) => {
+            let blocked =
+                sets.get(&atom.predicate).into_iter().flatten().any(|row| unify(atom, row, &mut binding.clone()));
+            if blocked {
+                return Ok(());
+            }
+        }
+        Literal::Assign { variable, value, .. } => {
+            let Some(value) = value.value(&values, universe).map(std::borrow::Cow::into_owned) else { return Ok(()) };
+            binding[*variable] = Some(universe.intern(value));
+        }
+        Literal::Compare { op, left, right, .. } => {
+            let (left, right) = (left.value(&values, universe), right.value(&values, universe));
+            if !matches!((left, right), (Some(left), Some(right)) if holds(*op, &left, &right)) {
+                return Ok(());
+            }
+        }
+        Literal::Test { value, .. } => {
+            if value.value(&values, universe).is_none_or(|value| *value != Term::Boolean(true)) {
+                return Ok(());
+            }
+        }
+    }
+    matches(rest, sets, universe, binding, found, meter)
+}
+
+/// Whether a row fits an atom; what was unbound is bound then.
+pub(crate) fn unify(atom: &Atom, row: &[TermId], binding: &mut [Option<TermId>]) -> bool {
+    atom.args.iter().zip(row).all(|(arg, value)| match arg {
+        Operand::Any => true,
+        Operand::Constant(id) => id == value,
+        Operand::Variable(variable) => *binding[*variable].get_or_insert(*value) == *value,
+    })
+}

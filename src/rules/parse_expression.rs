@@ -1,0 +1,287 @@
+//! Tokens to expressions: terms, calls, arithmetic.
+
+use crate::base::{Span, Term, did_you_mean, names};
+use crate::rules::lex::{FormatPiece, Token};
+use crate::rules::parse::{Lost, Parser};
+use crate::rules::syntax::{Expression, ExpressionKind};
+use crate::rules::values::{double_term, literal};
+
+/// Expressions nested deeper are refused; recursion over them is then safe everywhere.
+const DEPTH_LIMIT: usize = 64;
+/// Operators in one chain (`a + b + …`): the tree they make is that deep on its left side.
+const CHAIN_LIMIT: usize = 256;
+
+impl Parser<'_> {
+    /// A sum of products.
+    pub(crate) fn expression(&mut self) -> Result<Expression, Lost> {
+        self.depth += 1;
+        if self.depth > DEPTH_LIMIT {
+            let span = self.span();
+            self.depth -= 1;
+            let help = format!("at most {DEPTH_LIMIT} levels; name parts of it with assignments such as `?part = …`");
+            return Err(self.fault("R005", span, "expression is nested too deeply", help));
+        }
+        let result = self.chain(&["+", "-"], |parser| parser.chain(&["*", "/"], Self::factor));
+        self.depth -= 1;
+        result
+    }
+
+    fn chain(
+        &mut self,
+        operators: &[&'static str],
+        mut part: impl FnMut(&mut Self) -> Result<Expression, Lost>,
+    ) -> Result<Expression, Lost> {
+        let mut left = part(self)?;
+        let mut length = 0;
+        while let Some(operator) = operators.iter().find(|operator| self.is(operator)) {
+            self.advance();
+            let right = part(self)?;
+            let span = left.span.start..right.span.end;
+            length += 1;
+            if length > CHAIN_LIMIT {
+                let help = "name parts of it with assignments such as `?part = …`";
+                return Err(self.fault("R005", span, "chain of operators is too long", help));
+            }
+            let symbol = operator.chars().next().unwrap_or('+');
+            left = Expression { kind: ExpressionKind::Arithmetic(symbol, Box::new(left), Box::new(right)), span };
+        }
+        Ok(left)
+    }
+
+    fn factor(&mut self) -> Result<Expression, Lost> {
+        let start = self.span().start;
+        if self.take("(") {
+            let inner = self.expression()?;
+            self.expect(")", "at the end of the parenthesis")?;
+            return Ok(Expression { kind: inner.kind, span: start..self.end() });
+        }
+        if self.is("-") || self.is("+") {
+            let negative = self.is("-");
+            self.advance();
+            if let Token::Number(text) = self.token().clone() {
+                let span = start..self.span().end;
+                self.advance();
+                return Ok(self.number(&text, negative, span));
+            }
+            self.depth += 1;
+            if self.depth > DEPTH_LIMIT {
+                self.depth -= 1;
+                let span = self.span();
+                return Err(self.fault("R005", span, "expression is nested too deeply", "remove some of the signs"));
+            }
+            let inner = self.factor();
+            self.depth -= 1;
+            let inner = inner?;
+            if !negative {
+                return Ok(inner);
+            }
+            let span = start..inner.span.end;
+            return Ok(Expression { kind: ExpressionKind::Negative(Box::new(inner)), span });
+        }
+        self.primary()
+    }
+
+    fn primary(&mut self) -> Result<Expression, Lost> {
+        let span = self.span();
+        let kind = match self.token().clone() {
+            Token::Variable(name) => ExpressionKind::Variable(name),
+            Token::Existential(name) => ExpressionKind::Existential(name),
+            Token::Global(name) => ExpressionKind::Global(name),
+            Token::Anonymous => ExpressionKind::Anonymous,
+            Token::Blank(label) => ExpressionKind::Constant(Term::Blank(label.into())),
+            Token::Iri(iri) => ExpressionKind::Constant(Term::iri(self.resolve(&iri))),
+            Token::Number(text) => {
+                self.advance();
+                return Ok(self.number(&text, false, span));
+            }
+            Token::String(text) => {
+                self.advance();
+                return Ok(self.string(text, span.start));
+            }
+            Token::Format(pieces) => {
+                self.advance();
+                return self.format(pieces, span);
+            }
+            Token::Aggregate(name) => {
+                self.advance();
+                self.expect("(", "behind the aggregate")?;
+                let args = self.expressions(")")?;
+                let span = span.start..self.end();
+                return Ok(Expression { kind: ExpressionKind::Aggregate(name, args), span });
+            }
+            Token::Name(_) | Token::Prefixed(..) => return self.name_or_call(),
+            Token::Symbol("{") => {
+                let help = "maps belong to JSON imports, which this engine does not have; import CSV, TSV or RDF";
+                return Err(self.fault("R012", span, "maps are not supported", help));
+            }
+            _ => return Err(self.unexpected("a term")),
+        };
+        self.advance();
+        Ok(Expression { kind, span })
+    }
+
+    /// A constant, or a call where a parenthesis follows.
+    fn name_or_call(&mut self) -> Result<Expression, Lost> {
+        let span = self.span();
+        let token = self.token().clone();
+        let name = match &token {
+            Token::Name(name) => name.clone(),
+            Token::Prefixed(prefix, local) => self.expand(prefix, local, span.clone()),
+            _ => return Err(self.unexpected("a name")),
+        };
+        self.advance();
+        if self.take("(") {
+            let args = self.expressions(")")?;
+            return Ok(Expression { kind: ExpressionKind::Call(name, args), span: span.start..self.end() });
+        }
+        let term = match token {
+            Token::Name(word) if word == "true" => Term::Boolean(true),
+            Token::Name(word) if word == "false" => Term::Boolean(false),
+            Token::Name(word) => Term::iri(self.resolve(&word)),
+            _ => Term::iri(name),
+        };
+        Ok(Expression { kind: ExpressionKind::Constant(term), span })
+    }
+
+    /// Expressions separated by commas (one more at the end does no harm) up to a closing symbol.
+    pub(crate) fn expressions(&mut self, close: &'static str) -> Result<Vec<Expression>, Lost> {
+        let mut found = Vec::new();
+        while !self.take(close) {
+            found.push(self.expression()?);
+            if !self.is(close) {
+                self.expect(",", &format!("or `{close}`"))?;
+            }
+        }
+        Ok(found)
+    }
+
+    /// The value of an import's option: an expression or a tuple of them.
+    pub(crate) fn option_value(&mut self) -> Result<Expression, Lost> {
+        let start = self.span().start;
+        if self.is("(") {
+            self.advance();
+            let items = self.expressions(")")?;
+            return Ok(Expression { kind: ExpressionKind::Tuple(items), span: start..self.end() });
+        }
+        self.expression()
+    }
+
+    /// A string with what may follow it: a language or a datatype.
+    fn string(&mut self, text: String, start: usize) -> Expression {
+        let term = match self.token().clone() {
+            Token::Language(tag) => {
+                self.advance();
+                Term::LangString(text.into(), tag.into())
+            }
+            Token::Symbol("^^") => {
+                self.advance();
+                match self.predicate("a datatype behind `^^`") {
+                    Ok(datatype) => literal(&text, &datatype),
+                    Err(Lost) => return Expression { kind: ExpressionKind::Broken, span: start..self.end() },
+                }
+            }
+            _ => Term::string(text),
+        };
+        Expression { kind: ExpressionKind::Constant(term), span: start..self.end() }
+    }
+
+    fn format(&mut self, pieces: Vec<FormatPiece>, span: Span) -> Result<Expression, Lost> {
+        let mut parts = Vec::new();
+        for piece in pieces {
+            match piece {
+                FormatPiece::Text(text) if text.is_empty() => {}
+                FormatPiece::Text(text) => parts
+                    .push(Expression { kind: ExpressionKind::Constant(Term::string(text)), span: span.clone() }),
+                FormatPiece::Code(tokens) => {
+                    let mut inner = Parser {
+                        source: self.source,
+                        tokens: &tokens,
+                        at: 0,
+                        prefixes: std::mem::take(&mut self.prefixes),
+                        base: self.base.clone(),
+                        depth: self.depth + 1,
+                        diagnostics: std::mem::take(&mut self.diagnostics),
+                    };
+                    let part = inner.expression().and_then(|part| match inner.token() {
+                        Token::End => Ok(part),
+                        _ => Err(inner.unexpected("`}`")),
+                    });
+                    self.prefixes = inner.prefixes;
+                    self.diagnostics = inner.diagnostics;
+                    parts.push(part?);
+                }
+            }
+        }
+        Ok(Expression { kind: ExpressionKind::Format(parts), span })
+    }
+
+    fn number(&mut self, text: &str, negative: bool, span: Span) -> Expression {
+        let sign = if negative { "-" } else { "" };
+        let radix = match text.get(..2) {
+            Some("0b") => Some(2),
+            Some("0o") => Some(8),
+            Some("0x") => Some(16),
+            _ => None,
+        };
+        let term = match radix {
+            Some(radix) => match i64::from_str_radix(&format!("{sign}{}", &text[2..]), radix) {
+                Ok(value) => Some(Term::Integer(value)),
+                Err(_) => from_digits(&text[2..], radix).map(|value| double_term(if negative { -value } else { value })),
+            },
+            None => {
+                let plain = text.trim_end_matches(['f', 'd']);
+                match format!("{sign}{plain}").parse::<i64>() {
+                    Ok(value) if plain.len() == text.len() => Some(Term::Integer(value)),
+                    _ => format!("{sign}{plain}").parse::<f64>().ok().filter(|v| v.is_finite()).map(double_term),
+                }
+            }
+        };
+        match term {
+            Some(term) => Expression { kind: ExpressionKind::Constant(term), span },
+            None => {
+                let help = "a double reaches up to about 1.8e308";
+                self.fault("R013", span.clone(), format!("number `{text}` is out of range"), help);
+                Expression { kind: ExpressionKind::Broken, span }
+            }
+        }
+    }
+
+    /// The IRI of a prefixed name. An undeclared prefix is a fault; the result then keeps the spelling.
+    pub(crate) fn expand(&mut self, prefix: &str, local: &str, span: Span) -> String {
+        let declared = self.prefixes.iter().find(|(known, _)| known == prefix).map(|(_, namespace)| namespace.clone());
+        let known = || names::PREFIXES.iter().find(|(known, _)| *known == prefix).map(|(_, n)| (*n).to_owned());
+        match declared.or_else(known) {
+            Some(namespace) => format!("{namespace}{local}"),
+            None => {
+                let candidates: Vec<String> = self
+                    .prefixes
+                    .iter()
+                    .map(|(known, _)| known.clone())
+                    .chain(names::PREFIXES.iter().map(|(known, _)| (*known).to_owned()))
+                    .collect();
+                let help = format!(
+                    "declare it with `@prefix {prefix}: <…> .`, or {}",
+                    did_you_mean(prefix, candidates.iter().map(String::as_str))
+                );
+                self.fault("R014", span, format!("unknown prefix `{prefix}:`"), help);
+                format!("{prefix}:{local}")
+            }
+        }
+    }
+
+    /// An IRI against the base, where there is one and the IRI is relative.
+    pub(crate) fn resolve(&self, iri: &str) -> String {
+        let absolute = iri.split_once(':').is_some_and(|(scheme, _)| {
+            !scheme.is_empty() && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+        });
+        match &self.base {
+            Some(base) if !absolute => format!("{base}{iri}"),
+            _ => iri.to_owned(),
+        }
+    }
+}
+
+/// Digits in a radix as a double, where they don't fit an integer.
+fn from_digits(digits: &str, radix: u32) -> Option<f64> {
+    digits.chars().try_fold(0.0, |sum, c| Some(sum * f64::from(radix) + f64::from(c.to_digit(radix)?)))
+}

@@ -1,0 +1,178 @@
+//! Every variable of a rule gets its value from somewhere; comparisons and assignments come after what they need.
+
+use crate::rules::expression::Expr;
+use crate::rules::program::{Aggregation, Atom, Literal, Operand, Variable};
+use crate::rules::syntax::{Comparison, RuleSyntax};
+use crate::rules::translate::Translation;
+
+/// Turns equalities that give a variable its value into assignments, orders them by need, and settles negations.
+/// Notes a fault for each variable that has no value; false where there was one.
+pub(crate) fn order(
+    rule: &mut Translation<'_, '_>,
+    syntax: &RuleSyntax,
+    head: &Atom,
+    aggregation: Option<&Aggregation>,
+    _body_variables: usize,
+) -> bool {
+    let mut bound = vec![false; rule.variables.len()];
+    let mut sorted = Vec::new();
+    let mut waiting = Vec::new();
+    for literal in std::mem::take(&mut rule.body) {
+        match literal {
+            Literal::Positive(atom) => {
+                mark(&atom, &mut bound);
+                sorted.push(Literal::Positive(atom));
+            }
+            other => waiting.push(other),
+        }
+    }
+    settle(&mut waiting, &mut bound, &mut sorted);
+    let mut negated = Vec::new();
+    let mut safe = true;
+    for literal in waiting {
+        match literal {
+            Literal::Negative(atom) => negated.push(atom),
+            other => safe &= unbound(rule, &other, &bound),
+        }
+    }
+    for atom in negated {
+        let atom = settle_negation(rule, atom, &bound);
+        sorted.push(Literal::Negative(atom));
+    }
+    rule.body = sorted;
+    let derived: Vec<Variable> = aggregation
+        .iter()
+        .flat_map(|a| a.aggregates.iter().map(|g| g.output).chain(a.after.iter().map(|(variable, _)| *variable)))
+        .collect();
+    let inputs = aggregation.iter().flat_map(|a| {
+        a.aggregates.iter().flat_map(|g| g.distinct.iter().chain([&g.input])).chain(a.group.iter()).copied()
+    });
+    let heads = head.args.iter().filter_map(|arg| match arg {
+        Operand::Variable(variable) => Some(*variable),
+        _ => None,
+    });
+    let mut missing: Vec<Variable> =
+        heads.chain(inputs).filter(|v| !bound[*v] && !derived.contains(v)).collect();
+    missing.sort_unstable();
+    missing.dedup();
+    for variable in missing {
+        let (name, span) = rule.variables[variable].clone();
+        if !name.is_empty() {
+            let help = format!("use `?{name}` in a positive atom of the body, or give it a value with `?{name} = …`");
+            rule.error("R020", &span, format!("variable `?{name}` of the head is not bound in the body"), help);
+        }
+        safe = false;
+    }
+    if safe {
+        warn_lonely(rule, syntax);
+    }
+    safe
+}
+
+fn mark(atom: &Atom, bound: &mut [bool]) {
+    for arg in &atom.args {
+        if let Operand::Variable(variable) = arg {
+            bound[*variable] = true;
+        }
+    }
+}
+
+/// Moves what has all it needs, again and again, until nothing moves.
+fn settle(waiting: &mut Vec<Literal>, bound: &mut [bool], sorted: &mut Vec<Literal>) {
+    loop {
+        let mut moved = false;
+        for literal in std::mem::take(waiting) {
+            match ready(literal, bound) {
+                Ok(literal) => {
+                    if let Literal::Assign { variable, .. } = &literal {
+                        bound[*variable] = true;
+                    }
+                    sorted.push(literal);
+                    moved = true;
+                }
+                Err(literal) => waiting.push(literal),
+            }
+        }
+        if !moved {
+            return;
+        }
+    }
+}
+
+fn ready(literal: Literal, bound: &[bool]) -> Result<Literal, Literal> {
+    if let Literal::Compare { op: Comparison::Equal, left, right, span } = &literal {
+        for (target, value) in [(left, right), (right, left)] {
+            if let Expr::Variable(variable) = target
+                && !bound[*variable]
+                && all_bound(value, bound)
+            {
+                return Ok(Literal::Assign { variable: *variable, value: value.clone(), span: span.clone() });
+            }
+        }
+    }
+    let enough = !matches!(literal, Literal::Negative(_)) && literal.needs().iter().all(|v| bound[*v]);
+    if enough { Ok(literal) } else { Err(literal) }
+}
+
+fn all_bound(expr: &Expr, bound: &[bool]) -> bool {
+    let mut variables = Vec::new();
+    expr.variables(&mut variables);
+    variables.iter().all(|v| bound[*v])
+}
+
+/// Notes the first variable of a literal that has no value. (A made one stands for the expression around it.)
+fn unbound(rule: &mut Translation<'_, '_>, literal: &Literal, bound: &[bool]) -> bool {
+    let mut needed = literal.needs();
+    if let Literal::Assign { variable, .. } = literal {
+        needed.push(*variable);
+    }
+    let missing = needed.into_iter().find(|v| !bound[*v] && !rule.variables[*v].0.is_empty());
+    if let Some(variable) = missing {
+        let name = rule.variables[variable].0.clone();
+        let help = format!("use `?{name}` in a positive atom of the body, or give it a value with `?{name} = …`");
+        rule.error("R021", literal.span(), format!("variable `?{name}` has no value here"), help);
+    }
+    false
+}
+
+/// Variables that occur only here stand for anything; where one occurs twice, a helper rule says that both are the same.
+fn settle_negation(rule: &mut Translation<'_, '_>, atom: Atom, bound: &[bool]) -> Atom {
+    let free: Vec<Variable> = atom
+        .args
+        .iter()
+        .filter_map(|arg| match arg {
+            Operand::Variable(v) if !bound[*v] => Some(*v),
+            _ => None,
+        })
+        .collect();
+    let repeated = free.iter().any(|v| free.iter().filter(|other| *other == v).count() > 1);
+    if repeated {
+        let known: Vec<Variable> = (0..bound.len()).filter(|v| bound[*v]).collect();
+        return rule.helper(atom, &known);
+    }
+    let args = atom
+        .args
+        .iter()
+        .map(|arg| match arg {
+            Operand::Variable(v) if !bound[*v] => Operand::Any,
+            other => *other,
+        })
+        .collect();
+    Atom { args, ..atom }
+}
+
+/// A variable that occurs once is often a typing error.
+fn warn_lonely(rule: &mut Translation<'_, '_>, syntax: &RuleSyntax) {
+    let text = rule.source.text.get(syntax.span.clone()).unwrap_or_default().to_owned();
+    for (name, span) in rule.variables.clone() {
+        let word = format!("?{name}");
+        let uses = text.match_indices(&word).filter(|(at, _)| {
+            !text[at + word.len()..].starts_with(|c: char| c.is_alphanumeric() || c == '_')
+        });
+        if !name.is_empty() && uses.count() == 1 {
+            let help = "write `_` where any value will do";
+            let source = rule.source.clone();
+            rule.checking.warning("R041", &source, &span, format!("variable `{word}` occurs only once"), help);
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Properties written in SPARQL: prepared once, evaluated over an action's named graphs.
+
+use std::cell::Cell;
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use oxigraph::model::{NamedNode, Term as RdfTerm};
+use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, QuerySolutionIter, SparqlEvaluator};
+
+use crate::base::{Diagnostic, Diagnostics, Source, Span, TermId, names};
+use crate::facts::ActionFacts;
+use crate::ontology::{Ontology, Vocabulary};
+use crate::rules::book::RuleBook;
+use crate::rules::builtins;
+use crate::rules::dataset::{Graph, Snapshot, TimeSpent, View, from_rdf, to_rdf};
+use crate::rules::evaluate::Tables;
+use crate::rules::findings::{Budget, Findings, RuleFault, WitnessRow};
+use crate::rules::universe::Universe;
+use crate::rules::values::{Number, lexical};
+use crate::rules::vocabulary_scan::{first_group, scan, variables};
+
+/// A prepared query.
+pub(crate) struct Query {
+    prepared: PreparedSparqlQuery,
+}
+
+impl Query {
+    /// Parses a query, checks its terms, and binds designators that it uses as variables.
+    pub(crate) fn prepare(source: &Source, ontology: &Ontology, derived: &BTreeSet<String>) -> Result<Self, Diagnostics> {
+        let mut diagnostics = Diagnostics::new();
+        check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
+        if let Err(error) = evaluator().parse_query(source.text.as_ref()) {
+            diagnostics.push(syntax_fault(source, &error.to_string()));
+            return Err(diagnostics);
+        }
+        let designators: BTreeSet<&str> =
+            ontology.actions.values().flat_map(|action| action.parameters.iter().map(String::as_str)).collect();
+        let text = bind_designators(&source.text, &designators);
+        let prepared = evaluator().parse_query(&text).map_err(|error| {
+            let help = "a variable with the name of a designator is bound to its value; use it in the first group";
+            Diagnostics::from(Diagnostic::error("R060", error.to_string()).in_source(source).help(help))
+        })?;
+        if !first_word_is_ask_or_select(&source.text) {
+            let help = "write `ASK { … }` (true is passed) or `SELECT … { … }` (every row is a violation)";
+            diagnostics.push(Diagnostic::error("R061", "the query is neither ASK nor SELECT").in_source(source).help(help));
+        }
+        diagnostics.or(Self { prepared })
+    }
+
+    /// Judges an action: `ASK` holds when true, `SELECT` when it has no row.
+    pub(crate) fn judge(&self, book: &RuleBook, snapshot: &Snapshot, universe: &Universe<'_>, budget: &Budget) -> Result<Findings, RuleFault> {
+        let lookups = Cell::new(0);
+        let deadline =
+            Duration::try_from_secs_f64(budget.secs.max(0.0)).ok().and_then(|time| Instant::now().checked_add(time));
+        let view = View { snapshot, statements: &book.statements, universe, deadline, lookups: &lookups };
+        let results = self.prepared.clone().on_queryable_dataset(view).execute().map_err(|error| fault(&error, budget))?;
+        match results {
+            QueryResults::Boolean(holds) => Ok(Findings {
+                applicable: true,
+                holds,
+                witness: Vec::new(),
+                witness_count: 0,
+                margin: None,
+                because: Vec::new(),
+            }),
+            QueryResults::Solutions(rows) => self.rows(rows, deadline, budget),
+            QueryResults::Graph(_) => Err(RuleFault::Value("the query is neither ASK nor SELECT".into())),
+        }
+    }
+
+    /// Every row is a violation.
+    fn rows(&self, rows: QuerySolutionIter<'_>, deadline: Option<Instant>, budget: &Budget) -> Result<Findings, RuleFault> {
+        let mut witness = Vec::new();
+        let (mut margin, mut because) = (None::<f64>, BTreeSet::new());
+        for row in rows {
+            let row = row.map_err(|error| fault(&error, budget))?;
+            if witness.len() >= budget.tuples || deadline.is_some_and(|deadline| Instant::now() > deadline) {
+                return Err(RuleFault::BudgetSpent(format!("more than {} rows or {} s", budget.tuples, budget.secs)));
+            }
+            let mut values = Vec::new();
+            for (variable, term) in row.iter() {
+                let term = from_rdf(term);
+                match variable.as_str() {
+                    "margin" => {
+                        let value = Number::of(&term).map(Number::double).filter(|value| !value.is_nan());
+                        let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is no number")))?;
+                        margin = Some(margin.map_or(value, |least| least.min(value)));
+                    }
+                    "because" => {
+                        because.insert(lexical(&term));
+                    }
+                    name => values.push((name.to_owned(), term)),
+                }
+            }
+            witness.push(WitnessRow { predicate: "row".into(), values });
+        }
+        let witness_count = witness.len();
+        witness.sort_by(|a, b| a.values.cmp(&b.values));
+        witness.truncate(Findings::WITNESS_LIMIT);
+        let because = because.into_iter().collect();
+        Ok(Findings { applicable: true, holds: witness_count == 0, witness, witness_count, margin, because })
+    }
+}
+
+impl RuleBook {
+    /// The named graphs of an action: its facts and what the libraries added to them.
+    pub(crate) fn snapshot(&self, facts: &ActionFacts<'_>, derived: &Tables, universe: &mut Universe<'_>) -> Snapshot {
+        let mut graphs: Vec<(TermId, Vec<[TermId; 3]>)> = self
+            .given
+            .graphs(facts)
+            .into_iter()
+            .map(|(name, triples)| (name, triples.iter().map(|triple| triple.map(|id| universe.of_run(id))).collect()))
+            .collect();
+        let mut add = |phase: TermId, triple: [TermId; 3]| {
+            if let Some((_, triples)) = graphs.iter_mut().find(|(name, _)| *name == phase) {
+                triples.push(triple);
+            }
+        };
+        for (property, predicate) in self.given.states() {
+            for row in derived.get(predicate).map_or(&[][..], |table| table.index(0)).chunks_exact(3) {
+                add(row[0], [row[1], property, row[2]]);
+            }
+        }
+        if let Some(predicate) = self.given.any_state() {
+            for row in derived.get(predicate).map_or(&[][..], |table| table.index(0)).chunks_exact(4) {
+                add(row[0], [row[1], row[2], row[3]]);
+            }
+        }
+        // A designator with its value reads as a statement about the action.
+        let parameters = facts
+            .parameters
+            .iter()
+            .map(|[designator, value]| {
+                let designator = universe.of_run(*designator);
+                [designator, self.statements.value, universe.of_run(*value)]
+            })
+            .collect();
+        graphs.push((self.statements.parameters, parameters));
+        Snapshot { graphs: graphs.into_iter().map(|(name, triples)| (name, Graph::new(triples))).collect() }
+    }
+}
+
+/// An evaluator with the known prefixes and the geometry functions.
+fn evaluator() -> SparqlEvaluator {
+    let mut evaluator = SparqlEvaluator::new();
+    for (prefix, namespace) in names::PREFIXES {
+        // The namespaces are constants; should one of them be no IRI, queries that use it say so.
+        evaluator = match evaluator.clone().with_prefix(prefix, namespace) {
+            Ok(evaluator) => evaluator,
+            Err(_) => evaluator,
+        };
+    }
+    for name in builtins::builtin_names() {
+        let (Some(local), Some(function)) = (name.strip_prefix("geo3d:"), builtins::builtin_in_words(name)) else { continue };
+        let iri = NamedNode::new_unchecked(format!("{}{local}", builtins::GEO3D));
+        evaluator = evaluator.with_custom_function(iri, move |args: &[RdfTerm]| {
+            if !(function.least..=function.most).contains(&args.len()) {
+                return None;
+            }
+            let args: Vec<builtins::Value<'_>> = args.iter().map(|arg| std::borrow::Cow::Owned(from_rdf(arg))).collect();
+            (function.apply)(&args).map(|term| to_rdf(&term))
+        });
+    }
+    evaluator
+}
+
+fn fault(error: &QueryEvaluationError, budget: &Budget) -> RuleFault {
+    match error {
+        QueryEvaluationError::Dataset(inner) if inner.is::<TimeSpent>() => {
+            RuleFault::BudgetSpent(format!("the query took more than {} s", budget.secs))
+        }
+        other => RuleFault::Value(other.to_string()),
+    }
+}
+
+/// Binds each designator that the query uses as a variable, at the start of its first group:
+///
+/// ```sparql
+/// GRAPH act:parameters { act:pickObject act:value ?pickObject }
+/// ```
+fn bind_designators(text: &str, designators: &BTreeSet<&str>) -> String {
+    let Some(group) = first_group(text) else { return text.to_owned() };
+    let used = variables(text);
+    let mut bound = String::new();
+    for name in designators.iter().filter(|name| used.contains(**name)) {
+        let act = names::ACT;
+        bound.push_str(&format!(" GRAPH <{act}parameters> {{ <{act}{name}> <{act}value> ?{name} }}"));
+    }
+    format!("{}{bound}{}", &text[..=group], &text[group + 1..])
+}
+
+fn first_word_is_ask_or_select(text: &str) -> bool {
+    let Some(group) = first_group(text) else { return false };
+    scan(text)
+        .into_iter()
+        .take_while(|token| token.span.start < group)
+        .any(|token| token.word.eq_ignore_ascii_case("ask") || token.word.eq_ignore_ascii_case("select"))
+}
+
+/// A fault of the parser, whose words name line and column.
+fn syntax_fault(source: &Source, message: &str) -> Diagnostic {
+    let place = message.strip_prefix("error at ").and_then(|rest| {
+        let (line, rest) = rest.split_once(':')?;
+        let (column, rest) = rest.split_once(':')?;
+        Some((line.parse::<usize>().ok()?, column.trim().parse::<usize>().ok()?, rest.trim()))
+    });
+    let help = "see https://www.w3.org/TR/sparql11-query/";
+    match place {
+        Some((line, column, rest)) => {
+            let start: usize = source.text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+            let offset: usize = source.text[start..].chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
+            let at = (start + offset).min(source.text.len());
+            Diagnostic::error("R060", format!("the query can't be read: {rest}")).at(source, at..at).help(help)
+        }
+        None => Diagnostic::error("R060", format!("the query can't be read: {message}")).in_source(source).help(help),
+    }
+}
+
+/// Terms of our namespaces must be in the vocabulary, as in Datalog.
+fn check_vocabulary(source: &Source, vocabulary: &Vocabulary, derived: &BTreeSet<String>, diagnostics: &mut Diagnostics) {
+    for token in scan(&source.text) {
+        let Some(iri) = &token.iri else { continue };
+        let Some(namespace) = [names::W, names::ACT].into_iter().find(|n| iri.starts_with(n)) else { continue };
+        let local = &iri[namespace.len()..];
+        let ours = namespace == names::ACT && matches!(local, "" | "before" | "after" | "during" | "parameters" | "ontology" | "value");
+        if ours || local.is_empty() || vocabulary.terms.contains_key(iri) || derived.contains(iri) {
+            continue;
+        }
+        let known = vocabulary.terms.keys().chain(derived).filter_map(|known| known.strip_prefix(namespace));
+        let help = match crate::base::nearest(local, known) {
+            Some(found) => format!("did you mean `{}`?", names::shorten(&format!("{namespace}{found}"))),
+            None => "describe it in the ontology".to_owned(),
+        };
+        let span: Span = token.span.clone();
+        let message = format!("the ontology has no term `{}`", names::shorten(iri));
+        diagnostics.push(Diagnostic::error("R028", message).at(source, span).help(help));
+    }
+}

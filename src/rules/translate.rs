@@ -1,0 +1,588 @@
+//! One rule's syntax to one checked rule for each of its heads.
+
+use std::collections::BTreeMap;
+
+use crate::base::{Source, Span, Term, TermId, Terms, did_you_mean};
+use crate::rules::builtins;
+use crate::rules::check::{Checking, Role};
+use crate::rules::expression::Expr;
+use crate::rules::given::{GIVEN, add_given, phase_of, property_place};
+use crate::rules::program::{
+    Aggregate, AggregateKind, Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule, Variable,
+};
+use crate::rules::safety;
+use crate::rules::syntax::{
+    AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax,
+};
+use crate::rules::universe::Universe;
+
+/// The rules and facts of a file, checked. What has faults is left out; the faults are noted.
+pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> Program {
+    let mut program = Program::default();
+    let mut globals: BTreeMap<String, Term> = BTreeMap::new();
+    for statement in &syntax.statements {
+        match statement {
+            Statement::Parameter { name, value, span } => {
+                let mut rule = Translation::new(checking, &syntax.source, role, &globals);
+                let value = match value {
+                    Some(value) => rule.ground(value),
+                    None => {
+                        let help = format!("write `@parameter ${name} = … .`");
+                        rule.error("R036", span, format!("`${name}` has no value"), help);
+                        None
+                    }
+                };
+                globals.insert(name.clone(), value.unwrap_or(Term::Boolean(false)));
+            }
+            Statement::Rule(rule) if rule.body.is_empty() => {
+                for head in &rule.heads {
+                    if let Some(fact) = Translation::new(checking, &syntax.source, role, &globals).fact(head) {
+                        program.facts.push(fact);
+                    }
+                }
+            }
+            Statement::Rule(rule) => {
+                for head in &rule.heads {
+                    let rules = Translation::new(checking, &syntax.source, role, &globals).rule(rule, head);
+                    program.rules.extend(rules);
+                }
+            }
+            _ => {}
+        }
+    }
+    program
+}
+
+/// The state of translating one rule.
+pub(crate) struct Translation<'c, 'a> {
+    pub(crate) checking: &'c mut Checking<'a>,
+    pub(crate) source: &'c Source,
+    role: Role,
+    globals: &'c BTreeMap<String, Term>,
+    /// Name and first place of each variable; made ones have no name.
+    pub(crate) variables: Vec<(String, Span)>,
+    pub(crate) body: Vec<Literal>,
+    /// Rules for what a body atom can't say by itself.
+    extra: Vec<Rule>,
+    faulty: bool,
+}
+
+impl<'c, 'a> Translation<'c, 'a> {
+    pub(crate) fn new(
+        checking: &'c mut Checking<'a>,
+        source: &'c Source,
+        role: Role,
+        globals: &'c BTreeMap<String, Term>,
+    ) -> Self {
+        Self { checking, source, role, globals, variables: Vec::new(), body: Vec::new(), extra: Vec::new(), faulty: false }
+    }
+
+    pub(crate) fn error(&mut self, code: &'static str, span: &Span, message: impl Into<String>, help: impl Into<String>) {
+        self.faulty = true;
+        self.checking.error(code, self.source, span, message, help);
+    }
+
+    /// The checked rule, after the helper rules that it needs; nothing where a fault was noted.
+    fn rule(mut self, rule: &RuleSyntax, head: &AtomSyntax) -> Vec<Rule> {
+        for literal in &rule.body {
+            self.literal(literal);
+        }
+        let body_variables = self.variables.len();
+        let (predicate, args) = match self.predicate(head, true) {
+            Some(found) => found,
+            None => return Vec::new(),
+        };
+        let head_names = head.args.iter().map(|arg| variable_name(arg).unwrap_or_default().to_owned()).collect();
+        let mut aggregation = Aggregation { group: Vec::new(), aggregates: Vec::new(), after: Vec::new() };
+        let has_aggregate = args.iter().any(|arg| contains_aggregate(arg));
+        let mut operands = Vec::new();
+        for arg in &args {
+            operands.push(self.head_argument(arg, has_aggregate.then_some(&mut aggregation)));
+        }
+        let operands: Option<Vec<Operand>> = operands.into_iter().collect();
+        let Some(operands) = operands.filter(|_| !self.faulty) else { return Vec::new() };
+        let head = Atom { predicate, args: self.pad(predicate, operands), span: head.span.clone() };
+        let aggregation = has_aggregate.then_some(aggregation);
+        if !safety::order(&mut self, rule, &head, aggregation.as_ref(), body_variables) {
+            return Vec::new();
+        }
+        let origin = Origin {
+            source: self.source.clone(),
+            span: rule.span.clone(),
+            name: rule.name.clone(),
+            comment: rule.comment.clone(),
+        };
+        let variables = self.variables.into_iter().map(|(name, _)| name).collect();
+        let mut rules = self.extra;
+        rules.push(Rule { head, body: self.body, aggregation, variables, head_names, origin });
+        rules
+    }
+
+    fn fact(mut self, head: &AtomSyntax) -> Option<(PredicateId, Vec<TermId>, Span)> {
+        let (predicate, args) = self.predicate(head, true)?;
+        let mut row = Vec::new();
+        for arg in &args {
+            let term = self.ground(arg)?;
+            row.push(self.checking.terms.intern(term));
+        }
+        if row.is_empty() {
+            row.push(unit(self.checking.terms));
+        }
+        Some((predicate, row, head.span.clone()))
+    }
+
+    /// The value of an expression without variables.
+    fn ground(&mut self, expression: &Expression) -> Option<Term> {
+        let expr = self.expression(expression)?;
+        let mut variables = Vec::new();
+        expr.variables(&mut variables);
+        if let Some(variable) = variables.first() {
+            let name = self.variables[*variable].0.clone();
+            let help = "a fact has constants only; a rule has a body behind `:-`";
+            self.error("R020", &expression.span, format!("variable `?{name}` in a fact"), help);
+            return None;
+        }
+        let nothing = Terms::new();
+        let value = expr.value(&[], &Universe::new(&nothing, None)).map(|value| value.into_owned());
+        if value.is_none() {
+            self.error("R037", &expression.span, "the expression has no value", "look at the types of its arguments");
+        }
+        value
+    }
+
+    /// An atom of no columns keeps one, with the same constant always.
+    fn pad(&mut self, predicate: PredicateId, mut args: Vec<Operand>) -> Vec<Operand> {
+        if args.is_empty() && self.checking.predicates.get(predicate).width == 1 {
+            args.push(Operand::Constant(unit(self.checking.terms)));
+        }
+        args
+    }
+
+    /// Number of a variable by name.
+    pub(crate) fn variable(&mut self, name: &str, span: &Span) -> Variable {
+        match self.variables.iter().position(|(known, _)| known == name) {
+            Some(variable) => variable,
+            None => {
+                self.variables.push((name.to_owned(), span.clone()));
+                self.variables.len() - 1
+            }
+        }
+    }
+
+    fn made_variable(&mut self, span: &Span) -> Variable {
+        self.variables.push((String::new(), span.clone()));
+        self.variables.len() - 1
+    }
+
+    fn literal(&mut self, literal: &LiteralSyntax) {
+        match literal {
+            LiteralSyntax::Atom(atom) => {
+                if self.is_test(atom) {
+                    let call = Expression {
+                        kind: ExpressionKind::Call(atom.predicate.clone(), atom.args.clone()),
+                        span: atom.span.clone(),
+                    };
+                    if let Some(value) = self.expression(&call) {
+                        self.body.push(Literal::Test { value, span: atom.span.clone() });
+                    }
+                } else if let Some(atom) = self.body_atom(atom) {
+                    self.body.push(Literal::Positive(atom));
+                }
+            }
+            LiteralSyntax::Negated(syntax) => {
+                if let Some(atom) = self.body_atom(syntax) {
+                    self.body.push(Literal::Negative(atom));
+                }
+            }
+            LiteralSyntax::Comparison { op, left, right, span } => {
+                let (left, right) = (self.expression(left), self.expression(right));
+                if let (Some(left), Some(right)) = (left, right) {
+                    self.body.push(Literal::Compare { op: *op, left, right, span: span.clone() });
+                }
+            }
+        }
+    }
+
+    /// A built-in in an atom's place, unless a predicate has its name.
+    fn is_test(&self, atom: &AtomSyntax) -> bool {
+        let defined = |scope| self.checking.defined.contains_key(&(scope, atom.predicate.clone()));
+        builtins::builtin(&atom.predicate).is_some() && !defined(0) && !defined(self.role.scope())
+    }
+
+    /// The predicate of an atom and those of its arguments that are columns.
+    fn predicate<'e>(&mut self, atom: &'e AtomSyntax, head: bool) -> Option<(PredicateId, Vec<std::borrow::Cow<'e, Expression>>)> {
+        use std::borrow::Cow;
+        let name = atom.predicate.as_str();
+        let args: Vec<Cow<'e, Expression>> = atom.args.iter().map(Cow::Borrowed).collect();
+        if self.role != Role::Standalone
+            && let Some((_, form, arity)) = GIVEN.iter().find(|(given, ..)| *given == name)
+        {
+            if args.len() != *arity {
+                let message = format!("`{name}` has {} arguments, needs {arity}", args.len());
+                self.error("R022", &atom.span, message, format!("it reads `{form}`"));
+                return None;
+            }
+            return Some(self.given(atom, args));
+        }
+        for scope in [self.role.scope(), 0] {
+            let Some(definition) = self.checking.defined.get(&(scope, name.to_owned())) else { continue };
+            if definition.arity != args.len() {
+                if !head {
+                    let message = format!("`{name}` has {} arguments here and {} in {}", args.len(), definition.arity, definition.place);
+                    self.error("R022", &atom.span, message, "give it the same number everywhere, or another name");
+                }
+                self.faulty = true;
+                return None;
+            }
+            return self.checking.predicates.find(scope, name, None).map(|id| (id, args));
+        }
+        self.faulty = true;
+        if !head {
+            self.undefined(atom);
+        }
+        None
+    }
+
+    fn undefined(&mut self, atom: &AtomSyntax) {
+        let name = atom.predicate.as_str();
+        if self.role == Role::Standalone {
+            // A program may ask for facts that nobody gives: the predicate is empty.
+            return;
+        }
+        let known = self.checking.known_names(self.role);
+        let built_in = builtins::builtin_names().map(str::to_owned);
+        let names: Vec<String> = known.iter().cloned().chain(built_in).collect();
+        let help = match crate::base::nearest(name, names.iter().map(String::as_str)) {
+            Some(found) => format!("did you mean `{found}`?"),
+            None => did_you_mean(name, known.iter().map(String::as_str)),
+        };
+        self.error("R023", &atom.name_span, format!("no rule defines `{name}`"), help);
+    }
+
+    /// A given predicate: shorthands become `state`, a constant property becomes part of the predicate.
+    fn given<'e>(
+        &mut self,
+        atom: &'e AtomSyntax,
+        mut args: Vec<std::borrow::Cow<'e, Expression>>,
+    ) -> (PredicateId, Vec<std::borrow::Cow<'e, Expression>>) {
+        let mut name = atom.predicate.as_str();
+        if let Some(phase) = phase_of(name) {
+            let kind = ExpressionKind::Constant(Term::iri(phase));
+            args.insert(0, std::borrow::Cow::Owned(Expression { kind, span: atom.name_span.clone() }));
+            name = "state";
+        }
+        let Some(place) = property_place(name) else {
+            return (add_given(&mut self.checking.predicates, name, None), args);
+        };
+        let property = match &args[place].kind {
+            ExpressionKind::Constant(Term::Iri(iri)) => Some(iri.to_string()),
+            ExpressionKind::Global(global) => {
+                self.globals.get(global).and_then(Term::as_iri).map(str::to_owned)
+            }
+            _ => None,
+        };
+        if let Some(iri) = &property {
+            let span = args[place].span.clone();
+            self.checking.vocabulary(self.source, iri, &span, true);
+        }
+        match property.filter(|_| self.checking.split) {
+            Some(iri) => {
+                let property = self.checking.terms.intern(Term::iri(iri));
+                args.remove(place);
+                (add_given(&mut self.checking.predicates, name, Some(property)), args)
+            }
+            None => (add_given(&mut self.checking.predicates, name, None), args),
+        }
+    }
+
+    fn body_atom(&mut self, atom: &AtomSyntax) -> Option<Atom> {
+        let (predicate, args) = match self.predicate(atom, false) {
+            Some(found) => found,
+            None => {
+                if self.role != Role::Standalone {
+                    return None;
+                }
+                // Nobody defines it: an empty predicate.
+                self.faulty = false;
+                self.checking.define_predicate(self.source, &atom.predicate, atom.args.len(), &atom.span, self.role);
+                let id = self.checking.predicates.find(0, &atom.predicate, None)?;
+                (id, atom.args.iter().map(std::borrow::Cow::Borrowed).collect())
+            }
+        };
+        let mut operands = Vec::new();
+        for arg in &args {
+            operands.push(self.body_argument(arg)?);
+        }
+        Some(Atom { predicate, args: self.pad(predicate, operands), span: atom.span.clone() })
+    }
+
+    fn body_argument(&mut self, arg: &Expression) -> Option<Operand> {
+        match &arg.kind {
+            ExpressionKind::Anonymous => Some(Operand::Any),
+            ExpressionKind::Variable(name) => Some(Operand::Variable(self.variable(name, &arg.span))),
+            _ => match self.expression(arg)? {
+                Expr::Constant(term) => Some(Operand::Constant(self.checking.terms.intern(term))),
+                value => {
+                    let made = self.made_variable(&arg.span);
+                    let left = Expr::Variable(made);
+                    self.body.push(Literal::Compare { op: Comparison::Equal, left, right: value, span: arg.span.clone() });
+                    Some(Operand::Variable(made))
+                }
+            },
+        }
+    }
+
+    fn head_argument(&mut self, arg: &Expression, aggregation: Option<&mut Aggregation>) -> Option<Operand> {
+        match &arg.kind {
+            ExpressionKind::Anonymous => {
+                self.error("R035", &arg.span, "`_` in a head", "a head says what is derived: name the value");
+                None
+            }
+            ExpressionKind::Variable(name) => {
+                let variable = self.variable(name, &arg.span);
+                if let Some(aggregation) = aggregation {
+                    push_new(&mut aggregation.group, variable);
+                }
+                Some(Operand::Variable(variable))
+            }
+            _ if contains_aggregate(arg) => {
+                let aggregation = aggregation?;
+                let value = self.aggregated(arg, aggregation)?;
+                let made = self.made_variable(&arg.span);
+                aggregation.after.push((made, value));
+                Some(Operand::Variable(made))
+            }
+            _ => match self.expression(arg)? {
+                Expr::Constant(term) => Some(Operand::Constant(self.checking.terms.intern(term))),
+                value => {
+                    let variable = self.made_variable(&arg.span);
+                    self.body.push(Literal::Assign { variable, value, span: arg.span.clone() });
+                    if let Some(aggregation) = aggregation {
+                        push_new(&mut aggregation.group, variable);
+                    }
+                    Some(Operand::Variable(variable))
+                }
+            },
+        }
+    }
+
+    /// An expression of a head around aggregates: the variables outside of them group.
+    fn aggregated(&mut self, expression: &Expression, aggregation: &mut Aggregation) -> Option<Expr> {
+        match &expression.kind {
+            ExpressionKind::Aggregate(name, args) => self.aggregate(name, args, &expression.span, aggregation),
+            ExpressionKind::Arithmetic(op, left, right) => {
+                let left = self.aggregated(left, aggregation)?;
+                let right = self.aggregated(right, aggregation)?;
+                Some(Expr::Call(builtins::builtin(operator(*op))?, vec![left, right]))
+            }
+            ExpressionKind::Negative(inner) => {
+                Some(Expr::Call(builtins::builtin("INVERSE")?, vec![self.aggregated(inner, aggregation)?]))
+            }
+            ExpressionKind::Call(name, args) => {
+                let mut values = Vec::new();
+                for arg in args {
+                    values.push(self.aggregated(arg, aggregation)?);
+                }
+                self.call(name, values, &expression.span)
+            }
+            _ => {
+                let value = self.expression(expression)?;
+                let mut used = Vec::new();
+                value.variables(&mut used);
+                used.into_iter().for_each(|variable| push_new(&mut aggregation.group, variable));
+                Some(value)
+            }
+        }
+    }
+
+    fn aggregate(&mut self, name: &str, args: &[Expression], span: &Span, aggregation: &mut Aggregation) -> Option<Expr> {
+        const KINDS: [(&str, AggregateKind); 4] = [
+            ("count", AggregateKind::Count),
+            ("sum", AggregateKind::Sum),
+            ("min", AggregateKind::Min),
+            ("max", AggregateKind::Max),
+        ];
+        let Some((_, kind)) = KINDS.into_iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) else {
+            let help = did_you_mean(name, KINDS.map(|(known, _)| known));
+            self.error("R032", span, format!("unknown aggregate `#{name}`"), help);
+            return None;
+        };
+        if let Some(inner) = args.iter().find(|arg| contains_aggregate(arg)) {
+            let help = "compute the inner one in a rule of its own";
+            self.error("R032", &inner.span, "an aggregate in an aggregate", help);
+            return None;
+        }
+        let mut inputs = Vec::new();
+        for arg in args {
+            inputs.push(match &arg.kind {
+                ExpressionKind::Variable(name) => self.variable(name, &arg.span),
+                _ => {
+                    let value = self.expression(arg)?;
+                    let variable = self.made_variable(&arg.span);
+                    self.body.push(Literal::Assign { variable, value, span: arg.span.clone() });
+                    variable
+                }
+            });
+        }
+        let Some((input, distinct)) = inputs.split_first() else {
+            self.error("R032", span, format!("`#{name}` of nothing"), format!("write `#{name}(?x)`"));
+            return None;
+        };
+        let output = self.made_variable(span);
+        aggregation.aggregates.push(Aggregate { kind, input: *input, distinct: distinct.to_vec(), output });
+        Some(Expr::Variable(output))
+    }
+
+    /// A checked expression; nothing where a fault was noted.
+    fn expression(&mut self, expression: &Expression) -> Option<Expr> {
+        let span = &expression.span;
+        match &expression.kind {
+            ExpressionKind::Constant(term) => {
+                if let Term::Iri(iri) = term {
+                    self.checking.vocabulary(self.source, iri, span, false);
+                }
+                Some(Expr::Constant(term.clone()))
+            }
+            ExpressionKind::Variable(name) => Some(Expr::Variable(self.variable(name, span))),
+            ExpressionKind::Global(name) => match self.globals.get(name) {
+                Some(value) => Some(Expr::Constant(value.clone())),
+                None => {
+                    let help = format!("set it with `@parameter ${name} = … .` above this rule");
+                    self.error("R036", span, format!("unknown parameter `${name}`"), help);
+                    None
+                }
+            },
+            ExpressionKind::Call(name, args) => {
+                let args = self.all(args)?;
+                self.call(name, args, span)
+            }
+            ExpressionKind::Arithmetic(op, left, right) => {
+                let (left, right) = (self.expression(left), self.expression(right));
+                Some(Expr::Call(builtins::builtin(operator(*op))?, vec![left?, right?]))
+            }
+            ExpressionKind::Negative(inner) => Some(Expr::Call(builtins::builtin("INVERSE")?, vec![self.expression(inner)?])),
+            ExpressionKind::Format(parts) => self.all(parts).map(Expr::Format),
+            _ => self.no_expression(expression),
+        }
+    }
+
+    fn all(&mut self, expressions: &[Expression]) -> Option<Vec<Expr>> {
+        let values: Vec<Option<Expr>> = expressions.iter().map(|arg| self.expression(arg)).collect();
+        values.into_iter().collect()
+    }
+
+    fn no_expression(&mut self, expression: &Expression) -> Option<Expr> {
+        let span = &expression.span;
+        match &expression.kind {
+            ExpressionKind::Anonymous => self.error("R035", span, "`_` has no value to compute with", "use a variable"),
+            ExpressionKind::Existential(name) => {
+                let help = "this engine derives facts about known things only: existential rules are not supported";
+                self.error("R039", span, format!("existential variable `!{name}`"), help);
+            }
+            ExpressionKind::Aggregate(name, _) => {
+                let help = "aggregates stand in heads: derive the value in a rule of its own and use that here";
+                self.error("R032", span, format!("`#{name}` in a body"), help);
+            }
+            ExpressionKind::Tuple(_) => self.error("R012", span, "tuples are not supported", "use one argument for each part"),
+            // The parser has said it already.
+            _ => self.faulty = true,
+        }
+        None
+    }
+
+    fn call(&mut self, name: &str, args: Vec<Expr>, span: &Span) -> Option<Expr> {
+        let Some(builtin) = builtins::builtin(name) else {
+            let shown = name.strip_prefix(builtins::GEO3D).map_or(name.to_owned(), |local| format!("geo3d:{local}"));
+            let help = match crate::base::nearest(&shown, builtins::builtin_names()) {
+                Some(found) => format!("did you mean `{found}`?"),
+                None => "built-in functions are listed in rules/README.md".to_owned(),
+            };
+            self.error("R027", span, format!("unknown function `{shown}`"), help);
+            return None;
+        };
+        if !(builtin.least..=builtin.most).contains(&args.len()) {
+            let wanted = match (builtin.least, builtin.most) {
+                (least, usize::MAX) => format!("at least {least}"),
+                (least, most) if least == most => least.to_string(),
+                (least, most) => format!("{least} to {most}"),
+            };
+            let message = format!("`{}` has {} arguments, needs {wanted}", builtin.name, args.len());
+            self.error("R027", span, message, "functions and their arguments are listed in rules/README.md");
+            return None;
+        }
+        if let ("REGEX", [_, Expr::Constant(Term::String(pattern))]) = (builtin.name, args.as_slice()) {
+            return match builtins::compile_pattern(pattern) {
+                Ok(pattern) => args.into_iter().next().map(|text| Expr::Matches(Box::new(text), Box::new(pattern))),
+                Err(reason) => {
+                    self.error("R033", span, format!("the pattern can't be read: {reason}"), "see https://docs.rs/regex/#syntax");
+                    None
+                }
+            };
+        }
+        Some(Expr::Call(builtin, args))
+    }
+
+    /// A helper rule that keeps what a negated atom says about the variables that are bound elsewhere.
+    pub(crate) fn helper(&mut self, negated: Atom, bound: &[Variable]) -> Atom {
+        let name = format!("{}~{}", self.checking.predicates.get(negated.predicate).name, self.checking.predicates.len());
+        let kept: Vec<Variable> = bound
+            .iter()
+            .copied()
+            .filter(|variable| negated.args.contains(&Operand::Variable(*variable)))
+            .collect();
+        let span = negated.span.clone();
+        self.checking.define_predicate(self.source, &name, kept.len(), &span, self.role);
+        let predicate = self.checking.predicates.find(self.role.scope(), &name, None).unwrap_or(negated.predicate);
+        let args: Vec<Operand> = kept.iter().map(|variable| Operand::Variable(*variable)).collect();
+        let head = Atom { predicate, args: self.pad(predicate, args), span: span.clone() };
+        let origin = Origin { source: self.source.clone(), span, name: None, comment: None };
+        self.extra.push(Rule {
+            head: head.clone(),
+            body: vec![Literal::Positive(negated)],
+            aggregation: None,
+            variables: self.variables.iter().map(|(name, _)| name.clone()).collect(),
+            head_names: vec![String::new(); kept.len()],
+            origin,
+        });
+        head
+    }
+}
+
+/// The term in the only column of predicates without arguments.
+pub(crate) fn unit(terms: &mut Terms) -> TermId {
+    terms.intern(Term::Boolean(true))
+}
+
+fn push_new(list: &mut Vec<Variable>, variable: Variable) {
+    if !list.contains(&variable) {
+        list.push(variable);
+    }
+}
+
+fn operator(symbol: char) -> &'static str {
+    match symbol {
+        '+' => "SUM",
+        '-' => "MINUS",
+        '*' => "PRODUCT",
+        _ => "DIVISION",
+    }
+}
+
+fn variable_name(expression: &Expression) -> Option<&str> {
+    match &expression.kind {
+        ExpressionKind::Variable(name) => Some(name),
+        _ => None,
+    }
+}
+
+fn contains_aggregate(expression: &Expression) -> bool {
+    match &expression.kind {
+        ExpressionKind::Aggregate(..) => true,
+        ExpressionKind::Call(_, args) | ExpressionKind::Format(args) | ExpressionKind::Tuple(args) => {
+            args.iter().any(contains_aggregate)
+        }
+        ExpressionKind::Arithmetic(_, left, right) => contains_aggregate(left) || contains_aggregate(right),
+        ExpressionKind::Negative(inner) => contains_aggregate(inner),
+        _ => false,
+    }
+}

@@ -1,0 +1,92 @@
+//! A look at a SPARQL text: its words, IRIs and variables with their places, and where its first group opens.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Span, names};
+
+/// A word of the text.
+#[derive(Debug, Clone)]
+pub(crate) struct Word {
+    /// As written.
+    pub(crate) word: String,
+    /// The IRI that it stands for: of a prefixed name or of `<…>`.
+    pub(crate) iri: Option<String>,
+    /// Its place.
+    pub(crate) span: Span,
+}
+
+/// The words of a query, comments and strings left out.
+pub(crate) fn scan(text: &str) -> Vec<Word> {
+    let mut prefixes: BTreeMap<String, String> =
+        names::PREFIXES.iter().map(|(prefix, iri)| ((*prefix).to_owned(), (*iri).to_owned())).collect();
+    let mut words: Vec<Word> = Vec::new();
+    let mut at = 0;
+    while let Some(c) = text[at..].chars().next() {
+        let start = at;
+        match c {
+            '#' => at += text[at..].find('\n').unwrap_or(text.len() - at),
+            '"' | '\'' => at = string_end(text, at, c),
+            '<' => match text[at + 1..].find(|c: char| c == '>' || c.is_whitespace()) {
+                Some(length) if text[at + 1 + length..].starts_with('>') => {
+                    let iri = text[at + 1..at + 1 + length].to_owned();
+                    at += length + 2;
+                    if let [.., keyword, name] = words.as_slice()
+                        && keyword.word.eq_ignore_ascii_case("prefix")
+                    {
+                        prefixes.insert(name.word.trim_end_matches(':').to_owned(), iri);
+                    } else {
+                        words.push(Word { word: String::new(), iri: Some(iri), span: start..at });
+                    }
+                }
+                _ => at += 1,
+            },
+            c if c.is_alphanumeric() || "?$_:".contains(c) => {
+                let length = text[at..].find(|c: char| !(c.is_alphanumeric() || "?$_:-".contains(c))).unwrap_or(text.len() - at);
+                at += length;
+                let word = text[start..at].to_owned();
+                let iri = word
+                    .split_once(':')
+                    .and_then(|(prefix, local)| Some(format!("{}{local}", prefixes.get(prefix)?)));
+                words.push(Word { word, iri, span: start..at });
+            }
+            c => at += c.len_utf8(),
+        }
+    }
+    words
+}
+
+fn string_end(text: &str, start: usize, quote: char) -> usize {
+    let triple: String = std::iter::repeat_n(quote, 3).collect();
+    let close = if text[start..].starts_with(&triple) { triple } else { quote.to_string() };
+    let mut at = start + close.len();
+    while let Some(c) = text[at..].chars().next() {
+        if text[at..].starts_with(&close) {
+            return at + close.len();
+        }
+        at += c.len_utf8();
+        if c == '\\' {
+            at += text[at..].chars().next().map_or(0, char::len_utf8);
+        }
+    }
+    text.len()
+}
+
+/// Names of the variables in a query.
+pub(crate) fn variables(text: &str) -> BTreeSet<String> {
+    scan(text).into_iter().filter_map(|word| word.word.strip_prefix(['?', '$']).map(str::to_owned)).collect()
+}
+
+/// Offset of the first `{` that is no part of a string, an IRI or a comment.
+pub(crate) fn first_group(text: &str) -> Option<usize> {
+    let mut at = 0;
+    while let Some(c) = text[at..].chars().next() {
+        match c {
+            '{' => return Some(at),
+            '#' => at += text[at..].find('\n').unwrap_or(text.len() - at),
+            '"' | '\'' => at = string_end(text, at, c),
+            '<' => at += text[at..].find('>').map_or(1, |length| length + 1),
+            c => at += c.len_utf8(),
+        }
+    }
+    None
+}
