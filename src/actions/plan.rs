@@ -25,8 +25,8 @@ pub struct Plan {
     cost: f64,
 }
 
-/// How far the hand lifts. Unit: metres.
-const LIFT_M: f64 = 0.17;
+/// How far the hand lifts, the best first: the arm may not reach higher. Unit: metres.
+const LIFTS_M: [f64; 3] = [0.17, 0.13, 0.09];
 /// Length of the slow last part of the way. Unit: metres.
 const APPROACH_M: f64 = 0.12;
 /// How far in front of the furniture's edge the hand stays while the arm unfolds. Unit: metres.
@@ -50,14 +50,22 @@ const N_CHECKS: usize = 12;
 /// A sentence for the action's report.
 pub fn plan(operator: &Operator<'_>, grasps: &[Grasp], others: &[Sighting]) -> Result<Plan, String> {
     let planner = Planner::new(operator, others);
-    let mut best: Option<Plan> = None;
+    let mut seeds: Vec<(f64, &Grasp, Vec<f64>)> = Vec::new();
     for grasp in grasps {
         for posture in &planner.postures {
-            if let Some(plan) = planner.plan(grasp, posture)
-                && best.as_ref().is_none_or(|best| plan.cost < best.cost)
-            {
-                best = Some(plan);
+            let seed = planner.seed(grasp, posture);
+            if planner.points_along(&seed, grasp) {
+                seeds.push((planner.travel_cost(&seed), grasp, seed));
             }
+        }
+    }
+    // The nearest first, so that most of the others can't be better any more.
+    seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best: Option<Plan> = None;
+    for (_, grasp, seed) in seeds {
+        let bound = best.as_ref().map_or(f64::INFINITY, |best| best.cost);
+        if let Some(plan) = planner.plan(grasp, &seed, bound) {
+            best = Some(plan);
         }
     }
     best.ok_or_else(|| "no reachable and free way to it was found".to_owned())
@@ -101,7 +109,7 @@ impl<'a> Planner<'a> {
             let [x, y, foot] = seen.pose.position;
             let [width, depth, height] = seen.size_m;
             // Between the circle inside and the one around: corners seldom point at the hand.
-            let radius = (width.max(depth) + width.hypot(depth)) / 4.0;
+            let radius = (width.max(depth) + length(width, depth)) / 4.0;
             Pillar { centre: Point2::new(x, y), radius, foot, top: foot + height }
         };
         let mut postures = operator.profile().postures.clone();
@@ -117,11 +125,16 @@ impl<'a> Planner<'a> {
         }
     }
 
-    fn plan(&self, grasp: &Grasp, posture: &[f64]) -> Option<Plan> {
-        let at_thing = self.solve(&self.seed(grasp, posture), &grasp.pose, 1.0)?;
+    /// A plan that costs less than `bound`, if there is one near the seed.
+    fn plan(&self, grasp: &Grasp, seed: &[f64], bound: f64) -> Option<Plan> {
         let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
         let way = self.way_out(&grasp.pose.translation.vector, &back)?;
-        let lift = self.vertically(&at_thing, LIFT_M)?;
+        // What the way alone costs, before anything is solved. (Solving moves the base by centimetres.)
+        if self.travel_cost(&self.moved(seed, &(back * way))) > bound + 0.05 {
+            return None;
+        }
+        let at_thing = self.solve(seed, &grasp.pose, 1.0)?;
+        let lift = LIFTS_M.iter().find_map(|height| self.vertically(&at_thing, *height))?;
         let lifted = lift.last()?.clone();
         let (near, approach) = match grasp.approach {
             Approach::Side => {
@@ -135,8 +148,22 @@ impl<'a> Planner<'a> {
         let drive = self.with_start_arm(&reach);
         let retreat = vec![self.moved(&lifted, &(back * way))];
         let mut plan = Plan { drive, reach, near, approach, lift, retreat, cost: 0.0 };
-        plan.cost = self.cost(&plan)?;
+        plan.cost = self.cost(&plan, bound)?;
         Some(plan)
+    }
+
+    /// Whether the hand of a seed points within half a right angle of where the grasp wants it.
+    fn points_along(&self, seed: &[f64], grasp: &Grasp) -> bool {
+        let forward = |pose: &Isometry3<f64>| pose.rotation * Vector3::x();
+        forward(&self.kinematics.grasp(seed)).dot(&forward(&grasp.pose)) > std::f64::consts::FRAC_1_SQRT_2
+    }
+
+    /// What driving to a posture's base pose costs.
+    fn travel_cost(&self, positions: &[f64]) -> f64 {
+        self.layout.base.map_or(0.0, |[x, y, heading]| {
+            let way = length(positions[x] - self.start[x], positions[y] - self.start[y]);
+            0.4 * way + 0.12 * (positions[heading] - self.start[heading]).abs()
+        })
     }
 
     /// The posture with the base put so that the hand is over the thing, heading as the grasp wants it.
@@ -219,23 +246,22 @@ impl<'a> Planner<'a> {
         out
     }
 
-    /// What speaks against a plan: closeness to things, then length of the way; nothing if it is not free.
-    fn cost(&self, plan: &Plan) -> Option<f64> {
-        let travel = self.layout.base.map_or(0.0, |[x, y, heading]| {
-            let way = (plan.drive[x] - self.start[x]).hypot(plan.drive[y] - self.start[y]);
-            way + 0.3 * (plan.drive[heading] - self.start[heading]).abs()
-        });
+    /// What speaks against a plan: closeness to things, then length of the way; nothing if it is not free, or no better
+    /// than `bound`.
+    fn cost(&self, plan: &Plan, bound: f64) -> Option<f64> {
+        let travel = self.travel_cost(&plan.drive);
         let grasp = plan.approach.last()?;
         let course = [&self.start, &plan.drive, &plan.reach, &plan.near[0], grasp, plan.lift.last()?];
-        let mut clear = f64::INFINITY;
-        for pair in course.windows(2) {
+        let mut cost = travel;
+        // From the last leg, where most plans fail.
+        for pair in course.windows(2).rev() {
             let (furniture, things) = self.clearance(pair[0], pair[1]);
-            if furniture < FURNITURE_CLEAR_M || things < LEAST_CLEAR_M {
+            cost = cost.max(travel + (AMPLE_CLEAR_M - things).max(0.0) * 50.0);
+            if furniture < FURNITURE_CLEAR_M || things < LEAST_CLEAR_M || cost >= bound {
                 return None;
             }
-            clear = clear.min(things);
         }
-        Some((AMPLE_CLEAR_M - clear).max(0.0) * 50.0 + 0.4 * travel)
+        Some(cost)
     }
 
     /// Least distances to furniture and to things on the way between two postures. Unit: metres; negative inside.
@@ -264,7 +290,7 @@ impl Block {
     fn beside(&self, point: &Point3<f64>) -> f64 {
         let local = self.from_world * point;
         let (dx, dy) = (local.x.abs() - self.half[0], local.y.abs() - self.half[1]);
-        if dx > 0.0 && dy > 0.0 { dx.hypot(dy) } else { dx.max(dy) }
+        if dx > 0.0 && dy > 0.0 { length(dx, dy) } else { dx.max(dy) }
     }
 
     fn distance(&self, point: &Point3<f64>) -> f64 {
@@ -277,6 +303,11 @@ impl Pillar {
         let beside = (point.xy() - self.centre).norm() - self.radius;
         beside.max(point.z - self.top).max(self.foot - point.z)
     }
+}
+
+/// Length of a level vector, with the same bits on every machine.
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 /// An angle brought into (−π, π]. Unit: radians.
