@@ -1,0 +1,168 @@
+//! Statements to an ontology in which every link leads somewhere.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics, Digest, Files, Term, names};
+use crate::ontology::graph::{Graph, rdfs};
+use crate::ontology::read::Statement;
+use crate::ontology::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
+use crate::ontology::{check, read, rule_files};
+
+/// Reads an ontology with what it imports and the rule files that it links.
+///
+/// Turtle and RDF/XML, told apart by ending or content. Relative IRIs of files become IRIs that name no machine.
+///
+/// # Errors
+/// Every fault at once: a text can't be read or parsed (O001 to O003), a success property is none (O004), a property has
+/// no rule or several (O005, O006), a parameter is missing or unknown (O007, O008), a rule file is missing or of no rule
+/// language (O009 to O011), there is no action (O012).
+pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
+    let mut found = Diagnostics::new();
+    let graph = Graph::new(read::read(files, path, &mut found));
+    // What a text with a syntax error seems to lack may be in the part that could not be read.
+    if found.has_errors() {
+        return Err(found);
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let libraries = libraries(files, folder, &graph, &mut found);
+    let mut rules = property_rules(files, folder, &graph, &mut found);
+    let properties: BTreeMap<String, Property> = graph
+        .individuals(&names::act("Property"))
+        .into_iter()
+        .filter_map(|iri| rules.remove(&iri).map(|rule| (iri.clone(), property(&graph, iri, rule))))
+        .collect();
+    let actions: BTreeMap<String, Action> =
+        check::action_iris(&graph).into_iter().map(|iri| (names::local(&iri).to_owned(), action(&graph, iri))).collect();
+    check::actions(&graph, &actions, &mut found);
+    let mut digest = Digest::new();
+    graph.sources().iter().for_each(|source| digest.update(source.text.as_bytes()));
+    found.or(Ontology {
+        sources: graph.sources().to_vec(),
+        actions,
+        properties,
+        libraries,
+        triples: triples(&graph),
+        superclasses: graph.superclasses.clone(),
+        vocabulary: vocabulary(&graph),
+        digest: digest.finish(),
+    })
+}
+
+/// Libraries in the order of their paths, each once.
+fn libraries(files: &Files, folder: &Path, graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
+    let predicate = names::act("ruleLibrary");
+    let mut libraries: BTreeMap<String, RuleFile> = BTreeMap::new();
+    for statement in graph.statements().iter().filter(|statement| *statement.predicate == *predicate) {
+        let Some(library) = rule_files::read(files, folder, graph, statement, found) else { continue };
+        if library.language != RuleLanguage::Datalog
+            && let Some((source, span)) = &library.linked_at
+        {
+            let message = format!("the rule library `{}` is not Datalog", library.path);
+            found.push(Diagnostic::error("O010", message).at(source, span.clone()).help("a library's ending is `.rls`"));
+        }
+        libraries.insert(library.path.clone(), library);
+    }
+    libraries.into_values().collect()
+}
+
+/// The one rule file of each property.
+fn property_rules(files: &Files, folder: &Path, graph: &Graph, found: &mut Diagnostics) -> BTreeMap<String, RuleFile> {
+    let mut rules = BTreeMap::new();
+    for iri in graph.individuals(&names::act("Property")) {
+        let links: Vec<&Statement> = graph.stated(&iri, &names::act("verifiedBy")).collect();
+        match links.as_slice() {
+            [] => found.push(check::unverified(graph, &iri)),
+            [link] => {
+                if let Some(rule) = rule_files::read(files, folder, graph, link, found) {
+                    rules.insert(iri, rule);
+                }
+            }
+            [_, second, ..] => {
+                let message = format!("the property `{}` is verified by {} rule files", names::local(&iri), links.len());
+                let (source, span) = graph.place(second, second.object.as_iri().unwrap_or(&iri));
+                found.push(Diagnostic::error("O006", message).at(source, span).help("link one; make two properties of two rules"));
+            }
+        }
+    }
+    rules
+}
+
+fn property(graph: &Graph, iri: String, rule: RuleFile) -> Property {
+    Property {
+        name: names::local(&iri).to_owned(),
+        label: graph.label(&iri),
+        comment: graph.text(&iri, &rdfs("comment")),
+        rule,
+        needs: locals(graph.stated(&iri, &names::act("needsParameter"))),
+        unit: graph.text(&iri, &names::act("unit")),
+        iri,
+    }
+}
+
+/// An action with what is stated on it and on the classes that it is an instance of.
+fn action(graph: &Graph, iri: String) -> Action {
+    let stated = |predicate: &str| check::inherited(graph, &iri, predicate);
+    let iris = |predicate: &str| -> Vec<String> {
+        let mut seen = BTreeSet::new();
+        let objects = stated(predicate).into_iter().filter_map(|statement| statement.object.as_iri().map(str::to_owned));
+        objects.filter(|object| seen.insert(object.clone())).collect()
+    };
+    Action {
+        label: graph.label(&iri),
+        comment: graph.text(&iri, &rdfs("comment")),
+        performed_in: iris(&names::act("performedIn")).into_iter().next(),
+        success_properties: iris(&names::act("successProperty")),
+        preconditions: iris(&names::act("precondition")),
+        parameters: locals(stated(&names::act("hasParameter")).into_iter()),
+        iri,
+    }
+}
+
+fn locals<'a>(statements: impl Iterator<Item = &'a Statement>) -> BTreeSet<String> {
+    statements.filter_map(|statement| statement.object.as_iri()).map(|iri| names::local(iri).to_owned()).collect()
+}
+
+fn triples(graph: &Graph) -> Vec<[Term; 3]> {
+    let mut triples: Vec<[Term; 3]> = graph
+        .statements()
+        .iter()
+        .map(|statement| [statement.subject.clone(), Term::iri(&statement.predicate), statement.object.clone()])
+        .collect();
+    triples.sort();
+    triples.dedup();
+    triples
+}
+
+/// Classes whose individuals can stand as predicates.
+const PROPERTY_CLASSES: [(&str, &str); 5] = [
+    (names::RDF, "Property"),
+    (names::OWL, "ObjectProperty"),
+    (names::OWL, "DatatypeProperty"),
+    (names::OWL, "AnnotationProperty"),
+    (names::OWL, "FunctionalProperty"),
+];
+
+fn vocabulary(graph: &Graph) -> Vocabulary {
+    let predicates: BTreeSet<String> = PROPERTY_CLASSES.iter().map(|(space, local)| format!("{space}{local}")).collect();
+    let term = |iri: &str| VocabularyTerm {
+        is_property: !graph.classes_of(iri).is_disjoint(&predicates)
+            || graph.about(iri).any(|statement| *statement.predicate == *rdfs("domain")),
+        unit: graph.text(iri, &names::w("unit")),
+        label: graph.text(iri, &rdfs("label")),
+        comment: graph.text(iri, &rdfs("comment")),
+    };
+    Vocabulary { terms: graph.subjects().map(|iri| (iri.to_owned(), term(iri))).collect() }
+}
+
+impl Ontology {
+    /// Whether a class is another one or stands below it.
+    pub fn is_a(&self, class: &str, ancestor: &str) -> bool {
+        class == ancestor || self.superclasses.get(class).is_some_and(|above| above.contains(ancestor))
+    }
+
+    /// Whether the ontology declares a class of this IRI.
+    pub fn has_class(&self, class: &str) -> bool {
+        self.vocabulary.terms.contains_key(class) || self.superclasses.contains_key(class)
+    }
+}

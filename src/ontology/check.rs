@@ -1,0 +1,190 @@
+//! What must be true of actions, properties and designators together.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, nearest, names};
+use crate::ontology::Action;
+use crate::ontology::graph::Graph;
+use crate::ontology::read::Statement;
+
+/// Individuals of `act:Action` or of a class below it, and individuals of those (a special kind of Pick is a Pick).
+pub(super) fn action_iris(graph: &Graph) -> BTreeSet<String> {
+    let mut actions = graph.individuals(&names::act("Action"));
+    loop {
+        let kinds: Vec<String> =
+            graph.subjects().filter(|s| !graph.classes_of(s).is_disjoint(&actions)).map(str::to_owned).collect();
+        let before = actions.len();
+        actions.extend(kinds);
+        if actions.len() == before {
+            return actions;
+        }
+    }
+}
+
+/// Statements about an individual and about everything that it is an instance of, in the order of the texts.
+pub(super) fn inherited<'a>(graph: &'a Graph, iri: &str, predicate: &str) -> Vec<&'a Statement> {
+    let mut owners: BTreeSet<String> = BTreeSet::from([iri.to_owned()]);
+    let mut waiting = vec![iri.to_owned()];
+    while let Some(next) = waiting.pop() {
+        let above = graph.classes_of(&next);
+        waiting.extend(above.iter().filter(|class| !owners.contains(*class)).cloned());
+        owners.extend(above);
+    }
+    let mut statements: Vec<&Statement> = owners.iter().flat_map(|owner| graph.stated(owner, predicate)).collect();
+    // All statements lie in one list, in the order in which they were read.
+    statements.sort_by_key(|statement| std::ptr::from_ref::<Statement>(statement));
+    statements
+}
+
+/// A property that no rule verifies (O005).
+pub(super) fn unverified(graph: &Graph, iri: &str) -> Diagnostic {
+    let name = names::local(iri);
+    let fault = Diagnostic::error("O005", format!("no rule verifies the property `{name}`"));
+    let file = snake_case(name);
+    at_first(graph, iri, fault).help(format!("link its rule file: `act:verifiedBy <../rules/{file}.rls>`"))
+}
+
+fn snake_case(name: &str) -> String {
+    let mut out = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && !out.is_empty() {
+            out.push('_');
+        }
+        out.extend(c.to_lowercase());
+    }
+    out
+}
+
+fn at_first(graph: &Graph, iri: &str, fault: Diagnostic) -> Diagnostic {
+    match graph.about(iri).next() {
+        Some(statement) => {
+            let (source, span) = graph.place(statement, iri);
+            fault.at(source, span)
+        }
+        None => fault,
+    }
+}
+
+/// Checks every action's properties and parameters; each fault once, where it is stated.
+pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: &mut Diagnostics) {
+    if actions.is_empty() {
+        let fault = Diagnostic::error("O012", "the ontology has no action")
+            .help("state one, such as `act:Pick a act:Action`, or import an ontology that does");
+        found.push(match graph.sources().first() {
+            Some(source) => fault.in_source(source),
+            None => fault,
+        });
+    }
+    let known = Known { properties: graph.individuals(&names::act("Property")), parameters: parameters(graph) };
+    let mut told: BTreeSet<(String, usize)> = BTreeSet::new();
+    for (name, action) in actions {
+        for fault in faults_of(graph, &known, name, action) {
+            // An inherited statement is wrong once, not once for every action that inherits it.
+            let place = fault.span.as_ref().map_or(0, |span| span.start);
+            let source = fault.source.as_ref().map_or(String::new(), |source| source.name.to_string());
+            let parameter_fault = fault.code == "O007";
+            if told.insert((format!("{source} {} {}", fault.code, if parameter_fault { name } else { "" }), place)) {
+                found.push(fault);
+            }
+        }
+    }
+}
+
+/// What success properties and parameters may be.
+struct Known {
+    properties: BTreeSet<String>,
+    parameters: BTreeSet<String>,
+}
+
+fn parameters(graph: &Graph) -> BTreeSet<String> {
+    graph.individuals(&names::act("PropertyParameter")).iter().map(|iri| names::local(iri).to_owned()).collect()
+}
+
+fn faults_of(graph: &Graph, known: &Known, name: &str, action: &Action) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    for statement in inherited(graph, &action.iri, &names::act("hasParameter")) {
+        faults.extend(unknown_parameter(graph, known, statement, &format!("the action `{name}` has")));
+    }
+    for predicate in ["successProperty", "precondition"] {
+        for statement in inherited(graph, &action.iri, &names::act(predicate)) {
+            let Some(property) = statement.object.as_iri() else { continue };
+            if known.properties.contains(property) {
+                faults.extend(missing_parameters(graph, known, name, action, property));
+            } else {
+                faults.push(no_property(graph, known, statement, property));
+            }
+        }
+    }
+    faults
+}
+
+/// A success property that is no property (O004).
+fn no_property(graph: &Graph, known: &Known, statement: &Statement, property: &str) -> Diagnostic {
+    let (source, span) = graph.place(statement, property);
+    let local = names::local(property);
+    let help = match nearest(local, known.properties.iter().map(|iri| names::local(iri))) {
+        Some(found) => format!("did you mean `{found}`?"),
+        None => format!("state that it is one: `{} a act:Property ; act:verifiedBy <…>`", names::shorten(property)),
+    };
+    Diagnostic::error("O004", format!("`{local}` is no property")).at(source, span).help(help)
+}
+
+/// Parameters that a property needs and an action does not have (O007).
+fn missing_parameters(graph: &Graph, known: &Known, name: &str, action: &Action, property: &str) -> Vec<Diagnostic> {
+    let predicate = names::act("needsParameter");
+    let needs = graph.stated(property, &predicate);
+    let missing = needs.filter_map(|statement| {
+        let iri = statement.object.as_iri()?;
+        let parameter = names::local(iri);
+        (!action.parameters.contains(parameter)).then_some((statement, iri, parameter))
+    });
+    missing
+        .map(|(statement, iri, parameter)| {
+            let (source, span) = graph.place(statement, iri);
+            let message = format!(
+                "the property `{}` needs the parameter `{parameter}`, which the action `{name}` does not have",
+                names::local(property)
+            );
+            let help = if known.parameters.contains(parameter) {
+                match nearest(parameter, action.parameters.iter().map(String::as_str)) {
+                    Some(near) => format!("is the action's parameter `{near}` meant to be `{parameter}`?"),
+                    None => format!("state `act:{name} act:hasParameter act:{parameter}`"),
+                }
+            } else {
+                did_you_mean(parameter, action.parameters.iter().chain(&known.parameters).map(String::as_str))
+            };
+            Diagnostic::error("O007", message).at(source, span).help(help)
+        })
+        .collect()
+}
+
+/// A parameter that is declared nowhere (O008).
+fn unknown_parameter(graph: &Graph, known: &Known, statement: &Statement, who: &str) -> Option<Diagnostic> {
+    let iri = statement.object.as_iri()?;
+    let parameter = names::local(iri);
+    if known.parameters.contains(parameter) {
+        return None;
+    }
+    let (source, span): (&Source, Span) = graph.place(statement, iri);
+    let mentioned = mentioned_parameters(graph, parameter);
+    let candidates = known.parameters.iter().chain(&mentioned).map(String::as_str);
+    let help = match nearest(parameter, candidates) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("state that it is one: `{} a act:PropertyParameter`", names::shorten(iri)),
+    };
+    let message = format!("{who} the parameter `{parameter}`, which is declared nowhere");
+    Some(Diagnostic::error("O008", message).at(source, span).help(help))
+}
+
+/// Other names that stand where parameters do: in a listing without declarations they are all there is.
+fn mentioned_parameters(graph: &Graph, except: &str) -> BTreeSet<String> {
+    let predicates = [names::act("hasParameter"), names::act("needsParameter")];
+    graph
+        .statements()
+        .iter()
+        .filter(|statement| predicates.iter().any(|predicate| *statement.predicate == **predicate))
+        .filter_map(|statement| statement.object.as_iri().map(|iri| names::local(iri).to_owned()))
+        .chain(["pickObject", "placeSurface", "objectSurface", "surfaceObjects", "objectLocation", "world"].map(String::from))
+        .filter(|name| name != except)
+        .collect()
+}

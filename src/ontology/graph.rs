@@ -1,0 +1,114 @@
+//! Statements by subject and predicate, with class and property hierarchies followed upwards.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Source, Span, Term, names};
+use crate::ontology::read::{Reading, Statement};
+
+/// Questions that assembling an ontology asks of its statements.
+pub(super) struct Graph {
+    reading: Reading,
+    /// Statements of a subject IRI, by index, in the order of the texts.
+    by_subject: BTreeMap<String, Vec<usize>>,
+    /// Each class with all classes above it, itself left out.
+    pub(super) superclasses: BTreeMap<String, BTreeSet<String>>,
+    superproperties: BTreeMap<String, BTreeSet<String>>,
+}
+
+impl Graph {
+    pub(super) fn new(reading: Reading) -> Self {
+        let mut by_subject: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for (idx, statement) in reading.statements.iter().enumerate() {
+            if let Some(subject) = statement.subject.as_iri() {
+                by_subject.entry(subject.to_owned()).or_default().push(idx);
+            }
+        }
+        let superclasses = closure(&reading, &rdfs("subClassOf"));
+        let superproperties = closure(&reading, &rdfs("subPropertyOf"));
+        Self { reading, by_subject, superclasses, superproperties }
+    }
+
+    pub(super) fn statements(&self) -> &[Statement] {
+        &self.reading.statements
+    }
+
+    pub(super) fn sources(&self) -> &[Source] {
+        &self.reading.sources
+    }
+
+    /// All IRIs that something is said of, sorted.
+    pub(super) fn subjects(&self) -> impl Iterator<Item = &str> {
+        self.by_subject.keys().map(String::as_str)
+    }
+
+    /// What is said of an IRI, in the order of the texts.
+    pub(super) fn about<'a>(&'a self, subject: &str) -> impl Iterator<Item = &'a Statement> {
+        self.by_subject.get(subject).into_iter().flatten().map(|idx| &self.reading.statements[*idx])
+    }
+
+    /// Statements of a subject with a predicate or one of its sub-properties.
+    pub(super) fn stated<'a>(&'a self, subject: &str, predicate: &str) -> impl Iterator<Item = &'a Statement> {
+        self.about(subject).filter(move |statement| self.means(&statement.predicate, predicate))
+    }
+
+    /// The first text that a subject has for a predicate.
+    pub(super) fn text(&self, subject: &str, predicate: &str) -> Option<String> {
+        self.stated(subject, predicate).find_map(|statement| match &statement.object {
+            Term::String(text) | Term::LangString(text, _) => Some(text.to_string()),
+            _ => None,
+        })
+    }
+
+    /// `rdfs:label`, or the local name.
+    pub(super) fn label(&self, iri: &str) -> String {
+        self.text(iri, &rdfs("label")).unwrap_or_else(|| names::local(iri).to_owned())
+    }
+
+    /// Classes that an individual is stated to be of, with all classes above them.
+    pub(super) fn classes_of(&self, individual: &str) -> BTreeSet<String> {
+        let mut classes = BTreeSet::new();
+        for class in self.stated(individual, &format!("{}type", names::RDF)).filter_map(|s| s.object.as_iri()) {
+            classes.extend(self.superclasses.get(class).into_iter().flatten().cloned());
+            classes.insert(class.to_owned());
+        }
+        classes
+    }
+
+    /// Individuals of a class or of one below it, sorted.
+    pub(super) fn individuals(&self, class: &str) -> BTreeSet<String> {
+        self.subjects().filter(|subject| self.classes_of(subject).contains(class)).map(str::to_owned).collect()
+    }
+
+    /// Text and place of a statement's mention of an IRI.
+    pub(super) fn place(&self, statement: &Statement, iri: &str) -> (&Source, Span) {
+        (&self.reading.sources[statement.text], self.reading.place(statement, iri))
+    }
+
+    fn means(&self, predicate: &str, wanted: &str) -> bool {
+        predicate == wanted || self.superproperties.get(predicate).is_some_and(|above| above.contains(wanted))
+    }
+}
+
+fn closure(reading: &Reading, predicate: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let mut direct: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for statement in reading.statements.iter().filter(|statement| *statement.predicate == *predicate) {
+        if let (Some(below), Some(above)) = (statement.subject.as_iri(), statement.object.as_iri()) {
+            direct.entry(below).or_default().insert(above);
+        }
+    }
+    let above_of = |start: &str| {
+        let mut above: BTreeSet<String> = BTreeSet::new();
+        let mut waiting: Vec<&str> = direct.get(start).into_iter().flatten().copied().collect();
+        while let Some(next) = waiting.pop() {
+            if next != start && above.insert(next.to_owned()) {
+                waiting.extend(direct.get(next).into_iter().flatten().copied());
+            }
+        }
+        above
+    };
+    direct.keys().map(|start| ((*start).to_owned(), above_of(start))).collect()
+}
+
+pub(super) fn rdfs(local: &str) -> String {
+    format!("{}{local}", names::RDFS)
+}

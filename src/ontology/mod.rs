@@ -1,0 +1,14 @@
+//! Actions, properties, designators, categories and the vocabulary, read from RDF files and checked.
+//!
+//! Never: parses a rule, knows what a configuration asks for, or goes to the network.
+
+mod assemble;
+mod check;
+mod graph;
+mod literal;
+mod model;
+mod read;
+mod rule_files;
+
+pub use assemble::load;
+pub use model::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};

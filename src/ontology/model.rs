@@ -1,0 +1,108 @@
+//! What an ontology says, checked: actions, properties, designators, categories, vocabulary.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Source, Span, Term};
+
+/// A checked ontology with everything that it imports.
+#[derive(Debug, Clone)]
+pub struct Ontology {
+    /// The root file and what it imports, in reading order.
+    pub sources: Vec<Source>,
+    /// Actions by local name (`Pick`).
+    pub actions: BTreeMap<String, Action>,
+    /// Properties by IRI.
+    pub properties: BTreeMap<String, Property>,
+    /// Rule files whose derived predicates every rule may use (`act:ruleLibrary`), in order of their names.
+    pub libraries: Vec<RuleFile>,
+    /// Every statement, sorted; what `ontology(s, p, o)` sees.
+    pub triples: Vec<[Term; 3]>,
+    /// Each class with all classes above it (itself left out).
+    pub superclasses: BTreeMap<String, BTreeSet<String>>,
+    /// Terms that facts and rules may speak of.
+    pub vocabulary: Vocabulary,
+    /// Digest over all sources (not the rule files).
+    pub digest: String,
+}
+
+/// One action.
+#[derive(Debug, Clone)]
+pub struct Action {
+    /// Its IRI.
+    pub iri: String,
+    /// `rdfs:label`, or its local name.
+    pub label: String,
+    /// `rdfs:comment`.
+    pub comment: Option<String>,
+    /// Where it is performed: the IRI of a coordinate frame.
+    pub performed_in: Option<String>,
+    /// IRIs of success properties, inherited ones included, sorted by their order in the ontology text.
+    pub success_properties: Vec<String>,
+    /// IRIs of properties that must hold for the success properties to be applicable.
+    pub preconditions: Vec<String>,
+    /// Local names of its designators.
+    pub parameters: BTreeSet<String>,
+}
+
+/// One property.
+#[derive(Debug, Clone)]
+pub struct Property {
+    /// Its IRI.
+    pub iri: String,
+    /// Local name (`MovedObject`).
+    pub name: String,
+    /// `rdfs:label`, or its local name.
+    pub label: String,
+    /// `rdfs:comment`.
+    pub comment: Option<String>,
+    /// The rule file that verifies it.
+    pub rule: RuleFile,
+    /// Local names of the designators that it needs.
+    pub needs: BTreeSet<String>,
+    /// Unit of its margin (`act:unit`), such as `m`.
+    pub unit: Option<String>,
+}
+
+/// A rule file, read but not yet parsed.
+#[derive(Debug, Clone)]
+pub struct RuleFile {
+    /// Its text.
+    pub source: Source,
+    /// By the file's ending.
+    pub language: RuleLanguage,
+    /// Path relative to the ontology's folder, as it stands in the ontology; what the history keeps.
+    pub path: String,
+    /// Digest of its text.
+    pub digest: String,
+    /// Where the ontology links it.
+    pub linked_at: Option<(Source, Span)>,
+}
+
+/// The two rule languages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RuleLanguage {
+    /// `.rls`
+    Datalog,
+    /// `.rq`
+    Sparql,
+}
+
+/// Terms by IRI.
+#[derive(Debug, Clone, Default)]
+pub struct Vocabulary {
+    /// Every IRI that the ontology describes.
+    pub terms: BTreeMap<String, VocabularyTerm>,
+}
+
+/// One described term.
+#[derive(Debug, Clone, Default)]
+pub struct VocabularyTerm {
+    /// Whether it can stand as a predicate.
+    pub is_property: bool,
+    /// Unit of its values (`w:unit`), such as `m`, `rad`, `kg`, `N`.
+    pub unit: Option<String>,
+    /// `rdfs:label`.
+    pub label: Option<String>,
+    /// `rdfs:comment`.
+    pub comment: Option<String>,
+}

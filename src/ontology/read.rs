@@ -1,0 +1,329 @@
+//! RDF texts to statements, with the texts that they import.
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use oxigraph::io::{RdfFormat, RdfParseError, RdfParser};
+
+use crate::base::{Diagnostic, Diagnostics, Files, Source, Span, Term, names};
+use crate::ontology::literal;
+
+/// IRIs of files begin so. They name a file by its path from the ontology's folder, never by a path of a machine.
+const FILE: &str = "https://w3id.org/actcheck/file/";
+/// One folder above the one below it. Enough of them stand above the ontology's folder for any sensible `../../…`.
+const ABOVE: &str = "~above~/";
+const LEVELS: usize = 12;
+/// The ontology's own folder.
+const HERE: &str = "~here~/";
+/// Beyond this many, syntax errors of one text are echoes of the first ones.
+const MOST_SYNTAX_ERRORS: usize = 5;
+/// Imports beyond this are a mistake.
+const MOST_FILES: usize = 200;
+
+/// One statement and where it stands.
+#[derive(Debug, Clone)]
+pub(super) struct Statement {
+    pub(super) subject: Term,
+    /// An IRI.
+    pub(super) predicate: Arc<str>,
+    pub(super) object: Term,
+    /// Index of its text.
+    pub(super) text: usize,
+    /// End of the line on which it was complete. Unit: bytes.
+    pub(super) end: usize,
+}
+
+/// All statements of a root file and of what it imports.
+#[derive(Debug, Default)]
+pub(super) struct Reading {
+    pub(super) sources: Vec<Source>,
+    pub(super) statements: Vec<Statement>,
+}
+
+/// Reads a file and what it imports by relative paths, each once. Absolute imports are left alone: nothing is fetched.
+pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Reading {
+    let mut reading = Reading::default();
+    let folder = root.parent().unwrap_or(Path::new(""));
+    let name = root.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let mut waiting: Vec<(String, Option<(usize, Span)>)> = vec![(encoded(&name), None)];
+    let mut seen: BTreeSet<String> = BTreeSet::new();
+    while let Some((relative, importer)) = waiting.pop() {
+        if !seen.insert(relative.clone()) || seen.len() > MOST_FILES {
+            continue;
+        }
+        let path = on_disk(folder, &relative);
+        let source = match files.read(&path) {
+            Ok(source) => source,
+            Err(reason) => {
+                found.push(unreadable(&path, &reason, importer.map(|(text, span)| (&reading.sources[text], span))));
+                continue;
+            }
+        };
+        let text = reading.sources.len();
+        parse(&source, text, &format!("{}{relative}", base()), &mut reading.statements, found);
+        reading.sources.push(source);
+        let mut imports = imports_of(&reading, text);
+        imports.reverse();
+        waiting.extend(imports);
+    }
+    reading.statements.iter_mut().for_each(make_plain);
+    reading
+}
+
+fn unreadable(path: &Path, reason: &str, importer: Option<(&Source, Span)>) -> Diagnostic {
+    match importer {
+        None => Diagnostic::error("O001", format!("cannot read the ontology {}: {reason}", path.display()))
+            .help("name a Turtle (.ttl) or RDF/XML (.owl, .rdf, .xml) file"),
+        Some((source, span)) => {
+            Diagnostic::error("O003", format!("cannot read the imported ontology {}: {reason}", path.display()))
+                .at(source, span)
+                .help("imports with a relative path are read from there, seen from the file that imports")
+        }
+    }
+}
+
+fn imports_of(reading: &Reading, text: usize) -> Vec<(String, Option<(usize, Span)>)> {
+    let imports = format!("{}imports", names::OWL);
+    let of_text = reading.statements.iter().filter(|statement| statement.text == text && *statement.predicate == *imports);
+    of_text
+        .filter_map(|statement| {
+            let relative = relative_of(statement.object.as_iri()?)?;
+            Some((relative, Some((text, reading.place(statement, statement.object.as_iri()?)))))
+        })
+        .collect()
+}
+
+/// Parses one text. What comes before and after a syntax error still counts.
+fn parse(source: &Source, text: usize, base: &str, statements: &mut Vec<Statement>, found: &mut Diagnostics) {
+    let format = format_of(source);
+    let position = Rc::new(Cell::new(0));
+    let lines = Lines { text: source.text.as_bytes(), position: Rc::clone(&position) };
+    let parser = RdfParser::from_format(format).with_base_iri(base).unwrap_or_else(|_| RdfParser::from_format(format));
+    let mut blanks: BTreeMap<String, Arc<str>> = BTreeMap::new();
+    let mut errors = 0;
+    for quad in parser.for_reader(lines) {
+        let end = position.get();
+        match quad {
+            Ok(quad) => {
+                let subject = literal::subject(&quad.subject, |id| blank(&mut blanks, text, id));
+                let Some(object) = literal::object(&quad.object, |id| blank(&mut blanks, text, id)) else { continue };
+                statements.push(Statement { subject, predicate: quad.predicate.as_str().into(), object, text, end });
+            }
+            Err(error) => {
+                errors += 1;
+                found.push(syntax_error(source, &error, end));
+                // The XML parser does not recover.
+                if errors == MOST_SYNTAX_ERRORS || format == RdfFormat::RdfXml {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+fn syntax_error(source: &Source, error: &RdfParseError, end: usize) -> Diagnostic {
+    let location = match error {
+        RdfParseError::Syntax(error) => error.location(),
+        RdfParseError::Io(_) => None,
+    };
+    let offset = |position: u64| usize::try_from(position).unwrap_or(end).min(source.text.len());
+    let span = match location {
+        Some(range) => offset(range.start.offset)..offset(range.end.offset),
+        None => line_before(&source.text, end),
+    };
+    // Their messages begin with the place, which ours have anyway.
+    let text = error.to_string();
+    let message = text.rsplit_once("Parser error at ").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, m)| m);
+    let message = message.trim_end_matches('.').replace('\n', " ");
+    Diagnostic::error("O002", format!("this is not {}: {message}", language(source)))
+        .at(source, span)
+        .help("the ending tells the language: .ttl is Turtle, .owl, .rdf and .xml are RDF/XML")
+}
+
+fn line_before(text: &str, end: usize) -> Span {
+    let mut end = end.min(text.len());
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    let line_end = text[..end].trim_end().len();
+    let start = text[..line_end].rfind('\n').map_or(0, |newline| newline + 1);
+    let indent = text[start..line_end].len() - text[start..line_end].trim_start().len();
+    start + indent..line_end
+}
+
+fn language(source: &Source) -> &'static str {
+    if format_of(source) == RdfFormat::RdfXml { "RDF/XML" } else { "Turtle" }
+}
+
+/// By the ending where it says something, otherwise by how the text begins.
+fn format_of(source: &Source) -> RdfFormat {
+    let ending = source.name.rsplit('.').next().unwrap_or("").to_lowercase();
+    match ending.as_str() {
+        "ttl" | "nt" => RdfFormat::Turtle,
+        "rdf" | "xml" => RdfFormat::RdfXml,
+        // `.owl` files come in both.
+        _ if begins_like_xml(&source.text) => RdfFormat::RdfXml,
+        _ => RdfFormat::Turtle,
+    }
+}
+
+fn begins_like_xml(text: &str) -> bool {
+    let text = text.trim_start_matches('\u{feff}').trim_start();
+    ["<?xml", "<!", "<rdf:", "<RDF", "<owl:"].iter().any(|start| text.starts_with(start))
+}
+
+/// Blank nodes are numbered, so that the same text always gives the same statements.
+fn blank(known: &mut BTreeMap<String, Arc<str>>, text: usize, id: &str) -> Arc<str> {
+    let next = known.len() + 1;
+    Arc::clone(known.entry(id.to_owned()).or_insert_with(|| format!("t{}b{next}", text + 1).into()))
+}
+
+/// Hands out a text line by line, so that it is known how far the parser has come.
+struct Lines<'a> {
+    text: &'a [u8],
+    position: Rc<Cell<usize>>,
+}
+
+impl Read for Lines<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let rest = self.text.get(self.position.get()..).unwrap_or_default();
+        let line = rest.iter().position(|byte| *byte == b'\n').map_or(rest.len(), |newline| newline + 1);
+        let length = line.min(buffer.len());
+        buffer[..length].copy_from_slice(&rest[..length]);
+        self.position.set(self.position.get() + length);
+        Ok(length)
+    }
+}
+
+impl Reading {
+    /// Where a statement mentions an IRI: the last mention of its local name before the statement's end.
+    pub(super) fn place(&self, statement: &Statement, iri: &str) -> Span {
+        let text = &self.sources[statement.text].text;
+        let before = &text[..floor_char(text, statement.end)];
+        last_mention(before, written_name(iri)).unwrap_or_else(|| line_before(text, statement.end))
+    }
+}
+
+/// The end of an IRI as texts write it: behind the last `#`, `/` or the prefix's `:`; for files, the file name.
+fn written_name(iri: &str) -> &str {
+    names::local(iri)
+}
+
+fn last_mention(text: &str, name: &str) -> Option<Span> {
+    if name.is_empty() {
+        return None;
+    }
+    let in_name = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    text.rmatch_indices(name).map(|(start, _)| start..start + name.len()).find(|span| {
+        let before = text[..span.start].chars().next_back().is_some_and(in_name);
+        let after = text[span.end..].chars().next().is_some_and(in_name);
+        !before && !after
+    })
+}
+
+fn floor_char(text: &str, offset: usize) -> usize {
+    let mut offset = offset.min(text.len());
+    while !text.is_char_boundary(offset) {
+        offset -= 1;
+    }
+    offset
+}
+
+fn base() -> String {
+    format!("{FILE}{}{HERE}", ABOVE.repeat(LEVELS))
+}
+
+/// Path of a file IRI from the ontology's folder, with slashes; nothing for any other IRI.
+///
+/// `…/close_object.rls` next to the folder is `../close_object.rls`.
+pub(super) fn relative_of(iri: &str) -> Option<String> {
+    let rest = iri.strip_prefix(FILE)?;
+    let (rest, levels) = without_above(rest);
+    match rest.strip_prefix(HERE) {
+        Some(here) => Some(here.to_owned()),
+        None => Some(format!("{}{rest}", "../".repeat(LEVELS.saturating_sub(levels) + 1))),
+    }
+}
+
+fn without_above(mut rest: &str) -> (&str, usize) {
+    let mut levels = 0;
+    while let Some(shorter) = rest.strip_prefix(ABOVE) {
+        (rest, levels) = (shorter, levels + 1);
+    }
+    (rest, levels)
+}
+
+/// File IRIs without the scaffolding that made `..` work: `…/file/ontology/actions.ttl`, `…/file/rules/moved_object.rls`.
+fn make_plain(statement: &mut Statement) {
+    for term in [&mut statement.subject, &mut statement.object] {
+        if let Term::Iri(iri) = term
+            && let Some(relative) = relative_of(iri)
+        {
+            *iri = plain(&relative).into();
+        }
+    }
+}
+
+fn plain(relative: &str) -> String {
+    match relative.strip_prefix("../") {
+        Some(beside) if !beside.starts_with("../") => format!("{FILE}{beside}"),
+        Some(above) => format!("{FILE}{}", above.replace("../", "above/")),
+        None => format!("{FILE}ontology/{relative}"),
+    }
+}
+
+/// Path from the ontology's folder of a plain file IRI; nothing for any other IRI.
+pub(super) fn path_of_plain(iri: &str) -> Option<String> {
+    let rest = iri.strip_prefix(FILE)?;
+    Some(match rest.strip_prefix("ontology/") {
+        Some(here) => decoded(here),
+        None => format!("../{}", decoded(&rest.replace("above/", "../"))),
+    })
+}
+
+/// A file of which the path from the ontology's folder is known, as an IRI writes it.
+fn on_disk(folder: &Path, relative: &str) -> PathBuf {
+    beside(folder, &decoded(relative))
+}
+
+/// A path seen from where the program runs: without `..` where that changes nothing.
+pub(super) fn beside(folder: &Path, relative: &str) -> PathBuf {
+    let (mut base, mut rest) = (folder.to_path_buf(), Path::new(relative));
+    while let Ok(shorter) = rest.strip_prefix("..") {
+        if base.file_name().is_none() || base.is_symlink() || !base.pop() {
+            break;
+        }
+        rest = shorter;
+    }
+    base.join(rest)
+}
+
+fn encoded(name: &str) -> String {
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
+    name.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
+}
+
+/// Percent signs with two hexadecimal digits become the bytes that they stand for, where that gives UTF-8.
+fn decoded(text: &str) -> String {
+    let bytes = text.as_bytes();
+    let mut out = Vec::with_capacity(bytes.len());
+    let mut idx = 0;
+    while let Some(byte) = bytes.get(idx) {
+        let hex = bytes.get(idx + 1..idx + 3).filter(|_| *byte == b'%').and_then(|hex| std::str::from_utf8(hex).ok());
+        match hex.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
+            Some(value) => {
+                out.push(value);
+                idx += 3;
+            }
+            None => {
+                out.push(*byte);
+                idx += 1;
+            }
+        }
+    }
+    String::from_utf8(out).unwrap_or_else(|_| text.to_owned())
+}

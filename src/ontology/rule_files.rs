@@ -1,0 +1,75 @@
+//! The rule files that an ontology links: found, read, not yet parsed.
+
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics, Files, Term, digest_of, nearest};
+use crate::ontology::graph::Graph;
+use crate::ontology::read::{Statement, beside, path_of_plain};
+use crate::ontology::{RuleFile, RuleLanguage};
+
+/// Reads the rule file that a statement's object names: an IRI or a string, relative to the ontology file.
+///
+/// Faults: it is not relative (O011), has neither ending (O010), or can't be read (O009).
+pub(super) fn read(
+    files: &Files,
+    folder: &Path,
+    graph: &Graph,
+    statement: &Statement,
+    found: &mut Diagnostics,
+) -> Option<RuleFile> {
+    let mention = match &statement.object {
+        Term::Iri(text) | Term::String(text) => text.to_string(),
+        other => other.to_string(),
+    };
+    let (source, span) = graph.place(statement, &mention);
+    let mut fault = |code, message: String, help: String| {
+        found.push(Diagnostic::error(code, message).at(source, span.clone()).help(help));
+    };
+    let Some(path) = relative_path(&statement.object) else {
+        let help = "name it relative to the ontology file, such as `<../rules/moved_object.rls>`";
+        fault("O011", format!("the rule file {} is not given by a relative path", statement.object), help.to_owned());
+        return None;
+    };
+    let Some(language) = language_of(&path) else {
+        let help = "the ending tells the language: `.rls` is Datalog, `.rq` is SPARQL";
+        fault("O010", format!("the rule file `{path}` has neither ending of a rule language"), help.to_owned());
+        return None;
+    };
+    let place = beside(folder, &path);
+    match files.read(&place) {
+        Ok(text) => {
+            let digest = digest_of(&text.text);
+            Some(RuleFile { source: text, language, path, digest, linked_at: Some((source.clone(), span.clone())) })
+        }
+        Err(reason) => {
+            let message = format!("cannot read the rule file `{path}`: {reason}");
+            fault("O009", message, help_for_missing(files, &place));
+            None
+        }
+    }
+}
+
+fn relative_path(object: &Term) -> Option<String> {
+    match object {
+        Term::Iri(iri) => path_of_plain(iri),
+        Term::String(path) if !path.contains("://") && !Path::new(path.as_ref()).is_absolute() => Some(path.to_string()),
+        _ => None,
+    }
+}
+
+fn language_of(path: &str) -> Option<RuleLanguage> {
+    match Path::new(path).extension()?.to_str()? {
+        "rls" => Some(RuleLanguage::Datalog),
+        "rq" => Some(RuleLanguage::Sparql),
+        _ => None,
+    }
+}
+
+fn help_for_missing(files: &Files, place: &Path) -> String {
+    let name = |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let beside: Vec<String> = files.list(place.parent().unwrap_or(Path::new(""))).iter().map(|path| name(path)).collect();
+    match nearest(&name(place), beside.iter().map(String::as_str)) {
+        Some(found) => format!("did you mean `{found}`?"),
+        None => format!("it is looked for at {}: the path is relative to the ontology file", place.display()),
+    }
+}
