@@ -148,7 +148,7 @@ impl<'a> Checking<'a> {
         let key = (role.scope(), name.to_owned());
         if let Some(known) = self.defined.get(&key) {
             if known.arity != arity {
-                let message = format!("`{name}` has {arity} arguments here and {} in {}", known.arity, known.place);
+                let message = format!("`{name}` has {} here and {} in {}", counted(arity), known.arity, known.place);
                 self.error("R022", source, span, message, "give it the same number everywhere, or another name");
             }
             return;
@@ -197,7 +197,10 @@ impl<'a> Checking<'a> {
     /// Second pass: the rules of a file, checked.
     pub(crate) fn rules(&mut self, syntax: &Syntax, role: Role) -> Program {
         let program = translate(self, syntax, role);
-        if let Role::Property(scope) = role {
+        // What a text with syntax errors seems to lack may be in the part that could not be read.
+        if let Role::Property(scope) = role
+            && syntax.whole
+        {
             self.verdict(syntax, scope);
         }
         program
@@ -233,7 +236,7 @@ impl<'a> Checking<'a> {
             if let Some(definition) = self.defined.get(&(scope, name.to_owned()))
                 && definition.arity != columns
             {
-                let message = format!("`{name}` has {} arguments, needs one", definition.arity);
+                let message = format!("`{name}` has {}, needs one", counted(definition.arity));
                 let help = format!("write `{name}(?value) :- … .`");
                 self.error("R022", source, &place_of(syntax, name), message, help);
             }
@@ -279,6 +282,11 @@ impl<'a> Checking<'a> {
         let given = GIVEN.iter().filter(|_| role != Role::Standalone).map(|(name, ..)| (*name).to_owned());
         own.chain(given).collect()
     }
+}
+
+/// "1 argument", "2 arguments".
+pub(crate) fn counted(arguments: usize) -> String {
+    if arguments == 1 { "1 argument".to_owned() } else { format!("{arguments} arguments") }
 }
 
 /// The graphs of an action are named by terms that need no description.

@@ -24,6 +24,7 @@ mod parse;
 mod parse_expression;
 mod plan;
 mod program;
+mod query_text;
 mod reading;
 mod relation;
 mod safety;
@@ -33,7 +34,6 @@ mod syntax;
 mod translate;
 mod universe;
 mod values;
-mod vocabulary_scan;
 
 pub use book::RuleBook;
 pub use findings::{Budget, Findings, RuleFault, WitnessRow};

@@ -2,7 +2,7 @@
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 use crate::rules::lex::{Spanned, Token, lex};
-use crate::rules::syntax::{AtomSyntax, Comparison, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer};
+use crate::rules::syntax::{AtomSyntax, Comparison, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer};
 
 /// Directives of the language.
 const DIRECTIVES: [&str; 7] = ["base", "declare", "export", "import", "output", "parameter", "prefix"];
@@ -17,7 +17,7 @@ pub(crate) struct Lost;
 /// Parses a rule text. Never fails: what can't be read is left out, and noted in the diagnostics.
 pub fn parse(source: &Source) -> (Syntax, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
-    let mut syntax = Syntax { source: source.clone(), prefixes: Vec::new(), statements: Vec::new() };
+    let mut syntax = Syntax { source: source.clone(), prefixes: Vec::new(), statements: Vec::new(), whole: false };
     if source.text.len() > SIZE_LIMIT {
         let message = format!("rule text of {} bytes is too large", source.text.len());
         let help = format!("at most {SIZE_LIMIT} bytes; keep large tables of facts in a CSV file");
@@ -36,6 +36,7 @@ pub fn parse(source: &Source) -> (Syntax, Diagnostics) {
         }
     }
     syntax.prefixes = parser.prefixes;
+    syntax.whole = !parser.diagnostics.has_errors();
     (syntax, parser.diagnostics)
 }
 
@@ -196,9 +197,13 @@ impl Parser<'_> {
             Token::Symbol(">") => Comparison::Greater,
             Token::Symbol(">=") => Comparison::GreaterEqual,
             _ => {
-                // No comparison: it must read as an atom.
-                self.at = start;
-                return Ok(LiteralSyntax::Atom(self.atom("an atom or a comparison")?));
+                let name_span = self.tokens[start].span.clone();
+                return match left.kind {
+                    ExpressionKind::Call(predicate, args) => {
+                        Ok(LiteralSyntax::Atom(AtomSyntax { predicate, args, span: left.span, name_span }))
+                    }
+                    _ => Err(self.unexpected("a comparison")),
+                };
             }
         };
         self.advance();

@@ -1,6 +1,7 @@
 //! Tokens to expressions: terms, calls, arithmetic.
 
 use crate::base::{Span, Term, did_you_mean, names};
+use crate::rules::builtins;
 use crate::rules::lex::{FormatPiece, Token};
 use crate::rules::parse::{Lost, Parser};
 use crate::rules::syntax::{Expression, ExpressionKind};
@@ -259,10 +260,13 @@ impl Parser<'_> {
                     .map(|(known, _)| known.clone())
                     .chain(names::PREFIXES.iter().map(|(known, _)| (*known).to_owned()))
                     .collect();
-                let help = format!(
-                    "declare it with `@prefix {prefix}: <…> .`, or {}",
-                    did_you_mean(prefix, candidates.iter().map(String::as_str))
-                );
+                let help = match prefix {
+                    "geo3d" => format!("declare the extension with `@prefix geo3d: <{}> .`", builtins::GEO3D),
+                    _ => format!(
+                        "declare it with `@prefix {prefix}: <…> .`, or {}",
+                        did_you_mean(prefix, candidates.iter().map(String::as_str))
+                    ),
+                };
                 self.fault("R014", span, format!("unknown prefix `{prefix}:`"), help);
                 format!("{prefix}:{local}")
             }

@@ -17,7 +17,7 @@ use crate::rules::evaluate::Tables;
 use crate::rules::findings::{Budget, Findings, RuleFault, WitnessRow};
 use crate::rules::universe::Universe;
 use crate::rules::values::{Number, lexical};
-use crate::rules::vocabulary_scan::{first_group, scan, variables};
+use crate::rules::query_text::{first_group, groups, scan, variables};
 
 /// A prepared query.
 pub(crate) struct Query {
@@ -173,20 +173,25 @@ fn fault(error: &QueryEvaluationError, budget: &Budget) -> RuleFault {
     }
 }
 
-/// Binds each designator that the query uses as a variable, at the start of its first group:
+/// Binds each designator that the query uses as a variable, at the start of every group that uses it:
 ///
 /// ```sparql
 /// GRAPH act:parameters { act:pickObject act:value ?pickObject }
 /// ```
 fn bind_designators(text: &str, designators: &BTreeSet<&str>) -> String {
-    let Some(group) = first_group(text) else { return text.to_owned() };
-    let used = variables(text);
-    let mut bound = String::new();
-    for name in designators.iter().filter(|name| used.contains(**name)) {
-        let act = names::ACT;
-        bound.push_str(&format!(" GRAPH <{act}parameters> {{ <{act}{name}> <{act}value> ?{name} }}"));
+    let act = names::ACT;
+    let mut out = text.to_owned();
+    // From the last group to the first, so that places stay right.
+    for group in groups(text).into_iter().rev() {
+        let used = variables(&text[group.clone()]);
+        let bound: String = designators
+            .iter()
+            .filter(|name| used.contains(**name))
+            .map(|name| format!(" GRAPH <{act}parameters> {{ <{act}{name}> <{act}value> ?{name} }}"))
+            .collect();
+        out.insert_str(group.start + 1, &bound);
     }
-    format!("{}{bound}{}", &text[..=group], &text[group + 1..])
+    out
 }
 
 fn first_word_is_ask_or_select(text: &str) -> bool {
@@ -204,16 +209,31 @@ fn syntax_fault(source: &Source, message: &str) -> Diagnostic {
         let (column, rest) = rest.split_once(':')?;
         Some((line.parse::<usize>().ok()?, column.trim().parse::<usize>().ok()?, rest.trim()))
     });
-    let help = "see https://www.w3.org/TR/sparql11-query/";
     match place {
         Some((line, column, rest)) => {
+            let help = format!("expected {}", expected(rest));
             let start: usize = source.text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
             let offset: usize = source.text[start..].chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
             let at = (start + offset).min(source.text.len());
-            Diagnostic::error("R060", format!("the query can't be read: {rest}")).at(source, at..at).help(help)
+            Diagnostic::error("R060", "the query can't be read from here on").at(source, at..at).help(help)
         }
-        None => Diagnostic::error("R060", format!("the query can't be read: {message}")).in_source(source).help(help),
+        None => {
+            let help = "see https://www.w3.org/TR/sparql11-query/";
+            Diagnostic::error("R060", format!("the query can't be read: {message}")).in_source(source).help(help)
+        }
     }
+}
+
+/// The words and signs among what the parser expected; its classes of characters help nobody.
+fn expected(message: &str) -> String {
+    let words: Vec<&str> = message
+        .trim_start_matches("expected ")
+        .trim_start_matches("one of ")
+        .split(", ")
+        .filter(|word| word.starts_with('"') && word.ends_with('"') && word.len() > 2)
+        .take(12)
+        .collect();
+    if words.is_empty() { "something else".to_owned() } else { words.join(" or ") }
 }
 
 /// Terms of our namespaces must be in the vocabulary, as in Datalog.

@@ -11,6 +11,8 @@ pub struct Syntax {
     pub prefixes: Vec<(String, String)>,
     /// Its statements in order.
     pub statements: Vec<Statement>,
+    /// Whether all of it could be read.
+    pub whole: bool,
 }
 
 /// One statement. Directives that only name things (`@prefix`, `@base`) are resolved by the parser.

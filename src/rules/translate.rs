@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::base::{Source, Span, Term, TermId, Terms, did_you_mean};
 use crate::rules::builtins;
-use crate::rules::check::{Checking, Role};
+use crate::rules::check::{Checking, Role, counted};
 use crate::rules::expression::Expr;
 use crate::rules::given::{GIVEN, add_given, phase_of, property_place};
 use crate::rules::program::{
@@ -218,7 +218,7 @@ impl<'c, 'a> Translation<'c, 'a> {
             && let Some((_, form, arity)) = GIVEN.iter().find(|(given, ..)| *given == name)
         {
             if args.len() != *arity {
-                let message = format!("`{name}` has {} arguments, needs {arity}", args.len());
+                let message = format!("`{name}` has {}, needs {arity}", counted(args.len()));
                 self.error("R022", &atom.span, message, format!("it reads `{form}`"));
                 return None;
             }
@@ -228,7 +228,7 @@ impl<'c, 'a> Translation<'c, 'a> {
             let Some(definition) = self.checking.defined.get(&(scope, name.to_owned())) else { continue };
             if definition.arity != args.len() {
                 if !head {
-                    let message = format!("`{name}` has {} arguments here and {} in {}", args.len(), definition.arity, definition.place);
+                    let message = format!("`{name}` has {} here and {} in {}", counted(args.len()), definition.arity, definition.place);
                     self.error("R022", &atom.span, message, "give it the same number everywhere, or another name");
                 }
                 self.faulty = true;
@@ -250,12 +250,7 @@ impl<'c, 'a> Translation<'c, 'a> {
             return;
         }
         let known = self.checking.known_names(self.role);
-        let built_in = builtins::builtin_names().map(str::to_owned);
-        let names: Vec<String> = known.iter().cloned().chain(built_in).collect();
-        let help = match crate::base::nearest(name, names.iter().map(String::as_str)) {
-            Some(found) => format!("did you mean `{found}`?"),
-            None => did_you_mean(name, known.iter().map(String::as_str)),
-        };
+        let help = did_you_mean(name, known.iter().map(String::as_str));
         self.error("R023", &atom.name_span, format!("no rule defines `{name}`"), help);
     }
 
@@ -492,6 +487,11 @@ impl<'c, 'a> Translation<'c, 'a> {
 
     fn call(&mut self, name: &str, args: Vec<Expr>, span: &Span) -> Option<Expr> {
         let Some(builtin) = builtins::builtin(name) else {
+            if name.starts_with("geo3d:") {
+                // The prefix is unknown, which the parser has said.
+                self.faulty = true;
+                return None;
+            }
             let shown = name.strip_prefix(builtins::GEO3D).map_or(name.to_owned(), |local| format!("geo3d:{local}"));
             let help = match crate::base::nearest(&shown, builtins::builtin_names()) {
                 Some(found) => format!("did you mean `{found}`?"),
@@ -506,7 +506,7 @@ impl<'c, 'a> Translation<'c, 'a> {
                 (least, most) if least == most => least.to_string(),
                 (least, most) => format!("{least} to {most}"),
             };
-            let message = format!("`{}` has {} arguments, needs {wanted}", builtin.name, args.len());
+            let message = format!("`{}` has {}, needs {wanted}", builtin.name, counted(args.len()));
             self.error("R027", span, message, "functions and their arguments are listed in rules/README.md");
             return None;
         }

@@ -1,4 +1,4 @@
-//! A look at a SPARQL text: its words, IRIs and variables with their places, and where its first group opens.
+//! A look at a SPARQL text: its words, IRIs and variables with their places, and where its groups are.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -78,15 +78,42 @@ pub(crate) fn variables(text: &str) -> BTreeSet<String> {
 
 /// Offset of the first `{` that is no part of a string, an IRI or a comment.
 pub(crate) fn first_group(text: &str) -> Option<usize> {
+    braces(text).into_iter().find(|(_, open)| *open).map(|(at, _)| at)
+}
+
+/// Every `{ … }`, from its opening to behind its closing brace, in the order of opening.
+pub(crate) fn groups(text: &str) -> Vec<Span> {
+    let mut found: Vec<Span> = Vec::new();
+    let mut open = Vec::new();
+    for (at, opens) in braces(text) {
+        if opens {
+            open.push(found.len());
+            found.push(at..text.len());
+        } else if let Some(group) = open.pop() {
+            found[group].end = at + 1;
+        }
+    }
+    found
+}
+
+/// Offsets of braces outside of strings, IRIs and comments, and whether they open.
+fn braces(text: &str) -> Vec<(usize, bool)> {
+    let mut found = Vec::new();
     let mut at = 0;
     while let Some(c) = text[at..].chars().next() {
         match c {
-            '{' => return Some(at),
+            '{' | '}' => {
+                found.push((at, c == '{'));
+                at += 1;
+            }
             '#' => at += text[at..].find('\n').unwrap_or(text.len() - at),
             '"' | '\'' => at = string_end(text, at, c),
-            '<' => at += text[at..].find('>').map_or(1, |length| length + 1),
+            '<' => match text[at + 1..].find(|c: char| c == '>' || c.is_whitespace()) {
+                Some(length) if text[at + 1 + length..].starts_with('>') => at += length + 2,
+                _ => at += 1,
+            },
             c => at += c.len_utf8(),
         }
     }
-    None
+    found
 }
