@@ -97,7 +97,12 @@ fn read_tests(table: &mut Table) -> (Vec<Vec<String>>, BTreeMap<String, Span>) {
     let mut tests = Vec::new();
     for (idx, list) in lists.into_iter().enumerate() {
         if list.value.is_empty() {
-            table.fault("C007", list.span.clone(), "this test has no action", "name at least one, such as `[\"Pick\"]`");
+            table.fault(
+                "C007",
+                list.span.clone(),
+                "this test has no action",
+                "name at least one, such as `[\"Pick\"]`",
+            );
         }
         for (step, action) in list.value.iter().enumerate() {
             places.insert(format!("tests.{idx}.{step}"), action.span.clone());
@@ -119,7 +124,12 @@ fn read_ontology_path(table: &mut Table, folder: &Path) -> (Files, PathBuf) {
     let path = beside(folder, &written.value);
     if let Err(reason) = Files::Disk.read(&path) {
         let message = format!("cannot read the ontology {}: {reason}", path.display());
-        table.fault("C012", written.span, message, "the path is relative to the configuration; without it the shipped one serves");
+        table.fault(
+            "C012",
+            written.span,
+            message,
+            "the path is relative to the configuration; without it the shipped one serves",
+        );
     }
     (Files::Disk, path)
 }
@@ -139,8 +149,7 @@ fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Pa
 pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
     let (mut base, mut rest) = (folder.to_path_buf(), Path::new(written));
     while let Ok(shorter) = rest.strip_prefix("..") {
-        let plain = base.file_name().is_some() && !base.is_symlink();
-        if !plain || !base.pop() {
+        if base.file_name().is_none() || base.is_symlink() || !base.pop() {
             break;
         }
         rest = shorter;

@@ -14,5 +14,6 @@ mod table;
 pub use campaign::{Budget, Campaign, Launcher, Overrides, Physics, Range, Sensing};
 pub use load::load;
 pub use model::{ObjectModel, Part, Shape, Surface};
+pub use ranges::CONTROL_HZ;
 pub use robot::RobotProfile;
 pub use table::{Located, Table};

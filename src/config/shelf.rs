@@ -67,7 +67,12 @@ impl Shelf {
     }
 
     /// The robot that `[robot] profile` names: a path to a TOML file, or a name from the model folder or the shipped one.
-    pub(crate) fn read_robot(&self, root: &mut Table, folder: &Path, found: &mut Diagnostics) -> Option<Arc<RobotProfile>> {
+    pub(crate) fn read_robot(
+        &self,
+        root: &mut Table,
+        folder: &Path,
+        found: &mut Diagnostics,
+    ) -> Option<Arc<RobotProfile>> {
         let mut table = root.table("robot");
         let written = table.as_mut().and_then(|table| table.string("profile"));
         let name = written.as_ref().map_or(DEFAULT_ROBOT, |written| &written.value);

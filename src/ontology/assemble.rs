@@ -32,8 +32,10 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         .into_iter()
         .filter_map(|iri| rules.remove(&iri).map(|rule| (iri.clone(), property(&graph, iri, rule))))
         .collect();
-    let actions: BTreeMap<String, Action> =
-        check::action_iris(&graph).into_iter().map(|iri| (names::local(&iri).to_owned(), action(&graph, iri))).collect();
+    let actions: BTreeMap<String, Action> = check::action_iris(&graph)
+        .into_iter()
+        .map(|iri| (names::local(&iri).to_owned(), action(&graph, iri)))
+        .collect();
     check::actions(&graph, &actions, &mut found);
     let mut digest = Digest::new();
     graph.sources().iter().for_each(|source| digest.update(source.text.as_bytes()));
@@ -41,6 +43,7 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         sources: graph.sources().to_vec(),
         actions,
         properties,
+        designators: check::parameters(&graph),
         libraries,
         triples: triples(&graph),
         superclasses: graph.superclasses.clone(),
@@ -59,7 +62,8 @@ fn libraries(files: &Files, folder: &Path, graph: &Graph, found: &mut Diagnostic
             && let Some((source, span)) = &library.linked_at
         {
             let message = format!("the rule library `{}` is not Datalog", library.path);
-            found.push(Diagnostic::error("O010", message).at(source, span.clone()).help("a library's ending is `.rls`"));
+            found
+                .push(Diagnostic::error("O010", message).at(source, span.clone()).help("a library's ending is `.rls`"));
         }
         libraries.insert(library.path.clone(), library);
     }
@@ -79,9 +83,14 @@ fn property_rules(files: &Files, folder: &Path, graph: &Graph, found: &mut Diagn
                 }
             }
             [_, second, ..] => {
-                let message = format!("the property `{}` is verified by {} rule files", names::local(&iri), links.len());
+                let message =
+                    format!("the property `{}` is verified by {} rule files", names::local(&iri), links.len());
                 let (source, span) = graph.place(second, second.object.as_iri().unwrap_or(&iri));
-                found.push(Diagnostic::error("O006", message).at(source, span).help("link one; make two properties of two rules"));
+                found.push(
+                    Diagnostic::error("O006", message)
+                        .at(source, span)
+                        .help("link one; make two properties of two rules"),
+                );
             }
         }
     }
@@ -105,7 +114,8 @@ fn action(graph: &Graph, iri: String) -> Action {
     let stated = |predicate: &str| check::inherited(graph, &iri, predicate);
     let iris = |predicate: &str| -> Vec<String> {
         let mut seen = BTreeSet::new();
-        let objects = stated(predicate).into_iter().filter_map(|statement| statement.object.as_iri().map(str::to_owned));
+        let objects =
+            stated(predicate).into_iter().filter_map(|statement| statement.object.as_iri().map(str::to_owned));
         objects.filter(|object| seen.insert(object.clone())).collect()
     };
     Action {
@@ -144,7 +154,8 @@ const PROPERTY_CLASSES: [(&str, &str); 5] = [
 ];
 
 fn vocabulary(graph: &Graph) -> Vocabulary {
-    let predicates: BTreeSet<String> = PROPERTY_CLASSES.iter().map(|(space, local)| format!("{space}{local}")).collect();
+    let predicates: BTreeSet<String> =
+        PROPERTY_CLASSES.iter().map(|(space, local)| format!("{space}{local}")).collect();
     let term = |iri: &str| VocabularyTerm {
         is_property: !graph.classes_of(iri).is_disjoint(&predicates)
             || graph.about(iri).any(|statement| *statement.predicate == *rdfs("domain")),

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, nearest, names};
+use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, names, nearest};
 use crate::ontology::Action;
 use crate::ontology::graph::Graph;
 use crate::ontology::read::Statement;
@@ -96,7 +96,8 @@ struct Known {
     parameters: BTreeSet<String>,
 }
 
-fn parameters(graph: &Graph) -> BTreeSet<String> {
+/// Local names of all designators.
+pub(super) fn parameters(graph: &Graph) -> BTreeSet<String> {
     graph.individuals(&names::act("PropertyParameter")).iter().map(|iri| names::local(iri).to_owned()).collect()
 }
 
@@ -184,7 +185,10 @@ fn mentioned_parameters(graph: &Graph, except: &str) -> BTreeSet<String> {
         .iter()
         .filter(|statement| predicates.iter().any(|predicate| *statement.predicate == **predicate))
         .filter_map(|statement| statement.object.as_iri().map(|iri| names::local(iri).to_owned()))
-        .chain(["pickObject", "placeSurface", "objectSurface", "surfaceObjects", "objectLocation", "world"].map(String::from))
+        .chain(
+            ["pickObject", "placeSurface", "objectSurface", "surfaceObjects", "objectLocation", "world"]
+                .map(String::from),
+        )
         .filter(|name| name != except)
         .collect()
 }

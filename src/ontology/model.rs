@@ -13,6 +13,8 @@ pub struct Ontology {
     pub actions: BTreeMap<String, Action>,
     /// Properties by IRI.
     pub properties: BTreeMap<String, Property>,
+    /// Local names of all designators (`pickObject`), those of no action included.
+    pub designators: BTreeSet<String>,
     /// Rule files whose derived predicates every rule may use (`act:ruleLibrary`), in order of their names.
     pub libraries: Vec<RuleFile>,
     /// Every statement, sorted; what `ontology(s, p, o)` sees.

@@ -88,7 +88,8 @@ fn unreadable(path: &Path, reason: &str, importer: Option<(&Source, Span)>) -> D
 
 fn imports_of(reading: &Reading, text: usize) -> Vec<(String, Option<(usize, Span)>)> {
     let imports = format!("{}imports", names::OWL);
-    let of_text = reading.statements.iter().filter(|statement| statement.text == text && *statement.predicate == *imports);
+    let of_text =
+        reading.statements.iter().filter(|statement| statement.text == text && *statement.predicate == *imports);
     of_text
         .filter_map(|statement| {
             let relative = relative_of(statement.object.as_iri()?)?;
@@ -137,7 +138,8 @@ fn syntax_error(source: &Source, error: &RdfParseError, end: usize) -> Diagnosti
     };
     // Their messages begin with the place, which ours have anyway.
     let text = error.to_string();
-    let message = text.rsplit_once("Parser error at ").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, m)| m);
+    let message =
+        text.rsplit_once("Parser error at ").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, m)| m);
     let message = message.trim_end_matches('.').replace('\n', " ");
     Diagnostic::error("O002", format!("this is not {}: {message}", language(source)))
         .at(source, span)

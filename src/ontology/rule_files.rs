@@ -52,7 +52,9 @@ pub(super) fn read(
 fn relative_path(object: &Term) -> Option<String> {
     match object {
         Term::Iri(iri) => path_of_plain(iri),
-        Term::String(path) if !path.contains("://") && !Path::new(path.as_ref()).is_absolute() => Some(path.to_string()),
+        Term::String(path) if !path.contains("://") && !Path::new(path.as_ref()).is_absolute() => {
+            Some(path.to_string())
+        }
         _ => None,
     }
 }
@@ -67,7 +69,8 @@ fn language_of(path: &str) -> Option<RuleLanguage> {
 
 fn help_for_missing(files: &Files, place: &Path) -> String {
     let name = |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let beside: Vec<String> = files.list(place.parent().unwrap_or(Path::new(""))).iter().map(|path| name(path)).collect();
+    let beside: Vec<String> =
+        files.list(place.parent().unwrap_or(Path::new(""))).iter().map(|path| name(path)).collect();
     match nearest(&name(place), beside.iter().map(String::as_str)) {
         Some(found) => format!("did you mean `{found}`?"),
         None => format!("it is looked for at {}: the path is relative to the ontology file", place.display()),

@@ -1,0 +1,19 @@
+//! A recorded list of choices to one concrete `Scene`, and what "simpler" means.
+//!
+//! Simpler is closer to nominal: the first model of each list, in the middle, not turned, with the mass and friction of
+//! its model; the fewest other objects, each at its own place around the middle; the robot straight in front of the
+//! surface. A choice that a record lacks has its nominal value, so that a shorter record is a simpler scene. The nominal
+//! values stand where the choices are made, in `draw.rs`.
+//!
+//! Never: simulates, knows a robot's reach or skill, or draws what a run's sensors get wrong.
+
+mod draw;
+mod overlap;
+mod placement;
+mod scene;
+mod space;
+
+pub use draw::{Discard, draw};
+pub use overlap::{CLEARANCE_M, Solid};
+pub use scene::{RobotStart, Role, Scene, SceneObject};
+pub use space::Space;

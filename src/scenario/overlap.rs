@@ -1,0 +1,86 @@
+//! Whether two objects are in each other's way: boxes first, exact shapes where the boxes touch.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use parry3d::bounding_volume::{Aabb, BoundingVolume as _};
+use parry3d::math::{Pose as ParryPose, Rotation, Vector};
+use parry3d::query;
+use parry3d::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
+
+use crate::base::Pose;
+use crate::config::{ObjectModel, Shape};
+
+/// Objects keep at least this distance. Twice what contact detection sees ahead, so that nothing touches at the start.
+pub const CLEARANCE_M: f64 = 0.004;
+
+/// An object's exact form at a place of the scene.
+pub struct Solid {
+    parts: Vec<(ParryPose, Arc<dyn ParryShape>, Aabb)>,
+    around: Aabb,
+}
+
+impl Solid {
+    /// The form of a model whose origin has this pose. Frame: world.
+    pub fn new(model: &ObjectModel, pose: &Pose) -> Self {
+        let world_from_model = pose.to_isometry();
+        let parts: Vec<(ParryPose, Arc<dyn ParryShape>, Aabb)> = model
+            .solids()
+            .iter()
+            .filter_map(|part| {
+                let (shape, model_from_shape) = parry_shape(&part.shape)?;
+                let at = to_parry(&(world_from_model * part.pose.to_isometry() * model_from_shape));
+                let around = shape.compute_aabb(&at);
+                Some((at, shape, around))
+            })
+            .collect();
+        let around =
+            parts.iter().map(|(.., around)| *around).reduce(|a, b| a.merged(&b)).unwrap_or_else(Aabb::new_invalid);
+        Self { parts, around }
+    }
+
+    /// Whether the other object is nearer than the clearance.
+    pub fn is_in_the_way_of(&self, other: &Self) -> bool {
+        let clearance = to_real(CLEARANCE_M);
+        if !self.around.loosened(clearance).intersects(&other.around) {
+            return false;
+        }
+        self.parts.iter().any(|(at, shape, around)| {
+            let around = around.loosened(clearance);
+            other.parts.iter().filter(|(.., theirs)| around.intersects(theirs)).any(|(other_at, other_shape, _)| {
+                // Convex shapes of these kinds are always supported; were one not, it would be kept away from.
+                !query::distance(at, shape.as_ref(), other_at, other_shape.as_ref())
+                    .is_ok_and(|gap| gap.distance >= clearance)
+            })
+        })
+    }
+}
+
+/// The engine's shape, and its pose in our shape's frame (its cylinders stand along y). A tube is not one shape.
+fn parry_shape(shape: &Shape) -> Option<(Arc<dyn ParryShape>, Isometry3<f64>)> {
+    let upright = Isometry3::identity();
+    Some(match *shape {
+        Shape::Box { size: [x, y, z] } => {
+            let half = Vector::new(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0));
+            (Arc::new(Cuboid::new(half)), upright)
+        }
+        Shape::Cylinder { radius, height } => {
+            let from_y = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+            let cylinder = Cylinder::new(to_real(height / 2.0), to_real(radius));
+            (Arc::new(cylinder), Isometry3::from_parts(upright.translation, from_y))
+        }
+        Shape::Sphere { radius } => (Arc::new(Ball::new(to_real(radius))), upright),
+        Shape::Tube { .. } => return None,
+    })
+}
+
+fn to_parry(pose: &Isometry3<f64>) -> ParryPose {
+    let (t, q) = (pose.translation.vector, pose.rotation.quaternion());
+    let rotation = Rotation::from_xyzw(to_real(q.i), to_real(q.j), to_real(q.k), to_real(q.w)).normalize();
+    ParryPose::from_parts(Vector::new(to_real(t.x), to_real(t.y), to_real(t.z)), rotation)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the geometry library calculates in 32 bits")]
+fn to_real(value: f64) -> f32 {
+    value as f32
+}

@@ -1,0 +1,65 @@
+//! One concrete scene: everything that the simulation needs to know, as plain data.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::base::Pose;
+use crate::config::{ObjectModel, Physics, RobotProfile, Sensing};
+
+/// A sampled scene. Frame of all poses: world; z up; the floor at 0.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Name of the world that it lies in (`[world] worlds`).
+    pub world: String,
+    /// Platforms, the grasp target and the others; platforms first.
+    pub objects: Vec<SceneObject>,
+    /// The robot and where it starts.
+    pub robot: RobotStart,
+    /// Values of the designators: ids of objects, or names of locations.
+    pub designators: BTreeMap<String, Vec<String>>,
+    /// What sensors get wrong in this run.
+    pub sensing: Sensing,
+    /// What physics is stepped with.
+    pub physics: Physics,
+}
+
+/// One object of a scene.
+#[derive(Debug, Clone)]
+pub struct SceneObject {
+    /// Unique in the scene: the model's name and a number, such as `glass_1`.
+    pub id: String,
+    /// Its form and class.
+    pub model: Arc<ObjectModel>,
+    /// What it is there for.
+    pub role: Role,
+    /// Pose of the model's origin.
+    pub pose: Pose,
+    /// Unit: kilograms.
+    pub mass_kg: f64,
+    /// Sliding friction coefficient.
+    pub friction: f64,
+    /// Coefficient of restitution.
+    pub restitution: f64,
+}
+
+/// What an object is there for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// Carries others and never moves.
+    Platform,
+    /// What the robot is asked to handle.
+    Target,
+    /// Stands around.
+    Other,
+    /// Stands in the way of the base.
+    Obstacle,
+}
+
+/// The robot at the beginning.
+#[derive(Debug, Clone)]
+pub struct RobotStart {
+    /// Which robot.
+    pub profile: Arc<RobotProfile>,
+    /// Where its base stands. Units: metres, metres, radians. Shape: x, y, heading.
+    pub base: [f64; 3],
+}

@@ -1,0 +1,197 @@
+//! The abstract space of scenes that a configuration describes, checked against the ontology.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use crate::base::{Diagnostics, did_you_mean, names, nearest};
+use crate::config::{Campaign, ObjectModel, Physics, RobotProfile, Sensing};
+use crate::ontology::Ontology;
+use crate::scenario::placement;
+
+/// Designators that scene generation gives a meaning, whether an ontology declares them or not.
+const SPECIAL: [&str; 6] = ["world", "objectLocation", "objectSurface", "placeSurface", "pickObject", "surfaceObjects"];
+
+/// Everything that scenes are drawn from, with nothing left to check.
+#[derive(Debug, Clone)]
+pub struct Space {
+    pub(super) tests: usize,
+    pub(super) surfaces: Vec<Arc<ObjectModel>>,
+    pub(super) targets: Vec<Arc<ObjectModel>>,
+    pub(super) others: Vec<Arc<ObjectModel>>,
+    pub(super) other_count: (u32, u32),
+    /// Candidates of designators that are names and not objects.
+    pub(super) names: BTreeMap<String, Vec<String>>,
+    pub(super) robot: Arc<RobotProfile>,
+    pub(super) physics: Physics,
+    pub(super) sensing: Sensing,
+}
+
+impl Space {
+    /// The space of a configuration's scenes.
+    ///
+    /// # Errors
+    /// Every fault at once, at its place in the configuration: a test names no action of the ontology (S001) or one
+    /// without success properties (S002), a needed designator has no candidates (S003), a table is named after no
+    /// designator (S004), a model's category is no class of the ontology (S005), a surface is none (S006), or an object
+    /// can't stand on a surface (S007, S008).
+    pub fn new(campaign: &Campaign, ontology: &Ontology) -> Result<Self, Diagnostics> {
+        let mut found = Diagnostics::new();
+        check_tests(campaign, ontology, &mut found);
+        check_tables(campaign, ontology, &mut found);
+        let surfaces = models(campaign, "objectSurface");
+        let targets = models(campaign, "pickObject");
+        let others = if campaign.other_count.1 > 0 { models(campaign, "surfaceObjects") } else { Vec::new() };
+        check_categories(campaign, ontology, &mut found);
+        check_surfaces(campaign, &mut found);
+        if surfaces.is_empty() && !(targets.is_empty() && others.is_empty()) {
+            let key = if targets.is_empty() { "surfaceObjects" } else { "pickObject" };
+            let message = "there are objects, but no surface that they could stand on";
+            found.push(
+                campaign
+                    .fault("S008", key, message)
+                    .help("add `[objectSurface]` with `object_surfaces = [\"coffee_table\"]`"),
+            );
+        }
+        for key in ["pickObject", "surfaceObjects"] {
+            check_fit(campaign, key, &surfaces, &mut found);
+        }
+        let names = campaign.candidates.iter().filter(|(name, _)| !is_of_objects(name));
+        found.or(Self {
+            tests: campaign.tests.len(),
+            surfaces,
+            targets,
+            others,
+            other_count: campaign.other_count,
+            names: names.map(|(name, values)| (name.clone(), values.clone())).collect(),
+            robot: Arc::clone(&campaign.robot),
+            physics: campaign.physics.clone(),
+            sensing: campaign.sensing.clone(),
+        })
+    }
+
+    /// How many tests there are.
+    pub fn tests(&self) -> usize {
+        self.tests
+    }
+}
+
+fn is_of_objects(designator: &str) -> bool {
+    ["objectSurface", "placeSurface", "pickObject", "surfaceObjects"].contains(&designator)
+}
+
+/// The models that a designator's candidates name. The configuration has been checked, so none is missing.
+fn models(campaign: &Campaign, designator: &str) -> Vec<Arc<ObjectModel>> {
+    let names = campaign.candidates.get(designator).into_iter().flatten();
+    names.filter_map(|name| campaign.models.get(name).cloned()).collect()
+}
+
+/// Candidates of a designator with the keys of their places and their models.
+fn placed_models<'a>(
+    campaign: &'a Campaign,
+    designator: &'a str,
+) -> impl Iterator<Item = (String, &'a Arc<ObjectModel>)> {
+    let names = campaign.candidates.get(designator).into_iter().flatten().enumerate();
+    names.filter_map(move |(idx, name)| Some((format!("{designator}.{idx}"), campaign.models.get(name)?)))
+}
+
+/// Tests name actions that have success properties, and what these need can be drawn.
+fn check_tests(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
+    let mut told: BTreeSet<String> = BTreeSet::new();
+    for (idx, test) in campaign.tests.iter().enumerate() {
+        for (step, name) in test.iter().enumerate() {
+            let key = format!("tests.{idx}.{step}");
+            let Some(action) = ontology.actions.get(name) else {
+                let help = did_you_mean(name, ontology.actions.keys().map(String::as_str));
+                found.push(campaign.fault("S001", &key, format!("the ontology has no action `{name}`")).help(help));
+                continue;
+            };
+            if !told.insert(name.clone()) {
+                continue;
+            }
+            if action.success_properties.is_empty() {
+                let message = format!("the action `{name}` has no success properties, so there is nothing to test");
+                let help = format!("state at least one in the ontology: `act:{name} act:successProperty …`");
+                found.push(campaign.fault("S002", &key, message).help(help));
+            }
+            let needs = action.success_properties.iter().chain(&action.preconditions);
+            let needs: BTreeSet<&String> =
+                needs.filter_map(|iri| ontology.properties.get(iri)).flat_map(|property| &property.needs).collect();
+            for designator in needs.into_iter().filter(|name| !campaign.candidates.contains_key(*name)) {
+                let message = format!("`{name}` needs a value for `{designator}`, and there are none to choose from");
+                let help = format!("add a table with candidates: {}", example(designator));
+                found.push(campaign.fault("S003", &key, message).help(help));
+            }
+        }
+    }
+}
+
+fn example(designator: &str) -> String {
+    let key = match designator {
+        "world" => "worlds",
+        "objectLocation" => "location_list",
+        "objectSurface" => "object_surfaces",
+        "placeSurface" => "place_object_surfaces",
+        "pickObject" | "surfaceObjects" => "model_list",
+        _ => "candidates",
+    };
+    format!("`[{designator}]` with `{key} = [\"…\"]`")
+}
+
+/// Tables are named after designators.
+fn check_tables(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
+    let known: BTreeSet<&str> = ontology.designators.iter().map(String::as_str).chain(SPECIAL).collect();
+    let tables = ["physics", "sensing", "robot", "budget", "history"];
+    for name in campaign.candidates.keys().filter(|name| !known.contains(name.as_str())) {
+        let message = format!("unknown table `{name}`: the ontology has no designator of this name");
+        let help = match nearest(name, known.iter().copied().chain(tables)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("known designators: {}", known.iter().copied().collect::<Vec<_>>().join(", ")),
+        };
+        found.push(campaign.fault("S004", name, message).help(help));
+    }
+}
+
+/// Rules and analysis know objects by their classes.
+fn check_categories(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
+    let mut told: BTreeSet<&str> = BTreeSet::new();
+    for designator in SPECIAL.iter().filter(|name| is_of_objects(name)) {
+        for (key, model) in placed_models(campaign, designator) {
+            if ontology.has_class(&model.category) || !told.insert(&model.name) {
+                continue;
+            }
+            let short = names::shorten(&model.category);
+            let message =
+                format!("the model `{}` is of the category `{short}`, which the ontology does not have", model.name);
+            let classes: Vec<String> = ontology.superclasses.keys().map(|class| names::shorten(class)).collect();
+            let help = match nearest(&short, classes.iter().map(String::as_str)) {
+                Some(near) => format!("did you mean `{near}`? it stands in the model's file"),
+                None => format!("state it in the ontology: `{short} a owl:Class ; rdfs:subClassOf act:Graspable`"),
+            };
+            found.push(campaign.fault("S005", &key, message).help(help));
+        }
+    }
+}
+
+fn check_surfaces(campaign: &Campaign, found: &mut Diagnostics) {
+    let platforms: Vec<&str> =
+        campaign.models.values().filter(|model| model.surface.is_some()).map(|model| model.name.as_str()).collect();
+    for designator in ["objectSurface", "placeSurface"] {
+        for (key, model) in placed_models(campaign, designator).filter(|(_, model)| model.surface.is_none()) {
+            let message = format!("nothing can stand on the model `{}`: it has no `[surface]`", model.name);
+            let help = format!("models that have one: {}", platforms.join(", "));
+            found.push(campaign.fault("S006", &key, message).help(help));
+        }
+    }
+}
+
+fn check_fit(campaign: &Campaign, designator: &str, surfaces: &[Arc<ObjectModel>], found: &mut Diagnostics) {
+    for (key, model) in placed_models(campaign, designator) {
+        let too_small = surfaces.iter().filter_map(|platform| Some((platform, platform.surface.as_ref()?)));
+        for (platform, surface) in too_small.filter(|(_, surface)| !placement::fits(surface, model)) {
+            let message = format!("the model `{}` can't stand on `{}`", model.name, platform.name);
+            let [x, y] = surface.size_m;
+            let help = format!("it is {} × {} m, and the surface is {x} × {y} m", model.size_m[0], model.size_m[1]);
+            found.push(campaign.fault("S007", &key, message).help(help));
+        }
+    }
+}
