@@ -1,0 +1,48 @@
+//! What a query gives, and the handle that stops it.
+
+use oxigraph::sparql::CancellationToken;
+
+use crate::base::Term;
+
+/// Result of a SPARQL query.
+#[derive(Debug, Clone, PartialEq)]
+pub enum QueryAnswer {
+    /// Of `ASK`.
+    Boolean(bool),
+    /// Of `SELECT`.
+    Table {
+        /// Names of the variables, without `?`.
+        columns: Vec<String>,
+        /// One value for each column; nothing where it is unbound. In the query's order.
+        rows: Vec<Vec<Option<Term>>>,
+    },
+    /// Of `CONSTRUCT` and `DESCRIBE`: sorted, each once.
+    Graph(Vec<[Term; 3]>),
+}
+
+/// Stops a query from another thread. Clones stop the same query.
+#[derive(Clone, Default)]
+pub struct Cancel {
+    token: CancellationToken,
+}
+
+impl Cancel {
+    /// A handle that has stopped nothing yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Stops the query that was given this handle; it ends with a diagnostic.
+    pub fn cancel(&self) {
+        self.token.cancel();
+    }
+
+    /// Whether [`Cancel::cancel`] was called.
+    pub fn is_cancelled(&self) -> bool {
+        self.token.is_cancelled()
+    }
+
+    pub(super) fn token(&self) -> CancellationToken {
+        self.token.clone()
+    }
+}

@@ -1,0 +1,155 @@
+//! Everything that is kept of one run, read back.
+
+use std::collections::BTreeMap;
+
+use oxigraph::model::{NamedNode, Term};
+use oxigraph::store::{StorageError, Store};
+
+use crate::base::names;
+use crate::history::read::{Node, id_of, subjects, text_of};
+use crate::history::statements::iri;
+use crate::history::write_scene::role_of;
+use crate::history::{ActionDetail, ObjectDetail, RunDetail, RunRow, RunStatus};
+use crate::scenario::Role;
+use crate::verdict::{Judgement, Outcome};
+
+/// Reads a run that is known to be there.
+pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageError> {
+    let node = Node::read(store, run)?;
+    Ok(RunDetail {
+        row: row(run, &node),
+        seed: node.count("act:seed").unwrap_or_default(),
+        reason: node.text("act:reason"),
+        wall_secs: node.number("act:wallSeconds").unwrap_or_default(),
+        world: node.text("act:world").unwrap_or_default(),
+        program_version: node.text("act:program").unwrap_or_default(),
+        robot_base: ["w:baseX", "w:baseY", "w:baseYaw"].map(|property| node.number(property).unwrap_or_default()),
+        noise: noise(&node),
+        designators: designators(&node),
+        objects: objects(store, run)?,
+        actions: actions(store, run)?,
+    })
+}
+
+fn row(run: &NamedNode, node: &Node) -> RunRow {
+    RunRow {
+        run: id_of(&run.clone().into()),
+        campaign: node.all("act:campaign").first().map(id_of).unwrap_or_default(),
+        index: node.count("act:index").unwrap_or_default(),
+        test: node.text("act:test").unwrap_or_default(),
+        status: status(node.text("act:status").as_deref()),
+        score: node.number("act:score").unwrap_or_default(),
+        trace_hash: node.text("act:traceHash").unwrap_or_default(),
+        started: node.text("prov:startedAtTime").unwrap_or_default(),
+    }
+}
+
+/// The status of a word; what is no status is nobody's success.
+pub(super) fn status(word: Option<&str>) -> RunStatus {
+    word.and_then(RunStatus::from_word).unwrap_or(RunStatus::Broken)
+}
+
+/// The outcome of a word; what is no outcome is nobody's success.
+pub(super) fn outcome(word: Option<&str>) -> Outcome {
+    word.and_then(Outcome::from_word).unwrap_or(Outcome::Broken)
+}
+
+fn noise(node: &Node) -> BTreeMap<String, f64> {
+    node.properties()
+        .filter_map(|(property, _)| property.strip_prefix(names::ACT))
+        .filter(|name| name.ends_with("Noise"))
+        .filter_map(|name| Some((name.to_owned(), node.number(&names::act(name))?)))
+        .collect()
+}
+
+/// Values of the designators that a run or an execution names as such.
+fn designators(node: &Node) -> BTreeMap<String, Vec<String>> {
+    let mut found = BTreeMap::new();
+    for designator in node.all("act:designator").iter().map(text_of) {
+        let mut values: Vec<String> = node.all(&designator).iter().map(id_of).collect();
+        values.sort();
+        found.insert(names::local(&designator).to_owned(), values);
+    }
+    found
+}
+
+fn of_run(store: &Store, run: &NamedNode, class: &str) -> Result<Vec<(Term, Node)>, StorageError> {
+    let class = iri(class);
+    let mut found = Vec::new();
+    for subject in subjects(store, "act:ofRun", run.as_ref())? {
+        let node = Node::read(store, &subject)?;
+        if node.all("rdf:type").iter().any(|kind| *kind == Term::from(class.clone())) {
+            found.push((subject.into(), node));
+        }
+    }
+    Ok(found)
+}
+
+fn objects(store: &Store, run: &NamedNode) -> Result<Vec<ObjectDetail>, StorageError> {
+    let mut objects: Vec<ObjectDetail> =
+        of_run(store, run, "act:SceneObject")?.iter().map(|(_, node)| object(node)).collect();
+    objects.sort_by(|a, b| (a.role, &a.id).cmp(&(b.role, &b.id)));
+    Ok(objects)
+}
+
+fn object(node: &Node) -> ObjectDetail {
+    let number = |property| node.number(property).unwrap_or_default();
+    ObjectDetail {
+        id: node.all("act:object").first().map(id_of).unwrap_or_default(),
+        model: node.text("act:model").unwrap_or_default(),
+        category: node.text("act:category").unwrap_or_default(),
+        role: node.text("act:role").and_then(|word| role_of(&word)).unwrap_or(Role::Other),
+        x: number("w:x"),
+        y: number("w:y"),
+        z: number("w:z"),
+        yaw: number("w:yaw"),
+        mass_kg: number("w:mass"),
+        friction: number("w:friction"),
+        restitution: number("w:restitution"),
+        robot_distance_m: number("act:robotDistance"),
+        neighbour_distance_m: node.number("act:neighbourDistance"),
+        target_distance_m: node.number("act:targetDistance"),
+        displacement_m: node.number("act:displacement"),
+        max_tilt_rad: node.number("act:maxTilt"),
+    }
+}
+
+fn actions(store: &Store, run: &NamedNode) -> Result<Vec<ActionDetail>, StorageError> {
+    let mut actions = Vec::new();
+    for (execution, node) in of_run(store, run, "act:ActionExecution")? {
+        actions.push(ActionDetail {
+            step: node.count("act:step").and_then(|step| u32::try_from(step).ok()).unwrap_or_default(),
+            action: node.text("act:action").unwrap_or_default(),
+            score: node.number("act:score").unwrap_or_default(),
+            reported: node.truth("act:reported"),
+            message: node.text("act:message"),
+            duration_secs: node.number("act:duration").unwrap_or_default(),
+            end: node.text("act:end").unwrap_or_default(),
+            parameters: designators(&node),
+            judgements: judgements(store, &execution)?,
+        });
+    }
+    actions.sort_by_key(|action| action.step);
+    Ok(actions)
+}
+
+fn judgements(store: &Store, execution: &Term) -> Result<Vec<Judgement>, StorageError> {
+    let mut judgements = Vec::new();
+    for assertion in subjects(store, "earl:subject", execution.as_ref())? {
+        let assertion = Node::read(store, &assertion)?;
+        let result = match assertion.all("earl:result").first() {
+            Some(Term::BlankNode(result)) => Node::read(store, result)?,
+            Some(Term::NamedNode(result)) => Node::read(store, result)?,
+            _ => Node::default(),
+        };
+        judgements.push(Judgement {
+            property: assertion.text("earl:test").unwrap_or_default(),
+            outcome: outcome(result.text("act:outcome").as_deref()),
+            margin: result.number("act:margin"),
+            witness: result.text("act:witness").unwrap_or_default(),
+            rule_digest: result.text("act:ruleDigest").unwrap_or_default(),
+        });
+    }
+    judgements.sort_by(|a, b| a.property.cmp(&b.property));
+    Ok(judgements)
+}

@@ -1,0 +1,108 @@
+//! What can go wrong with a history, in words: each fault names the folder and the way out.
+
+use std::io::ErrorKind;
+use std::path::Path;
+
+use oxigraph::store::StorageError;
+
+use crate::base::{Diagnostic, Diagnostics};
+
+/// A folder can't be a history, or not be reached.
+pub(super) fn unusable(dir: &Path, why: &str) -> Diagnostics {
+    Diagnostic::error("H001", format!("the history `{}` can't be opened: {why}", dir.display()))
+        .help("name a folder that you may write to with `--history DIR`")
+        .into()
+}
+
+/// Somebody else has it.
+pub(super) fn in_use(dir: &Path) -> Diagnostics {
+    Diagnostic::error("H002", format!("the history `{}` is open in another process", dir.display()))
+        .help("wait until it ends, or name another folder with `--history DIR`; nothing was changed")
+        .into()
+}
+
+/// There is none where one was asked for.
+pub(super) fn none_there(dir: &Path) -> Diagnostics {
+    Diagnostic::error("H003", format!("there is no history at `{}`", dir.display()))
+        .help("`actcheck run CONFIG` writes one; name its folder with `--history DIR`")
+        .into()
+}
+
+/// A folder with other things in it.
+pub(super) fn foreign(dir: &Path) -> Diagnostics {
+    Diagnostic::error("H003", format!("the folder `{}` is no history: it holds other things", dir.display()))
+        .help("name a new or empty folder, or that of a history, with `--history DIR`; nothing was changed")
+        .into()
+}
+
+/// Its layout is of a later program.
+pub(super) fn newer(dir: &Path, theirs: u64, ours: u64) -> Diagnostics {
+    let message = format!(
+        "the history `{}` was written by a newer actcheck: its format is {theirs}, this program knows {ours}",
+        dir.display()
+    );
+    Diagnostic::error("H004", message)
+        .help("update actcheck, or name another folder with `--history DIR`; nothing was changed")
+        .into()
+}
+
+/// Reading or writing a file failed.
+pub(super) fn io(dir: &Path, doing: &str, error: &std::io::Error) -> Diagnostics {
+    failed(dir, doing, error.kind(), &error.to_string())
+}
+
+/// The store failed.
+pub(super) fn store(dir: &Path, doing: &str, error: &StorageError) -> Diagnostics {
+    match error {
+        StorageError::Io(error) => io(dir, doing, error),
+        StorageError::Corruption(error) => damaged(dir, &error.to_string()),
+        other => failed(dir, doing, ErrorKind::Other, &other.to_string()),
+    }
+}
+
+/// What was written can't be read any more.
+pub(super) fn damaged(dir: &Path, what: &str) -> Diagnostics {
+    Diagnostic::error("H007", format!("the history `{}` is damaged: {}", dir.display(), lower(what)))
+        .help("restore the folder from a copy, or name another one with `--history DIR`")
+        .into()
+}
+
+fn failed(dir: &Path, doing: &str, kind: ErrorKind, text: &str) -> Diagnostics {
+    let has = |words: &[&str]| words.iter().any(|word| text.contains(word));
+    if matches!(kind, ErrorKind::StorageFull | ErrorKind::QuotaExceeded) || has(&["No space left", "quota exceeded"]) {
+        return Diagnostic::error(
+            "H005",
+            format!("the disk of the history `{}` is full: {doing} failed", dir.display()),
+        )
+        .help(
+            "free some space and run again: what was kept before is whole; or name another folder with `--history DIR`",
+        )
+        .into();
+    }
+    if has(&["lock file", "lock hold by"]) {
+        return in_use(dir);
+    }
+    match kind {
+        ErrorKind::PermissionDenied => unusable(dir, "writing there is not permitted"),
+        ErrorKind::ReadOnlyFilesystem => unusable(dir, "it lies on a read-only file system"),
+        _ if has(&["Permission denied"]) => unusable(dir, "writing there is not permitted"),
+        _ if has(&["Read-only file system"]) => unusable(dir, "it lies on a read-only file system"),
+        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => unusable(dir, "a file stands in its place"),
+        _ => Diagnostic::error("H006", format!("{doing} failed in the history `{}`: {}", dir.display(), lower(text)))
+            .help("see to the disk and run again: what was kept before is whole")
+            .into(),
+    }
+}
+
+/// A library's sentence in our spelling: the first letter small, no full stop.
+fn lower(text: &str) -> String {
+    let text = text.trim().trim_end_matches('.');
+    let mut letters = text.chars();
+    match letters.next() {
+        // "IO error" stays as it is.
+        Some(first) if !letters.as_str().starts_with(|c: char| c.is_uppercase()) => {
+            first.to_lowercase().chain(letters).collect()
+        }
+        _ => text.to_owned(),
+    }
+}

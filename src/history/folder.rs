@@ -1,0 +1,130 @@
+//! The folder of a history: its layout, its version, and that one process owns it.
+//!
+//! `VERSION` says what the rest is; `lock` is held while a process has it open; `store/` is the RDF store; `traces/` has one
+//! file for each run.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use crate::base::Diagnostics;
+use crate::history::fault;
+
+/// Format of the folder that this program writes, and the newest that it reads.
+pub(super) const FORMAT: u64 = 1;
+const TITLE: &str = "actcheck history";
+
+/// A folder that this process owns until the value is dropped.
+#[derive(Debug)]
+pub(super) struct Folder {
+    dir: PathBuf,
+    /// Holds the lock; the system gives it back when the process ends, however it ends.
+    _lock: File,
+}
+
+impl Folder {
+    /// Takes a folder, which is made where `create` says so.
+    pub(super) fn take(dir: &Path, create: bool) -> Result<Self, Diagnostics> {
+        if dir.is_file() {
+            return Err(fault::unusable(dir, "a file stands in its place"));
+        }
+        let known = has_version(dir)?;
+        if !known && !create {
+            return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
+        }
+        if !known {
+            if holds_other_things(dir) {
+                return Err(fault::foreign(dir));
+            }
+            fs::create_dir_all(dir).map_err(|error| fault::io(dir, "making the folder", &error))?;
+        }
+        let folder = Self { dir: dir.to_path_buf(), _lock: lock(dir)? };
+        if !known {
+            write_whole(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
+                .map_err(|error| fault::io(dir, "writing its version", &error))?;
+        }
+        fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "making the folder of traces", &error))?;
+        Ok(folder)
+    }
+
+    /// The folder as the user gave it.
+    pub(super) fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Where the RDF store is.
+    pub(super) fn store(&self) -> PathBuf {
+        self.dir.join("store")
+    }
+
+    /// Where the traces are.
+    pub(super) fn traces(&self) -> PathBuf {
+        self.dir.join("traces")
+    }
+
+    /// File of a run's trace.
+    pub(super) fn trace(&self, run: &str) -> PathBuf {
+        self.traces().join(format!("{run}.trace"))
+    }
+}
+
+/// Whether there is a history that this program can read.
+fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
+    let text = match fs::read_to_string(dir.join("VERSION")) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
+        Err(error) if error.kind() == ErrorKind::InvalidData => return Err(fault::foreign(dir)),
+        Err(error) => return Err(fault::io(dir, "reading its version", &error)),
+    };
+    let Some(version) = text.trim().strip_prefix(TITLE).and_then(|number| number.trim().parse::<u64>().ok()) else {
+        return Err(fault::foreign(dir));
+    };
+    if version > FORMAT { Err(fault::newer(dir, version, FORMAT)) } else { Ok(true) }
+}
+
+/// Whether a folder without a version holds anything but what an interrupted beginning leaves.
+fn holds_other_things(dir: &Path) -> bool {
+    let ours = BTreeSet::from(["lock", "VERSION.tmp"]);
+    fs::read_dir(dir)
+        .into_iter()
+        .flatten()
+        .filter_map(Result::ok)
+        .any(|entry| !entry.file_name().to_str().is_some_and(|name| ours.contains(name)))
+}
+
+fn lock(dir: &Path) -> Result<File, Diagnostics> {
+    let file = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(dir.join("lock"))
+        .map_err(|error| fault::io(dir, "locking it", &error))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(fault::in_use(dir)),
+        // Some network file systems know no locks; the store's own still guards.
+        Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(file),
+        Err(TryLockError::Error(error)) => Err(fault::io(dir, "locking it", &error)),
+    }
+}
+
+/// Writes a file so that it is there whole or not at all, also after a power cut.
+pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(".tmp");
+    let temporary = path.with_file_name(name);
+    let written = File::create(&temporary).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()
+    });
+    if let Err(error) = written.and_then(|()| fs::rename(&temporary, path)) {
+        // Half a file is of no use; where it can't be removed either, the next campaign does.
+        let _ = fs::remove_file(&temporary);
+        return Err(error);
+    }
+    match path.parent() {
+        Some(parent) => File::open(parent)?.sync_all(),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,149 @@
+//! Lists of campaigns, runs and outcomes.
+
+use std::collections::BTreeMap;
+
+use oxigraph::model::{Literal, Term};
+use oxigraph::sparql::QueryEvaluationError;
+use oxigraph::store::Store;
+
+use crate::history::detail::{outcome, status};
+use crate::history::read::{Node, id_of, select, text_of};
+use crate::history::write_campaign::campaign_node;
+use crate::history::{CampaignRow, OutcomeRow, RunFilter, RunRow};
+use crate::verdict::Outcome;
+
+const CAMPAIGNS: &str = "
+SELECT ?campaign (COUNT(?run) AS ?runs) WHERE {
+    ?campaign a act:Campaign ; prov:startedAtTime ?started .
+    OPTIONAL { ?run act:campaign ?campaign }
+} GROUP BY ?campaign ?started ORDER BY ?started ?campaign";
+
+const STARTS: &str = "
+SELECT ?campaign WHERE { ?campaign a act:Campaign ; prov:startedAtTime ?started } ORDER BY ?started ?campaign";
+
+const RUNS: &str = "
+SELECT ?run ?campaign ?index ?test ?status ?score ?hash ?started WHERE {
+    ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status ; act:score ?score ;
+        act:traceHash ?hash ; prov:startedAtTime ?started .
+}";
+
+const OUTCOMES: &str = "
+SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?margin WHERE {
+    ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status .
+    ?execution act:ofRun ?run ; act:step ?step ; act:action ?action .
+    ?assertion earl:subject ?execution ; earl:test ?property ; earl:result ?result .
+    ?result act:outcome ?outcome .
+    OPTIONAL { ?result act:margin ?margin }
+}";
+
+type Row = Vec<Option<Term>>;
+
+fn text(row: &Row, column: usize) -> String {
+    row.get(column).and_then(Option::as_ref).map(text_of).unwrap_or_default()
+}
+
+fn id(row: &Row, column: usize) -> String {
+    row.get(column).and_then(Option::as_ref).map(id_of).unwrap_or_default()
+}
+
+fn number<T: std::str::FromStr + Default>(row: &Row, column: usize) -> T {
+    text(row, column).parse().unwrap_or_default()
+}
+
+/// All campaigns, by their start.
+pub(super) fn campaigns(store: &Store) -> Result<Vec<CampaignRow>, QueryEvaluationError> {
+    let mut rows = Vec::new();
+    for row in select(store, CAMPAIGNS, Vec::new())? {
+        let name = id(&row, 0);
+        let node =
+            Node::read(store, &campaign_node(&name)).map_err(|error| QueryEvaluationError::Dataset(Box::new(error)))?;
+        rows.push(campaign(name, number(&row, 1), &node));
+    }
+    Ok(rows)
+}
+
+fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
+    let text = |property| node.text(property).unwrap_or_default();
+    CampaignRow {
+        id,
+        name: text("rdfs:label"),
+        started: text("prov:startedAtTime"),
+        ended: node.text("prov:endedAtTime"),
+        interrupted: node.truth("act:interrupted").unwrap_or(true),
+        seed: node.count("act:seed").unwrap_or_default(),
+        planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
+        runs,
+        score: node.number("act:score"),
+        score_without_broken: node.number("act:scoreWithoutBroken"),
+        outcomes: Outcome::ALL
+            .into_iter()
+            .filter_map(|outcome| Some((outcome, node.count(&format!("act:{outcome}Count"))?)))
+            .collect(),
+        program_version: text("act:program"),
+        config_digest: text("act:configDigest"),
+        ontology_digest: text("act:ontologyDigest"),
+    }
+}
+
+/// Position of each campaign in the order of their starts.
+fn ranks(store: &Store) -> Result<BTreeMap<String, usize>, QueryEvaluationError> {
+    Ok(select(store, STARTS, Vec::new())?.iter().enumerate().map(|(rank, row)| (id(row, 0), rank)).collect())
+}
+
+/// Values of the variables that a filter fixes.
+fn given(filter: &RunFilter) -> Vec<(&'static str, Term)> {
+    let literal = |text: &str| Term::from(Literal::new_simple_literal(text));
+    let campaign = filter.campaign.as_ref().map(|id| ("campaign", Term::from(campaign_node(id))));
+    let test = filter.test.as_ref().map(|test| ("test", literal(test)));
+    let status = filter.status.map(|status| ("status", literal(status.word())));
+    [campaign, test, status].into_iter().flatten().collect()
+}
+
+/// The runs that a filter lets through, by the start of their campaign, then by index.
+pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, QueryEvaluationError> {
+    let ranks = ranks(store)?;
+    let mut rows: Vec<RunRow> = select(store, RUNS, given(filter))?
+        .iter()
+        .map(|row| RunRow {
+            run: id(row, 0),
+            campaign: id(row, 1),
+            index: number(row, 2),
+            test: text(row, 3),
+            status: status(Some(&text(row, 4))),
+            score: number(row, 5),
+            trace_hash: text(row, 6),
+            started: text(row, 7),
+        })
+        .collect();
+    rows.sort_by(|a, b| (ranks.get(&a.campaign), a.index, &a.run).cmp(&(ranks.get(&b.campaign), b.index, &b.run)));
+    Ok(rows)
+}
+
+/// Outcomes of the runs that a filter lets through, in the same order, then by step and property.
+pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeRow>, QueryEvaluationError> {
+    let ranks = ranks(store)?;
+    let mut rows: Vec<OutcomeRow> = select(store, OUTCOMES, given(filter))?
+        .iter()
+        .map(|row| OutcomeRow {
+            run: id(row, 0),
+            campaign: id(row, 1),
+            index: number(row, 2),
+            test: text(row, 3),
+            step: number(row, 5),
+            action: text(row, 6),
+            property: text(row, 7),
+            outcome: outcome(Some(&text(row, 8))),
+            margin: row.get(9).and_then(Option::as_ref).and_then(|margin| text_of(margin).parse().ok()),
+        })
+        .collect();
+    rows.sort_by(|a, b| {
+        (ranks.get(&a.campaign), a.index, &a.run, a.step, &a.property).cmp(&(
+            ranks.get(&b.campaign),
+            b.index,
+            &b.run,
+            b.step,
+            &b.property,
+        ))
+    });
+    Ok(rows)
+}

@@ -1,0 +1,31 @@
+//! The memory: campaigns, runs, scenes, facts and outcomes in an RDF store on disk, traces in files beside it.
+//!
+//! Never: judges, simulates, changes what was kept, or looks at a clock.
+
+mod answer;
+mod detail;
+mod fault;
+mod folder;
+mod frames;
+mod lists;
+mod query;
+mod read;
+mod record;
+mod rows;
+mod statements;
+mod store;
+mod terms;
+mod trace_file;
+mod write_campaign;
+mod write_run;
+mod write_scene;
+
+pub use answer::{Cancel, QueryAnswer};
+pub use record::{CampaignEnd, CampaignRecord, RunRecord, RunStatus};
+pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
+pub use store::History;
+
+// What the readers of a history meet in its products.
+pub use crate::actions::Trace;
+pub use crate::scenario::Role;
+pub use crate::world::{BodyState, Snapshot};

@@ -1,0 +1,120 @@
+//! Reading the store: all that it says of one thing, and rows of a query of our own.
+
+use std::collections::BTreeMap;
+
+use oxigraph::model::{GraphNameRef, NamedNodeRef, NamedOrBlankNode, NamedOrBlankNodeRef, Term, TermRef, Variable};
+use oxigraph::sparql::{QueryEvaluationError, QueryResults};
+use oxigraph::store::{StorageError, Store};
+
+use crate::base::names;
+use crate::history::Cancel;
+use crate::history::query::evaluator;
+use crate::history::statements::iri;
+
+/// All that the default graph says of one thing.
+#[derive(Debug, Default)]
+pub(super) struct Node {
+    values: BTreeMap<String, Vec<Term>>,
+}
+
+impl Node {
+    /// Reads it; a thing of which nothing is said is empty.
+    pub(super) fn read<'a>(store: &Store, subject: impl Into<NamedOrBlankNodeRef<'a>>) -> Result<Self, StorageError> {
+        let mut node = Self::default();
+        for quad in store.quads_for_pattern(Some(subject.into()), None, None, Some(GraphNameRef::DefaultGraph)) {
+            let quad = quad?;
+            node.values.entry(quad.predicate.into_string()).or_default().push(quad.object);
+        }
+        Ok(node)
+    }
+
+    /// Every value of a property.
+    pub(super) fn all(&self, property: &str) -> &[Term] {
+        self.values.get(iri(property).as_str()).map_or(&[], Vec::as_slice)
+    }
+
+    /// Properties in order, with their values.
+    pub(super) fn properties(&self) -> impl Iterator<Item = (&str, &[Term])> {
+        self.values.iter().map(|(property, values)| (property.as_str(), values.as_slice()))
+    }
+
+    /// Text of a literal, or the IRI.
+    pub(super) fn text(&self, property: &str) -> Option<String> {
+        self.all(property).first().map(text_of)
+    }
+
+    /// A number.
+    pub(super) fn number(&self, property: &str) -> Option<f64> {
+        self.text(property)?.parse().ok()
+    }
+
+    /// A count.
+    pub(super) fn count(&self, property: &str) -> Option<u64> {
+        self.text(property)?.parse().ok()
+    }
+
+    /// A truth value.
+    pub(super) fn truth(&self, property: &str) -> Option<bool> {
+        self.text(property)?.parse().ok()
+    }
+}
+
+/// Text of a literal, or the IRI, or the label of a blank node.
+pub(super) fn text_of(term: &Term) -> String {
+    match term {
+        Term::NamedNode(node) => node.as_str().to_owned(),
+        Term::BlankNode(node) => node.as_str().to_owned(),
+        Term::Literal(literal) => literal.value().to_owned(),
+        #[expect(
+            unreachable_patterns,
+            reason = "other builds of the library know quoted triples, which we never write"
+        )]
+        other => other.to_string(),
+    }
+}
+
+/// A value as people call it: the id of an object or run, or the text.
+pub(super) fn id_of(term: &Term) -> String {
+    match term {
+        Term::NamedNode(node) => short_id(node.as_str()).to_owned(),
+        other => text_of(other),
+    }
+}
+
+/// The id in an IRI of ours.
+pub(super) fn short_id(iri: &str) -> &str {
+    [names::RUN, names::CAMPAIGN, names::OBJ].iter().find_map(|namespace| iri.strip_prefix(namespace)).unwrap_or(iri)
+}
+
+/// Things of which a property has a value, in no order that means anything.
+pub(super) fn subjects<'a>(
+    store: &Store,
+    property: &str,
+    value: impl Into<TermRef<'a>>,
+) -> Result<Vec<NamedOrBlankNode>, StorageError> {
+    let property = iri(property);
+    let property: NamedNodeRef<'_> = property.as_ref();
+    store
+        .quads_for_pattern(None, Some(property), Some(value.into()), Some(GraphNameRef::DefaultGraph))
+        .map(|quad| quad.map(|quad| quad.subject))
+        .collect()
+}
+
+/// Rows of one of our own queries, with some of its variables given.
+pub(super) fn select(
+    store: &Store,
+    query: &str,
+    given: Vec<(&str, Term)>,
+) -> Result<Vec<Vec<Option<Term>>>, QueryEvaluationError> {
+    let mut prepared = evaluator(&Cancel::new()).parse_query(query)?;
+    for (variable, value) in given {
+        prepared = prepared.substitute_variable(Variable::new_unchecked(variable), value);
+    }
+    let mut rows = Vec::new();
+    if let QueryResults::Solutions(solutions) = prepared.on_store(store).execute()? {
+        for solution in solutions {
+            rows.push(solution?.values().to_vec());
+        }
+    }
+    Ok(rows)
+}

@@ -1,0 +1,119 @@
+//! What is kept of a campaign and of a run.
+
+use std::collections::BTreeMap;
+
+use crate::actions::Trace;
+use crate::base::Choice;
+use crate::facts::RunFacts;
+use crate::scenario::Scene;
+use crate::verdict::{Judgement, Outcome};
+
+/// A campaign, written before its first run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CampaignRecord {
+    /// Short id, such as `k7f3`; unique in its history.
+    pub id: String,
+    /// The configuration's file name without its ending.
+    pub name: String,
+    /// The configuration's text.
+    pub config_text: String,
+    /// Digest of that text.
+    pub config_digest: String,
+    /// Digest of the ontology.
+    pub ontology_digest: String,
+    /// Property IRI, rule path and digest of the rule file (with its libraries), sorted.
+    pub rules: Vec<(String, String, String)>,
+    /// Digests of robot and models by name, sorted.
+    pub models: Vec<(String, String)>,
+    /// Seed of all randomness.
+    pub seed: u64,
+    /// How many runs were asked for.
+    pub planned_runs: u64,
+    /// RFC 3339.
+    pub started: String,
+    /// Version of this program.
+    pub program_version: String,
+}
+
+/// How a run ended as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RunStatus {
+    /// Every action came to its own end.
+    Completed,
+    /// Simulation or tool failed.
+    Broken,
+    /// A budget was spent.
+    Timeout,
+}
+
+impl RunStatus {
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Completed => "completed",
+            Self::Broken => "broken",
+            Self::Timeout => "timeout",
+        }
+    }
+
+    /// The status of a word.
+    pub fn from_word(word: &str) -> Option<Self> {
+        [Self::Completed, Self::Broken, Self::Timeout].into_iter().find(|status| status.word() == word)
+    }
+}
+
+/// What is known of a campaign when it ends.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CampaignEnd {
+    /// RFC 3339.
+    pub ended: String,
+    /// The paper's T; nothing where there was no run.
+    pub score: Option<f64>,
+    /// The same over the runs that were not broken.
+    pub score_without_broken: Option<f64>,
+    /// Counts of all outcomes.
+    pub outcomes: BTreeMap<Outcome, u64>,
+    /// Scenes that were drawn and discarded.
+    pub discards: u64,
+    /// Whether it ended before all its runs were done.
+    pub interrupted: bool,
+}
+
+/// One run, complete: written in one transaction.
+#[derive(Debug, Clone)]
+pub struct RunRecord {
+    /// `CAMPAIGN-NUMBER`, such as `k7f3-3`. The number is the index + 1.
+    pub id: String,
+    /// Id of its campaign.
+    pub campaign: String,
+    /// Position in the campaign, from 0.
+    pub index: u64,
+    /// Names of the actions, joined by a space.
+    pub test: String,
+    /// Seed of the campaign.
+    pub seed: u64,
+    /// How it ended.
+    pub status: RunStatus,
+    /// Why, where it did not complete.
+    pub reason: Option<String>,
+    /// Mean of the action scores (the paper's S).
+    pub score: f64,
+    /// One for each action (the paper's A).
+    pub action_scores: Vec<f64>,
+    /// Every decision.
+    pub choices: Vec<Choice>,
+    /// The scene.
+    pub scene: Scene,
+    /// What happened.
+    pub trace: Trace,
+    /// The same as facts.
+    pub facts: RunFacts,
+    /// IRIs of the actions, one for each action of the trace.
+    pub actions: Vec<String>,
+    /// One list for each action, sorted by property.
+    pub judgements: Vec<Vec<Judgement>>,
+    /// RFC 3339.
+    pub started: String,
+    /// Wall time. Unit: seconds.
+    pub wall_secs: f64,
+}

@@ -1,0 +1,182 @@
+//! What is read from a history, as plain data.
+
+use std::collections::BTreeMap;
+
+use crate::history::RunStatus;
+use crate::scenario::Role;
+use crate::verdict::{Judgement, Outcome};
+
+/// Which runs are asked for; the default is all.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RunFilter {
+    /// Only those of this campaign.
+    pub campaign: Option<String>,
+    /// Only those of this test (names of its actions, joined by a space).
+    pub test: Option<String>,
+    /// Only those that ended so.
+    pub status: Option<RunStatus>,
+}
+
+/// One run in a list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunRow {
+    /// Its id, such as `k7f3-3`.
+    pub run: String,
+    /// Id of its campaign.
+    pub campaign: String,
+    /// Position in the campaign, from 0.
+    pub index: u64,
+    /// Names of the actions, joined by a space.
+    pub test: String,
+    /// How it ended.
+    pub status: RunStatus,
+    /// The paper's S.
+    pub score: f64,
+    /// Digest over every state.
+    pub trace_hash: String,
+    /// RFC 3339.
+    pub started: String,
+}
+
+/// One campaign in a list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CampaignRow {
+    /// Its id, such as `k7f3`.
+    pub id: String,
+    /// Name of its configuration.
+    pub name: String,
+    /// RFC 3339.
+    pub started: String,
+    /// RFC 3339; nothing where the program was ended from outside.
+    pub ended: Option<String>,
+    /// Whether it ended before all its runs were done.
+    pub interrupted: bool,
+    /// Seed of all randomness.
+    pub seed: u64,
+    /// How many runs were asked for.
+    pub planned_runs: u64,
+    /// How many runs are kept.
+    pub runs: u64,
+    /// The paper's T.
+    pub score: Option<f64>,
+    /// The same over the runs that were not broken.
+    pub score_without_broken: Option<f64>,
+    /// Counts of outcomes; empty where it never ended.
+    pub outcomes: BTreeMap<Outcome, u64>,
+    /// Version of the program that ran it.
+    pub program_version: String,
+    /// Digest of the configuration's text.
+    pub config_digest: String,
+    /// Digest of the ontology.
+    pub ontology_digest: String,
+}
+
+/// Outcome of one property in one action execution.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutcomeRow {
+    /// Id of the run.
+    pub run: String,
+    /// Id of its campaign.
+    pub campaign: String,
+    /// Position of the run in the campaign, from 0.
+    pub index: u64,
+    /// Names of the run's actions, joined by a space.
+    pub test: String,
+    /// Position of the action in the test, from 1.
+    pub step: u32,
+    /// IRI of the action.
+    pub action: String,
+    /// IRI of the property.
+    pub property: String,
+    /// The outcome.
+    pub outcome: Outcome,
+    /// How far from flipping, in the property's unit.
+    pub margin: Option<f64>,
+}
+
+/// Everything that is to be shown of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunDetail {
+    /// As in a list.
+    pub row: RunRow,
+    /// Seed of the campaign.
+    pub seed: u64,
+    /// Why it did not complete.
+    pub reason: Option<String>,
+    /// Unit: seconds.
+    pub wall_secs: f64,
+    /// Name of the world.
+    pub world: String,
+    /// Program and version that ran it.
+    pub program_version: String,
+    /// Where the base stood at first. Units: metres, metres, radians. Shape: x, y, heading.
+    pub robot_base: [f64; 3],
+    /// Standard deviations of sensing by name of their term, such as `positionNoise`. Units: metres, radians.
+    pub noise: BTreeMap<String, f64>,
+    /// Values of the designators.
+    pub designators: BTreeMap<String, Vec<String>>,
+    /// Objects of the scene: platforms, targets, others, obstacles; each kind by id.
+    pub objects: Vec<ObjectDetail>,
+    /// Its actions in order.
+    pub actions: Vec<ActionDetail>,
+}
+
+/// One object of a run's scene, as it was placed, and what became of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObjectDetail {
+    /// Id in the scene.
+    pub id: String,
+    /// Name of its model.
+    pub model: String,
+    /// Its class: an IRI.
+    pub category: String,
+    /// What it is there for.
+    pub role: Role,
+    /// Unit: metres.
+    pub x: f64,
+    /// Unit: metres.
+    pub y: f64,
+    /// Unit: metres.
+    pub z: f64,
+    /// Unit: radians.
+    pub yaw: f64,
+    /// Unit: kilograms.
+    pub mass_kg: f64,
+    /// Sliding friction coefficient.
+    pub friction: f64,
+    /// Coefficient of restitution.
+    pub restitution: f64,
+    /// Horizontal distance from the base. Unit: metres.
+    pub robot_distance_m: f64,
+    /// Horizontal distance to the nearest other object that is no platform. Unit: metres.
+    pub neighbour_distance_m: Option<f64>,
+    /// Horizontal distance to the nearest target; nothing for a target. Unit: metres.
+    pub target_distance_m: Option<f64>,
+    /// Largest distance from where it was before an action. Unit: metres.
+    pub displacement_m: Option<f64>,
+    /// Largest angle from the vertical during an action. Unit: radians.
+    pub max_tilt_rad: Option<f64>,
+}
+
+/// One action of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActionDetail {
+    /// Position in the test, from 1.
+    pub step: u32,
+    /// IRI of the action.
+    pub action: String,
+    /// The paper's A.
+    pub score: f64,
+    /// Whether it reported success; nothing where it came to no report.
+    pub reported: Option<bool>,
+    /// Its own words, or why it did not complete.
+    pub message: Option<String>,
+    /// Simulated time. Unit: seconds.
+    pub duration_secs: f64,
+    /// `completed`, `broken`, `timeout` or `untested`.
+    pub end: String,
+    /// Values of the designators in force.
+    pub parameters: BTreeMap<String, Vec<String>>,
+    /// Outcomes, sorted by property.
+    pub judgements: Vec<Judgement>,
+}

@@ -1,0 +1,327 @@
+//! A history that is open: its folder, and the RDF store in it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use oxigraph::model::vocab::rdf;
+use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
+use oxigraph::sparql::QueryEvaluationError;
+use oxigraph::store::{StorageError, Store};
+
+use crate::actions::Trace;
+use crate::base::{Choice, Diagnostic, Diagnostics, Digest, Source, nearest};
+use crate::facts::{RunFacts, extract};
+use crate::history::folder::{Folder, write_whole};
+use crate::history::lists;
+use crate::history::read::{short_id, subjects, text_of};
+use crate::history::statements::iri;
+use crate::history::write_campaign::{self, campaign_node};
+use crate::history::write_run::{self, run_node};
+use crate::history::{
+    CampaignEnd, CampaignRecord, CampaignRow, Cancel, OutcomeRow, QueryAnswer, RunDetail, RunFilter, RunRecord, RunRow,
+    detail, fault, query, trace_file,
+};
+
+/// A history that this process has open, and no other.
+///
+/// A run that [`History::commit`] took is there whole after the process was killed, and after [`History::flush`] also after a
+/// power cut. The file of its trace is written before, so that a run in the store always has one.
+pub struct History {
+    // Dropped before the folder, which gives the lock back.
+    store: Store,
+    folder: Folder,
+}
+
+impl History {
+    /// Opens the history in a folder; where there is none, it is made.
+    ///
+    /// # Errors
+    /// `H001` the folder can't be used, `H002` another process has it, `H003` it holds other things, `H004` a newer program
+    /// wrote it, `H005` the disk is full, `H006`, `H007` it is damaged.
+    pub fn open(dir: &Path) -> Result<Self, Diagnostics> {
+        Self::open_folder(Folder::take(dir, true)?)
+    }
+
+    /// Opens the history in a folder, which must be there.
+    ///
+    /// # Errors
+    /// As [`History::open`]; `H003` also where there is none.
+    pub fn open_existing(dir: &Path) -> Result<Self, Diagnostics> {
+        Self::open_folder(Folder::take(dir, false)?)
+    }
+
+    fn open_folder(folder: Folder) -> Result<Self, Diagnostics> {
+        let store =
+            Store::open(folder.store()).map_err(|error| fault::store(folder.dir(), "opening its store", &error))?;
+        Ok(Self { store, folder })
+    }
+
+    /// The folder as it was given.
+    pub fn dir(&self) -> &Path {
+        self.folder.dir()
+    }
+
+    /// An id for a new campaign: short, unlike all others here, the same for the same history, configuration and seed.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn next_campaign_id(&self, config_digest: &str, seed: u64) -> Result<String, Diagnostics> {
+        let known: BTreeSet<String> = self.campaign_ids()?.into_iter().collect();
+        let first = known.len() as u64;
+        let free = (first..).map(|counter| campaign_id(config_digest, seed, counter)).find(|id| !known.contains(id));
+        // There are nearly a million ids; whoever has used them all gets a long one.
+        Ok(free.unwrap_or_else(|| config_digest.to_owned()))
+    }
+
+    /// Writes a campaign, before its first run, and removes what killed processes left.
+    ///
+    /// # Errors
+    /// Writing failed: `H005`, `H006`.
+    pub fn begin_campaign(&self, record: &CampaignRecord) -> Result<(), Diagnostics> {
+        self.remove_orphans()?;
+        self.store
+            .extend(write_campaign::beginning(record))
+            .map_err(|error| self.fault("writing the campaign", &error))?;
+        self.flush()
+    }
+
+    /// Keeps a run: when this returns, it is there whole; when it fails, nothing of it is.
+    ///
+    /// # Errors
+    /// Writing failed: `H005`, `H006`. What was kept before is whole.
+    pub fn commit(&self, record: &RunRecord) -> Result<(), Diagnostics> {
+        let doing = format!("writing run {}", record.id);
+        let bytes = trace_file::encode(&record.choices, &record.trace)
+            .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
+        let file = self.folder.trace(&record.id);
+        write_whole(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
+        self.store.extend(write_run::quads(record)).map_err(|error| {
+            // A trace without a run is harmless; if it can't be removed now, the next campaign does.
+            let _ = std::fs::remove_file(&file);
+            self.fault(&doing, &error)
+        })
+    }
+
+    /// Brings everything that was committed to the disk.
+    ///
+    /// # Errors
+    /// Writing failed: `H005`, `H006`.
+    pub fn flush(&self) -> Result<(), Diagnostics> {
+        self.store.flush().map_err(|error| self.fault("writing to the disk", &error))
+    }
+
+    /// Writes how a campaign ended, and brings everything to the disk.
+    ///
+    /// # Errors
+    /// Writing failed: `H005`, `H006`.
+    pub fn finish_campaign(&self, id: &str, end: &CampaignEnd) -> Result<(), Diagnostics> {
+        self.store
+            .extend(write_campaign::end(id, end))
+            .map_err(|error| self.fault("writing the end of the campaign", &error))?;
+        self.flush()
+    }
+
+    /// All campaigns, by their start, then by id.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn campaigns(&self) -> Result<Vec<CampaignRow>, Diagnostics> {
+        lists::campaigns(&self.store).map_err(|error| self.query_fault(&error))
+    }
+
+    /// The runs that a filter lets through, by the start of their campaign, then by index.
+    ///
+    /// # Errors
+    /// The store can't be read. A campaign that is not there has no runs.
+    pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
+        lists::runs(&self.store, filter).map_err(|error| self.query_fault(&error))
+    }
+
+    /// Outcomes of the runs that a filter lets through, in the order of [`History::runs`], then by step and property.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
+        lists::outcomes(&self.store, filter).map_err(|error| self.query_fault(&error))
+    }
+
+    /// The id of a run from its id, its IRI, `run:ID`, or a beginning that only one run has.
+    ///
+    /// # Errors
+    /// `H008` no run is meant, or several are.
+    pub fn resolve(&self, name: &str) -> Result<String, Diagnostics> {
+        let name = short_id(name.trim().trim_start_matches('<').trim_end_matches('>'));
+        let name = name.strip_prefix("run:").unwrap_or(name);
+        if self.has_run(name)? {
+            return Ok(name.to_owned());
+        }
+        let known = self.ids("act:Run")?;
+        let beginning: Vec<&String> = known.iter().filter(|id| !name.is_empty() && id.starts_with(name)).collect();
+        let fault = match beginning.as_slice() {
+            [only] => return Ok((*only).clone()),
+            [] => Diagnostic::error("H008", format!("the history `{}` has no run `{name}`", self.dir().display()))
+                .help(match nearest(name, known.iter().map(String::as_str)) {
+                    Some(found) => format!("did you mean `{found}`? `actcheck list` shows all runs"),
+                    None => "`actcheck list` shows all runs".to_owned(),
+                }),
+            several => {
+                Diagnostic::error("H008", format!("`{name}` can be any of {} runs", several.len())).help(format!(
+                    "say which: {}{}",
+                    several.iter().take(5).map(|id| id.as_str()).collect::<Vec<_>>().join(", "),
+                    if several.len() > 5 { ", …" } else { "" }
+                ))
+            }
+        };
+        Err(fault.into())
+    }
+
+    /// Everything that is to be shown of a run, named as in [`History::resolve`].
+    ///
+    /// # Errors
+    /// `H008` there is no such run.
+    pub fn run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
+        let id = self.resolve(name)?;
+        detail::read(&self.store, &run_node(&id)).map_err(|error| self.fault("reading a run", &error))
+    }
+
+    /// What happened in a run, named as in [`History::resolve`].
+    ///
+    /// # Errors
+    /// `H008` there is no such run, `H009` its trace is missing, `H007` or damaged.
+    pub fn trace(&self, name: &str) -> Result<Trace, Diagnostics> {
+        let id = self.resolve(name)?;
+        Ok(self.decoded(&id, trace_file::decode)?.1)
+    }
+
+    /// Every decision of a run, named as in [`History::resolve`].
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn choices(&self, name: &str) -> Result<Vec<Choice>, Diagnostics> {
+        let id = self.resolve(name)?;
+        Ok(self.decoded(&id, trace_file::decode_states)?.0)
+    }
+
+    /// The facts of a run, named as in [`History::resolve`]: extracted from its trace, the same as when it was run.
+    ///
+    /// They are not read from the store, which holds them for queries, because that takes many times as long.
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn facts(&self, name: &str) -> Result<RunFacts, Diagnostics> {
+        let id = self.resolve(name)?;
+        Ok(extract(&self.decoded(&id, trace_file::decode_states)?.1))
+    }
+
+    /// Answers a SPARQL query. The prefixes of [`crate::base::names::PREFIXES`] need no declaration.
+    ///
+    /// The default graph holds campaigns, runs, executions, scenes and outcomes; facts are in the graphs that
+    /// `act:before`, `act:after` and `act:during` name.
+    ///
+    /// # Errors
+    /// `H010` it is no query, `H011` it is an update, `H012` it failed.
+    pub fn query(&self, sparql: &str) -> Result<QueryAnswer, Diagnostics> {
+        self.query_from(&Source::new("query", sparql), &Cancel::new())
+    }
+
+    /// The same for a text that has a name, with a handle that stops it.
+    ///
+    /// # Errors
+    /// As [`History::query`]; `H013` it was stopped.
+    pub fn query_from(&self, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
+        query::answer(&self.store, text, cancel)
+    }
+
+    fn decoded<T>(&self, id: &str, decode: impl FnOnce(&[u8]) -> Result<T, String>) -> Result<T, Diagnostics> {
+        let file = self.folder.trace(id);
+        let bytes = std::fs::read(&file).map_err(|error| {
+            Diagnostic::error("H009", format!("the trace of run {id} can't be read from `{}`: {error}", file.display()))
+                .help("restore the file from a copy; what the store says of the run is still there")
+        })?;
+        decode(&bytes).map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
+    }
+
+    fn has_run(&self, id: &str) -> Result<bool, Diagnostics> {
+        let (run, class) = (run_node(id), iri("act:Run"));
+        self.store
+            .contains(QuadRef::new(&run, rdf::TYPE, &class, GraphNameRef::DefaultGraph))
+            .map_err(|error| self.fault("reading", &error))
+    }
+
+    /// Ids of all things of a class, sorted.
+    fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
+        let class = iri(class);
+        let found = subjects(&self.store, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
+        let mut ids: Vec<String> = found.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
+        ids.sort();
+        Ok(ids)
+    }
+
+    fn campaign_ids(&self) -> Result<Vec<String>, Diagnostics> {
+        self.ids("act:Campaign")
+    }
+
+    /// Removes traces that have no run. Only a process that was killed leaves such, and its campaign has no end.
+    fn remove_orphans(&self) -> Result<(), Diagnostics> {
+        let mut ended = BTreeMap::new();
+        for entry in std::fs::read_dir(self.folder.traces()).into_iter().flatten().filter_map(Result::ok) {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let orphan = match name.strip_suffix(".trace") {
+                None => name.ends_with(".tmp"),
+                Some(run) => {
+                    let campaign = run.rsplit_once('-').map_or(run, |(campaign, _)| campaign);
+                    if !ended.contains_key(campaign) {
+                        ended.insert(campaign.to_owned(), self.has_ended(&campaign_node(campaign))?);
+                    }
+                    !ended[campaign] && !self.has_run(run)?
+                }
+            };
+            if orphan {
+                // Harmless where it stays.
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+        Ok(())
+    }
+
+    fn has_ended(&self, campaign: &NamedNode) -> Result<bool, Diagnostics> {
+        let property = iri("prov:endedAtTime");
+        let mut ends = self.store.quads_for_pattern(
+            Some(campaign.into()),
+            Some(property.as_ref()),
+            None,
+            Some(GraphNameRef::DefaultGraph),
+        );
+        ends.next().transpose().map(|end| end.is_some()).map_err(|error| self.fault("reading", &error))
+    }
+
+    fn fault(&self, doing: &str, error: &StorageError) -> Diagnostics {
+        fault::store(self.dir(), doing, error)
+    }
+
+    fn query_fault(&self, error: &QueryEvaluationError) -> Diagnostics {
+        match error {
+            QueryEvaluationError::Dataset(error) => fault::damaged(self.dir(), &error.to_string()),
+            other => {
+                Diagnostic::error("H012", format!("reading the history `{}` failed: {other}", self.dir().display()))
+                    .into()
+            }
+        }
+    }
+}
+
+/// A letter and three letters or digits, without those that look alike.
+fn campaign_id(config_digest: &str, seed: u64, counter: u64) -> String {
+    const LETTERS: &[u8] = b"abcdefghjkmnpqrstvwxyz";
+    const ALL: &[u8] = b"abcdefghjkmnpqrstvwxyz23456789";
+    let mut digest = Digest::new();
+    digest.update(config_digest.as_bytes());
+    digest.update(&seed.to_le_bytes());
+    digest.update(&counter.to_le_bytes());
+    let bytes = digest.finish().into_bytes();
+    let number = |at: usize| bytes[at..at + 4].iter().fold(0usize, |sum, byte| sum * 256 + usize::from(*byte));
+    [(LETTERS, 0), (ALL, 4), (ALL, 8), (ALL, 12)]
+        .map(|(set, at)| char::from(set[number(at) % set.len()]))
+        .iter()
+        .collect()
+}

@@ -1,0 +1,76 @@
+//! The file of a run: its decisions and its trace, so that it can be judged anew, drawn and replayed.
+//!
+//! Two compressed parts, one behind the other: what facts are made of, and the course of all bodies, which only pictures and
+//! replay need.
+
+use std::io::{Read, Write};
+
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
+
+use crate::actions::{ActionTrace, Frames, Trace};
+use crate::base::Choice;
+use crate::history::frames;
+use crate::world::Snapshot;
+
+/// What each file begins with. The last letter is the format; it goes up whenever a type of the trace changes.
+const MAGIC: &[u8; 8] = b"actrace1";
+
+/// First part: decisions, states, actions, time between frames, names of tracks, hash.
+type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
+
+/// A run's file as bytes.
+///
+/// # Errors
+/// A sentence, where a part can't be written as bytes. (None of today's types can bring that about.)
+pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, String> {
+    let frames = &trace.frames;
+    let head = (choices, &trace.snapshots, &trace.actions, frames.period_secs, &frames.names, &trace.hash);
+    let head = compressed(&postcard::to_stdvec(&head).map_err(|error| error.to_string())?)?;
+    let course = compressed(&frames::encode(&frames.rows))?;
+    let length = u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
+    Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
+}
+
+/// Decisions and the whole trace.
+///
+/// # Errors
+/// A sentence that says what is damaged.
+pub(super) fn decode(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
+    let (head, course) = parts(bytes)?;
+    let (choices, mut trace) = decode_head(head)?;
+    trace.frames.rows = frames::decode(&expanded(course)?).ok_or("the course of the bodies can't be read")?;
+    Ok((choices, trace))
+}
+
+/// Decisions and the trace without the rows of its frames: all that facts are made of.
+///
+/// # Errors
+/// A sentence that says what is damaged.
+pub(super) fn decode_states(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
+    decode_head(parts(bytes)?.0)
+}
+
+fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
+    let head: Head = postcard::from_bytes(&expanded(head)?).map_err(|error| error.to_string().to_lowercase())?;
+    let (choices, snapshots, actions, period_secs, names, hash) = head;
+    Ok((choices, Trace { snapshots, actions, frames: Frames { period_secs, names, rows: Vec::new() }, hash }))
+}
+
+fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
+    let rest = bytes.strip_prefix(MAGIC.as_slice()).ok_or("it is no trace of this format")?;
+    let (length, rest) = rest.split_first_chunk::<4>().ok_or("it ends too early")?;
+    rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| "it ends too early".to_owned())
+}
+
+fn compressed(bytes: &[u8]) -> Result<Vec<u8>, String> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(bytes).and_then(|()| encoder.finish()).map_err(|error| error.to_string())
+}
+
+fn expanded(bytes: &[u8]) -> Result<Vec<u8>, String> {
+    let mut out = Vec::new();
+    GzDecoder::new(bytes).read_to_end(&mut out).map_err(|error| error.to_string())?;
+    Ok(out)
+}

@@ -1,0 +1,67 @@
+//! A campaign as quads: what it was asked for, what it was judged by, how it ended.
+
+use oxigraph::model::{Literal, NamedNode, Quad};
+
+use crate::base::names;
+use crate::history::statements::{Statements, count, iri, time};
+use crate::history::{CampaignEnd, CampaignRecord};
+
+/// A campaign's node.
+pub(super) fn campaign_node(id: &str) -> NamedNode {
+    NamedNode::new_unchecked(format!("{}{id}", names::CAMPAIGN))
+}
+
+/// What is known before the first run.
+pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
+    let mut statements = Statements::default();
+    let campaign = campaign_node(&record.id);
+    statements
+        .about(campaign.clone())
+        .is_a("act:Campaign")
+        .is_a("prov:Activity")
+        .text("rdfs:label", &record.name)
+        .text("act:configText", &record.config_text)
+        .text("act:configDigest", &record.config_digest)
+        .text("act:ontologyDigest", &record.ontology_digest)
+        .has("act:seed", count(record.seed))
+        .has("act:plannedRuns", count(record.planned_runs))
+        .has("prov:startedAtTime", time(&record.started))
+        .text("act:program", &program(&record.program_version));
+    for (number, (property, path, digest)) in record.rules.iter().enumerate() {
+        let rule = NamedNode::new_unchecked(format!("{}/rule/{}", campaign.as_str(), number + 1));
+        statements.about(campaign.clone()).has("act:usedRule", rule.clone());
+        statements
+            .about(rule)
+            .is_a("act:UsedRule")
+            .has("act:verifies", iri(property))
+            .text("act:rulePath", path)
+            .text("act:ruleDigest", digest);
+    }
+    for (number, (name, digest)) in record.models.iter().enumerate() {
+        let model = NamedNode::new_unchecked(format!("{}/model/{}", campaign.as_str(), number + 1));
+        statements.about(campaign.clone()).has("act:usedModel", model.clone());
+        statements.about(model).is_a("act:UsedModel").text("act:model", name).text("act:digest", digest);
+    }
+    statements.quads
+}
+
+/// What is known after its last run.
+pub(super) fn end(id: &str, end: &CampaignEnd) -> Vec<Quad> {
+    let mut statements = Statements::default();
+    let mut about = statements.about(campaign_node(id));
+    about
+        .has("prov:endedAtTime", time(&end.ended))
+        .may("act:score", end.score.map(Literal::from))
+        .may("act:scoreWithoutBroken", end.score_without_broken.map(Literal::from))
+        .has("act:discards", count(end.discards))
+        .has("act:interrupted", Literal::from(end.interrupted));
+    for (outcome, times) in &end.outcomes {
+        about.has(&format!("act:{outcome}Count"), count(*times));
+    }
+    statements.quads
+}
+
+/// Program and version as one text.
+pub(super) fn program(version: &str) -> String {
+    format!("actcheck {version}")
+}

@@ -1,0 +1,174 @@
+//! A run as quads: itself, its executions, its outcomes, and its facts in named graphs.
+
+use std::collections::BTreeMap;
+
+use oxigraph::model::{BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term};
+
+use crate::actions::{ActionEnd, ActionTrace};
+use crate::base::{Digest, names};
+use crate::facts::{RunFacts, Triple, thing_iri};
+use crate::history::RunRecord;
+use crate::history::statements::{About, Statements, count, iri, time};
+use crate::history::terms::to_store;
+use crate::history::write_campaign::{campaign_node, program};
+use crate::history::write_scene;
+use crate::verdict::Judgement;
+
+/// A run's node.
+pub(super) fn run_node(id: &str) -> NamedNode {
+    NamedNode::new_unchecked(format!("{}{id}", names::RUN))
+}
+
+/// Everything that the store keeps of a run.
+pub(super) fn quads(record: &RunRecord) -> Vec<Quad> {
+    let run = run_node(&record.id);
+    let mut statements = Statements::default();
+    write_run(record, &run, &mut statements);
+    write_scene::write(record, &run, &mut statements);
+    for step in 0..record.trace.actions.len() {
+        write_execution(record, step, &run, &mut statements);
+    }
+    let mut quads = statements.quads;
+    write_facts(&record.facts, &run, &mut quads);
+    quads
+}
+
+fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
+    let mut about = statements.about(run.clone());
+    about
+        .is_a("act:Run")
+        .is_a("prov:Activity")
+        .has("act:campaign", campaign_node(&record.campaign))
+        .text("act:test", &record.test)
+        .has("act:seed", count(record.seed))
+        .has("act:index", count(record.index))
+        .has("act:score", Literal::from(record.score))
+        .text("act:status", record.status.word())
+        .text("act:traceHash", &record.trace.hash)
+        .may("act:reason", record.reason.as_deref().map(Literal::new_simple_literal))
+        .has("prov:startedAtTime", time(&record.started))
+        .has("act:wallSeconds", Literal::from(record.wall_secs))
+        .text("act:program", &program(env!("CARGO_PKG_VERSION")));
+    write_designators(&record.scene.designators, record, &mut about);
+}
+
+/// Designators: an object where the scene has one of that name, otherwise a text.
+fn write_designators(designators: &BTreeMap<String, Vec<String>>, record: &RunRecord, about: &mut About<'_>) {
+    for (designator, values) in designators {
+        let property = names::act(designator);
+        about.has("act:designator", iri(&property));
+        for value in values {
+            if record.scene.objects.iter().any(|object| object.id == *value) {
+                about.has(&property, iri(&thing_iri(value)));
+            } else {
+                about.text(&property, value);
+            }
+        }
+    }
+}
+
+fn write_execution(record: &RunRecord, step: usize, run: &NamedNode, statements: &mut Statements) {
+    let action = &record.trace.actions[step];
+    let node = below(run, &(step + 1).to_string());
+    let mut about = statements.about(node.clone());
+    about
+        .is_a("act:ActionExecution")
+        .has("act:ofRun", run.clone())
+        .may("act:action", record.actions.get(step).map(|action| iri(action)))
+        .has("act:step", Literal::from((step + 1) as u64))
+        .may("act:score", record.action_scores.get(step).copied().map(Literal::from))
+        .text("act:end", end_word(&action.end))
+        .has("act:duration", Literal::from(action.duration_secs))
+        .may("act:reported", action.report.as_ref().map(|report| Literal::from(report.succeeded)))
+        .may("act:message", message(action).map(Literal::new_simple_literal));
+    write_designators(&action.parameters, record, &mut about);
+    for (property, state) in [("act:before", step), ("act:after", step + 1)] {
+        if state < record.facts.snapshots.len() {
+            about.has(property, state_graph(run, state));
+        }
+    }
+    if record.facts.during.get(step).is_some_and(|during| !during.is_empty()) {
+        about.has("act:during", during_graph(run, step));
+    }
+    for judgement in record.judgements.get(step).into_iter().flatten() {
+        write_assertion(judgement, &node, statements);
+    }
+}
+
+/// The word for how an action ended.
+fn end_word(end: &ActionEnd) -> &'static str {
+    match end {
+        ActionEnd::Completed => "completed",
+        ActionEnd::Broken(_) => "broken",
+        ActionEnd::Timeout(_) => "timeout",
+        ActionEnd::NotReached => "untested",
+    }
+}
+
+/// What there is to say of how an action ended: why it did not complete, or its own words.
+fn message(action: &ActionTrace) -> Option<&str> {
+    match &action.end {
+        ActionEnd::Broken(reason) | ActionEnd::Timeout(reason) => Some(reason),
+        ActionEnd::Completed | ActionEnd::NotReached => action.report.as_ref().map(|report| report.message.as_str()),
+    }
+}
+
+fn write_assertion(judgement: &Judgement, execution: &NamedNode, statements: &mut Statements) {
+    let (assertion, result) = (blank(execution, judgement, "assertion"), blank(execution, judgement, "result"));
+    statements
+        .about(assertion)
+        .is_a("earl:Assertion")
+        .has("earl:subject", execution.clone())
+        .has("earl:test", iri(&judgement.property))
+        .has("earl:mode", iri("earl:automatic"))
+        .has("earl:result", result.clone());
+    statements
+        .about(result)
+        .has("earl:outcome", iri(&format!("earl:{}", judgement.outcome.earl())))
+        .text("act:outcome", judgement.outcome.word())
+        .may("act:margin", judgement.margin.map(Literal::from))
+        .text("act:witness", &judgement.witness)
+        .text("act:ruleDigest", &judgement.rule_digest);
+}
+
+/// A blank node that is the same whenever the same is written.
+fn blank(execution: &NamedNode, judgement: &Judgement, part: &str) -> BlankNode {
+    let mut digest = Digest::new();
+    for text in [execution.as_str(), &judgement.property, part] {
+        digest.update(text.as_bytes());
+    }
+    // A digest is 32 hexadecimal digits.
+    BlankNode::new_from_unique_id(u128::from_str_radix(&digest.finish(), 16).unwrap_or_default())
+}
+
+fn below(node: &NamedNode, part: &str) -> NamedNode {
+    NamedNode::new_unchecked(format!("{}/{part}", node.as_str()))
+}
+
+/// Graph of a state between actions, counted from 0.
+pub(super) fn state_graph(run: &NamedNode, state: usize) -> NamedNode {
+    below(run, &format!("state/{state}"))
+}
+
+/// Graph of what happened during an action, counted from 0 (its name counts from 1).
+pub(super) fn during_graph(run: &NamedNode, step: usize) -> NamedNode {
+    below(run, &format!("{}/during", step + 1))
+}
+
+fn write_facts(facts: &RunFacts, run: &NamedNode, quads: &mut Vec<Quad>) {
+    let terms: Vec<Term> = (0u32..).take(facts.terms.len()).map(|id| to_store(facts.terms.term(id))).collect();
+    let mut write = |triples: &[Triple], graph: NamedNode| {
+        let graph = GraphName::NamedNode(graph);
+        quads.extend(triples.iter().filter_map(|[s, p, o]| {
+            let subject = NamedOrBlankNode::try_from(terms[*s as usize].clone()).ok()?;
+            let Term::NamedNode(property) = &terms[*p as usize] else { return None };
+            Some(Quad::new(subject, property.clone(), terms[*o as usize].clone(), graph.clone()))
+        }));
+    };
+    for (state, triples) in facts.snapshots.iter().enumerate() {
+        write(triples, state_graph(run, state));
+    }
+    for (step, triples) in facts.during.iter().enumerate() {
+        write(triples, during_graph(run, step));
+    }
+}

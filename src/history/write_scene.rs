@@ -1,0 +1,114 @@
+//! A scene as quads: each object as it was placed, and what became of it.
+
+use oxigraph::model::{Literal, NamedNode};
+
+use crate::base::names;
+use crate::facts::thing_iri;
+use crate::history::RunRecord;
+use crate::history::statements::{Statements, iri};
+use crate::scenario::{Role, Scene, SceneObject};
+
+/// The word for a role.
+pub(super) fn role_word(role: Role) -> &'static str {
+    match role {
+        Role::Platform => "platform",
+        Role::Target => "target",
+        Role::Other => "other",
+        Role::Obstacle => "obstacle",
+    }
+}
+
+/// The role of a word.
+pub(super) fn role_of(word: &str) -> Option<Role> {
+    [Role::Platform, Role::Target, Role::Other, Role::Obstacle].into_iter().find(|role| role_word(*role) == word)
+}
+
+/// Standard deviations of sensing by local name of their terms.
+pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 7] {
+    let sensing = &scene.sensing;
+    [
+        ("positionNoise", sensing.position_noise_m),
+        ("heightNoise", sensing.height_noise_m),
+        ("yawNoise", sensing.yaw_noise_rad),
+        ("sizeNoise", sensing.size_noise_m),
+        ("localisationNoise", sensing.localisation_noise_m),
+        ("headingNoise", sensing.heading_noise_rad),
+        ("gripperNoise", sensing.gripper_noise_m),
+    ]
+}
+
+/// States the scene of a run: on the run's node what belongs to the whole, and one node for each object.
+pub(super) fn write(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
+    let scene = &record.scene;
+    let standing = scene.objects.iter().filter(|object| object.role != Role::Platform).count();
+    let mut about = statements.about(run.clone());
+    about
+        .text("act:world", &scene.world)
+        .text("act:robot", &scene.robot.profile.name)
+        .has("act:objectCount", Literal::from(standing as u64));
+    for (property, value) in ["w:baseX", "w:baseY", "w:baseYaw"].into_iter().zip(scene.robot.base) {
+        about.has(property, Literal::from(value));
+    }
+    for (name, value) in noise(scene) {
+        about.has(&format!("act:{name}"), Literal::from(value));
+    }
+    for object in &scene.objects {
+        write_object(record, object, run, statements);
+    }
+}
+
+fn write_object(record: &RunRecord, object: &SceneObject, run: &NamedNode, statements: &mut Statements) {
+    let thing = thing_iri(&object.id);
+    let node = NamedNode::new_unchecked(format!("{}/scene/{}", run.as_str(), names::local(&thing)));
+    let extremes =
+        || record.trace.actions.iter().flat_map(|action| &action.extremes).filter(|extremes| extremes.id == object.id);
+    let targets = |other: &SceneObject| other.role == Role::Target;
+    let [x, y, z] = object.pose.position;
+    let mut about = statements.about(node);
+    about
+        .is_a("act:SceneObject")
+        .has("act:ofRun", run.clone())
+        .has("act:object", iri(&thing))
+        .has("act:category", iri(&object.model.category))
+        .text("act:model", &object.model.name)
+        .text("act:role", role_word(object.role));
+    for (property, value) in [
+        ("w:x", x),
+        ("w:y", y),
+        ("w:z", z),
+        ("w:yaw", object.pose.yaw()),
+        ("w:mass", object.mass_kg),
+        ("w:friction", object.friction),
+        ("w:restitution", object.restitution),
+        ("act:robotDistance", libm::hypot(x - scene_base(record)[0], y - scene_base(record)[1])),
+    ] {
+        about.has(property, Literal::from(value));
+    }
+    about.may("act:neighbourDistance", nearest(&record.scene, object, |other| other.role != Role::Platform));
+    if object.role != Role::Platform && object.role != Role::Target {
+        about.may("act:targetDistance", nearest(&record.scene, object, targets));
+    }
+    about
+        .may("act:displacement", largest(extremes().map(|extremes| extremes.max_displacement_m)))
+        .may("act:maxTilt", largest(extremes().map(|extremes| extremes.max_tilt_rad)));
+}
+
+fn scene_base(record: &RunRecord) -> [f64; 3] {
+    record.scene.robot.base
+}
+
+/// Horizontal distance of an object from the nearest of some others.
+fn nearest(scene: &Scene, object: &SceneObject, among: impl Fn(&SceneObject) -> bool) -> Option<Literal> {
+    let [x, y, _] = object.pose.position;
+    scene
+        .objects
+        .iter()
+        .filter(|other| other.id != object.id && among(other))
+        .map(|other| libm::hypot(other.pose.position[0] - x, other.pose.position[1] - y))
+        .min_by(f64::total_cmp)
+        .map(Literal::from)
+}
+
+fn largest(values: impl Iterator<Item = f64>) -> Option<Literal> {
+    values.max_by(f64::total_cmp).map(Literal::from)
+}
