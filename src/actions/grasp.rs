@@ -24,6 +24,8 @@ pub struct Grasp {
     pub heading: f64,
     /// Gap between the fingers on the way. Unit: metres.
     pub opening_m: f64,
+    /// What speaks against it. Unit: that of a plan's cost, of which a metre of driving is 0.4.
+    pub penalty: f64,
 }
 
 /// Things at least so high are taken from the side: the hand, 6 cm across, then clears what they stand on. Unit: metres.
@@ -39,35 +41,55 @@ const TOP_LOWEST_M: f64 = 0.03;
 const LEAST_ROOM_M: f64 = 0.012;
 /// Sides that differ by less are taken for a round body. Unit: metres. Sensing gets sizes wrong by some millimetres.
 const ROUND_M: f64 = 0.015;
+/// How far a slanted hand points down, where one that points straight down does not reach. Unit: radians. Steep enough
+/// for the palm to clear what the fingers go around.
+const SLANT_RAD: f64 = 0.95;
+/// What speaks against a slanted hand: half a metre of driving.
+const SLANT_PENALTY: f64 = 0.2;
 /// Directions that are tried around a thing.
 const N_HEADINGS: u32 = 24;
 
 /// All ways to take a thing with a gripper that opens so wide. None: it is too wide every way.
 pub fn grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
-    let [x, y, z] = thing.pose.position;
-    let height = thing.size_m[2];
-    let tall = height >= TALL_M;
-    let mut found = Vec::new();
-    for idx in 0..N_HEADINGS {
-        let heading = std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS);
-        if tall {
-            if width_across(thing, heading) + LEAST_ROOM_M <= max_opening_m {
-                let at = Vector3::new(x, y, z + (height / 2.0).clamp(SIDE_HEIGHT_M.0, SIDE_HEIGHT_M.1));
-                let pose = Isometry3::from_parts(Translation3::from(at), level(heading));
-                found.push(Grasp { approach: Approach::Side, pose, heading, opening_m: max_opening_m });
-            }
-        } else {
-            let at = Vector3::new(x, y, z + (height - TOP_DEPTH_M).max(TOP_LOWEST_M));
-            for quarter in 0..4 {
-                let turn = heading + std::f64::consts::FRAC_PI_4 * f64::from(quarter);
-                if width_across(thing, turn) + LEAST_ROOM_M <= max_opening_m {
-                    let pose = Isometry3::from_parts(Translation3::from(at), downward(turn));
-                    found.push(Grasp { approach: Approach::Top, pose, heading, opening_m: max_opening_m });
-                }
-            }
-        }
-    }
+    let headings = (0..N_HEADINGS).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS));
+    let tall = thing.size_m[2] >= TALL_M;
+    headings
+        .flat_map(|heading| if tall { vec![from_side(thing, heading)] } else { from_above(thing, heading) })
+        .filter(|(across, _)| width_across(thing, *across) + LEAST_ROOM_M <= max_opening_m)
+        .map(|(_, grasp)| Grasp { opening_m: max_opening_m, ..grasp })
+        .collect()
+}
+
+/// The level way from one heading, and the heading to which the fingers are across.
+fn from_side(thing: &Sighting, heading: f64) -> (f64, Grasp) {
+    let height = (thing.size_m[2] / 2.0).clamp(SIDE_HEIGHT_M.0, SIDE_HEIGHT_M.1);
+    let pose = hand(thing, height, heading, 0.0);
+    (heading, Grasp { approach: Approach::Side, pose, heading, opening_m: 0.0, penalty: 0.0 })
+}
+
+/// The ways from above with the base at one heading, each with the heading to which the fingers are across.
+fn from_above(thing: &Sighting, heading: f64) -> Vec<(f64, Grasp)> {
+    let height = (thing.size_m[2] - TOP_DEPTH_M).max(TOP_LOWEST_M);
+    let grasp = |turn: f64, pitch: f64, penalty: f64| {
+        let pose = hand(thing, height, turn, pitch);
+        (turn, Grasp { approach: Approach::Top, pose, heading, opening_m: 0.0, penalty })
+    };
+    let mut found: Vec<(f64, Grasp)> = (0..4)
+        .map(|eighth| grasp(heading + std::f64::consts::FRAC_PI_4 * f64::from(eighth), std::f64::consts::FRAC_PI_2, 0.0))
+        .collect();
+    found.push(grasp(heading, SLANT_RAD, SLANT_PENALTY));
     found
+}
+
+/// The grasp link at a height above a thing's foot, heading somewhere and pointing down by an angle.
+fn hand(thing: &Sighting, height: f64, heading: f64, pitch: f64) -> Isometry3<f64> {
+    let [x, y, z] = thing.pose.position;
+    let (sin, cos) = (libm::sin(heading), libm::cos(heading));
+    let forward = Vector3::new(cos * libm::cos(pitch), sin * libm::cos(pitch), -libm::sin(pitch));
+    let left = Vector3::new(-sin, cos, 0.0);
+    let axes = Matrix3::from_columns(&[forward, left, forward.cross(&left)]);
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    Isometry3::from_parts(Translation3::new(x, y, z + height), rotation)
 }
 
 /// Width of a thing across the fingers of a hand that heads somewhere. Unit: metres.
@@ -78,19 +100,6 @@ fn width_across(thing: &Sighting, heading: f64) -> f64 {
     }
     let turn = heading - thing.pose.yaw();
     width * libm::sin(turn).abs() + depth * libm::cos(turn).abs()
-}
-
-/// A hand that points level: x forward, y across to the left, z up.
-fn level(heading: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading)
-}
-
-/// A hand that points down, its back towards where a base of this heading stands.
-fn downward(heading: f64) -> UnitQuaternion<f64> {
-    let forward = Vector3::new(libm::cos(heading), libm::sin(heading), 0.0);
-    let down = -Vector3::z();
-    let axes = Matrix3::from_columns(&[down, forward.cross(&down), forward]);
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
 }
 
 #[cfg(test)]

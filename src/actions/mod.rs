@@ -8,6 +8,7 @@ mod operator;
 mod perform;
 mod pick;
 mod plan;
+mod route;
 mod trace;
 
 pub use call::{ActionCall, UnknownSkill, known_skill, reference_skills};

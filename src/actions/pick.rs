@@ -43,7 +43,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
         Err(reason) => return Ok(failed(format!("{target}: {reason}"))),
     };
     robot.begin("drive");
-    robot.follow(&[way.drive], 0.0)?;
+    robot.follow(&way.drive, 0.0)?;
     robot.begin("reach");
     robot.set_opening(robot.profile().max_opening_m);
     robot.follow(&[way.reach], 0.0)?;

@@ -4,13 +4,14 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use crate::actions::grasp::{Approach, Grasp};
 use crate::actions::operator::Operator;
+use crate::actions::route::{Block, Ground, Pillar, length};
 use crate::world::{Kinematics, Layout, Sighting, ik};
 
 /// Joint positions for each leg of a pick.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// Base beside the furniture, arm as it is for driving.
-    pub drive: Vec<f64>,
+    /// To in front of the furniture, arm as it is for driving.
+    pub drive: Vec<Vec<f64>>,
     /// The same place with the arm as it will take the thing.
     pub reach: Vec<f64>,
     /// To where the hand is a little before the thing.
@@ -55,7 +56,7 @@ pub fn plan(operator: &Operator<'_>, grasps: &[Grasp], others: &[Sighting]) -> R
         for posture in &planner.postures {
             let seed = planner.seed(grasp, posture);
             if planner.points_along(&seed, grasp) {
-                seeds.push((planner.travel_cost(&seed), grasp, seed));
+                seeds.push((planner.travel_cost(&seed) + grasp.penalty, grasp, seed));
             }
         }
     }
@@ -80,49 +81,20 @@ struct Planner<'a> {
     points: Vec<(usize, Point3<f64>)>,
     furniture: Vec<Block>,
     things: Vec<Pillar>,
-}
-
-/// Furniture: a box on the floor. Nothing goes below a table.
-struct Block {
-    from_world: Isometry3<f64>,
-    half: [f64; 2],
-    height: f64,
-}
-
-/// A thing as the upright cylinder around it.
-struct Pillar {
-    centre: Point2<f64>,
-    radius: f64,
-    foot: f64,
-    top: f64,
+    ground: Ground,
 }
 
 impl<'a> Planner<'a> {
     fn new(operator: &'a Operator<'_>, others: &[Sighting]) -> Self {
         let (kinematics, layout) = (operator.kinematics(), operator.layout());
-        let block = |seen: &Sighting| {
-            let [width, depth, height] = seen.size_m;
-            let half = [width / 2.0, depth / 2.0];
-            Block { from_world: seen.pose.to_isometry().inverse(), half, height: seen.pose.position[2] + height }
-        };
-        let pillar = |seen: &Sighting| {
-            let [x, y, foot] = seen.pose.position;
-            let [width, depth, height] = seen.size_m;
-            // Between the circle inside and the one around: corners seldom point at the hand.
-            let radius = (width.max(depth) + length(width, depth)) / 4.0;
-            Pillar { centre: Point2::new(x, y), radius, foot, top: foot + height }
-        };
+        let start = operator.commanded().to_vec();
+        let points = kinematics.surface_points(CHECK_M);
+        let furniture: Vec<Block> = others.iter().filter(|seen| seen.furniture).map(Block::new).collect();
+        let things: Vec<Pillar> = others.iter().filter(|seen| !seen.furniture).map(Pillar::new).collect();
+        let ground = Ground::new(&furniture, &things, radius(kinematics, layout, &start, &points));
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
-        Self {
-            kinematics,
-            layout,
-            start: operator.commanded().to_vec(),
-            postures,
-            points: kinematics.surface_points(CHECK_M),
-            furniture: others.iter().filter(|seen| seen.furniture).map(block).collect(),
-            things: others.iter().filter(|seen| !seen.furniture).map(pillar).collect(),
-        }
+        Self { kinematics, layout, start, postures, points, furniture, things, ground }
     }
 
     /// A plan that costs less than `bound`, if there is one near the seed.
@@ -130,7 +102,7 @@ impl<'a> Planner<'a> {
         let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
         let way = self.way_out(&grasp.pose.translation.vector, &back)?;
         // What the way alone costs, before anything is solved. (Solving moves the base by centimetres.)
-        if self.travel_cost(&self.moved(seed, &(back * way))) > bound + 0.05 {
+        if self.travel_cost(&self.moved(seed, &(back * way))) + grasp.penalty > bound + 0.05 {
             return None;
         }
         let at_thing = self.solve(seed, &grasp.pose, 1.0)?;
@@ -145,10 +117,10 @@ impl<'a> Planner<'a> {
             Approach::Top => (vec![lifted.clone()], lift.iter().rev().skip(1).cloned().chain([at_thing.clone()]).collect()),
         };
         let reach = self.moved(near.last()?, &(back * (way - if grasp.approach == Approach::Side { APPROACH_M.min(way) } else { 0.0 })));
-        let drive = self.with_start_arm(&reach);
+        let drive = self.drive(&reach)?;
         let retreat = vec![self.moved(&lifted, &(back * way))];
         let mut plan = Plan { drive, reach, near, approach, lift, retreat, cost: 0.0 };
-        plan.cost = self.cost(&plan, bound)?;
+        plan.cost = grasp.penalty + self.cost(&plan, bound - grasp.penalty)?;
         Some(plan)
     }
 
@@ -237,21 +209,28 @@ impl<'a> Planner<'a> {
         Some(path)
     }
 
-    /// The base of one posture with the arm of the start.
-    fn with_start_arm(&self, positions: &[f64]) -> Vec<f64> {
-        let mut out = self.start.clone();
-        for idx in self.layout.base.iter().flatten() {
-            out[*idx] = positions[*idx];
-        }
-        out
+    /// The way of the base to where a posture has it, with the arm as it is at the start.
+    fn drive(&self, to: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let Some([x, y, heading]) = self.layout.base else { return Some(vec![self.start.clone()]) };
+        let route = self.ground.route(Point2::new(self.start[x], self.start[y]), Point2::new(to[x], to[y]))?;
+        let n_legs = route.len() as f64;
+        let legs = route.iter().enumerate().map(|(idx, point)| {
+            let share = (idx + 1) as f64 / n_legs;
+            let mut positions = self.start.clone();
+            positions[x] = point.x;
+            positions[y] = point.y;
+            positions[heading] += (to[heading] - self.start[heading]) * share;
+            positions
+        });
+        Some(legs.collect())
     }
 
     /// What speaks against a plan: closeness to things, then length of the way; nothing if it is not free, or no better
     /// than `bound`.
     fn cost(&self, plan: &Plan, bound: f64) -> Option<f64> {
-        let travel = self.travel_cost(&plan.drive);
-        let grasp = plan.approach.last()?;
-        let course = [&self.start, &plan.drive, &plan.reach, &plan.near[0], grasp, plan.lift.last()?];
+        let stand = plan.drive.last()?;
+        let travel = self.travel_cost(stand) + 0.4 * self.detour(&plan.drive);
+        let course = [stand, &plan.reach, &plan.near[0], plan.approach.last()?, plan.lift.last()?];
         let mut cost = travel;
         // From the last leg, where most plans fail.
         for pair in course.windows(2).rev() {
@@ -262,6 +241,14 @@ impl<'a> Planner<'a> {
             }
         }
         Some(cost)
+    }
+
+    /// How much longer the drive is than the straight line. Unit: metres.
+    fn detour(&self, drive: &[Vec<f64>]) -> f64 {
+        let (Some([x, y, _]), Some(end)) = (self.layout.base, drive.last()) else { return 0.0 };
+        let way = |a: &[f64], b: &[f64]| length(b[x] - a[x], b[y] - a[y]);
+        let legs = std::iter::once(&self.start).chain(drive);
+        legs.zip(drive).map(|(a, b)| way(a, b)).sum::<f64>() - way(&self.start, end)
     }
 
     /// Least distances to furniture and to things on the way between two postures. Unit: metres; negative inside.
@@ -285,29 +272,15 @@ impl<'a> Planner<'a> {
     }
 }
 
-impl Block {
-    /// Level distance to the outline, negative inside. Unit: metres.
-    fn beside(&self, point: &Point3<f64>) -> f64 {
-        let local = self.from_world * point;
-        let (dx, dy) = (local.x.abs() - self.half[0], local.y.abs() - self.half[1]);
-        if dx > 0.0 && dy > 0.0 { length(dx, dy) } else { dx.max(dy) }
-    }
-
-    fn distance(&self, point: &Point3<f64>) -> f64 {
-        self.beside(point).max(point.z - self.height)
-    }
-}
-
-impl Pillar {
-    fn distance(&self, point: &Point3<f64>) -> f64 {
-        let beside = (point.xy() - self.centre).norm() - self.radius;
-        beside.max(point.z - self.top).max(self.foot - point.z)
-    }
-}
-
-/// Length of a level vector, with the same bits on every machine.
-fn length(x: f64, y: f64) -> f64 {
-    (x * x + y * y).sqrt()
+/// Radius of the circle around the base in which the whole robot is. Unit: metres.
+fn radius(kinematics: &Kinematics, layout: &Layout, positions: &[f64], points: &[(usize, Point3<f64>)]) -> f64 {
+    let Some([x, y, _]) = layout.base else { return 0.0 };
+    let links = kinematics.links(positions);
+    let far = |(link, point): &(usize, Point3<f64>)| {
+        let point = links[*link] * point;
+        length(point.x - positions[x], point.y - positions[y])
+    };
+    points.iter().map(far).fold(0.0, f64::max)
 }
 
 /// An angle brought into (−π, π]. Unit: radians.

@@ -1,0 +1,181 @@
+//! Ways of the base around what stands on the floor.
+
+use nalgebra::{Isometry3, Point2, Point3};
+
+use crate::world::Sighting;
+
+/// Room left beside the base on its way. Unit: metres. What is seen of furniture is off by as much.
+const ROOM_M: f64 = 0.04;
+/// How much further out corners are rounded. Unit: metres.
+const CORNER_M: f64 = 0.03;
+/// Distance between checked points of a way. Unit: metres.
+const CHECK_M: f64 = 0.05;
+/// Things whose foot is below this stand on the floor. Unit: metres.
+const ON_FLOOR_M: f64 = 0.2;
+
+/// Furniture: a box on the floor. Nothing goes below a table.
+#[derive(Debug, Clone)]
+pub struct Block {
+    from_world: Isometry3<f64>,
+    half: [f64; 2],
+    height: f64,
+}
+
+/// A thing as the upright cylinder around it.
+#[derive(Debug, Clone)]
+pub struct Pillar {
+    centre: Point2<f64>,
+    radius: f64,
+    foot: f64,
+    top: f64,
+}
+
+impl Block {
+    /// The box that a piece of furniture was seen as, down to the floor.
+    pub fn new(seen: &Sighting) -> Self {
+        let [width, depth, height] = seen.size_m;
+        let half = [width / 2.0, depth / 2.0];
+        Self { from_world: seen.pose.to_isometry().inverse(), half, height: seen.pose.position[2] + height }
+    }
+
+    /// Level distance to the outline, negative inside. Unit: metres.
+    pub fn beside(&self, point: &Point3<f64>) -> f64 {
+        let local = self.from_world * point;
+        let (dx, dy) = (local.x.abs() - self.half[0], local.y.abs() - self.half[1]);
+        if dx > 0.0 && dy > 0.0 { length(dx, dy) } else { dx.max(dy) }
+    }
+
+    /// Distance to the box (a lower bound near its upper edges), negative inside. Unit: metres.
+    pub fn distance(&self, point: &Point3<f64>) -> f64 {
+        self.beside(point).max(point.z - self.height)
+    }
+
+    /// Points around its corners at a distance.
+    fn corners(&self, out: f64) -> [Point2<f64>; 4] {
+        // On the diagonal, so that a circle of radius `out` clears the corner.
+        let (x, y) = (self.half[0] + out * 0.8, self.half[1] + out * 0.8);
+        [(x, y), (x, -y), (-x, y), (-x, -y)]
+            .map(|(x, y)| (self.from_world.inverse() * Point3::new(x, y, 0.0)).xy())
+    }
+}
+
+impl Pillar {
+    /// The cylinder that a thing was seen as.
+    pub fn new(seen: &Sighting) -> Self {
+        let [x, y, foot] = seen.pose.position;
+        let [width, depth, height] = seen.size_m;
+        // Between the circle inside and the one around: corners seldom point at the hand.
+        let radius = (width.max(depth) + length(width, depth)) / 4.0;
+        Self { centre: Point2::new(x, y), radius, foot, top: foot + height }
+    }
+
+    /// Distance to the cylinder (a lower bound near its edges), negative inside. Unit: metres.
+    pub fn distance(&self, point: &Point3<f64>) -> f64 {
+        let beside = length(point.x - self.centre.x, point.y - self.centre.y) - self.radius;
+        beside.max(point.z - self.top).max(self.foot - point.z)
+    }
+
+    fn corners(&self, out: f64) -> [Point2<f64>; 4] {
+        let reach = (self.radius + out) * 0.8;
+        [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+            .map(|(x, y)| Point2::new(self.centre.x + x * reach, self.centre.y + y * reach))
+    }
+}
+
+/// Where a round base may go.
+#[derive(Debug, Clone)]
+pub struct Ground {
+    blocks: Vec<Block>,
+    pillars: Vec<Pillar>,
+    /// Radius of the base with what it carries. Unit: metres.
+    radius: f64,
+    corners: Vec<Point2<f64>>,
+}
+
+impl Ground {
+    /// The floor with furniture and things on it.
+    pub fn new(blocks: &[Block], pillars: &[Pillar], radius: f64) -> Self {
+        let pillars: Vec<Pillar> = pillars.iter().filter(|pillar| pillar.foot < ON_FLOOR_M).cloned().collect();
+        let out = radius + ROOM_M + CORNER_M;
+        let around_blocks = blocks.iter().flat_map(|block| block.corners(out));
+        let mut ground = Self {
+            corners: around_blocks.chain(pillars.iter().flat_map(|pillar| pillar.corners(out))).collect(),
+            blocks: blocks.to_vec(),
+            pillars,
+            radius,
+        };
+        ground.corners.retain({
+            let ground = ground.clone();
+            move |corner| ground.room(corner) >= 0.0
+        });
+        ground
+    }
+
+    /// The shortest way from one place to another over at most two corners: the points after the first.
+    /// Nothing if there is none.
+    pub fn route(&self, from: Point2<f64>, to: Point2<f64>) -> Option<Vec<Point2<f64>>> {
+        if self.free(&from, &to) {
+            return Some(vec![to]);
+        }
+        let mut best: Option<(f64, Vec<Point2<f64>>)> = None;
+        let mut offer = |way: Vec<Point2<f64>>| {
+            let ends = std::iter::once(&from).chain(&way);
+            let total: f64 = ends.zip(&way).map(|(a, b)| length(b.x - a.x, b.y - a.y)).sum();
+            if best.as_ref().is_none_or(|(shortest, _)| total < *shortest) {
+                best = Some((total, way));
+            }
+        };
+        let last: Vec<&Point2<f64>> = self.corners.iter().filter(|corner| self.free(corner, &to)).collect();
+        for first in self.corners.iter().filter(|corner| self.free(&from, corner)) {
+            for second in &last {
+                if first == *second {
+                    offer(vec![*first, to]);
+                } else if self.free(first, second) {
+                    offer(vec![*first, **second, to]);
+                }
+            }
+        }
+        best.map(|(_, way)| way)
+    }
+
+    fn free(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
+        let way = to - from;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few metres of centimetres")]
+        let n_steps = (length(way.x, way.y) / CHECK_M).ceil().clamp(1.0, 1e3) as usize;
+        (0..=n_steps).all(|step| self.room(&(from + way * (step as f64 / n_steps as f64))) >= 0.0)
+    }
+
+    /// Room to spare around a base that stands here. Unit: metres.
+    fn room(&self, at: &Point2<f64>) -> f64 {
+        let point = Point3::new(at.x, at.y, 0.0);
+        let blocks = self.blocks.iter().map(|block| block.beside(&point));
+        let pillars = self.pillars.iter().map(|pillar| length(at.x - pillar.centre.x, at.y - pillar.centre.y) - pillar.radius);
+        blocks.chain(pillars).fold(f64::INFINITY, f64::min) - self.radius - ROOM_M
+    }
+}
+
+/// Length of a level vector, with the same bits on every machine.
+pub fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Pose;
+
+    fn table() -> Block {
+        let pose = Pose::IDENTITY;
+        Block::new(&Sighting { id: "t".to_owned(), pose, size_m: [0.6, 0.6, 0.7], furniture: true })
+    }
+
+    #[test]
+    fn a_way_around_a_table_goes_over_its_corners() {
+        let ground = Ground::new(&[table()], &[], 0.25);
+        let straight = ground.route(Point2::new(-1.0, 0.0), Point2::new(-1.0, 1.0)).expect("nothing is in the way");
+        assert_eq!(straight.len(), 1);
+        let around = ground.route(Point2::new(-1.0, 0.0), Point2::new(1.0, 0.0)).expect("there is room");
+        assert_eq!(around.len(), 3);
+        assert_eq!(ground.route(Point2::new(-1.0, 0.0), Point2::new(0.0, 0.0)), None);
+    }
+}
