@@ -300,7 +300,9 @@ impl Preparing {
 
 fn extend(program: &mut Program, more: Program) {
     program.rules.extend(more.rules);
-    program.facts.extend(more.facts);
+    for (predicate, rows) in more.facts {
+        program.facts.entry(predicate).or_default().extend(rows);
+    }
 }
 
 fn judge(ontology: &Ontology, property: &Property, rules: JudgeRules) -> Judge {
@@ -369,8 +371,9 @@ fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) 
     for rule in program.rules {
         if moving.contains(&rule.head.predicate) { rest.rules.push(rule) } else { fixed.rules.push(rule) }
     }
-    for fact in program.facts {
-        if moving.contains(&fact.0) { rest.facts.push(fact) } else { fixed.facts.push(fact) }
+    for (predicate, rows) in program.facts {
+        let target = if moving.contains(&predicate) { &mut rest } else { &mut fixed };
+        target.facts.insert(predicate, rows);
     }
     (fixed, rest)
 }

@@ -1,5 +1,7 @@
 //! Semi-naive evaluation, stratum by stratum, on datafrog relations.
 
+use std::collections::BTreeMap;
+
 use crate::base::TermId;
 use crate::rules::aggregate::{aggregate, projection};
 use crate::rules::join::{Join, Sink};
@@ -25,6 +27,11 @@ impl Tables {
 
     pub(crate) fn get(&self, predicate: PredicateId) -> Option<&dyn Finished> {
         self.list.get(predicate)?.as_deref()
+    }
+
+    /// The rows of a predicate, taken out.
+    pub(crate) fn take_rows(&mut self, predicate: PredicateId) -> Vec<TermId> {
+        self.list.get_mut(predicate).and_then(Option::take).map_or(Vec::new(), |table| table.index(0).to_vec())
     }
 
     pub(crate) fn set(&mut self, predicate: PredicateId, table: Box<dyn Finished>) {
@@ -58,8 +65,8 @@ impl Layers<'_> {
 pub(crate) struct Planned {
     pub(crate) rules: Vec<Rule>,
     pub(crate) strata: Vec<Stratum>,
-    /// Facts of the text: rows by predicate.
-    pub(crate) facts: Vec<(PredicateId, Vec<TermId>)>,
+    /// Facts of the text: rows one behind the other.
+    pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,
     plans: Vec<Option<RulePlan>>,
 }
 
@@ -72,8 +79,7 @@ impl Planned {
                 plans[*rule] = Some(plan_rule(&program.rules[*rule], stratum, indexes, sizes));
             }
         }
-        let facts = program.facts.into_iter().map(|(predicate, row, _)| (predicate, row)).collect();
-        Self { rules: program.rules, strata, facts, plans }
+        Self { rules: program.rules, strata, facts: program.facts, plans }
     }
 }
 
@@ -121,13 +127,10 @@ type Grown = Vec<Box<dyn Growing>>;
 impl Run<'_, '_, '_> {
     /// Facts of the text join what is there already.
     fn facts(&mut self, layers: &mut Layers<'_>) {
-        let mut facts = self.planned.facts.as_slice();
-        while let Some((predicate, _)) = facts.first() {
-            let count = facts.iter().take_while(|(other, _)| other == predicate).count();
+        for (predicate, facts) in &self.planned.facts {
             let mut rows = layers.rows(*predicate).to_vec();
-            rows.extend(facts[..count].iter().flat_map(|(_, row)| row));
+            rows.extend(facts);
             self.finish(*predicate, rows, layers);
-            facts = &facts[count..];
         }
     }
 

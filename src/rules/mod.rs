@@ -29,6 +29,7 @@ mod reading;
 mod relation;
 mod safety;
 mod sparql;
+pub mod standalone;
 mod stratify;
 mod syntax;
 mod translate;

@@ -1,6 +1,6 @@
 //! Checked rules: predicates and variables are numbers, every variable is bound, every name is known.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use crate::base::{Source, Span, TermId};
 use crate::rules::expression::Expr;
@@ -198,6 +198,6 @@ pub(crate) struct Rule {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Program {
     pub(crate) rules: Vec<Rule>,
-    /// Facts that stand in the text.
-    pub(crate) facts: Vec<(PredicateId, Vec<TermId>, Span)>,
+    /// Facts that stand in the text or were read from files: rows one behind the other.
+    pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,
 }

@@ -33,9 +33,7 @@ impl Query {
             diagnostics.push(syntax_fault(source, &error.to_string()));
             return Err(diagnostics);
         }
-        let designators: BTreeSet<&str> =
-            ontology.actions.values().flat_map(|action| action.parameters.iter().map(String::as_str)).collect();
-        let text = bind_designators(&source.text, &designators);
+        let text = bind_designators(&source.text, &ontology.designators);
         let prepared = evaluator().parse_query(&text).map_err(|error| {
             let help = "a variable with the name of a designator is bound to its value; use it in the first group";
             Diagnostics::from(Diagnostic::error("R060", error.to_string()).in_source(source).help(help))
@@ -178,7 +176,7 @@ fn fault(error: &QueryEvaluationError, budget: &Budget) -> RuleFault {
 /// ```sparql
 /// GRAPH act:parameters { act:pickObject act:value ?pickObject }
 /// ```
-fn bind_designators(text: &str, designators: &BTreeSet<&str>) -> String {
+fn bind_designators(text: &str, designators: &BTreeSet<String>) -> String {
     let act = names::ACT;
     let mut out = text.to_owned();
     // From the last group to the first, so that places stay right.
@@ -186,7 +184,7 @@ fn bind_designators(text: &str, designators: &BTreeSet<&str>) -> String {
         let used = variables(&text[group.clone()]);
         let bound: String = designators
             .iter()
-            .filter(|name| used.contains(**name))
+            .filter(|name| used.contains(*name))
             .map(|name| format!(" GRAPH <{act}parameters> {{ <{act}{name}> <{act}value> ?{name} }}"))
             .collect();
         out.insert_str(group.start + 1, &bound);

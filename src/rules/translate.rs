@@ -12,32 +12,21 @@ use crate::rules::program::{
 };
 use crate::rules::safety;
 use crate::rules::syntax::{
-    AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax,
+    AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer,
 };
 use crate::rules::universe::Universe;
 
 /// The rules and facts of a file, checked. What has faults is left out; the faults are noted.
 pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> Program {
     let mut program = Program::default();
-    let mut globals: BTreeMap<String, Term> = BTreeMap::new();
+    let globals = globals(checking, syntax, role);
     for statement in &syntax.statements {
         match statement {
-            Statement::Parameter { name, value, span } => {
-                let mut rule = Translation::new(checking, &syntax.source, role, &globals);
-                let value = match value {
-                    Some(value) => rule.ground(value),
-                    None => {
-                        let help = format!("write `@parameter ${name} = … .`");
-                        rule.error("R036", span, format!("`${name}` has no value"), help);
-                        None
-                    }
-                };
-                globals.insert(name.clone(), value.unwrap_or(Term::Boolean(false)));
-            }
             Statement::Rule(rule) if rule.body.is_empty() => {
                 for head in &rule.heads {
-                    if let Some(fact) = Translation::new(checking, &syntax.source, role, &globals).fact(head) {
-                        program.facts.push(fact);
+                    let fact = Translation::new(checking, &syntax.source, role, &globals).fact(head);
+                    if let Some((predicate, row)) = fact {
+                        program.facts.entry(predicate).or_default().extend(row);
                     }
                 }
             }
@@ -51,6 +40,79 @@ pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role
         }
     }
     program
+}
+
+/// The values of a file's parameters, each computed from those above it.
+fn globals(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> BTreeMap<String, Term> {
+    let mut globals: BTreeMap<String, Term> = BTreeMap::new();
+    for statement in &syntax.statements {
+        let Statement::Parameter { name, value, span } = statement else { continue };
+        let mut rule = Translation::new(checking, &syntax.source, role, &globals);
+        let value = match value {
+            Some(value) => rule.ground(value),
+            None => {
+                let help = format!("write `@parameter ${name} = … .`");
+                rule.error("R036", span, format!("`${name}` has no value"), help);
+                None
+            }
+        };
+        globals.insert(name.clone(), value.unwrap_or(Term::Boolean(false)));
+    }
+    globals
+}
+
+/// The values of an import's or export's options, after its assignments.
+pub(crate) fn options(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transfer) -> BTreeMap<String, OptionValue> {
+    // What is wrong with a parameter is said when the rules are translated.
+    let before = std::mem::take(&mut checking.diagnostics);
+    let globals = globals(checking, syntax, Role::Standalone);
+    checking.diagnostics = before;
+    let mut known: BTreeMap<String, Term> = BTreeMap::new();
+    for (name, value) in &transfer.bindings {
+        let value = substituted(value, &known);
+        if let Some(term) = Translation::new(checking, &syntax.source, Role::Standalone, &globals).ground(&value) {
+            known.insert(name.clone(), term);
+        }
+    }
+    let mut values = BTreeMap::new();
+    for (name, value) in &transfer.options {
+        let mut ground = |value: &Expression| {
+            Translation::new(checking, &syntax.source, Role::Standalone, &globals).ground(&substituted(value, &known))
+        };
+        let found = match &value.kind {
+            ExpressionKind::Tuple(items) => items.iter().map(&mut ground).collect::<Option<_>>().map(OptionValue::Many),
+            _ => ground(value).map(OptionValue::One),
+        };
+        if let Some(found) = found {
+            values.insert(name.clone(), found);
+        }
+    }
+    values
+}
+
+/// The value of an option.
+#[derive(Debug, Clone)]
+pub(crate) enum OptionValue {
+    One(Term),
+    Many(Vec<Term>),
+}
+
+/// An expression with known variables replaced by their values.
+fn substituted(expression: &Expression, known: &BTreeMap<String, Term>) -> Expression {
+    let all = |args: &[Expression]| args.iter().map(|arg| substituted(arg, known)).collect::<Vec<_>>();
+    let one = |arg: &Expression| Box::new(substituted(arg, known));
+    let kind = match &expression.kind {
+        ExpressionKind::Variable(name) => match known.get(name) {
+            Some(term) => ExpressionKind::Constant(term.clone()),
+            None => ExpressionKind::Variable(name.clone()),
+        },
+        ExpressionKind::Call(name, args) => ExpressionKind::Call(name.clone(), all(args)),
+        ExpressionKind::Format(args) => ExpressionKind::Format(all(args)),
+        ExpressionKind::Arithmetic(op, left, right) => ExpressionKind::Arithmetic(*op, one(left), one(right)),
+        ExpressionKind::Negative(inner) => ExpressionKind::Negative(one(inner)),
+        other => other.clone(),
+    };
+    Expression { kind, span: expression.span.clone() }
 }
 
 /// The state of translating one rule.
@@ -118,7 +180,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         rules
     }
 
-    fn fact(mut self, head: &AtomSyntax) -> Option<(PredicateId, Vec<TermId>, Span)> {
+    fn fact(mut self, head: &AtomSyntax) -> Option<(PredicateId, Vec<TermId>)> {
         let (predicate, args) = self.predicate(head, true)?;
         let mut row = Vec::new();
         for arg in &args {
@@ -128,7 +190,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         if row.is_empty() {
             row.push(unit(self.checking.terms));
         }
-        Some((predicate, row, head.span.clone()))
+        Some((predicate, row))
     }
 
     /// The value of an expression without variables.

@@ -1,0 +1,98 @@
+//! `@export`: tuples to delimited text or N-Triples-like rows.
+
+use std::path::{Path, PathBuf};
+
+use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
+use crate::rules::standalone::program::{Closure, Program};
+use crate::rules::standalone::table::delimiter_of;
+use crate::rules::syntax::{Statement, Syntax, Transfer};
+use crate::rules::translate::{OptionValue, options};
+use crate::rules::values;
+
+const FORMATS: [&str; 3] = ["csv", "dsv", "tsv"];
+
+/// A predicate and where it goes.
+#[derive(Debug)]
+pub(super) struct Export {
+    pub(super) predicate: String,
+    pub(super) path: PathBuf,
+    delimiter: u8,
+}
+
+/// What a program exports; where it says nothing of that, nothing.
+pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<Export> {
+    let syntax = &program.syntax;
+    let mut found = Vec::new();
+    for statement in &syntax.statements {
+        match statement {
+            Statement::Transfer(transfer) if !transfer.import => {
+                found.extend(export(program, syntax, transfer, diagnostics));
+            }
+            Statement::Output { predicates, .. } => found.extend(predicates.iter().map(|predicate| Export {
+                predicate: predicate.clone(),
+                path: PathBuf::from(format!("{}.csv", file_name(predicate))),
+                delimiter: b',',
+            })),
+            _ => {}
+        }
+    }
+    found
+}
+
+fn export(program: &Program, syntax: &Syntax, transfer: &Transfer, diagnostics: &mut Diagnostics) -> Option<Export> {
+    if !FORMATS.contains(&transfer.format.as_str()) {
+        let message = format!("exports to `{}` are not supported", transfer.format);
+        let help = did_you_mean(&transfer.format, FORMATS);
+        diagnostics.push(Diagnostic::error("R070", message).at(&syntax.source, transfer.span.clone()).help(help));
+        return None;
+    }
+    let mut terms = program.terms.clone();
+    let mut checking = crate::rules::check::Checking::new(&mut terms, None);
+    let options = options(&mut checking, syntax, transfer);
+    diagnostics.extend(checking.diagnostics);
+    let text = |name: &str| match options.get(name) {
+        Some(OptionValue::One(term)) => Some(values::lexical(term)),
+        _ => None,
+    };
+    let path = text("resource").unwrap_or_else(|| format!("{}.{}", file_name(&transfer.predicate), transfer.format));
+    let relative = Path::new(&path);
+    let inside = relative.is_relative() && !relative.components().any(|c| matches!(c, std::path::Component::ParentDir));
+    if !inside {
+        let message = format!("`{path}` is outside of the output folder");
+        let help = "name a file below it, and the folder with `-D`";
+        diagnostics.push(Diagnostic::error("R073", message).at(&syntax.source, transfer.span.clone()).help(help));
+        return None;
+    }
+    let delimiter = delimiter_of(&transfer.format, text("delimiter").as_deref());
+    Some(Export { predicate: transfer.predicate.clone(), path: PathBuf::from(path), delimiter })
+}
+
+/// A predicate's name as a file's: of an IRI the last part.
+fn file_name(predicate: &str) -> &str {
+    names::local(predicate)
+}
+
+/// Writes the tuples of a predicate, sorted, and tells how many there are.
+///
+/// # Errors
+/// Why the file can't be written.
+pub(super) fn write(export: &Export, folder: &Path, closure: &Closure) -> Result<usize, String> {
+    let path = folder.join(&export.path);
+    let lower = |error: &dyn std::fmt::Display| error.to_string().to_lowercase();
+    if let Some(parent) = path.parent() {
+        std::fs::create_dir_all(parent).map_err(|error| lower(&error))?;
+    }
+    let mut writer =
+        csv::WriterBuilder::new().delimiter(export.delimiter).from_path(&path).map_err(|error| lower(&error))?;
+    let mut count = 0;
+    let mut tuples: Vec<Vec<&crate::base::Term>> = closure.tuples_unsorted(&export.predicate).collect();
+    tuples.sort();
+    for tuple in tuples {
+        if !tuple.is_empty() {
+            writer.write_record(tuple.into_iter().map(values::full)).map_err(|error| lower(&error))?;
+        }
+        count += 1;
+    }
+    writer.flush().map_err(|error| lower(&error))?;
+    Ok(count)
+}

@@ -1,0 +1,245 @@
+//! `@import`: which file, which format, and its rows as facts.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use oxigraph::io::{RdfFormat, RdfParser};
+use oxigraph::model::GraphName;
+
+use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, TermId, Terms, did_you_mean};
+use crate::rules::check::{Checking, Role, counted};
+use crate::rules::dataset::from_rdf;
+use crate::rules::program::{Predicates, Program};
+use crate::rules::standalone::table::{ColumnKind, delimiter_of, read_table};
+use crate::rules::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
+use crate::rules::translate::{OptionValue, options};
+
+/// Formats of imports.
+const FORMATS: [&str; 9] = ["csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];
+const OPTIONS: [&str; 8] =
+    ["resource", "format", "delimiter", "quoting", "compression", "ignore_headers", "limit", "base"];
+/// Larger files (unpacked) are refused. Unit: bytes.
+const SIZE_LIMIT: u64 = 4 << 30;
+
+/// A file that is to be read.
+#[derive(Debug)]
+pub(super) struct Import {
+    source: Source,
+    span: Span,
+    predicate: String,
+    arity: usize,
+    path: PathBuf,
+    content: Content,
+    limit: usize,
+}
+
+#[derive(Debug)]
+enum Content {
+    Table { delimiter: u8, quoting: bool, headers: bool, columns: Vec<ColumnKind> },
+    Rdf { format: RdfFormat, base: Option<String> },
+}
+
+/// First pass: what is imported, with the number of columns, which a rule, an option or the file itself tells.
+pub(super) fn define_imports(checking: &mut Checking<'_>, syntax: &Syntax, folder: &Path) -> Vec<Import> {
+    let mut imports = Vec::new();
+    for statement in &syntax.statements {
+        if let Statement::Transfer(transfer) = statement
+            && transfer.import
+            && let Some(import) = define_import(checking, syntax, transfer, folder)
+        {
+            let Import { predicate, arity, .. } = &import;
+            checking.define_predicate(&syntax.source, predicate, *arity, &transfer.span, Role::Standalone);
+            imports.push(import);
+        }
+    }
+    imports
+}
+
+fn define_import(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transfer, folder: &Path) -> Option<Import> {
+    let source = &syntax.source;
+    if matches!(transfer.format.as_str(), "json" | "sparql") {
+        let message = format!("imports from {} are not supported", transfer.format);
+        let help = format!("formats: {}", FORMATS.join(", "));
+        checking.error("R070", source, &transfer.span, message, help);
+        return None;
+    }
+    if !FORMATS.contains(&transfer.format.as_str()) {
+        let message = format!("unknown format `{}`", transfer.format);
+        checking.error("R070", source, &transfer.span, message, did_you_mean(&transfer.format, FORMATS));
+        return None;
+    }
+    for (name, value) in &transfer.options {
+        if !OPTIONS.contains(&name.as_str()) {
+            checking.error("R071", source, &value.span, format!("unknown option `{name}`"), did_you_mean(name, OPTIONS));
+        }
+    }
+    let options = options(checking, syntax, transfer);
+    let text = |name: &str| match options.get(name) {
+        Some(OptionValue::One(term)) => Some(super::super::values::lexical(term)),
+        _ => None,
+    };
+    let Some(resource) = text("resource") else {
+        let help = "write `csv{resource = \"file.csv\"}`";
+        checking.error("R071", source, &transfer.span, "the import names no resource", help);
+        return None;
+    };
+    if resource.contains("://") {
+        let help = "download it first; this program does not go to the network";
+        checking.error("R072", source, &transfer.span, format!("`{resource}` is no file"), help);
+        return None;
+    }
+    let path = folder.join(&resource);
+    let used = arity_in_rules(checking, syntax, &transfer.predicate);
+    let is_table = matches!(transfer.format.as_str(), "csv" | "dsv" | "tsv");
+    let (content, arity) = if is_table {
+        let flag = |name: &str, usual: bool| text(name).map_or(usual, |value| value == "true");
+        let (quoting, headers) = (flag("quoting", true), flag("ignore_headers", false));
+        let delimiter = delimiter_of(&transfer.format, text("delimiter").as_deref());
+        let columns = match columns(&options) {
+            Ok(columns) => columns,
+            Err(word) => {
+                let help = did_you_mean(&word, ColumnKind::NAMES);
+                checking.error("R071", source, &transfer.span, format!("unknown column format `{word}`"), help);
+                return None;
+            }
+        };
+        let columns = columns.or_else(|| used.map(|arity| vec![ColumnKind::Any; arity]));
+        let columns = columns.or_else(|| Some(vec![ColumnKind::Any; columns_of_file(&path, delimiter)?])).unwrap_or_default();
+        let arity = columns.iter().filter(|column| **column != ColumnKind::Skip).count();
+        (Content::Table { delimiter, quoting, headers, columns }, arity)
+    } else {
+        let format = rdf_format(&transfer.format, &path);
+        let Some(format) = format else {
+            let help = "name the format: ntriples, nquads, turtle, trig or rdfxml";
+            checking.error("R070", source, &transfer.span, format!("`{resource}` does not tell its format"), help);
+            return None;
+        };
+        let arity = if format.supports_datasets() { 4 } else { 3 };
+        (Content::Rdf { format, base: text("base") }, arity)
+    };
+    let limit = text("limit").and_then(|limit| limit.parse().ok()).unwrap_or(usize::MAX);
+    let predicate = transfer.predicate.clone();
+    Some(Import { source: source.clone(), span: transfer.span.clone(), predicate, arity, path, content, limit })
+}
+
+/// Arguments of a predicate as the program uses it anywhere.
+fn arity_in_rules(checking: &Checking<'_>, syntax: &Syntax, predicate: &str) -> Option<usize> {
+    if let Some(definition) = checking.defined.get(&(0, predicate.to_owned())) {
+        return Some(definition.arity);
+    }
+    syntax.statements.iter().find_map(|statement| match statement {
+        Statement::Rule(rule) => rule.body.iter().find_map(|literal| match literal {
+            LiteralSyntax::Atom(atom) | LiteralSyntax::Negated(atom) if atom.predicate == predicate => Some(atom.args.len()),
+            _ => None,
+        }),
+        _ => None,
+    })
+}
+
+fn columns(options: &std::collections::BTreeMap<String, OptionValue>) -> Result<Option<Vec<ColumnKind>>, String> {
+    let terms = match options.get("format") {
+        None => return Ok(None),
+        Some(OptionValue::One(term)) => std::slice::from_ref(term),
+        Some(OptionValue::Many(terms)) => terms.as_slice(),
+    };
+    let kinds = terms.iter().map(|term| {
+        let word = super::super::values::lexical(term);
+        ColumnKind::from_word(&word).ok_or(word)
+    });
+    kinds.collect::<Result<Vec<_>, _>>().map(Some)
+}
+
+/// Columns of the first row; nothing for an empty file.
+fn columns_of_file(path: &Path, delimiter: u8) -> Option<usize> {
+    let reader = open(path).ok()?;
+    let mut table = csv::ReaderBuilder::new().delimiter(delimiter).has_headers(false).flexible(true).from_reader(reader);
+    table.records().next()?.ok().map(|row| row.len())
+}
+
+fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
+    match format {
+        "ntriples" => Some(RdfFormat::NTriples),
+        "nquads" => Some(RdfFormat::NQuads),
+        "turtle" => Some(RdfFormat::Turtle),
+        "trig" => Some(RdfFormat::TriG),
+        "rdfxml" => Some(RdfFormat::RdfXml),
+        _ => {
+            let name = path.file_name()?.to_str()?;
+            let name = name.strip_suffix(".gz").unwrap_or(name);
+            RdfFormat::from_extension(name.rsplit_once('.')?.1)
+        }
+    }
+}
+
+/// A file, unpacked where its name ends in `.gz`.
+fn open(path: &Path) -> Result<Box<dyn Read>, String> {
+    let file = std::fs::File::open(path).map_err(|error| error.to_string().to_lowercase())?;
+    let file = std::io::BufReader::new(file);
+    let packed = path.extension().is_some_and(|extension| extension == "gz");
+    Ok(if packed {
+        Box::new(flate2::read::MultiGzDecoder::new(file).take(SIZE_LIMIT))
+    } else {
+        Box::new(file.take(SIZE_LIMIT))
+    })
+}
+
+/// Second pass: the rows of a file become facts of the program.
+pub(super) fn import(
+    import: Import,
+    predicates: &Predicates,
+    terms: &mut Terms,
+    program: &mut Program,
+    diagnostics: &mut Diagnostics,
+) {
+    let Some(id) = predicates.find(0, &import.predicate, None) else { return };
+    let arity = predicates.get(id).arity;
+    let fault = |message: String, help: &str| Diagnostic::error("R072", message).at(&import.source, import.span.clone()).help(help);
+    if arity != import.arity {
+        let message = format!("`{}` has {}, the file has {}", import.predicate, counted(arity), import.arity);
+        diagnostics.push(fault(message, "use every column, or skip some with `format = (any, skip, …)`"));
+        return;
+    }
+    let rows = program.facts.entry(id).or_default();
+    let read = open(&import.path).and_then(|reader| match &import.content {
+        Content::Table { delimiter, quoting, headers, columns } => {
+            read_table(reader, *delimiter, *quoting, *headers, columns, import.limit, terms, rows)
+        }
+        Content::Rdf { format, base } => read_rdf(reader, *format, base.as_deref(), import.limit, terms, rows),
+    });
+    if let Err(reason) = read {
+        let message = format!("`{}` can't be read: {reason}", import.path.display());
+        diagnostics.push(fault(message, "paths are relative to the program's folder"));
+    }
+}
+
+fn read_rdf(
+    reader: Box<dyn Read>,
+    format: RdfFormat,
+    base: Option<&str>,
+    limit: usize,
+    terms: &mut Terms,
+    rows: &mut Vec<TermId>,
+) -> Result<(), String> {
+    let mut parser = RdfParser::from_format(format);
+    if let Some(base) = base {
+        parser = parser.with_base_iri(base).map_err(|error| error.to_string())?;
+    }
+    let quads = format.supports_datasets();
+    // The name under which Nemo, too, puts statements without a graph.
+    let default_graph = Term::iri("tag:nemo:defaultgraph");
+    for quad in parser.for_reader(reader).take(limit) {
+        let quad = quad.map_err(|error| error.to_string())?;
+        if quads {
+            let graph = match quad.graph_name {
+                GraphName::NamedNode(node) => Term::iri(node.as_str()),
+                GraphName::BlankNode(node) => Term::Blank(node.as_str().into()),
+                GraphName::DefaultGraph => default_graph.clone(),
+            };
+            rows.push(terms.intern(graph));
+        }
+        for term in [quad.subject.into(), quad.predicate.into(), quad.object] {
+            rows.push(terms.intern(from_rdf(&term)));
+        }
+    }
+    Ok(())
+}

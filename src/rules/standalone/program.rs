@@ -1,0 +1,165 @@
+//! A program in memory: checked, planned, and closed by either evaluator.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::base::{Diagnostics, Source, Term, TermId, Terms};
+use crate::rules::book::fault;
+use crate::rules::check::{Checking, Role};
+use crate::rules::evaluate::{Layers, Planned, Tables, evaluate};
+use crate::rules::findings::{Budget, RuleFault};
+use crate::rules::meter::Meter;
+use crate::rules::naive;
+use crate::rules::parse::parse;
+use crate::rules::plan::Indexes;
+use crate::rules::program::{PredicateId, Predicates};
+use crate::rules::standalone::import::{define_imports, import};
+use crate::rules::stratify::stratify;
+use crate::rules::syntax::{Statement, Syntax};
+use crate::rules::universe::Universe;
+
+/// Which evaluator closes a program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Engine {
+    /// Semi-naive on datafrog relations.
+    Fast,
+    /// Nested loops over sets: slow and obviously right.
+    Naive,
+}
+
+/// A checked program with its facts.
+#[derive(Debug)]
+pub struct Program {
+    pub(crate) syntax: Syntax,
+    pub(crate) terms: Terms,
+    pub(crate) predicates: Predicates,
+    pub(crate) indexes: Indexes,
+    pub(crate) planned: Planned,
+    /// What is odd about it but no fault.
+    pub warnings: Diagnostics,
+}
+
+/// Everything that a program derives, its facts included.
+#[derive(Debug, Clone)]
+pub struct Closure {
+    terms: Vec<Term>,
+    /// Arguments and rows of each predicate.
+    tables: BTreeMap<String, (usize, Vec<TermId>)>,
+}
+
+impl Closure {
+    /// Names of the predicates, sorted.
+    pub fn predicates(&self) -> impl Iterator<Item = &str> {
+        self.tables.keys().map(String::as_str)
+    }
+
+    /// How many tuples a predicate has.
+    pub fn count(&self, predicate: &str) -> usize {
+        self.tables.get(predicate).map_or(0, |(arity, rows)| rows.len() / (*arity).max(1))
+    }
+
+    /// How many arguments a predicate has; nothing for one that the program does not speak of.
+    pub fn arity(&self, predicate: &str) -> Option<usize> {
+        self.tables.get(predicate).map(|(arity, _)| *arity)
+    }
+
+    /// The tuples of a predicate, in no particular order.
+    pub fn tuples_unsorted(&self, predicate: &str) -> impl Iterator<Item = Vec<&Term>> {
+        let (arity, rows) = self.tables.get(predicate).map_or((0, &[][..]), |(arity, rows)| (*arity, rows.as_slice()));
+        rows.chunks_exact(arity.max(1)).map(move |row| row[..arity].iter().map(|id| &self.terms[*id as usize]).collect())
+    }
+
+    /// The tuples of a predicate, sorted.
+    pub fn tuples(&self, predicate: &str) -> Vec<Vec<Term>> {
+        let mut tuples: Vec<Vec<Term>> =
+            self.tuples_unsorted(predicate).map(|tuple| tuple.into_iter().cloned().collect()).collect();
+        tuples.sort();
+        tuples
+    }
+}
+
+impl Program {
+    /// Checks a program and reads what it imports; relative paths of imports begin at `folder`.
+    ///
+    /// # Errors
+    /// All faults, each with its place: of the text, of the rules, and of files that can't be read.
+    pub fn load(source: &Source, folder: &Path) -> Result<Self, Diagnostics> {
+        let (syntax, mut diagnostics) = parse(source);
+        let mut terms = Terms::new();
+        let mut checking = Checking::new(&mut terms, None);
+        checking.define(&syntax, Role::Standalone);
+        define_declared(&mut checking, &syntax);
+        let imports = define_imports(&mut checking, &syntax, folder);
+        let mut program = checking.rules(&syntax, Role::Standalone);
+        let (predicates, found) = (checking.predicates, checking.diagnostics);
+        diagnostics.extend(found);
+        if diagnostics.has_errors() {
+            return Err(diagnostics);
+        }
+        for table in imports {
+            import(table, &predicates, &mut terms, &mut program, &mut diagnostics);
+        }
+        let strata = stratify(&program.rules, &predicates, &Universe::new(&terms, None)).unwrap_or_else(|found| {
+            diagnostics.extend(found);
+            Vec::new()
+        });
+        let sizes: Vec<Option<usize>> = (0..predicates.len())
+            .map(|id| program.facts.get(&id).map(|rows| rows.len() / predicates.get(id).width))
+            .collect();
+        let mut indexes = Indexes::new(&predicates);
+        let planned = Planned::new(program, strata, &mut indexes, &|id| sizes[id]);
+        diagnostics.clone().or(Self { syntax, terms, predicates, indexes, planned, warnings: diagnostics })
+    }
+
+    /// Derives everything that the rules say.
+    ///
+    /// # Errors
+    /// The budget was spent; the fault names the rule.
+    pub fn close(&self, engine: Engine, budget: &Budget) -> Result<Closure, RuleFault> {
+        let mut universe = Universe::new(&self.terms, None);
+        let mut meter = Meter::new(budget);
+        let rows: Vec<(PredicateId, Vec<TermId>)> = match engine {
+            Engine::Fast => {
+                let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
+                evaluate(&self.planned, &self.predicates, &self.indexes, &mut layers, &mut universe, &mut meter)
+                    .map_err(|stopped| fault(&meter, stopped, &self.planned))?;
+                (0..self.predicates.len()).map(|id| (id, layers.own.take_rows(id))).collect()
+            }
+            Engine::Naive => self.naive(&mut universe, &mut meter)?,
+        };
+        let mut tables = BTreeMap::new();
+        for (id, rows) in rows {
+            let predicate = self.predicates.get(id);
+            if !predicate.name.contains('~') {
+                tables.insert(predicate.name.clone(), (predicate.arity, rows));
+            }
+        }
+        let made = universe.into_made();
+        let terms = (0..self.terms.len()).map(|id| self.terms.term(id as TermId).clone()).chain(made).collect();
+        Ok(Closure { terms, tables })
+    }
+
+    fn naive(
+        &self,
+        universe: &mut Universe<'_>,
+        meter: &mut Meter,
+    ) -> Result<Vec<(PredicateId, Vec<TermId>)>, RuleFault> {
+        let mut sets = naive::Sets::new();
+        for (predicate, rows) in &self.planned.facts {
+            let width = self.predicates.get(*predicate).width;
+            sets.entry(*predicate).or_default().extend(rows.chunks_exact(width).map(<[TermId]>::to_vec));
+        }
+        naive::close(&self.planned.rules, &self.planned.strata, &mut sets, universe, meter)
+            .map_err(|stop| meter.fault(stop, None))?;
+        let rows = |id| sets.get(&id).map_or(Vec::new(), |set| set.iter().flatten().copied().collect());
+        Ok((0..self.predicates.len()).map(|id| (id, rows(id))).collect())
+    }
+}
+
+fn define_declared(checking: &mut Checking<'_>, syntax: &Syntax) {
+    for statement in &syntax.statements {
+        if let Statement::Declare { name, arity, span } = statement {
+            checking.define_predicate(&syntax.source, name, *arity, span, Role::Standalone);
+        }
+    }
+}

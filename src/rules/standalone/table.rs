@@ -1,0 +1,125 @@
+//! Rows of delimited text to terms.
+
+use std::io::Read;
+
+use crate::base::{Term, TermId, Terms, names};
+use crate::rules::values::{double_term, literal};
+
+/// How the fields of a column are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ColumnKind {
+    /// Whatever the field looks like.
+    Any,
+    /// The text itself.
+    String,
+    /// Whole numbers only.
+    Int,
+    /// Numbers only.
+    Double,
+    /// Not at all.
+    Skip,
+}
+
+impl ColumnKind {
+    pub(super) const NAMES: [&'static str; 5] = ["any", "string", "int", "double", "skip"];
+
+    pub(super) fn from_word(word: &str) -> Option<Self> {
+        [Self::Any, Self::String, Self::Int, Self::Double, Self::Skip]
+            .into_iter()
+            .zip(Self::NAMES)
+            .find_map(|(kind, name)| (name == word).then_some(kind))
+    }
+
+    /// The term of a field; nothing where the field does not fit the column.
+    fn term(self, field: &str) -> Option<Term> {
+        match self {
+            Self::Any => Some(any(field)),
+            Self::String | Self::Skip => Some(Term::string(field)),
+            Self::Int => match literal(field, &format!("{}integer", names::XSD)) {
+                term @ Term::Integer(_) => Some(term),
+                _ => None,
+            },
+            Self::Double => field.parse().ok().filter(|value: &f64| value.is_finite()).map(double_term),
+        }
+    }
+}
+
+/// The byte between fields.
+pub(super) fn delimiter_of(format: &str, option: Option<&str>) -> u8 {
+    match (format, option) {
+        (_, Some(text)) if text.len() == 1 => text.as_bytes()[0],
+        ("tsv", _) => b'\t',
+        _ => b',',
+    }
+}
+
+/// Reads rows to the end of `rows`. A row that does not fit its columns is left out.
+///
+/// # Errors
+/// Why the text can't be read.
+#[expect(clippy::too_many_arguments, reason = "the options of one format; each is used once")]
+pub(super) fn read_table(
+    reader: impl Read,
+    delimiter: u8,
+    quoting: bool,
+    headers: bool,
+    columns: &[ColumnKind],
+    limit: usize,
+    terms: &mut Terms,
+    rows: &mut Vec<TermId>,
+) -> Result<(), String> {
+    let mut table = csv::ReaderBuilder::new()
+        .delimiter(delimiter)
+        .quoting(quoting)
+        .has_headers(headers)
+        .flexible(true)
+        .from_reader(reader);
+    for row in table.records().take(limit) {
+        let row = match row {
+            Ok(row) => row,
+            Err(error) if error.is_io_error() => return Err(error.to_string()),
+            Err(_) => continue,
+        };
+        if row.len() != columns.len() {
+            continue;
+        }
+        let read: Option<Vec<Term>> = row
+            .iter()
+            .zip(columns)
+            .filter(|(_, kind)| **kind != ColumnKind::Skip)
+            .map(|(field, kind)| kind.term(field))
+            .collect();
+        rows.extend(read.into_iter().flatten().map(|term| terms.intern(term)));
+    }
+    Ok(())
+}
+
+/// The term that a field looks like: an IRI, a number, a literal, a name; otherwise it is text.
+fn any(field: &str) -> Term {
+    let field = field.trim();
+    if let Some(iri) = field.strip_prefix('<').and_then(|rest| rest.strip_suffix('>')) {
+        return Term::iri(iri);
+    }
+    if field.starts_with(|c: char| c.is_ascii_digit() || c == '+' || c == '-') {
+        match literal(field, &format!("{}decimal", names::XSD)) {
+            number @ (Term::Integer(_) | Term::Decimal(_)) => return number,
+            _ => {}
+        }
+    }
+    if field.starts_with('"')
+        && let Some(end) = field.rfind('"').filter(|end| *end > 0)
+    {
+        let (text, rest) = (&field[1..end], &field[end + 1..]);
+        if rest.is_empty() {
+            return Term::string(text);
+        }
+        if let Some(tag) = rest.strip_prefix('@') {
+            return Term::LangString(text.into(), tag.into());
+        }
+        if let Some(datatype) = rest.strip_prefix("^^<").and_then(|rest| rest.strip_suffix('>')) {
+            return literal(text, datatype);
+        }
+    }
+    // What has no blanks reads as a name or an IRI.
+    if !field.is_empty() && !field.contains([' ', '\n', '>']) { Term::iri(field) } else { Term::string(field) }
+}

@@ -1,0 +1,183 @@
+//! The engine against others: the naive evaluator on random programs, and Nemo's published programs.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use actcheck::base::{Source, Term};
+use actcheck::rules::Budget;
+use actcheck::rules::standalone::{Engine, Program, run};
+use proptest::prelude::*;
+
+/// A rule or fact of a random program, as text.
+fn statements() -> impl Strategy<Value = Vec<String>> {
+    let fact = (0..4usize, 0..5i64, 0..5i64).prop_map(|(p, a, b)| format!("e{p}({a}, {b}) ."));
+    proptest::collection::vec(prop_oneof![2 => fact, 3 => rule()], 4..28)
+}
+
+/// Predicates `e0 … e3` have facts, `p0 … p5` are derived. A rule negates and aggregates only over smaller numbers, and reads
+/// equal or smaller ones positively, so that every program is stratified and many are recursive.
+fn rule() -> impl Strategy<Value = String> {
+    let variable = || prop_oneof![Just("?x"), Just("?y"), Just("?z"), Just("?u"), Just("_"), Just("1"), Just("2.5"), Just("\"a\"")];
+    let atom = move || (0..10usize, variable(), variable());
+    (0..6usize, proptest::collection::vec(atom(), 1..4), proptest::option::of(atom()), 0..14usize).prop_map(
+        |(head, atoms, negated, extra)| {
+            let name = |number: usize, limit: usize| match number % (5 + limit) {
+                number if number < 4 => format!("e{number}"),
+                number => format!("p{}", (number - 4).min(limit)),
+            };
+            let mut body: Vec<String> =
+                atoms.iter().map(|(p, a, b)| format!("{}({a}, {b})", name(*p, head))).collect();
+            let bound: Vec<&str> =
+                atoms.iter().flat_map(|(_, a, b)| [*a, *b]).filter(|v| v.starts_with('?')).collect();
+            let first = bound.first().copied().unwrap_or("3");
+            let last = bound.last().copied().unwrap_or("4");
+            if let Some((p, a, b)) = negated.filter(|_| head > 0) {
+                body.push(format!("~{}({a}, {b})", name(p, head - 1)));
+            }
+            let mut target = format!("p{head}({first}, {last})");
+            match extra {
+                0 => body.push(format!("{first} < {last}")),
+                1 => body.push(format!("{first} != {last}")),
+                // Bounded, so that counting up ends.
+                2 => {
+                    body.push(format!("?n = {first} + 1, ?n < 8"));
+                    target = format!("p{head}(?n, {last})");
+                }
+                3 => {
+                    body.push(format!("?n = {first} * {last}, ?n <= 20"));
+                    target = format!("p{head}({first}, ?n)");
+                }
+                4 if head > 0 => {
+                    body = atoms.iter().map(|(p, a, b)| format!("{}({a}, {b})", name(*p, head - 1))).collect();
+                    target = format!("p{head}({first}, #count({last}))");
+                }
+                5 if head > 0 => {
+                    body = atoms.iter().map(|(p, a, b)| format!("{}({a}, {b})", name(*p, head - 1))).collect();
+                    target = format!("p{head}(#sum({last}, {first}), #max({last}))");
+                }
+                6 => body.push(format!("isInteger({first})")),
+                7 => target = format!("p{head}({first}, {last}), p{head}({last}, {first})"),
+                _ => {}
+            }
+            format!("{target} :- {} .", body.join(", "))
+        },
+    )
+}
+
+fn load(text: &str) -> Program {
+    Program::load(&Source::new("random.rls", text), Path::new("")).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn both_evaluators_derive_the_same(statements in statements()) {
+        let text = statements.join("\n");
+        let program = load(&text);
+        let budget = Budget { tuples: 20_000, secs: 20.0 };
+        let (Ok(fast), Ok(naive)) = (program.close(Engine::Fast, &budget), program.close(Engine::Naive, &budget)) else {
+            // Too large for the naive one: nothing to compare.
+            return Ok(());
+        };
+        for predicate in naive.predicates() {
+            prop_assert_eq!(fast.tuples(predicate), naive.tuples(predicate), "{} in\n{}", predicate, text);
+        }
+    }
+
+    #[test]
+    fn the_parser_never_panics(text in "[?!$#@%~(){}\\[\\]<>:=,. \\n\"\\\\a-cw0-9_^*/+-]{0,80}") {
+        let _ = Program::load(&Source::new("random.rls", text), Path::new(""));
+    }
+}
+
+#[test]
+fn recursion_closes_a_chain() {
+    let program = load("e(1, 2) . e(2, 3) . e(3, 1) . e(3, 4) . p(?x, ?y) :- e(?x, ?y) . p(?x, ?z) :- p(?x, ?y), e(?y, ?z) .");
+    let closure = program.close(Engine::Fast, &Budget::default()).unwrap();
+    assert_eq!(closure.count("p"), 12);
+    assert!(closure.tuples("p").contains(&vec![Term::Integer(1), Term::Integer(1)]));
+}
+
+#[test]
+fn a_program_that_never_ends_is_stopped_at_its_rule() {
+    let program = load("n(0) .\nn(?y) :- n(?x), ?y = ?x + 1 .");
+    let budget = Budget { tuples: 10_000, secs: 10.0 };
+    let fault = program.close(Engine::Fast, &budget).unwrap_err().to_string();
+    assert!(fault.contains("random.rls:2"), "{fault}");
+    let budget = Budget { tuples: usize::MAX, secs: 0.2 };
+    let started = std::time::Instant::now();
+    let fault = program.close(Engine::Fast, &budget).unwrap_err().to_string();
+    assert!(fault.contains("0.2 s") && started.elapsed().as_secs_f64() < 5.0, "{fault}");
+}
+
+/// Nemo's programs that don't give its tables, with the reason.
+const NEMO_DEVIATIONS: [(&str, &str); 1] = [("data-formats/json/authors", "imports JSON")];
+
+/// Runs the programs of a checkout of knowsys/nemo: `NEMO=path/to/nemo cargo test --release nemo`. Without it, nothing to do.
+#[test]
+fn nemo_programs_give_their_tables() {
+    let Some(nemo) = std::env::var_os("NEMO") else { return };
+    let root = PathBuf::from(nemo).join("resources/testcases");
+    let (mut right, mut wrong) = (0, Vec::new());
+    for program in programs(&root) {
+        let name = program.strip_prefix(&root).unwrap().with_extension("").display().to_string();
+        let text = std::fs::read_to_string(&program).unwrap();
+        let result = match text.lines().any(|line| !line.trim_start().starts_with('%') && has_existential(line)) {
+            true => Err("existential rules".to_owned()),
+            false => same_tables(&program),
+        };
+        match result {
+            Ok(()) => right += 1,
+            Err(reason) => wrong.push((name, reason)),
+        }
+    }
+    println!("{right} programs give the expected tables");
+    for (name, reason) in &wrong {
+        println!("{name}: {}", reason.lines().take(6).collect::<Vec<_>>().join("\n    "));
+    }
+    let unexplained: Vec<_> = wrong
+        .iter()
+        .filter(|(name, reason)| reason != "existential rules" && !NEMO_DEVIATIONS.iter().any(|(known, _)| known == name))
+        .collect();
+    assert!(unexplained.is_empty(), "{} without a reason", unexplained.len());
+}
+
+fn has_existential(line: &str) -> bool {
+    line.match_indices('!').any(|(at, _)| line[at + 1..].starts_with(|c: char| c.is_alphabetic()))
+}
+
+fn programs(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(programs(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rls") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Runs a program and compares its exports with the folder of its name, line by line in any order.
+fn same_tables(program: &Path) -> Result<(), String> {
+    let out = tempfile::tempdir().unwrap();
+    run(program, out.path(), &Budget { tuples: 50_000_000, secs: 300.0 }).map_err(|faults| faults.to_string())?;
+    for entry in std::fs::read_dir(program.with_extension("")).unwrap() {
+        let expected = entry.unwrap().path();
+        let lines = |path: &Path| -> BTreeSet<String> {
+            std::fs::read_to_string(path).unwrap_or_default().trim().lines().map(str::to_owned).collect()
+        };
+        let got = lines(&out.path().join(expected.file_name().unwrap()));
+        let wanted = lines(&expected);
+        if got != wanted {
+            let missing: Vec<_> = wanted.difference(&got).take(6).collect();
+            let surplus: Vec<_> = got.difference(&wanted).take(6).collect();
+            let table = expected.file_name().unwrap().to_string_lossy();
+            return Err(format!("{table}: missing {missing:?}, surplus {surplus:?}"));
+        }
+    }
+    Ok(())
+}
