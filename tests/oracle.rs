@@ -112,7 +112,10 @@ fn a_program_that_never_ends_is_stopped_at_its_rule() {
 }
 
 /// Nemo's programs that don't give its tables, with the reason.
-const NEMO_DEVIATIONS: [(&str, &str); 1] = [("data-formats/json/authors", "imports JSON")];
+const NEMO_DEVIATIONS: [(&str, &str); 2] = [
+    ("data-formats/json/authors", "imports JSON"),
+    ("basic/encodings", "Nemo writes the datatype of integers over 64 bits as `xsd:integer`, unexpanded; we write its IRI"),
+];
 
 /// Runs the programs of a checkout of knowsys/nemo: `NEMO=path/to/nemo cargo test --release nemo`. Without it, nothing to do.
 #[test]

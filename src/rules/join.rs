@@ -47,7 +47,7 @@ impl Join<'_, '_, '_> {
                 let width = self.widths[at];
                 let found = self.batches[at].iter().any(|rows| {
                     let start = lower_bound(rows, width, &values[..length]);
-                    rows.get(start..start + length).is_some_and(|row| row == &values[..length])
+                    rows.get(start..start + width).is_some_and(|row| row[..length] == values[..length])
                 });
                 if found { Ok(()) } else { self.run(at + 1) }
             }

@@ -17,7 +17,8 @@ pub(crate) struct Lost;
 /// Parses a rule text. Never fails: what can't be read is left out, and noted in the diagnostics.
 pub fn parse(source: &Source) -> (Syntax, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
-    let mut syntax = Syntax { source: source.clone(), prefixes: Vec::new(), statements: Vec::new(), whole: false };
+    let mut syntax =
+        Syntax { source: source.clone(), prefixes: Vec::new(), base: None, statements: Vec::new(), whole: false };
     if source.text.len() > SIZE_LIMIT {
         let message = format!("rule text of {} bytes is too large", source.text.len());
         let help = format!("at most {SIZE_LIMIT} bytes; keep large tables of facts in a CSV file");
@@ -36,6 +37,7 @@ pub fn parse(source: &Source) -> (Syntax, Diagnostics) {
         }
     }
     syntax.prefixes = parser.prefixes;
+    syntax.base = parser.base;
     syntax.whole = !parser.diagnostics.has_errors();
     (syntax, parser.diagnostics)
 }

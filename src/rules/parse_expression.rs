@@ -224,23 +224,18 @@ impl Parser<'_> {
             Some("0x") => Some(16),
             _ => None,
         };
+        let plain = text.trim_end_matches(['f', 'd']);
         let term = match radix {
-            Some(radix) => match i64::from_str_radix(&format!("{sign}{}", &text[2..]), radix) {
-                Ok(value) => Some(Term::Integer(value)),
-                Err(_) => from_digits(&text[2..], radix).map(|value| double_term(if negative { -value } else { value })),
-            },
-            None => {
-                let plain = text.trim_end_matches(['f', 'd']);
-                match format!("{sign}{plain}").parse::<i64>() {
-                    Ok(value) if plain.len() == text.len() => Some(Term::Integer(value)),
-                    _ => format!("{sign}{plain}").parse::<f64>().ok().filter(|v| v.is_finite()).map(double_term),
-                }
+            Some(radix) => i128::from_str_radix(&format!("{sign}{}", &text[2..]), radix).ok().map(integer),
+            None if plain.len() == text.len() && text.bytes().all(|b| b.is_ascii_digit()) => {
+                format!("{sign}{text}").parse::<i128>().ok().map(integer)
             }
+            None => format!("{sign}{plain}").parse::<f64>().ok().filter(|v| v.is_finite()).map(double_term),
         };
         match term {
             Some(term) => Expression { kind: ExpressionKind::Constant(term), span },
             None => {
-                let help = "a double reaches up to about 1.8e308";
+                let help = "integers have up to 38 digits, doubles reach up to about 1.8e308";
                 self.fault("R013", span.clone(), format!("number `{text}` is out of range"), help);
                 Expression { kind: ExpressionKind::Broken, span }
             }
@@ -285,7 +280,10 @@ impl Parser<'_> {
     }
 }
 
-/// Digits in a radix as a double, where they don't fit an integer.
-fn from_digits(digits: &str, radix: u32) -> Option<f64> {
-    digits.chars().try_fold(0.0, |sum, c| Some(sum * f64::from(radix) + f64::from(c.to_digit(radix)?)))
+/// An integer; one that does not fit 64 bits is kept as a literal, exact but nothing to compute with.
+fn integer(value: i128) -> Term {
+    match i64::try_from(value) {
+        Ok(value) => Term::Integer(value),
+        Err(_) => Term::Literal(value.to_string().into(), format!("{}integer", names::XSD).into()),
+    }
 }

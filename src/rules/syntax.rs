@@ -9,6 +9,8 @@ pub struct Syntax {
     pub source: Source,
     /// Prefixes that it declares, in order: prefix, namespace.
     pub prefixes: Vec<(String, String)>,
+    /// What `@base` says last.
+    pub base: Option<String>,
     /// Its statements in order.
     pub statements: Vec<Statement>,
     /// Whether all of it could be read.

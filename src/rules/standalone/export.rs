@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
+use crate::base::{Diagnostic, Diagnostics, did_you_mean};
 use crate::rules::standalone::program::{Closure, Program};
 use crate::rules::standalone::table::delimiter_of;
 use crate::rules::syntax::{Statement, Syntax, Transfer};
@@ -30,7 +30,7 @@ pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<E
             }
             Statement::Output { predicates, .. } => found.extend(predicates.iter().map(|predicate| Export {
                 predicate: predicate.clone(),
-                path: PathBuf::from(format!("{}.csv", file_name(predicate))),
+                path: PathBuf::from(format!("{}.csv", file_name(syntax, predicate))),
                 delimiter: b',',
             })),
             _ => {}
@@ -54,7 +54,7 @@ fn export(program: &Program, syntax: &Syntax, transfer: &Transfer, diagnostics: 
         Some(OptionValue::One(term)) => Some(values::lexical(term)),
         _ => None,
     };
-    let path = text("resource").unwrap_or_else(|| format!("{}.{}", file_name(&transfer.predicate), transfer.format));
+    let path = text("resource").unwrap_or_else(|| format!("{}.{}", file_name(syntax, &transfer.predicate), transfer.format));
     let relative = Path::new(&path);
     let inside = relative.is_relative() && !relative.components().any(|c| matches!(c, std::path::Component::ParentDir));
     if !inside {
@@ -67,9 +67,11 @@ fn export(program: &Program, syntax: &Syntax, transfer: &Transfer, diagnostics: 
     Some(Export { predicate: transfer.predicate.clone(), path: PathBuf::from(path), delimiter })
 }
 
-/// A predicate's name as a file's: of an IRI the last part.
-fn file_name(predicate: &str) -> &str {
-    names::local(predicate)
+/// A predicate's name as a file's: with its base, and `_` for what file names can't hold.
+fn file_name(syntax: &Syntax, predicate: &str) -> String {
+    let base = syntax.base.as_deref().filter(|_| !predicate.contains(':')).unwrap_or("");
+    let fits = |c: char| c.is_alphanumeric() || ".-_".contains(c);
+    format!("{base}{predicate}").chars().map(|c| if fits(c) { c } else { '_' }).collect()
 }
 
 /// Writes the tuples of a predicate, sorted, and tells how many there are.

@@ -3,14 +3,14 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use oxigraph::io::{RdfFormat, RdfParser};
+use oxigraph::io::{RdfFormat, RdfParseError, RdfParser};
 use oxigraph::model::GraphName;
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, TermId, Terms, did_you_mean};
 use crate::rules::check::{Checking, Role, counted};
 use crate::rules::dataset::from_rdf;
 use crate::rules::program::{Predicates, Program};
-use crate::rules::standalone::table::{ColumnKind, delimiter_of, read_table};
+use crate::rules::standalone::table::{ColumnKind, LeftOut, delimiter_of, read_table};
 use crate::rules::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
 use crate::rules::translate::{OptionValue, options};
 
@@ -206,9 +206,18 @@ pub(super) fn import(
         }
         Content::Rdf { format, base } => read_rdf(reader, *format, base.as_deref(), import.limit, terms, rows),
     });
-    if let Err(reason) = read {
-        let message = format!("`{}` can't be read: {reason}", import.path.display());
-        diagnostics.push(fault(message, "paths are relative to the program's folder"));
+    match read {
+        Err(reason) => {
+            let message = format!("`{}` can't be read: {reason}", import.path.display());
+            diagnostics.push(fault(message, "paths are relative to the program's folder"));
+        }
+        Ok(LeftOut { count: 0, .. }) => {}
+        Ok(LeftOut { count, first }) => {
+            let message = format!("{count} rows of `{}` were left out; the first: {first}", import.path.display());
+            let help = "a row needs as many fields as the predicate has arguments, of the format that its column has";
+            let warning = Diagnostic::warning("R074", message).at(&import.source, import.span.clone()).help(help);
+            diagnostics.push(warning);
+        }
     }
 }
 
@@ -219,7 +228,8 @@ fn read_rdf(
     limit: usize,
     terms: &mut Terms,
     rows: &mut Vec<TermId>,
-) -> Result<(), String> {
+) -> Result<LeftOut, String> {
+    let mut left_out = LeftOut::default();
     let mut parser = RdfParser::from_format(format);
     if let Some(base) = base {
         parser = parser.with_base_iri(base).map_err(|error| error.to_string())?;
@@ -228,7 +238,14 @@ fn read_rdf(
     // The name under which Nemo, too, puts statements without a graph.
     let default_graph = Term::iri("tag:nemo:defaultgraph");
     for quad in parser.for_reader(reader).take(limit) {
-        let quad = quad.map_err(|error| error.to_string())?;
+        let quad = match quad {
+            Ok(quad) => quad,
+            Err(RdfParseError::Io(error)) => return Err(error.to_string()),
+            Err(RdfParseError::Syntax(error)) => {
+                left_out.add(|| error.to_string());
+                continue;
+            }
+        };
         if quads {
             let graph = match quad.graph_name {
                 GraphName::NamedNode(node) => Term::iri(node.as_str()),
@@ -241,5 +258,5 @@ fn read_rdf(
             rows.push(terms.intern(from_rdf(&term)));
         }
     }
-    Ok(())
+    Ok(left_out)
 }

@@ -44,6 +44,23 @@ impl ColumnKind {
     }
 }
 
+/// Rows of a file that did not fit.
+#[derive(Debug, Default)]
+pub(super) struct LeftOut {
+    pub(super) count: usize,
+    /// What was wrong with the first.
+    pub(super) first: String,
+}
+
+impl LeftOut {
+    pub(super) fn add(&mut self, reason: impl FnOnce() -> String) {
+        if self.count == 0 {
+            self.first = reason();
+        }
+        self.count += 1;
+    }
+}
+
 /// The byte between fields.
 pub(super) fn delimiter_of(format: &str, option: Option<&str>) -> u8 {
     match (format, option) {
@@ -67,7 +84,8 @@ pub(super) fn read_table(
     limit: usize,
     terms: &mut Terms,
     rows: &mut Vec<TermId>,
-) -> Result<(), String> {
+) -> Result<LeftOut, String> {
+    let mut left_out = LeftOut::default();
     let mut table = csv::ReaderBuilder::new()
         .delimiter(delimiter)
         .quoting(quoting)
@@ -78,9 +96,13 @@ pub(super) fn read_table(
         let row = match row {
             Ok(row) => row,
             Err(error) if error.is_io_error() => return Err(error.to_string()),
-            Err(_) => continue,
+            Err(error) => {
+                left_out.add(|| error.to_string());
+                continue;
+            }
         };
         if row.len() != columns.len() {
+            left_out.add(|| format!("{} fields instead of {}", row.len(), columns.len()));
             continue;
         }
         let read: Option<Vec<Term>> = row
@@ -89,9 +111,12 @@ pub(super) fn read_table(
             .filter(|(_, kind)| **kind != ColumnKind::Skip)
             .map(|(field, kind)| kind.term(field))
             .collect();
-        rows.extend(read.into_iter().flatten().map(|term| terms.intern(term)));
+        match read {
+            Some(read) => rows.extend(read.into_iter().map(|term| terms.intern(term))),
+            None => left_out.add(|| format!("`{}`", row.iter().collect::<Vec<_>>().join(", "))),
+        }
     }
-    Ok(())
+    Ok(left_out)
 }
 
 /// The term that a field looks like: an IRI, a number, a literal, a name; otherwise it is text.
