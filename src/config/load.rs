@@ -70,7 +70,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics>
 }
 
 /// Faults of one text in the order of their places; texts in the order in which they were read.
-fn in_order_of_place(found: Diagnostics) -> Diagnostics {
+pub(crate) fn in_order_of_place(found: Diagnostics) -> Diagnostics {
     let mut names: Vec<String> = Vec::new();
     let mut faults: Vec<(usize, usize, Diagnostic)> = Vec::new();
     for fault in found {
@@ -89,21 +89,8 @@ fn in_order_of_place(found: Diagnostics) -> Diagnostics {
 
 fn read_tests(table: &mut Table) -> (Vec<Vec<String>>, BTreeMap<String, Span>) {
     let mut places = BTreeMap::new();
-    let header = table.key_span("tests").unwrap_or(0..0);
-    let Some(lists) = table.lists_of_strings("tests") else { return (Vec::new(), places) };
-    if lists.is_empty() {
-        table.fault("C007", header, "`tests` is an empty list", "write it like `tests = [[\"Pick\"]]`");
-    }
     let mut tests = Vec::new();
-    for (idx, list) in lists.into_iter().enumerate() {
-        if list.value.is_empty() {
-            table.fault(
-                "C007",
-                list.span.clone(),
-                "this test has no action",
-                "name at least one, such as `[\"Pick\"]`",
-            );
-        }
+    for (idx, list) in table.some_lists_of_strings("tests").unwrap_or_default().into_iter().enumerate() {
         for (step, action) in list.value.iter().enumerate() {
             places.insert(format!("tests.{idx}.{step}"), action.span.clone());
         }

@@ -12,6 +12,7 @@ mod shelf;
 mod table;
 
 pub use campaign::{Budget, Campaign, Launcher, Overrides, Physics, Range, Sensing};
+pub(crate) use load::in_order_of_place;
 pub use load::load;
 pub use model::{ObjectModel, Part, Shape, Surface};
 pub use ranges::CONTROL_HZ;

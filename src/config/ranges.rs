@@ -58,14 +58,14 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
         gripper_noise_m: 0.0,
     };
     let Some(mut table) = root.table("sensing") else { return sensing };
-    // Half a metre or half a turn of noise already makes sensing worthless.
+    // Half a metre or half a turn (3.2 rad) of noise already makes sensing worthless.
     for (key, value, most) in [
         ("position_noise_m", &mut sensing.position_noise_m, 0.5),
         ("height_noise_m", &mut sensing.height_noise_m, 0.5),
-        ("yaw_noise_rad", &mut sensing.yaw_noise_rad, std::f64::consts::PI),
+        ("yaw_noise_rad", &mut sensing.yaw_noise_rad, 3.2),
         ("size_noise_m", &mut sensing.size_noise_m, 0.5),
         ("localisation_noise_m", &mut sensing.localisation_noise_m, 0.5),
-        ("heading_noise_rad", &mut sensing.heading_noise_rad, std::f64::consts::PI),
+        ("heading_noise_rad", &mut sensing.heading_noise_rad, 3.2),
         ("gripper_noise_m", &mut sensing.gripper_noise_m, 0.5),
     ] {
         set(value, table.number(key, 0.0..=most));

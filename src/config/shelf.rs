@@ -77,13 +77,16 @@ impl Shelf {
         let written = table.as_mut().and_then(|table| table.string("profile"));
         let name = written.as_ref().map_or(DEFAULT_ROBOT, |written| &written.value);
         let place = match &written {
-            Some(path) if path.value.ends_with(".toml") => Some((Files::Disk, beside(folder, &path.value))),
+            Some(path) if path.value.ends_with(".toml") => {
+                let place = beside(folder, &path.value);
+                Files::Disk.read(&place).map(|_| (Files::Disk, place.clone())).map_err(|reason| {
+                    let help = "the path is relative to the configuration";
+                    (format!("cannot read the robot profile {}: {reason}", place.display()), help.to_owned())
+                })
+            }
             _ => self.find_robot(name),
         };
-        if place.is_none() {
-            let known: Vec<String> = self.robots().iter().map(|(_, path)| stem(path)).collect();
-            let message = format!("there is no robot `{name}`");
-            let help = format!("{}; a path to a profile ends in `.toml`", choose(name, &known));
+        if let Err((message, help)) = &place {
             match (&written, &mut table) {
                 (Some(written), Some(table)) => table.fault("C011", written.span.clone(), message, help),
                 _ => root.fault("C011", 0..0, message, help),
@@ -92,12 +95,17 @@ impl Shelf {
         if let Some(table) = table {
             table.finish(found);
         }
-        let (files, path) = place?;
+        let (files, path) = place.ok()?;
         robot::read(&files, &path).map(Arc::new).map_err(|faults| found.extend(faults)).ok()
     }
 
-    fn find_robot(&self, name: &str) -> Option<(Files, PathBuf)> {
-        self.robots().into_iter().find(|(_, path)| stem(path) == name)
+    /// A robot's profile by name, or what is wrong and what to do.
+    fn find_robot(&self, name: &str) -> Result<(Files, PathBuf), (String, String)> {
+        self.robots().into_iter().find(|(_, path)| stem(path) == name).ok_or_else(|| {
+            let mut known: Vec<String> = self.robots().iter().map(|(_, path)| stem(path)).collect();
+            known.dedup();
+            (format!("there is no robot `{name}`"), choose(name, &known))
+        })
     }
 
     /// The robots of the model folder, then the shipped ones.

@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue};
 use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 
 /// Beyond this many, syntax errors are echoes of the first ones.
-const MOST_SYNTAX_ERRORS: usize = 5;
+const MOST_SYNTAX_ERRORS: usize = 3;
 
 /// A value with the place where it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -106,12 +106,14 @@ impl Table {
         self.entries.get(key).is_some_and(|entry| matches!(entry.value.value, Value::Array(_)))
     }
 
-    /// The only key of an untaken sub-table, where there is just one and it holds a list.
+    /// The only key of an untaken sub-table, where there is just one and it holds a list of strings.
     pub fn only_list_of(&self, table: &str) -> Option<String> {
         let Value::Table(entries) = &self.entries.get(table)?.value.value else { return None };
         let mut entries = entries.iter();
         match (entries.next(), entries.next()) {
-            (Some((key, entry)), None) if matches!(entry.value.value, Value::Array(_)) => Some(key.clone()),
+            (Some((key, Entry { value: Located { value: Value::Array(list), .. }, .. })), None) => {
+                list.iter().all(|element| matches!(element.value, Value::String(_))).then(|| key.clone())
+            }
             _ => None,
         }
     }
@@ -157,13 +159,13 @@ impl Table {
     /// A string that is not empty.
     pub fn string(&mut self, key: &str) -> Option<Located<String>> {
         let value = self.take(key)?;
-        self.text_of(key, value)
+        self.text_of(key, "a string", value)
     }
 
     /// A list of strings, none of them empty. The list may be empty: see [`Table::some_strings`].
     pub fn strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let list = self.list(key, "a list of strings")?;
-        Some(list.into_iter().filter_map(|value| self.text_of(key, value)).collect())
+        Some(list.into_iter().filter_map(|value| self.text_of(key, "a list of strings", value)).collect())
     }
 
     /// A list of at least one string, with the place of the whole list.
@@ -177,15 +179,27 @@ impl Table {
         (!list.is_empty()).then_some(list)
     }
 
-    /// A list of lists of strings. Both may be empty; each inner list has its place.
-    pub fn lists_of_strings(&mut self, key: &str) -> Option<Vec<Located<Vec<Located<String>>>>> {
+    /// A list of at least one list of at least one string; each inner list has its place.
+    pub fn some_lists_of_strings(&mut self, key: &str) -> Option<Vec<Located<Vec<Located<String>>>>> {
         let expected = "a list of lists of strings";
+        let place = self.entries.get(key).map(|entry| entry.value.span.clone());
         let outer = self.list(key, expected)?;
+        if outer.is_empty() {
+            self.fault("C007", place?, format!("{} is an empty list", self.name(key)), example(key, expected));
+        }
         let mut lists = Vec::new();
         for Located { value, span } in outer {
             match value {
+                Value::Array(inner) if inner.is_empty() => {
+                    self.fault(
+                        "C007",
+                        span,
+                        format!("an empty list stands in {}", self.name(key)),
+                        "name at least one",
+                    );
+                }
                 Value::Array(inner) => {
-                    let value = inner.into_iter().filter_map(|value| self.text_of(key, value)).collect();
+                    let value = inner.into_iter().filter_map(|value| self.text_of(key, expected, value)).collect();
                     lists.push(Located { value, span });
                 }
                 other => self.wrong(key, expected, &Located { value: other, span }),
@@ -308,15 +322,16 @@ impl Table {
         }
     }
 
-    fn text_of(&mut self, key: &str, value: Located<Value>) -> Option<Located<String>> {
+    /// The text of a value, which is the whole of what `expected` says or an element of it.
+    fn text_of(&mut self, key: &str, expected: &str, value: Located<Value>) -> Option<Located<String>> {
         match value.value {
             Value::String(text) if text.trim().is_empty() => {
-                self.fault("C006", value.span, format!("a string of {} is empty", self.name(key)), "write a name");
+                self.fault("C006", value.span, format!("an empty string stands in {}", self.name(key)), "write a name");
                 None
             }
             Value::String(text) => Some(Located { value: text, span: value.span }),
             other => {
-                self.wrong(key, "a string", &Located { value: other, span: value.span });
+                self.wrong(key, expected, &Located { value: other, span: value.span });
                 None
             }
         }
@@ -375,7 +390,7 @@ impl Table {
     }
 
     fn wrong_length(&mut self, key: &str, span: Span, expected: &str, length: usize) {
-        let message = format!("{} must be {expected}, but this list has {length} elements", self.name(key));
+        let message = format!("{} must be {expected}, but this list has {length}", self.name(key));
         self.fault("C004", span, message, example(key, expected));
     }
 
@@ -455,7 +470,8 @@ fn example(key: &str, expected: &str) -> String {
         text if text.contains("list of tables") => return format!("write one `[[{key}]]` header for each"),
         text if text.contains("range of whole") => "[1, 4]",
         text if text.contains("range of") => "[0.8, 1.2]",
-        text if text.contains("list of") => "[0.1, 0.2]",
+        text if text.contains("list of 2") => "[0.1, 0.2]",
+        text if text.contains("list of") => "[0.1, 0.2, 0.3]",
         text if text.contains("whole number") => "3",
         text if text.contains("number") => "0.5",
         text if text.contains("table") => return format!("write it as a table: `[{key}]`"),

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics, Digest, Files, Term, names};
+use crate::base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names};
 use crate::ontology::graph::{Graph, rdfs};
 use crate::ontology::read::Statement;
 use crate::ontology::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
@@ -37,6 +37,7 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         .map(|iri| (names::local(&iri).to_owned(), action(&graph, iri)))
         .collect();
     check::actions(&graph, &actions, &mut found);
+    let found = in_order_of_place(found, graph.sources());
     let mut digest = Digest::new();
     graph.sources().iter().for_each(|source| digest.update(source.text.as_bytes()));
     found.or(Ontology {
@@ -50,6 +51,16 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         vocabulary: vocabulary(&graph),
         digest: digest.finish(),
     })
+}
+
+/// Faults in the order of their places, text by text.
+fn in_order_of_place(found: Diagnostics, sources: &[Source]) -> Diagnostics {
+    let rank = |fault: &Diagnostic| sources.iter().position(|source| fault.source.as_ref() == Some(source));
+    let mut faults: Vec<Diagnostic> = found.into_iter().collect();
+    faults.sort_by_key(|fault| (rank(fault), fault.span.as_ref().map_or(0, |span| span.start)));
+    let mut sorted = Diagnostics::new();
+    faults.into_iter().for_each(|fault| sorted.push(fault));
+    sorted
 }
 
 /// Libraries in the order of their paths, each once.

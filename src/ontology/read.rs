@@ -140,10 +140,22 @@ fn syntax_error(source: &Source, error: &RdfParseError, end: usize) -> Diagnosti
     let text = error.to_string();
     let message =
         text.rsplit_once("Parser error at ").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, m)| m);
-    let message = message.trim_end_matches('.').replace('\n', " ");
-    Diagnostic::error("O002", format!("this is not {}: {message}", language(source)))
-        .at(source, span)
-        .help("the ending tells the language: .ttl is Turtle, .owl, .rdf and .xml are RDF/XML")
+    let message = lower_case_start(&message.trim_end_matches('.').replace('\n', " "));
+    Diagnostic::error("O002", format!("this is not {}: {message}", language(source))).at(source, span).help(
+        match format_of(source) {
+            RdfFormat::RdfXml => "every tag that is opened must be closed, and every prefix declared by `xmlns:…`",
+            _ => "every statement ends in ` .`, and every prefix is declared by `@prefix …: <…> .`",
+        },
+    )
+}
+
+/// "A dot is missing" becomes "a dot is missing"; words in capitals stay.
+fn lower_case_start(text: &str) -> String {
+    let mut chars = text.chars();
+    match (chars.next(), chars.clone().next()) {
+        (Some(first), Some(second)) if !second.is_uppercase() => first.to_lowercase().chain(chars).collect(),
+        _ => text.to_owned(),
+    }
 }
 
 fn line_before(text: &str, end: usize) -> Span {

@@ -26,7 +26,7 @@ pub(super) fn read(
         found.push(Diagnostic::error(code, message).at(source, span.clone()).help(help));
     };
     let Some(path) = relative_path(&statement.object) else {
-        let help = "name it relative to the ontology file, such as `<../rules/moved_object.rls>`";
+        let help = "name it relative to the ontology file, such as `<../rules/moved_object.rls>`, or in quotes";
         fault("O011", format!("the rule file {} is not given by a relative path", statement.object), help.to_owned());
         return None;
     };

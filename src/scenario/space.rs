@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::base::{Diagnostics, did_you_mean, names, nearest};
-use crate::config::{Campaign, ObjectModel, Physics, RobotProfile, Sensing};
+use crate::config::{self, Campaign, ObjectModel, Physics, RobotProfile, Sensing};
 use crate::ontology::Ontology;
 use crate::scenario::placement;
 
@@ -56,7 +56,7 @@ impl Space {
             check_fit(campaign, key, &surfaces, &mut found);
         }
         let names = campaign.candidates.iter().filter(|(name, _)| !is_of_objects(name));
-        found.or(Self {
+        config::in_order_of_place(found).or(Self {
             tests: campaign.tests.len(),
             surfaces,
             targets,
@@ -162,9 +162,9 @@ fn check_categories(campaign: &Campaign, ontology: &Ontology, found: &mut Diagno
             let short = names::shorten(&model.category);
             let message =
                 format!("the model `{}` is of the category `{short}`, which the ontology does not have", model.name);
-            let classes: Vec<String> = ontology.superclasses.keys().map(|class| names::shorten(class)).collect();
-            let help = match nearest(&short, classes.iter().map(String::as_str)) {
-                Some(near) => format!("did you mean `{near}`? it stands in the model's file"),
+            let classes: BTreeSet<&str> = ontology.superclasses.keys().map(|class| names::local(class)).collect();
+            let help = match nearest(names::local(&model.category), classes) {
+                Some(near) => format!("did you mean `{near}`? the category stands in the model's file"),
                 None => format!("state it in the ontology: `{short} a owl:Class ; rdfs:subClassOf act:Graspable`"),
             };
             found.push(campaign.fault("S005", &key, message).help(help));

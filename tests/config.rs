@@ -1,0 +1,163 @@
+//! Configurations: all parameters, what serves where nothing is said, and files that can't be read.
+//!
+//! Wrong values are in `tests/diagnostics/config/`.
+
+use std::path::{Path, PathBuf};
+
+use actcheck::base::Files;
+use actcheck::config::{self, Campaign, Launcher, Overrides};
+
+fn load(path: &Path) -> Campaign {
+    config::load(path, &Overrides::default()).unwrap_or_else(|found| panic!("{found}"))
+}
+
+fn load_text(text: &str) -> Campaign {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.toml");
+    std::fs::write(&path, text).unwrap();
+    load(&path)
+}
+
+fn refused(path: &Path) -> String {
+    config::load(path, &Overrides::default()).unwrap_err().to_string()
+}
+
+#[test]
+fn every_shipped_configuration_loads() {
+    for path in Files::Disk.list(Path::new("configs")) {
+        let campaign = load(&path);
+        assert!(!campaign.tests.is_empty(), "{}", path.display());
+    }
+}
+
+/// The paper's eleven parameters, those of later actions included.
+#[test]
+fn all_parameters_of_the_paper_are_read() {
+    let campaign = load_text(
+        r#"
+        tests = [["Pick"], ["MoveTo", "PerceivePlane", "Pick", "Place"]]
+        test_count = 15
+        test_launcher = "python3 my_robot.py"
+        nav_obstacle_list = ["box", "bottle"]
+        nav_obstacle_count = 2
+        [world]
+        worlds = ["lab", "kitchen"]
+        [objectLocation]
+        location_list = ["by the window"]
+        [objectSurface]
+        object_surfaces = ["coffee_table"]
+        [placeSurface]
+        place_object_surfaces = ["mini_coffee_table", "table"]
+        [pickObject]
+        model_list = ["glass"]
+        [surfaceObjects]
+        model_list = ["mug", "can"]
+        "#,
+    );
+    assert_eq!(campaign.tests[1], ["MoveTo", "PerceivePlane", "Pick", "Place"]);
+    assert_eq!(campaign.test_count, 15);
+    assert_eq!(campaign.launcher, Launcher::Program("python3 my_robot.py".to_owned()));
+    assert_eq!((campaign.nav_obstacles.join(" "), campaign.nav_obstacle_count), ("box bottle".to_owned(), 2));
+    let candidates: Vec<String> =
+        campaign.candidates.iter().map(|(name, values)| format!("{name}: {}", values.join(", "))).collect();
+    assert_eq!(
+        candidates,
+        [
+            "objectLocation: by the window",
+            "objectSurface: coffee_table",
+            "pickObject: glass",
+            "placeSurface: mini_coffee_table, table",
+            "surfaceObjects: mug, can",
+            "world: lab, kitchen",
+        ]
+    );
+    assert_eq!(campaign.other_count, (1, 4));
+}
+
+#[test]
+fn without_anything_said_the_shipped_files_serve() {
+    let campaign = load_text("tests = [[\"Pick\"]]\ntest_count = 1\n");
+    assert_eq!(campaign.ontology, (Files::Shipped, PathBuf::from("ontology/actions.ttl")));
+    assert!(campaign.models.contains_key("glass") && campaign.models["coffee_table"].surface.is_some());
+    assert_eq!(
+        campaign.robot.urdf.name.strip_prefix("built-in:").map(|name| name.contains("mobile_manipulator")),
+        Some(true)
+    );
+    assert_eq!((campaign.seed, campaign.other_count), (0, (0, 0)));
+    assert_eq!(campaign.launcher, Launcher::Reference);
+    assert!(campaign.history.ends_with(".actcheck"));
+    assert_eq!(campaign.sensing.position_noise_m, 0.0);
+}
+
+#[test]
+fn a_table_of_one_list_may_be_named_after_any_designator() {
+    let campaign = load_text("tests = [[\"Pour\"]]\ntest_count = 1\n[drink]\nkinds = [\"tea\", \"milk\"]\n");
+    assert_eq!(campaign.candidates["drink"], ["tea", "milk"]);
+    assert!(campaign.places.contains_key("drink") && campaign.places.contains_key("drink.1"));
+}
+
+#[test]
+fn numbers_of_other_objects_may_be_exact() {
+    let count = |text: &str| {
+        load_text(&format!(
+            "tests = [[\"Pick\"]]\ntest_count = 1\n[surfaceObjects]\nmodel_list = [\"mug\"]\ncount = {text}\n"
+        ))
+        .other_count
+    };
+    assert_eq!(count("3"), (3, 3));
+    assert_eq!(count("0"), (0, 0));
+    assert_eq!(count("[0, 7]"), (0, 7));
+}
+
+#[test]
+fn paths_are_relative_to_the_configuration_and_the_command_line_wins() {
+    let campaign = load(Path::new("configs/pick.toml"));
+    assert_eq!(campaign.ontology, (Files::Disk, PathBuf::from("ontology/actions.ttl")));
+    assert_eq!(campaign.history, Path::new("configs/.actcheck"));
+    let overrides = Overrides { runs: Some(2), seed: Some(99), history: Some(PathBuf::from("elsewhere")) };
+    let campaign = config::load(Path::new("configs/pick.toml"), &overrides).unwrap();
+    assert_eq!((campaign.test_count, campaign.seed, campaign.history), (2, 99, PathBuf::from("elsewhere")));
+}
+
+#[test]
+fn places_are_kept_for_later_stages() {
+    let campaign = load(Path::new("configs/pick.toml"));
+    let written = |key: &str| &campaign.source.text[campaign.places[key].clone()];
+    assert_eq!(written("tests.0.0"), "\"Pick\"");
+    assert_eq!(written("pickObject.0"), "\"glass\"");
+    assert_eq!(written("pickObject"), "pickObject");
+}
+
+#[test]
+fn a_configuration_that_can_not_be_read_is_told_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("none.toml");
+    assert!(refused(&missing).contains("there is no such file"));
+    assert!(refused(folder.path()).contains("it is a folder"));
+    let binary = folder.path().join("binary.toml");
+    std::fs::write(&binary, [0xff, 0xfe, 0x00]).unwrap();
+    assert!(refused(&binary).contains("it is not UTF-8 text"));
+    assert!(refused(&binary).starts_with("C001"));
+    let empty = folder.path().join("empty.toml");
+    std::fs::write(&empty, "").unwrap();
+    assert!(refused(&empty).contains("`tests` is missing"));
+}
+
+/// Deep nesting and long lists are refused or read, never a crash.
+#[test]
+fn monstrous_texts_do_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.toml");
+    for text in [
+        format!("tests = {}{}", "[".repeat(100_000), "]".repeat(100_000)),
+        format!("tests = [[\"Pick\"]]\n{}", "[a.b.c]\n".repeat(2_000)),
+        format!("tests = [{}]\ntest_count = 1", "[\"Pick\"],".repeat(10_000)),
+        "\u{feff}tests = [[\"Pick\"]]\r\ntest_count = 1\r\n".to_owned(),
+        "tests = [[\"Pick\"]]\ntest_count = 1\0".to_owned(),
+        "\"tests\" = [[\"Päck🦀\"]]\n'test_count' = 0x10\n".to_owned(),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        // Whatever it says, it says it.
+        let _ = config::load(&path, &Overrides::default()).map_err(|found| found.to_string());
+    }
+}
