@@ -10,6 +10,8 @@ mod ranges;
 pub mod robot;
 mod shelf;
 mod table;
+mod value;
+mod words;
 
 pub use campaign::{Budget, Campaign, Launcher, Overrides, Physics, Range, Sensing};
 pub(crate) use load::in_order_of_place;
@@ -17,4 +19,5 @@ pub use load::load;
 pub use model::{ObjectModel, Part, Shape, Surface};
 pub use ranges::CONTROL_HZ;
 pub use robot::RobotProfile;
-pub use table::{Located, Table};
+pub use table::Table;
+pub use value::Located;

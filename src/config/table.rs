@@ -2,24 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
-use std::ops::{Bound, RangeBounds, RangeInclusive};
-
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use std::ops::{RangeBounds, RangeInclusive};
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
-
-/// Beyond this many, syntax errors are echoes of the first ones.
-const MOST_SYNTAX_ERRORS: usize = 3;
-
-/// A value with the place where it is written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Located<T> {
-    /// The value.
-    pub value: T,
-    /// Where it is written.
-    pub span: Span,
-}
+use crate::config::value::{self, Entry, Located, Value};
+use crate::config::words::{example, in_words};
 
 /// A table that is being read.
 ///
@@ -38,43 +25,13 @@ pub struct Table {
     found: Diagnostics,
 }
 
-#[derive(Debug)]
-struct Entry {
-    key_span: Span,
-    value: Located<Value>,
-}
-
-#[derive(Debug)]
-enum Value {
-    String(String),
-    /// Nothing where it does not fit 64 bits.
-    Integer(Option<i64>),
-    /// Nothing where it is too large for a double.
-    Float(Option<f64>),
-    Boolean(bool),
-    Datetime,
-    Array(Vec<Located<Value>>),
-    Table(BTreeMap<String, Entry>),
-}
-
 impl Table {
     /// The root table of a text.
     ///
     /// # Errors
     /// C002 for each place where the text is not TOML.
     pub fn parse(source: &Source) -> Result<Self, Diagnostics> {
-        let (root, errors) = DeTable::parse_recoverable(&source.text);
-        let mut found = Diagnostics::new();
-        for error in errors.iter().take(MOST_SYNTAX_ERRORS) {
-            let span = error.span().unwrap_or(0..0);
-            found.push(
-                Diagnostic::error("C002", format!("this is not TOML: {}", error.message()))
-                    .at(source, span)
-                    .help("see https://toml.io for how tables, strings and lists are written"),
-            );
-        }
-        let entries = entries_of(root.get_ref());
-        found.or(Self::new(source, String::new(), 0..0, entries))
+        Ok(Self::new(source, String::new(), 0..0, value::parse(source)?))
     }
 
     fn new(source: &Source, path: String, span: Span, entries: BTreeMap<String, Entry>) -> Self {
@@ -408,81 +365,10 @@ impl Table {
     }
 }
 
-impl Value {
-    fn kind(&self) -> &'static str {
-        match self {
-            Self::String(_) => "a string",
-            Self::Integer(_) => "a whole number",
-            Self::Float(_) => "a number",
-            Self::Boolean(_) => "a boolean",
-            Self::Datetime => "a date or time",
-            Self::Array(_) => "a list",
-            Self::Table(_) => "a table",
-        }
-    }
-}
-
-fn entries_of(table: &DeTable<'_>) -> BTreeMap<String, Entry> {
-    table
-        .iter()
-        .map(|(key, value)| (key.get_ref().to_string(), Entry { key_span: key.span(), value: located(value) }))
-        .collect()
-}
-
-fn located(value: &Spanned<DeValue<'_>>) -> Located<Value> {
-    let span = value.span();
-    let value = match value.get_ref() {
-        DeValue::String(text) => Value::String(text.to_string()),
-        DeValue::Integer(number) => Value::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok()),
-        DeValue::Float(number) => Value::Float(number.as_str().parse().ok()),
-        DeValue::Boolean(boolean) => Value::Boolean(*boolean),
-        DeValue::Datetime(_) => Value::Datetime,
-        DeValue::Array(list) => Value::Array(list.iter().map(located).collect()),
-        DeValue::Table(table) => Value::Table(entries_of(table)),
-    };
-    Located { value, span }
-}
-
-/// "a number of at least 0 and at most 1": bounds at or beyond `unlimited` are left out.
-fn in_words<T: PartialOrd + Display>(what: &str, bounds: &impl RangeBounds<T>, unlimited: &T) -> String {
-    let low = match bounds.start_bound() {
-        Bound::Included(low) => Some(format!("of at least {low}")),
-        Bound::Excluded(low) => Some(format!("above {low}")),
-        Bound::Unbounded => None,
-    };
-    let high = match bounds.end_bound() {
-        Bound::Included(high) | Bound::Excluded(high) if high >= unlimited => None,
-        Bound::Included(high) => Some(format!("at most {high}")),
-        Bound::Excluded(high) => Some(format!("below {high}")),
-        Bound::Unbounded => None,
-    };
-    match (low, high) {
-        (Some(low), Some(high)) => format!("{what} {low} and {high}"),
-        (Some(one), None) | (None, Some(one)) => format!("{what} {one}"),
-        (None, None) => what.to_owned(),
-    }
-}
-
-fn example(key: &str, expected: &str) -> String {
-    let value = match expected {
-        text if text.contains("list of lists") => "[[\"…\"], [\"…\", \"…\"]]",
-        text if text.contains("list of strings") => "[\"…\", \"…\"]",
-        text if text.contains("list of tables") => return format!("write one `[[{key}]]` header for each"),
-        text if text.contains("range of whole") => "[1, 4]",
-        text if text.contains("range of") => "[0.8, 1.2]",
-        text if text.contains("list of 2") => "[0.1, 0.2]",
-        text if text.contains("list of") => "[0.1, 0.2, 0.3]",
-        text if text.contains("whole number") => "3",
-        text if text.contains("number") => "0.5",
-        text if text.contains("table") => return format!("write it as a table: `[{key}]`"),
-        text if text.contains("true") => "true",
-        _ => "\"…\"",
-    };
-    format!("write it like `{key} = {value}`")
-}
-
 #[cfg(test)]
 mod tests {
+    use std::ops::Bound;
+
     use super::*;
 
     fn faults(text: &str, read: impl FnOnce(&mut Table)) -> Vec<String> {

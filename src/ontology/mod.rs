@@ -4,6 +4,7 @@
 
 mod assemble;
 mod check;
+mod file_iri;
 mod graph;
 mod literal;
 mod model;

@@ -3,22 +3,15 @@
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use oxigraph::io::{RdfFormat, RdfParseError, RdfParser};
 
 use crate::base::{Diagnostic, Diagnostics, Files, Source, Span, Term, names};
-use crate::ontology::literal;
+use crate::ontology::{file_iri, literal};
 
-/// IRIs of files begin so. They name a file by its path from the ontology's folder, never by a path of a machine.
-const FILE: &str = "https://w3id.org/actcheck/file/";
-/// One folder above the one below it. Enough of them stand above the ontology's folder for any sensible `../../…`.
-const ABOVE: &str = "~above~/";
-const LEVELS: usize = 12;
-/// The ontology's own folder.
-const HERE: &str = "~here~/";
 /// Beyond this many, syntax errors of one text are echoes of the first ones.
 const MOST_SYNTAX_ERRORS: usize = 5;
 /// Imports beyond this are a mistake.
@@ -49,13 +42,13 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
     let mut reading = Reading::default();
     let folder = root.parent().unwrap_or(Path::new(""));
     let name = root.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let mut waiting: Vec<(String, Option<(usize, Span)>)> = vec![(encoded(&name), None)];
+    let mut waiting: Vec<(String, Option<(usize, Span)>)> = vec![(file_iri::encoded(&name), None)];
     let mut seen: BTreeSet<String> = BTreeSet::new();
     while let Some((relative, importer)) = waiting.pop() {
         if !seen.insert(relative.clone()) || seen.len() > MOST_FILES {
             continue;
         }
-        let path = on_disk(folder, &relative);
+        let path = file_iri::on_disk(folder, &relative);
         let source = match files.read(&path) {
             Ok(source) => source,
             Err(reason) => {
@@ -64,7 +57,7 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
             }
         };
         let text = reading.sources.len();
-        parse(&source, text, &format!("{}{relative}", base()), &mut reading.statements, found);
+        parse(&source, text, &file_iri::base_of(&relative), &mut reading.statements, found);
         reading.sources.push(source);
         let mut imports = imports_of(&reading, text);
         imports.reverse();
@@ -92,7 +85,7 @@ fn imports_of(reading: &Reading, text: usize) -> Vec<(String, Option<(usize, Spa
         reading.statements.iter().filter(|statement| statement.text == text && *statement.predicate == *imports);
     of_text
         .filter_map(|statement| {
-            let relative = relative_of(statement.object.as_iri()?)?;
+            let relative = file_iri::relative_of(statement.object.as_iri()?)?;
             Some((relative, Some((text, reading.place(statement, statement.object.as_iri()?)))))
         })
         .collect()
@@ -247,97 +240,13 @@ fn floor_char(text: &str, offset: usize) -> usize {
     offset
 }
 
-fn base() -> String {
-    format!("{FILE}{}{HERE}", ABOVE.repeat(LEVELS))
-}
-
-/// Path of a file IRI from the ontology's folder, with slashes; nothing for any other IRI.
-///
-/// `…/close_object.rls` next to the folder is `../close_object.rls`.
-pub(super) fn relative_of(iri: &str) -> Option<String> {
-    let rest = iri.strip_prefix(FILE)?;
-    let (rest, levels) = without_above(rest);
-    match rest.strip_prefix(HERE) {
-        Some(here) => Some(here.to_owned()),
-        None => Some(format!("{}{rest}", "../".repeat(LEVELS.saturating_sub(levels) + 1))),
-    }
-}
-
-fn without_above(mut rest: &str) -> (&str, usize) {
-    let mut levels = 0;
-    while let Some(shorter) = rest.strip_prefix(ABOVE) {
-        (rest, levels) = (shorter, levels + 1);
-    }
-    (rest, levels)
-}
-
-/// File IRIs without the scaffolding that made `..` work: `…/file/ontology/actions.ttl`, `…/file/rules/moved_object.rls`.
+/// File IRIs without the scaffolding that makes `..` work.
 fn make_plain(statement: &mut Statement) {
     for term in [&mut statement.subject, &mut statement.object] {
         if let Term::Iri(iri) = term
-            && let Some(relative) = relative_of(iri)
+            && let Some(relative) = file_iri::relative_of(iri)
         {
-            *iri = plain(&relative).into();
+            *iri = file_iri::plain(&relative).into();
         }
     }
-}
-
-fn plain(relative: &str) -> String {
-    match relative.strip_prefix("../") {
-        Some(beside) if !beside.starts_with("../") => format!("{FILE}{beside}"),
-        Some(above) => format!("{FILE}{}", above.replace("../", "above/")),
-        None => format!("{FILE}ontology/{relative}"),
-    }
-}
-
-/// Path from the ontology's folder of a plain file IRI; nothing for any other IRI.
-pub(super) fn path_of_plain(iri: &str) -> Option<String> {
-    let rest = iri.strip_prefix(FILE)?;
-    Some(match rest.strip_prefix("ontology/") {
-        Some(here) => decoded(here),
-        None => format!("../{}", decoded(&rest.replace("above/", "../"))),
-    })
-}
-
-/// A file of which the path from the ontology's folder is known, as an IRI writes it.
-fn on_disk(folder: &Path, relative: &str) -> PathBuf {
-    beside(folder, &decoded(relative))
-}
-
-/// A path seen from where the program runs: without `..` where that changes nothing.
-pub(super) fn beside(folder: &Path, relative: &str) -> PathBuf {
-    let (mut base, mut rest) = (folder.to_path_buf(), Path::new(relative));
-    while let Ok(shorter) = rest.strip_prefix("..") {
-        if base.file_name().is_none() || base.is_symlink() || !base.pop() {
-            break;
-        }
-        rest = shorter;
-    }
-    base.join(rest)
-}
-
-fn encoded(name: &str) -> String {
-    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
-    name.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
-}
-
-/// Percent signs with two hexadecimal digits become the bytes that they stand for, where that gives UTF-8.
-fn decoded(text: &str) -> String {
-    let bytes = text.as_bytes();
-    let mut out = Vec::with_capacity(bytes.len());
-    let mut idx = 0;
-    while let Some(byte) = bytes.get(idx) {
-        let hex = bytes.get(idx + 1..idx + 3).filter(|_| *byte == b'%').and_then(|hex| std::str::from_utf8(hex).ok());
-        match hex.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
-            Some(value) => {
-                out.push(value);
-                idx += 3;
-            }
-            None => {
-                out.push(*byte);
-                idx += 1;
-            }
-        }
-    }
-    String::from_utf8(out).unwrap_or_else(|_| text.to_owned())
 }

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use crate::base::{Diagnostic, Diagnostics, Files, Term, digest_of, nearest};
+use crate::ontology::file_iri::{beside, path_of_plain};
 use crate::ontology::graph::Graph;
-use crate::ontology::read::{Statement, beside, path_of_plain};
+use crate::ontology::read::Statement;
 use crate::ontology::{RuleFile, RuleLanguage};
 
 /// Reads the rule file that a statement's object names: an IRI or a string, relative to the ontology file.
