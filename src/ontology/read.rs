@@ -94,7 +94,7 @@ fn imports_of(reading: &Reading, text: usize) -> Vec<(String, Option<(usize, Spa
 /// Parses one text. What comes before and after a syntax error still counts.
 fn parse(source: &Source, text: usize, base: &str, statements: &mut Vec<Statement>, found: &mut Diagnostics) {
     let format = format_of(source);
-    let position = Rc::new(Cell::new(0));
+    let position = Rc::new(Cell::new(mark_length(source)));
     let lines = Lines { text: source.text.as_bytes(), position: Rc::clone(&position) };
     let parser = RdfParser::from_format(format).with_base_iri(base).unwrap_or_else(|_| RdfParser::from_format(format));
     let mut blanks: BTreeMap<String, Arc<str>> = BTreeMap::new();
@@ -124,7 +124,9 @@ fn syntax_error(source: &Source, error: &RdfParseError, end: usize) -> Diagnosti
         RdfParseError::Syntax(error) => error.location(),
         RdfParseError::Io(_) => None,
     };
-    let offset = |position: u64| usize::try_from(position).unwrap_or(end).min(source.text.len());
+    let offset = |position: u64| {
+        usize::try_from(position).map_or(end, |position| position + mark_length(source)).min(source.text.len())
+    };
     let span = match location {
         Some(range) => offset(range.start.offset)..offset(range.end.offset),
         None => line_before(&source.text, end),
@@ -164,6 +166,11 @@ fn line_before(text: &str, end: usize) -> Span {
 
 fn language(source: &Source) -> &'static str {
     if format_of(source) == RdfFormat::RdfXml { "RDF/XML" } else { "Turtle" }
+}
+
+/// Some editors begin texts with a byte order mark, which the parsers do not know. Unit: bytes.
+fn mark_length(source: &Source) -> usize {
+    if source.text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 }
 }
 
 /// By the ending where it says something, otherwise by how the text begins.
