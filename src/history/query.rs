@@ -1,24 +1,51 @@
 //! SPARQL over the history, for people: prefixes are known, faults have their place, updates are refused.
 
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::time::Duration;
+
 use oxigraph::sparql::{QueryEvaluationError, QueryResults, SparqlEvaluator};
 use oxigraph::store::Store;
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, names};
+use crate::history::syntax_fault::syntax_fault;
 use crate::history::terms::from_store;
 use crate::history::{Cancel, QueryAnswer};
 
 /// Words with which an update begins.
 const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREATE", "ADD", "MOVE", "COPY", "WITH"];
-/// Expected words that a message lists; a syntax error can have a hundred.
-const EXPECTED_SHOWN: usize = 8;
+/// How often a waiting query looks whether it was stopped: nobody notices this much.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Answers a query.
+///
+/// The evaluation looks at its token only when it reads the store, which a join of large results may not do for minutes. So it
+/// has a thread of its own, which is left alone (to end at its next look) when the query is stopped.
 pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     let prepared =
         evaluator(cancel).parse_query(&*text.text).map_err(|error| syntax_fault(text, &error.to_string()))?;
-    let results = prepared.on_store(store).execute().map_err(|error| evaluation_fault(text, &error))?;
-    collect(results).map_err(|error| evaluation_fault(text, &error).into())
+    let (sender, receiver) = sync_channel(1);
+    let store = store.clone();
+    std::thread::spawn(move || {
+        let answer = prepared.on_store(&store).execute().and_then(collect);
+        drop(store);
+        // Nobody listens any more when the query was stopped.
+        let _ = sender.send(answer);
+    });
+    loop {
+        match receiver.recv_timeout(LOOK_EVERY) {
+            Ok(answer) => return answer.map_err(|error| evaluation_fault(text, &error).into()),
+            Err(RecvTimeoutError::Timeout) if cancel.is_cancelled() => return Err(stopped(text).into()),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into());
+            }
+        }
+    }
+}
+
+fn stopped(text: &Source) -> Diagnostic {
+    Diagnostic::error("H013", "the query was stopped before it had ended").in_source(text)
 }
 
 /// An evaluator that knows the prefixes and can be stopped.
@@ -61,9 +88,7 @@ fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationErro
 
 fn evaluation_fault(text: &Source, error: &QueryEvaluationError) -> Diagnostic {
     match error {
-        QueryEvaluationError::Cancelled => {
-            Diagnostic::error("H013", "the query was stopped before it had ended").in_source(text)
-        }
+        QueryEvaluationError::Cancelled => stopped(text),
         QueryEvaluationError::UnsupportedService(_) | QueryEvaluationError::Service(_) => {
             Diagnostic::error("H012", "`SERVICE` asks another endpoint, which is not done here")
                 .in_source(text)
@@ -104,53 +129,6 @@ fn first_keyword(text: &str) -> Option<(&str, Span)> {
     }
 }
 
-/// A syntax error of the parser, which reads `error at 1:8: expected one of …`, at its place.
-fn syntax_fault(text: &Source, error: &str) -> Diagnostic {
-    let place = error.strip_prefix("error at ").and_then(|rest| {
-        let (place, expected) = rest.split_once(": ")?;
-        let (line, column) = place.split_once(':')?;
-        Some((offset(&text.text, line.parse().ok()?, column.parse().ok()?), expected))
-    });
-    let Some((start, expected)) = place else {
-        return Diagnostic::error("H010", format!("this is no SPARQL query: {error}")).in_source(text);
-    };
-    let rest = &text.text[start..];
-    let length = rest.find(char::is_whitespace).filter(|length| *length > 0);
-    let length = length.unwrap_or_else(|| if start < text.text.len() { rest.len() } else { 0 });
-    let message = match &rest[..length] {
-        "" => "the query ends too early".to_owned(),
-        found => format!("this is no SPARQL query: `{}` can't stand here", found.chars().take(40).collect::<String>()),
-    };
-    let fault = Diagnostic::error("H010", message).at(text, start..start + length);
-    if expected.contains("Prefix not found") || expected.contains("prefix not found") {
-        let known: Vec<&str> = names::PREFIXES.iter().map(|(prefix, _)| *prefix).collect();
-        return fault.help(format!(
-            "its prefix is not known; declare it with `PREFIX`, or use one of {} which are",
-            known.join(", ")
-        ));
-    }
-    fault.help(shown(expected))
-}
-
-/// The expected words, shortened to a readable number.
-fn shown(expected: &str) -> String {
-    let Some(list) = expected.strip_prefix("expected one of ") else { return expected.to_owned() };
-    let words: Vec<&str> = list.split(", ").collect();
-    if words.len() <= EXPECTED_SHOWN {
-        return expected.to_owned();
-    }
-    format!("expected one of {} and {} more", words[..EXPECTED_SHOWN].join(", "), words.len() - EXPECTED_SHOWN)
-}
-
-/// Byte offset of a line and a column (of characters), both counted from 1; the end where there is no such place.
-fn offset(text: &str, line: usize, column: usize) -> usize {
-    let start = match line.checked_sub(2) {
-        None => 0,
-        Some(idx) => text.match_indices('\n').nth(idx).map_or(text.len(), |(at, _)| at + 1),
-    };
-    text[start..].char_indices().nth(column.saturating_sub(1)).map_or(text.len(), |(at, _)| start + at)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,12 +141,5 @@ mod tests {
         assert_eq!(keyword("  # nothing"), None);
         assert_eq!(keyword("PREFIX a: http"), None);
         assert_eq!(keyword("é"), None);
-    }
-
-    #[test]
-    fn a_place_is_a_byte_offset() {
-        assert_eq!(offset("äb\ncd", 1, 2), 2);
-        assert_eq!(offset("äb\ncd", 2, 2), 5);
-        assert_eq!(offset("äb\ncd", 9, 9), 6);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::{PoisonError, RwLock};
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
@@ -27,8 +28,8 @@ use crate::history::{
 /// A run that [`History::commit`] took is there whole after the process was killed, and after [`History::flush`] also after a
 /// power cut. The file of its trace is written before, so that a run in the store always has one.
 pub struct History {
-    // Dropped before the folder, which gives the lock back.
-    store: Store,
+    // Dropped before the folder, which gives the lock back. Nothing only where opening it anew failed.
+    store: RwLock<Option<Store>>,
     folder: Folder,
 }
 
@@ -51,9 +52,23 @@ impl History {
     }
 
     fn open_folder(folder: Folder) -> Result<Self, Diagnostics> {
-        let store =
-            Store::open(folder.store()).map_err(|error| fault::store(folder.dir(), "opening its store", &error))?;
-        Ok(Self { store, folder })
+        let store = open_store(&folder)?;
+        Ok(Self { store: RwLock::new(Some(store)), folder })
+    }
+
+    /// The store, for one piece of work. (Clones are the same store.)
+    fn store(&self) -> Result<Store, Diagnostics> {
+        let store = self.store.read().unwrap_or_else(PoisonError::into_inner);
+        store.clone().ok_or_else(|| fault::damaged(self.dir(), "it could not be opened again"))
+    }
+
+    /// Closes the store and opens it anew: that is when it gives up the logs of what is long in its tables, which are as
+    /// large as the tables of a hundred runs.
+    fn reopen(&self) -> Result<(), Diagnostics> {
+        let mut store = self.store.write().unwrap_or_else(PoisonError::into_inner);
+        *store = None;
+        *store = Some(open_store(&self.folder)?);
+        Ok(())
     }
 
     /// The folder as it was given.
@@ -79,7 +94,7 @@ impl History {
     /// Writing failed: `H005`, `H006`.
     pub fn begin_campaign(&self, record: &CampaignRecord) -> Result<(), Diagnostics> {
         self.remove_orphans()?;
-        self.store
+        self.store()?
             .extend(write_campaign::beginning(record))
             .map_err(|error| self.fault("writing the campaign", &error))?;
         self.flush()
@@ -95,7 +110,7 @@ impl History {
             .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         let file = self.folder.trace(&record.id);
         write_whole(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
-        self.store.extend(write_run::quads(record)).map_err(|error| {
+        self.store()?.extend(write_run::quads(record)).map_err(|error| {
             // A trace without a run is harmless; if it can't be removed now, the next campaign does.
             let _ = std::fs::remove_file(&file);
             self.fault(&doing, &error)
@@ -107,7 +122,7 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub fn flush(&self) -> Result<(), Diagnostics> {
-        self.store.flush().map_err(|error| self.fault("writing to the disk", &error))
+        self.store()?.flush().map_err(|error| self.fault("writing to the disk", &error))
     }
 
     /// Writes how a campaign ended, and brings everything to the disk.
@@ -115,10 +130,11 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub fn finish_campaign(&self, id: &str, end: &CampaignEnd) -> Result<(), Diagnostics> {
-        self.store
+        self.store()?
             .extend(write_campaign::end(id, end))
             .map_err(|error| self.fault("writing the end of the campaign", &error))?;
-        self.flush()
+        self.flush()?;
+        self.reopen()
     }
 
     /// All campaigns, by their start, then by id.
@@ -126,7 +142,7 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn campaigns(&self) -> Result<Vec<CampaignRow>, Diagnostics> {
-        lists::campaigns(&self.store).map_err(|error| self.query_fault(&error))
+        lists::campaigns(&self.store()?).map_err(|error| self.query_fault(&error))
     }
 
     /// The runs that a filter lets through, by the start of their campaign, then by index.
@@ -134,7 +150,7 @@ impl History {
     /// # Errors
     /// The store can't be read. A campaign that is not there has no runs.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
-        lists::runs(&self.store, filter).map_err(|error| self.query_fault(&error))
+        lists::runs(&self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
     /// Outcomes of the runs that a filter lets through, in the order of [`History::runs`], then by step and property.
@@ -142,7 +158,7 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
-        lists::outcomes(&self.store, filter).map_err(|error| self.query_fault(&error))
+        lists::outcomes(&self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
     /// The id of a run from its id, its IRI, `run:ID`, or a beginning that only one run has.
@@ -181,7 +197,7 @@ impl History {
     /// `H008` there is no such run.
     pub fn run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
         let id = self.resolve(name)?;
-        detail::read(&self.store, &run_node(&id)).map_err(|error| self.fault("reading a run", &error))
+        detail::read(&self.store()?, &run_node(&id)).map_err(|error| self.fault("reading a run", &error))
     }
 
     /// What happened in a run, named as in [`History::resolve`].
@@ -229,7 +245,7 @@ impl History {
     /// # Errors
     /// As [`History::query`]; `H013` it was stopped.
     pub fn query_from(&self, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
-        query::answer(&self.store, text, cancel)
+        query::answer(&self.store()?, text, cancel)
     }
 
     fn decoded<T>(&self, id: &str, decode: impl FnOnce(&[u8]) -> Result<T, String>) -> Result<T, Diagnostics> {
@@ -243,7 +259,7 @@ impl History {
 
     fn has_run(&self, id: &str) -> Result<bool, Diagnostics> {
         let (run, class) = (run_node(id), iri("act:Run"));
-        self.store
+        self.store()?
             .contains(QuadRef::new(&run, rdf::TYPE, &class, GraphNameRef::DefaultGraph))
             .map_err(|error| self.fault("reading", &error))
     }
@@ -251,7 +267,8 @@ impl History {
     /// Ids of all things of a class, sorted.
     fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
         let class = iri(class);
-        let found = subjects(&self.store, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
+        let found =
+            subjects(&self.store()?, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
         let mut ids: Vec<String> = found.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
         ids.sort();
         Ok(ids)
@@ -286,7 +303,8 @@ impl History {
 
     fn has_ended(&self, campaign: &NamedNode) -> Result<bool, Diagnostics> {
         let property = iri("prov:endedAtTime");
-        let mut ends = self.store.quads_for_pattern(
+        let store = self.store()?;
+        let mut ends = store.quads_for_pattern(
             Some(campaign.into()),
             Some(property.as_ref()),
             None,
@@ -308,6 +326,10 @@ impl History {
             }
         }
     }
+}
+
+fn open_store(folder: &Folder) -> Result<Store, Diagnostics> {
+    Store::open(folder.store()).map_err(|error| fault::store(folder.dir(), "opening its store", &error))
 }
 
 /// A letter and three letters or digits, without those that look alike.

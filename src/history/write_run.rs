@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use oxigraph::model::{BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term};
+use oxigraph::model::{BlankNode, Literal, NamedNode, Quad};
 
 use crate::actions::{ActionEnd, ActionTrace};
 use crate::base::{Digest, names};
-use crate::facts::{RunFacts, Triple, thing_iri};
+use crate::facts::thing_iri;
 use crate::history::RunRecord;
+use crate::history::graphs::{self, below, during_graph, state_graph};
 use crate::history::statements::{About, Statements, count, iri, time};
-use crate::history::terms::to_store;
 use crate::history::write_campaign::{campaign_node, program};
 use crate::history::write_scene;
 use crate::verdict::Judgement;
@@ -29,7 +29,7 @@ pub(super) fn quads(record: &RunRecord) -> Vec<Quad> {
         write_execution(record, step, &run, &mut statements);
     }
     let mut quads = statements.quads;
-    write_facts(&record.facts, &run, &mut quads);
+    graphs::write(&record.facts, &run, &mut quads);
     quads
 }
 
@@ -139,36 +139,4 @@ fn blank(execution: &NamedNode, judgement: &Judgement, part: &str) -> BlankNode 
     }
     // A digest is 32 hexadecimal digits.
     BlankNode::new_from_unique_id(u128::from_str_radix(&digest.finish(), 16).unwrap_or_default())
-}
-
-fn below(node: &NamedNode, part: &str) -> NamedNode {
-    NamedNode::new_unchecked(format!("{}/{part}", node.as_str()))
-}
-
-/// Graph of a state between actions, counted from 0.
-pub(super) fn state_graph(run: &NamedNode, state: usize) -> NamedNode {
-    below(run, &format!("state/{state}"))
-}
-
-/// Graph of what happened during an action, counted from 0 (its name counts from 1).
-pub(super) fn during_graph(run: &NamedNode, step: usize) -> NamedNode {
-    below(run, &format!("{}/during", step + 1))
-}
-
-fn write_facts(facts: &RunFacts, run: &NamedNode, quads: &mut Vec<Quad>) {
-    let terms: Vec<Term> = (0u32..).take(facts.terms.len()).map(|id| to_store(facts.terms.term(id))).collect();
-    let mut write = |triples: &[Triple], graph: NamedNode| {
-        let graph = GraphName::NamedNode(graph);
-        quads.extend(triples.iter().filter_map(|[s, p, o]| {
-            let subject = NamedOrBlankNode::try_from(terms[*s as usize].clone()).ok()?;
-            let Term::NamedNode(property) = &terms[*p as usize] else { return None };
-            Some(Quad::new(subject, property.clone(), terms[*o as usize].clone(), graph.clone()))
-        }));
-    };
-    for (state, triples) in facts.snapshots.iter().enumerate() {
-        write(triples, state_graph(run, state));
-    }
-    for (step, triples) in facts.during.iter().enumerate() {
-        write(triples, during_graph(run, step));
-    }
 }

@@ -1,0 +1,568 @@
+//! The memory: what goes in comes out, nothing is half there, and every fault of the folder is told clearly.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use actcheck::actions::ActionEnd;
+use actcheck::base::{Choice, ChoiceKind, Diagnostics, Pose, Source, Term, digest_of, names};
+use actcheck::config::{ObjectModel, Physics, RobotProfile, Sensing};
+use actcheck::facts::{RunFacts, extract};
+use actcheck::history::{CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus};
+use actcheck::scenario::{RobotStart, Role, Scene, SceneObject};
+use actcheck::verdict::{Judgement, Outcome};
+use tempfile::TempDir;
+
+use crate::facts::{BODIES, sample_trace};
+
+fn model(name: &str) -> Arc<ObjectModel> {
+    Arc::new(ObjectModel {
+        name: name.to_owned(),
+        category: names::act("Glass"),
+        mass_kg: 0.3,
+        friction: 0.8,
+        restitution: 0.1,
+        size_m: [0.1; 3],
+        parts: Vec::new(),
+        surface: None,
+        digest: digest_of(name),
+    })
+}
+
+fn robot() -> Arc<RobotProfile> {
+    Arc::new(RobotProfile {
+        name: "mobile manipulator".to_owned(),
+        urdf: Source::new("robot.urdf", "<robot/>"),
+        base_joints: None,
+        arm_joints: Vec::new(),
+        finger_joints: [String::new(), String::new()],
+        head_joints: Vec::new(),
+        grasp_link: String::new(),
+        finger_links: [String::new(), String::new()],
+        camera_link: String::new(),
+        max_opening_m: 0.135,
+        home: Vec::new(),
+        postures: Vec::new(),
+        finger_friction: 1.0,
+        grip_force_n: 10.0,
+        digest: String::new(),
+    })
+}
+
+/// Objects stand in a row, 0.2 m apart; the target is the second.
+fn scene() -> Scene {
+    let object = |(place, id): (usize, &&str)| SceneObject {
+        id: (*id).to_owned(),
+        model: model(&id[..id.len() - 2]),
+        role: [Role::Platform, Role::Target, Role::Other][place.min(2)],
+        pose: Pose::upright([0.2 * place as f64, 0.0, 0.7], 0.5),
+        mass_kg: 0.31,
+        friction: 0.7,
+        restitution: 0.05,
+    };
+    Scene {
+        world: "living room".to_owned(),
+        objects: BODIES.iter().enumerate().map(object).collect(),
+        robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1] },
+        designators: sample_trace(0).actions[0].parameters.clone(),
+        sensing: Sensing {
+            position_noise_m: 0.005,
+            height_noise_m: 0.002,
+            yaw_noise_rad: 0.05,
+            size_noise_m: 0.003,
+            localisation_noise_m: 0.01,
+            heading_noise_rad: 0.01,
+            gripper_noise_m: 0.001,
+        },
+        physics: Physics {
+            mass_scale: (1.0, 1.0),
+            friction_scale: (1.0, 1.0),
+            restitution: (0.0, 0.0),
+            steps_per_second: 240,
+            iterations: 4,
+        },
+    }
+}
+
+const PROPERTIES: [&str; 5] = ["CloseObject", "MovedObject", "NoGraspCollisions", "ObjectGrasped", "ObjectInGripper"];
+
+fn judgement(property: &str, outcome: Outcome) -> Judgement {
+    Judgement {
+        property: names::act(property),
+        outcome,
+        margin: (outcome == Outcome::Failed).then_some(-0.04),
+        witness: format!("{property}: glass_1 \"moved\" 0.4 cm"),
+        rule_digest: digest_of(property),
+    }
+}
+
+/// A run; every third has a property that failed.
+pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
+    let trace = sample_trace(index);
+    let failed = index % 3 == 0;
+    let outcome = |property: &str| {
+        if failed && property == "ObjectInGripper" { Outcome::Failed } else { Outcome::Passed }
+    };
+    let score = if failed { 0.8 } else { 1.0 };
+    RunRecord {
+        id: format!("{campaign}-{}", index + 1),
+        campaign: campaign.to_owned(),
+        index,
+        test: "Pick".to_owned(),
+        seed: u64::MAX,
+        status: RunStatus::Completed,
+        reason: None,
+        score,
+        action_scores: vec![score],
+        choices: vec![Choice { name: "target.yaw".to_owned(), kind: ChoiceKind::Normal { sigma: 0.1 }, value: 0.07 }],
+        scene: scene(),
+        facts: extract(&trace),
+        trace,
+        actions: vec![names::act("Pick")],
+        judgements: vec![PROPERTIES.iter().map(|property| judgement(property, outcome(property))).collect()],
+        started: "2026-08-01T12:00:00Z".to_owned(),
+        wall_secs: 1.25,
+    }
+}
+
+/// A campaign that began in a given minute.
+pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
+    CampaignRecord {
+        id: id.to_owned(),
+        name: "pick".to_owned(),
+        config_text: "seed = 7\n".to_owned(),
+        config_digest: digest_of("seed = 7\n"),
+        ontology_digest: digest_of("ontology"),
+        rules: PROPERTIES.iter().map(|p| (names::act(p), format!("../rules/{p}.rls"), digest_of(p))).collect(),
+        models: vec![("glass".to_owned(), digest_of("glass"))],
+        seed: 7,
+        planned_runs: 6,
+        started: format!("2026-08-01T12:{minute:02}:00Z"),
+        program_version: "0.1.0".to_owned(),
+    }
+}
+
+/// A history with campaigns `z2` and, later, `a1`, of a few runs each.
+fn filled() -> (TempDir, History) {
+    let folder = tempfile::tempdir().unwrap();
+    let history = History::open(&folder.path().join("history")).unwrap();
+    for (id, minute, runs) in [("z2", 1, 6), ("a1", 2, 2)] {
+        history.begin_campaign(&sample_campaign(id, minute)).unwrap();
+        for index in (0..runs).rev() {
+            history.commit(&sample_run(id, index)).unwrap();
+        }
+    }
+    (folder, history)
+}
+
+fn code(result: Result<History, Diagnostics>) -> String {
+    let faults = result.err().expect("a fault");
+    let fault = faults.iter().next().unwrap();
+    assert!(fault.help.is_some(), "{faults}");
+    faults.to_string()
+}
+
+fn table(history: &History, sparql: &str) -> Vec<Vec<Option<Term>>> {
+    match history.query(sparql) {
+        Ok(QueryAnswer::Table { rows, .. }) => rows,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn facts_as_terms(facts: &RunFacts) -> Vec<BTreeSet<[Term; 3]>> {
+    let term = |id: u32| facts.terms.term(id).clone();
+    facts.snapshots.iter().chain(&facts.during).map(|list| list.iter().map(|t| t.map(term)).collect()).collect()
+}
+
+#[test]
+fn a_stored_run_has_the_facts_trace_and_choices_that_it_had() {
+    let (folder, history) = filled();
+    let record = sample_run("z2", 3);
+    drop(history);
+    let history = History::open_existing(&folder.path().join("history")).unwrap();
+    assert_eq!(history.trace("z2-4").unwrap(), record.trace);
+    assert_eq!(history.choices("z2-4").unwrap(), record.choices);
+    let facts = history.facts("z2-4").unwrap();
+    assert_eq!((&facts.snapshots, &facts.during), (&record.facts.snapshots, &record.facts.during));
+    assert_eq!(facts.parameters, record.facts.parameters);
+    assert_eq!(facts_as_terms(&facts), facts_as_terms(&record.facts));
+}
+
+#[test]
+fn the_graphs_say_the_same_bit_for_bit_but_for_what_they_leave_out() {
+    let (_folder, history) = filled();
+    let record = sample_run("z2", 3);
+    for (graph, all) in ["state/0", "state/1", "1/during"].into_iter().zip(facts_as_terms(&record.facts)) {
+        let iri = format!("{}z2-4/{graph}", names::RUN);
+        let QueryAnswer::Graph(triples) =
+            history.query(&format!("CONSTRUCT {{ ?s ?p ?o }} WHERE {{ GRAPH <{iri}> {{ ?s ?p ?o }} }}")).unwrap()
+        else {
+            panic!("no graph")
+        };
+        let kept: BTreeSet<[Term; 3]> = triples.into_iter().collect();
+        assert!(kept.is_subset(&all), "{graph}");
+        let left_out: BTreeSet<String> = all
+            .difference(&kept)
+            .filter(|[subject, ..]| !subject.to_string().contains("contact"))
+            .map(|[_, property, _]| names::local(property.as_iri().unwrap()).to_owned())
+            .collect();
+        let expected: &[&str] = match graph {
+            "1/during" => &["type"],
+            _ => &[
+                "fixed",
+                "friction",
+                "lower",
+                "mass",
+                "maxEffort",
+                "maxVelocity",
+                "maxX",
+                "maxY",
+                "minX",
+                "minY",
+                "qw",
+                "qx",
+                "qy",
+                "qz",
+                "restitution",
+                "type",
+                "upper",
+                "velocity",
+            ],
+        };
+        assert_eq!(left_out.into_iter().collect::<Vec<_>>(), expected, "{graph}");
+    }
+}
+
+#[test]
+fn of_each_pair_the_graphs_keep_the_strongest_contact() {
+    let (_folder, history) = filled();
+    let rows = table(
+        &history,
+        "SELECT ?second ?force WHERE { <https://w3id.org/actcheck/run/z2-4/1> act:during ?g . GRAPH ?g {
+           ?c w:first obj:glass_1 ; w:second ?second ; w:maxForce ?force ; w:start ?start ; w:end ?end } } ORDER BY ?second",
+    );
+    let trace = sample_run("z2", 3).trace;
+    let strongest = |link: &str| {
+        let of_link = |contact: &&actcheck::actions::ContactEpisode| contact.pair[1] == format!("robot/{link}");
+        trace.actions[0].contacts.iter().filter(of_link).map(|contact| contact.max_force_n).fold(0.0, f64::max)
+    };
+    let links = ["finger_left", "finger_right", "hand"];
+    assert_eq!(rows.len(), links.len());
+    for (row, link) in rows.iter().zip(links) {
+        assert_eq!(row[0], Some(Term::iri(names::w(&format!("link/{link}")))));
+        let force = row[1].as_ref().and_then(Term::number).unwrap();
+        assert!((force - strongest(link)).abs() < 1e-5, "{force}");
+    }
+}
+
+#[test]
+fn a_run_is_shown_with_all_that_was_kept() {
+    let (_folder, history) = filled();
+    let record = sample_run("z2", 3);
+    let run = history.run("z2-4").unwrap();
+    assert_eq!((run.row.index, run.row.status, run.row.score), (3, RunStatus::Completed, 0.8));
+    assert_eq!((run.row.trace_hash.as_str(), run.row.started.as_str()), (&*record.trace.hash, "2026-08-01T12:00:00Z"));
+    assert_eq!((run.seed, run.wall_secs, run.world.as_str()), (u64::MAX, 1.25, "living room"));
+    assert_eq!(run.program_version, format!("actcheck {}", env!("CARGO_PKG_VERSION")));
+    assert_eq!(run.robot_base, [-0.6, 0.0, 0.1]);
+    assert_eq!(run.noise["yawNoise"], 0.05);
+    assert_eq!(run.designators, record.scene.designators);
+    let roles: Vec<Role> = run.objects.iter().map(|object| object.role).collect();
+    assert_eq!(&roles[..3], [Role::Platform, Role::Target, Role::Other]);
+    let mug = run.objects.iter().find(|object| object.id == "mug_1").unwrap();
+    assert_eq!((mug.model.as_str(), mug.mass_kg, mug.friction, mug.restitution), ("mug", 0.31, 0.7, 0.05));
+    assert!((mug.target_distance_m.unwrap() - 0.2).abs() < 1e-12 && (mug.robot_distance_m - 1.0).abs() < 1e-12);
+    assert_eq!(mug.displacement_m, Some(record.trace.actions[0].extremes[2].max_displacement_m));
+    assert_eq!(run.objects[1].target_distance_m, None);
+    let pick = &run.actions[0];
+    assert_eq!((pick.step, pick.end.as_str(), pick.reported), (1, "completed", Some(true)));
+    assert_eq!(pick.message.as_deref(), Some("the object is held"));
+    assert_eq!(pick.parameters, record.trace.actions[0].parameters);
+    assert_eq!(pick.judgements, record.judgements[0]);
+}
+
+#[test]
+fn a_run_that_broke_says_why() {
+    let (_folder, history) = filled();
+    let mut record = sample_run("a1", 7);
+    record.trace.snapshots.clear();
+    record.trace.actions[0].end = ActionEnd::Broken("a pose is no number".to_owned());
+    record.trace.actions[0].report = None;
+    record.facts = extract(&record.trace);
+    (record.status, record.reason) = (RunStatus::Broken, Some("a pose is no number".to_owned()));
+    record.judgements[0].iter_mut().for_each(|judgement| judgement.outcome = Outcome::Broken);
+    history.commit(&record).unwrap();
+    let run = history.run("a1-8").unwrap();
+    assert_eq!((run.row.status, run.reason.as_deref()), (RunStatus::Broken, Some("a pose is no number")));
+    assert_eq!((run.actions[0].end.as_str(), run.actions[0].reported), ("broken", None));
+    assert!(run.actions[0].judgements.iter().all(|judgement| judgement.outcome == Outcome::Broken));
+    let broken = RunFilter { status: Some(RunStatus::Broken), ..RunFilter::default() };
+    assert_eq!(history.runs(&broken).unwrap().len(), 1);
+}
+
+#[test]
+fn lists_are_in_order_and_can_be_filtered() {
+    let (_folder, history) = filled();
+    let runs: Vec<String> = history.runs(&RunFilter::default()).unwrap().into_iter().map(|row| row.run).collect();
+    assert_eq!(runs, ["z2-1", "z2-2", "z2-3", "z2-4", "z2-5", "z2-6", "a1-1", "a1-2"]);
+    let filter = RunFilter { campaign: Some("a1".to_owned()), test: Some("Pick".to_owned()), status: None };
+    assert_eq!(history.runs(&filter).unwrap().len(), 2);
+    assert!(history.runs(&RunFilter { test: Some("Place".to_owned()), ..filter.clone() }).unwrap().is_empty());
+    let outcomes = history.outcomes(&filter).unwrap();
+    assert_eq!(outcomes.len(), 10);
+    let failed: Vec<_> = outcomes.iter().filter(|row| row.outcome == Outcome::Failed).collect();
+    assert_eq!((failed[0].run.as_str(), failed[0].step, failed[0].margin), ("a1-1", 1, Some(-0.04)));
+    assert_eq!((failed[0].property.as_str(), failed.len()), (names::act("ObjectInGripper").as_str(), 1));
+}
+
+#[test]
+fn a_campaign_is_listed_with_its_end() {
+    let (_folder, history) = filled();
+    let end = CampaignEnd {
+        ended: "2026-08-01T12:09:00Z".to_owned(),
+        score: Some(0.9),
+        score_without_broken: None,
+        outcomes: BTreeMap::from([(Outcome::Passed, 28), (Outcome::Failed, 2)]),
+        discards: 3,
+        interrupted: false,
+    };
+    history.finish_campaign("z2", &end).unwrap();
+    let campaigns = history.campaigns().unwrap();
+    let [z2, a1] = campaigns.as_slice() else { panic!("{campaigns:?}") };
+    assert_eq!((z2.id.as_str(), z2.name.as_str(), z2.runs, z2.planned_runs, z2.seed), ("z2", "pick", 6, 6, 7));
+    assert_eq!((z2.score, z2.score_without_broken, z2.interrupted), (Some(0.9), None, false));
+    assert_eq!((&z2.ended, &z2.outcomes), (&Some(end.ended), &end.outcomes));
+    assert_eq!((a1.id.as_str(), a1.runs, a1.interrupted, &a1.ended), ("a1", 2, true, &None));
+}
+
+#[test]
+fn a_run_is_found_by_what_people_type() {
+    let (_folder, history) = filled();
+    for name in ["z2-4", "run:z2-4", " z2-4 ", "<https://w3id.org/actcheck/run/z2-4>"] {
+        assert_eq!(history.resolve(name).unwrap(), "z2-4", "{name}");
+    }
+    let several = history.run("a1").unwrap_err().to_string();
+    assert!(several.contains("H008: `a1` can be any of 2 runs") && several.contains("a1-1, a1-2"), "{several}");
+    let none = history.run("zz-4").unwrap_err().to_string();
+    assert!(none.contains("has no run `zz-4`") && none.contains("did you mean `z2-4`?"), "{none}");
+    assert!(history.run("").is_err());
+}
+
+#[test]
+fn campaign_ids_are_short_new_and_repeatable() {
+    let (_folder, history) = filled();
+    let id = history.next_campaign_id("abc", 7).unwrap();
+    assert_eq!(id, history.next_campaign_id("abc", 7).unwrap());
+    assert_ne!(id, history.next_campaign_id("abc", 8).unwrap());
+    assert!(id.len() == 4 && id.starts_with(|c: char| c.is_ascii_lowercase()), "{id}");
+    history.begin_campaign(&sample_campaign(&id, 9)).unwrap();
+    assert_ne!(id, history.next_campaign_id("abc", 7).unwrap());
+}
+
+#[test]
+fn questions_of_people_have_short_queries() {
+    let (_folder, history) = filled();
+    let count = table(&history, "PREFIX act: <http://actions#> SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }");
+    assert_eq!(count, [[Some(Term::Integer(8))]]);
+    let moved = table(
+        &history,
+        "SELECT ?run ?object ?moved ?distance WHERE { ?o act:ofRun ?run ; act:role 'other' ; act:object ?object ;
+           act:displacement ?moved ; act:targetDistance ?distance FILTER(?moved > 0.01) } ORDER BY DESC(?moved)",
+    );
+    assert!(!moved.is_empty());
+    let failed = table(
+        &history,
+        "SELECT ?property (COUNT(?e) AS ?n) WHERE { ?a earl:subject ?e ; earl:test ?property ;
+           earl:result/earl:outcome earl:failed } GROUP BY ?property",
+    );
+    assert_eq!(failed, [[Some(Term::iri(names::act("ObjectInGripper"))), Some(Term::Integer(3))]]);
+    let held = table(
+        &history,
+        "SELECT ?z WHERE { ?e act:ofRun run:z2-4 ; act:pickObject ?o ; act:after ?g . GRAPH ?g { ?o w:z ?z } }",
+    );
+    assert_eq!(
+        held,
+        [[Some(Term::Double(sample_run("z2", 3).trace.snapshots[1].bodies[1].pose.position[2]))]].map(|row| row.map(
+            |z| z.map(|z| Term::Double(z.number().map_or(f64::NAN, |z| format!("{}", z as f32).parse().unwrap())))
+        ))
+    );
+    assert_eq!(
+        history.query("ASK { GRAPH ?g { obj:glass_1 w:restsOn w:robot } }").unwrap(),
+        QueryAnswer::Boolean(true)
+    );
+}
+
+#[test]
+fn a_query_that_is_none_is_told_where() {
+    let (_folder, history) = filled();
+    let fault = |text: &str| history.query(text).unwrap_err().to_string();
+    let starts = |text: &str, expected: &str| {
+        let fault = fault(text);
+        assert!(fault.starts_with(expected) && fault.contains("help: "), "{fault}");
+    };
+    starts(
+        "SELECT ?r\nWHER { ?r a act:Run }",
+        "H010 query:2:1: this is no SPARQL query: it can't be understood at `WHER`",
+    );
+    starts(
+        "SELEC ?r WHERE { ?r a act:Run }",
+        "H010 query:1:1: this is no SPARQL query: it can't be understood at `SELEC",
+    );
+    starts("SELECT ?r WHERE { ?r a act:Run ", "H010 query:1:32: the query ends too early");
+    starts("", "H010 query:1:1: the query ends too early");
+    starts("SELECT (COUNT(?r) AS ?n WHERE { ?r ?p ?o }", "H010 query:1:25: this is no SPARQL query");
+    starts("SELECT ?r WHERE { ?r a foo:Run }", "H010 query:1:24: the prefix of `foo:Run` is not known");
+    starts(
+        "SELECT ?x (COUNT(?r) AS ?n) WHERE { ?x ?p ?r }",
+        "H010 query:1:46: the SELECT contains a variable that is unbound",
+    );
+    let update = fault("PREFIX a: <http://a#>\n  insert data { a:b a:c a:d }");
+    assert!(update.starts_with("H011 query:2:3: `INSERT` changes what it finds"), "{update}");
+    let service = fault("SELECT * WHERE { SERVICE <http://localhost/> { ?s ?p ?o } }");
+    assert!(service.starts_with("H012"), "{service}");
+}
+
+#[test]
+fn a_long_query_can_be_stopped() {
+    let (_folder, history) = filled();
+    let cancel = Cancel::new();
+    let stopper = cancel.clone();
+    let text = Source::new(
+        "long.rq",
+        "SELECT (COUNT(*) AS ?n) WHERE { GRAPH ?g { ?a ?b ?c } GRAPH ?h { ?d ?e ?f } GRAPH ?i { ?j ?k ?l } FILTER(?c < ?l) }",
+    );
+    let waiting = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_millis(100));
+        stopper.cancel();
+    });
+    let started = std::time::Instant::now();
+    let fault = history.query_from(&text, &cancel).unwrap_err().to_string();
+    assert!(started.elapsed() < Duration::from_secs(2), "{:?}", started.elapsed());
+    waiting.join().unwrap();
+    assert!(fault.starts_with("H013 long.rq: the query was stopped"), "{fault}");
+}
+
+#[test]
+fn a_second_owner_is_refused_and_changes_nothing() {
+    let (folder, history) = filled();
+    let dir = folder.path().join("history");
+    let fault = code(History::open(&dir));
+    assert!(fault.starts_with("H002") && fault.contains(&dir.display().to_string()), "{fault}");
+    assert_eq!(history.runs(&RunFilter::default()).unwrap().len(), 8);
+    drop(history);
+    assert!(History::open_existing(&dir).is_ok());
+}
+
+#[test]
+fn a_history_of_a_newer_program_is_left_alone() {
+    let (folder, history) = filled();
+    drop(history);
+    let dir = folder.path().join("history");
+    std::fs::write(dir.join("VERSION"), "actcheck history 2\n").unwrap();
+    let fault = code(History::open(&dir));
+    assert!(fault.starts_with("H004") && fault.contains("update actcheck"), "{fault}");
+    std::fs::write(dir.join("VERSION"), "actcheck history 1\n").unwrap();
+    assert_eq!(History::open_existing(&dir).unwrap().runs(&RunFilter::default()).unwrap().len(), 8);
+}
+
+#[test]
+fn folders_that_are_no_histories_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let none = folder.path().join("none");
+    assert!(code(History::open_existing(&none)).starts_with("H003: there is no history"));
+    assert!(!none.exists());
+    std::fs::write(folder.path().join("thesis.tex"), "").unwrap();
+    assert!(code(History::open(folder.path())).contains("it holds other things"));
+    assert!(code(History::open_existing(folder.path())).contains("it holds other things"));
+    let file = code(History::open(&folder.path().join("thesis.tex")));
+    assert!(file.starts_with("H001") && file.contains("a file stands in its place"), "{file}");
+    let below = code(History::open(&folder.path().join("thesis.tex/history")));
+    assert!(below.starts_with("H001"), "{below}");
+}
+
+#[test]
+fn a_place_that_nobody_may_write_to_is_told() {
+    // Permission bits don't stop root, so this is a place where nobody can make a folder.
+    let fault = code(History::open(Path::new("/proc/actcheck")));
+    assert!(fault.contains("/proc/actcheck") && fault.starts_with('H'), "{fault}");
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("history");
+    drop(History::open(&dir).unwrap());
+    let mut permissions = std::fs::metadata(&dir).unwrap().permissions();
+    std::os::unix::fs::PermissionsExt::set_mode(&mut permissions, 0o555);
+    std::fs::set_permissions(dir.join("lock"), permissions.clone()).unwrap();
+    if std::fs::OpenOptions::new().write(true).open(dir.join("lock")).is_ok() {
+        eprintln!("permission bits don't hold for this user: not tested further");
+        return;
+    }
+    let fault = code(History::open(&dir));
+    assert!(fault.starts_with("H001") && fault.contains("not permitted"), "{fault}");
+}
+
+#[test]
+fn a_damaged_or_missing_trace_is_told_and_the_rest_is_there() {
+    let (folder, history) = filled();
+    let traces = folder.path().join("history/traces");
+    let file = traces.join("z2-1.trace");
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
+    assert!(history.trace("z2-1").unwrap_err().to_string().starts_with("H007"));
+    std::fs::remove_file(&file).unwrap();
+    assert!(history.facts("z2-1").unwrap_err().to_string().starts_with("H009"));
+    assert_eq!(history.run("z2-1").unwrap().actions.len(), 1);
+}
+
+#[test]
+fn traces_without_a_run_are_cleaned_up() {
+    let (folder, history) = filled();
+    let traces = folder.path().join("history/traces");
+    for orphan in ["z2-99.trace", "gone-1.trace", "z2-7.trace.tmp"] {
+        std::fs::write(traces.join(orphan), "half").unwrap();
+    }
+    history.begin_campaign(&sample_campaign("b3", 5)).unwrap();
+    assert_eq!(std::fs::read_dir(&traces).unwrap().count(), 8);
+}
+
+#[test]
+fn a_full_disk_is_told_and_keeps_what_was_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let mount = |arguments: &[&str]| {
+        std::process::Command::new(arguments[0]).args(&arguments[1..]).status().is_ok_and(|status| status.success())
+    };
+    let path = folder.path().to_str().unwrap();
+    if !mount(&["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs", path]) {
+        eprintln!("a small file system can't be mounted here: not tested");
+        return;
+    }
+    let checked = std::panic::catch_unwind(|| fill_up(&folder.path().join("history")));
+    assert!(mount(&["umount", path]));
+    checked.unwrap();
+}
+
+fn fill_up(dir: &Path) {
+    let history = History::open(dir).unwrap();
+    history.begin_campaign(&sample_campaign("a1", 1)).unwrap();
+    let mut kept = 0;
+    let fault = loop {
+        if let Err(fault) = history.commit(&sample_run("a1", kept)).and_then(|()| history.flush()) {
+            break fault.to_string();
+        }
+        kept += 1;
+        assert!(kept < 1000, "the disk does not fill up");
+    };
+    assert!(fault.starts_with("H005") && fault.contains("full") && fault.contains("history"), "{fault}");
+    drop(history);
+    let blocked = dir.parent().unwrap().join("blocked");
+    // What is freed is taken by somebody else, but for a little.
+    let history = History::open(dir);
+    let runs = match &history {
+        Ok(history) => history.runs(&RunFilter::default()).unwrap().len() as u64,
+        Err(fault) => panic!("{fault}"),
+    };
+    assert!(runs >= kept, "{runs} of {kept}");
+    for run in history.as_ref().unwrap().runs(&RunFilter::default()).unwrap() {
+        history.as_ref().unwrap().facts(&run.run).unwrap();
+    }
+    assert!(!blocked.exists());
+}
