@@ -36,7 +36,10 @@ pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
                 if impulse <= 0.0 {
                     continue;
                 }
-                let friction = from_vector(point.data.warmstart_tangent_world);
+                // Friction is kept for the last substep only, and as it acts on the first of the pair.
+                let last = f64::from(point.data.warmstart_impulse);
+                let share = if last > 0.0 { impulse / last } else { 0.0 };
+                let friction = from_vector(point.data.warmstart_tangent_world) * -share;
                 let touch = found.entry(key).or_insert(Touch { normal_n: 0.0, force_n: Vector3::zeros() });
                 touch.normal_n += impulse * per_second;
                 touch.force_n += (normal * impulse + friction) * (sign * per_second);

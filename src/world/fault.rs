@@ -33,11 +33,13 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A fault to inject, for tests of what happens then.
+/// A disturbance to inject, for tests of physics, and of what notices it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Poison {
     /// The body's velocity becomes NaN.
     NotFinite,
     /// The body is put somewhere. Unit: metres.
     Teleport([f64; 3]),
+    /// The body gets a velocity, without turning. Unit: m/s.
+    Velocity([f64; 3]),
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
     GenericJoint, JointAxesMask, JointAxis, MassProperties, MotorModel, MultibodyDofCoupling, MultibodyJointHandle,
-    PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+    PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
 };
 
 use crate::base::Pose;
@@ -26,6 +26,10 @@ const DAMPING_SECS: f64 = 0.02;
 const FINGER_DAMPING_SECS: f64 = 0.01;
 /// Friction of the robot's links other than the fingers: painted metal and plastic.
 const LINK_FRICTION: f64 = 0.4;
+/// Natural frequency of the stops at joint limits. Unit: hertz. The engine's own stops throw a loaded joint back.
+const STOP_FREQUENCY_HZ: f32 = 60.0;
+/// Damping ratio of the stops.
+const STOP_DAMPING: f32 = 5.0;
 /// Ranges wider than this are no stops in practice; leaving them out saves the solver work. Unit: metres or radians.
 const WIDEST_RANGE: f64 = 20.0;
 
@@ -202,12 +206,12 @@ impl Robot {
         }
     }
 
-    /// One step of the joint controllers: setpoints follow targets within the velocity limits, motors follow
-    /// setpoints, with the robot's own weight (not that of what it holds) compensated.
-    pub fn control(&mut self, engine: &mut PhysicsWorld, holding: &[f64], dt: f64) {
+    /// One step of the joint controllers: setpoints go evenly to the targets in the `steps_left` of the tick, within the
+    /// velocity limits; motors follow setpoints, with the robot's own weight (not that of what it holds) compensated.
+    pub fn control(&mut self, engine: &mut PhysicsWorld, holding: &[f64], dt: f64, steps_left: u32) {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let largest = self.model.joints[idx].velocity * dt;
-            let change = (motor.target - motor.setpoint).clamp(-largest, largest);
+            let change = ((motor.target - motor.setpoint) / f64::from(steps_left)).clamp(-largest, largest);
             motor.setpoint += change;
             motor.setpoint_velocity = change / dt;
             let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
@@ -372,6 +376,7 @@ fn engine_joint(joint: &Joint) -> (GenericJoint, JointAxis) {
     data.set_local_frame2(to_pose(&frame));
     data.set_motor_model(axis, MotorModel::ForceBased);
     if joint.upper - joint.lower < WIDEST_RANGE {
+        data.softness = SpringCoefficients { natural_frequency: STOP_FREQUENCY_HZ, damping_ratio: STOP_DAMPING };
         data.set_limits(axis, [to_real(joint.lower), to_real(joint.upper)]);
     }
     (data, axis)

@@ -188,15 +188,16 @@ impl World {
         }
         let holding = self.robot.kinematics.holding_efforts(&self.robot.state(&self.engine).0);
         let dt = 1.0 / f64::from(self.steps_per_second);
-        for _ in 0..self.steps_per_tick {
-            self.robot.control(&mut self.engine, &holding, dt);
+        for step in 0..self.steps_per_tick {
+            self.robot.control(&mut self.engine, &holding, dt, self.steps_per_tick - step);
             self.engine.step();
             self.n_steps += 1;
+            self.fault = self.find_fault();
+            if self.fault.is_some() {
+                return;
+            }
         }
-        self.fault = self.find_fault();
-        if self.fault.is_none() {
-            self.record();
-        }
+        self.record();
     }
 
     /// What the robot measures of itself now.
@@ -228,12 +229,13 @@ impl World {
         }
     }
 
-    /// Breaks the state of an object, for tests of what happens then. False if there is no such object.
+    /// Disturbs the state of an object, for tests. False if there is no such object.
     pub fn poison(&mut self, id: &str, poison: Poison) -> bool {
         let Some(object) = self.objects.iter().find(|object| object.id == id) else { return false };
         let Some(body) = self.engine.bodies.get_mut(object.body) else { return false };
         match poison {
             Poison::NotFinite => body.set_linvel(to_vector(&Vector3::repeat(f64::NAN)), true),
+            Poison::Velocity(velocity) => body.set_linvel(to_vector(&Vector3::from(velocity)), true),
             Poison::Teleport(position) => body.set_translation(to_vector(&Vector3::from(position)), true),
         }
         true

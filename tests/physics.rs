@@ -1,0 +1,339 @@
+//! Simulation against closed-form answers, and what happens when it breaks.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use actcheck::actions::{ActionCall, ActionEnd, Trace, perform};
+use actcheck::base::{Choices, Files, Pose};
+use actcheck::config::{Budget, ObjectModel, Part, Physics, RobotProfile, Sensing, Shape};
+use actcheck::scenario::{RobotStart, Role, Scene, SceneObject};
+use actcheck::world::{BodyState, GRAVITY, Poison, World, build};
+
+const PERFECT: Sensing = Sensing {
+    position_noise_m: 0.0,
+    height_noise_m: 0.0,
+    yaw_noise_rad: 0.0,
+    size_noise_m: 0.0,
+    localisation_noise_m: 0.0,
+    heading_noise_rad: 0.0,
+    gripper_noise_m: 0.0,
+};
+
+fn robot() -> Arc<RobotProfile> {
+    let path = Path::new("models/robots/mobile_manipulator.toml");
+    Arc::new(actcheck::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right"))
+}
+
+fn shipped(name: &str) -> Arc<ObjectModel> {
+    let path = format!("models/objects/{name}.toml");
+    let source = Files::Shipped.read(Path::new(&path)).expect("the model is shipped");
+    Arc::new(actcheck::config::model::read(&source).expect("the shipped models are right"))
+}
+
+/// A box of 1 kg, unless the scene says otherwise.
+fn block(size: [f64; 3]) -> Arc<ObjectModel> {
+    let pose = Pose::upright([0.0, 0.0, size[2] / 2.0], 0.0);
+    Arc::new(ObjectModel {
+        name: "block".to_owned(),
+        category: "http://actions#Box".to_owned(),
+        mass_kg: 1.0,
+        friction: 0.5,
+        restitution: 0.0,
+        size_m: size,
+        parts: vec![Part { pose, shape: Shape::Box { size } }],
+        surface: None,
+        digest: String::new(),
+    })
+}
+
+fn object(id: &str, model: Arc<ObjectModel>, role: Role, pose: Pose, mass_kg: f64, friction: f64) -> SceneObject {
+    SceneObject { id: id.to_owned(), restitution: model.restitution, model, role, pose, mass_kg, friction }
+}
+
+/// A scene with the robot out of the way.
+fn scene(objects: Vec<SceneObject>) -> Scene {
+    Scene {
+        world: "empty".to_owned(),
+        objects,
+        robot: RobotStart { profile: robot(), base: [-5.0, 0.0, 0.0] },
+        designators: BTreeMap::new(),
+        sensing: PERFECT,
+        physics: Physics {
+            mass_scale: (1.0, 1.0),
+            friction_scale: (1.0, 1.0),
+            restitution: (0.0, 0.0),
+            steps_per_second: 240,
+            iterations: 2,
+        },
+    }
+}
+
+fn world(objects: Vec<SceneObject>) -> World {
+    build(&scene(objects)).expect("the scene is right")
+}
+
+fn run(world: &mut World, secs: f64) {
+    let (command, until) = (world.hold(), world.time_secs() + secs);
+    while world.time_secs() < until - 1e-9 {
+        world.step(&command);
+    }
+    assert_eq!(world.fault(), None);
+}
+
+fn body(world: &World, id: &str) -> BodyState {
+    world.snapshot().bodies.into_iter().find(|body| body.id == id).expect("the object is in the scene")
+}
+
+fn distance(a: &Pose, b: &Pose) -> f64 {
+    a.position.iter().zip(&b.position).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Half of g·t², the integrator's first step aside (g·t·dt).
+#[test]
+fn free_fall() {
+    let pose = Pose::upright([0.0, 0.0, 3.0], 0.0);
+    let mut world = world(vec![object("a", block([0.1; 3]), Role::Target, pose, 1.0, 0.5)]);
+    run(&mut world, 0.5);
+    let (time, fallen) = (world.time_secs(), 3.0 - body(&world, "a").pose.position[2]);
+    let expected = GRAVITY * time * time / 2.0;
+    assert!((fallen - expected).abs() < GRAVITY * time / 240.0, "fell {fallen} m, expected {expected} m");
+    let speed = -body(&world, "a").linear_velocity[2];
+    assert!((speed / (GRAVITY * time) - 1.0).abs() < 1e-3, "{speed}");
+}
+
+/// How far a block slides down a slope in a second, with the friction's angle given apart from the slope's.
+fn slide_on_slope(degrees: f64, friction: f64) -> f64 {
+    let (half, model) = (degrees.to_radians() / 2.0, block([3.0, 0.5, 0.1]));
+    let tilted = |position| Pose { position, rotation: [0.0, half.sin(), 0.0, half.cos()] };
+    let slope = tilted([0.0, 0.0, 1.0]);
+    let on_it = slope.to_isometry() * nalgebra::Point3::new(-1.0, 0.0, 0.1);
+    let mut world = world(vec![
+        object("slope", model, Role::Platform, slope, 10.0, friction),
+        object("a", block([0.2, 0.2, 0.05]), Role::Target, tilted(on_it.coords.into()), 1.0, friction),
+    ]);
+    let start = body(&world, "a").pose;
+    run(&mut world, 1.0);
+    distance(&start, &body(&world, "a").pose)
+}
+
+/// Coulomb: below the angle whose tangent is µ a block rests; above it, it slides with g·(sin − µ·cos).
+#[test]
+fn slope_at_and_below_the_friction_angle() {
+    let friction: f64 = 0.4;
+    let critical = friction.atan().to_degrees();
+    assert!(slide_on_slope(critical - 0.7, friction) < 2e-3, "slid {}", slide_on_slope(critical - 0.7, friction));
+    for above in [2.0, 8.0] {
+        let angle = (critical + above).to_radians();
+        let expected = GRAVITY * (angle.sin() - friction * angle.cos()) / 2.0;
+        let slid = slide_on_slope(critical + above, friction);
+        assert!((slid / expected - 1.0).abs() < 0.06, "slid {slid} m, expected {expected} m at {above} above");
+    }
+}
+
+/// Constant deceleration µ·g: v² / (2·µ·g).
+#[test]
+fn sliding_block_stops() {
+    for (friction, speed) in [(0.5, 1.5), (0.3, 1.0)] {
+        let floor = block([6.0, 1.0, 0.2]);
+        let on_it = Pose::upright([-2.0, 0.0, 0.2], 0.0);
+        let mut world = world(vec![
+            object("floor", floor, Role::Platform, Pose::IDENTITY, 10.0, friction),
+            object("a", block([0.2, 0.2, 0.04]), Role::Target, on_it, 1.0, friction),
+        ]);
+        run(&mut world, 0.2);
+        let start = body(&world, "a").pose;
+        assert!(world.poison("a", Poison::Velocity([speed, 0.0, 0.0])));
+        run(&mut world, 2.0);
+        let slid = distance(&start, &body(&world, "a").pose);
+        let expected = speed * speed / (2.0 * friction * GRAVITY);
+        assert!((slid / expected - 1.0).abs() < 0.05, "slid {slid} m, expected {expected} m");
+    }
+}
+
+/// A stack's contact forces are the weights above them, and what carries is told apart from what only touches.
+#[test]
+fn resting_forces_are_weights() {
+    let at = |z| Pose::upright([0.0, 0.0, z], 0.0);
+    let mut world = world(vec![
+        object("low", block([0.2, 0.2, 0.1]), Role::Target, at(0.0), 2.0, 0.5),
+        object("high", block([0.1, 0.1, 0.1]), Role::Other, at(0.1), 1.0, 0.5),
+    ]);
+    run(&mut world, 0.4);
+    world.begin_record();
+    run(&mut world, 0.1);
+    let record = world.end_record();
+    let force = |pair: [&str; 2]| {
+        let contact = record.contacts.iter().find(|contact| contact.pair == pair.map(str::to_owned));
+        contact.unwrap_or_else(|| panic!("{pair:?} touch")).max_force_n
+    };
+    assert!((force(["high", "low"]) / GRAVITY - 1.0).abs() < 0.03, "{}", force(["high", "low"]));
+    assert!((force(["floor", "low"]) / (3.0 * GRAVITY) - 1.0).abs() < 0.03, "{}", force(["floor", "low"]));
+    assert_eq!(body(&world, "high").rests_on, ["low"]);
+    assert_eq!(body(&world, "low").rests_on, ["floor"]);
+    assert_eq!(body(&world, "low").touches, ["floor", "high"]);
+}
+
+fn pick(scene: &Scene, disturb: impl FnOnce(&mut World)) -> Trace {
+    let mut world = build(scene).expect("the scene is right");
+    assert!(world.settle().settled);
+    disturb(&mut world);
+    let parameters = BTreeMap::from([("pickObject".to_owned(), vec!["thing_1".to_owned()])]);
+    let calls = [ActionCall { action: "Pick".to_owned(), parameters }];
+    perform(&calls, &mut world, &mut Choices::random(1, 0), &Budget { action_secs: 60.0 })
+}
+
+/// A thing alone on a coffee table, a metre in front of the robot.
+fn on_table(model: Arc<ObjectModel>, mass_kg: f64, friction: f64) -> Scene {
+    let table = shipped("coffee_table");
+    let mut scene = scene(vec![
+        object("table_1", table, Role::Platform, Pose::IDENTITY, 14.0, 0.5),
+        object("thing_1", model, Role::Target, Pose::upright([-0.1, 0.02, 0.706], 0.0), mass_kg, friction),
+    ]);
+    scene.robot.base = [-1.0, 0.0, 0.0];
+    scene
+}
+
+/// Two fingers that push with F each hold up to 2·µ·F. Surfaces share the geometric mean of their frictions.
+#[test]
+fn grip_at_and_below_its_limit() {
+    let (friction, profile) = (0.2_f64, robot());
+    let limit_kg = 2.0 * (friction * profile.finger_friction).sqrt() * profile.grip_force_n / GRAVITY;
+    for (share, holds) in [(0.85, true), (1.12, false)] {
+        let trace = pick(&on_table(block([0.06, 0.06, 0.15]), share * limit_kg, friction), |_| {});
+        let after = trace.snapshots.last().expect("there is a last state");
+        let thing = &after.bodies[1];
+        let risen = thing.pose.position[2] - trace.snapshots[0].bodies[1].pose.position[2];
+        assert_eq!(thing.rests_on == ["robot"], holds, "{share} of the limit: rests on {:?}", thing.rests_on);
+        assert_eq!(risen > 0.15, holds, "{share} of the limit: rose by {risen} m");
+        let slipped = (after.robot.gripper.position[2] - thing.pose.position[2] - 0.075).abs();
+        assert!(!holds || slipped < 0.008, "{share} of the limit: slipped by {slipped} m");
+        let report = trace.actions[0].report.as_ref().expect("the skill reports");
+        assert_eq!(report.succeeded, holds, "{}", report.message);
+    }
+}
+
+/// More than the lift's motor can carry stands on it: its stop holds, and the motor does not raise it.
+#[test]
+fn joint_limits_hold_under_load() {
+    let weight = Pose::upright([0.05, 0.05, 0.402], 0.0);
+    let mut scene = scene(vec![object("weight", block([0.08, 0.08, 0.08]), Role::Other, weight, 40.0, 0.8)]);
+    scene.robot.base = [0.0, 0.0, 0.0];
+    let mut world = build(&scene).expect("the scene is right");
+    let mut command = world.hold();
+    let lift = world.layout().arm[0];
+    let lift_joint = world.kinematics().joints()[lift].clone();
+    command.positions[lift] = 0.3;
+    for _ in 0..180 {
+        world.step(&command);
+    }
+    assert_eq!(body(&world, "weight").rests_on, ["robot"]);
+    assert!(40.0 * GRAVITY > lift_joint.effort, "the load has to be more than the motor carries");
+    let position = world.observe().positions[lift];
+    assert!((lift_joint.lower - 0.002..lift_joint.lower + 0.002).contains(&position), "{position}");
+    // Without the load the same motor gets there.
+    assert!(world.poison("weight", Poison::Teleport([2.0, 0.0, 0.1])));
+    for _ in 0..180 {
+        world.step(&command);
+    }
+    assert!((world.observe().positions[lift] - 0.3).abs() < 0.002);
+}
+
+/// Commands beyond the limits end at the limits, and no joint is faster than it may be.
+#[test]
+fn limits_of_position_and_speed_hold_against_commands() {
+    let mut world = world(Vec::new());
+    let mut command = world.hold();
+    let arm = world.layout().arm.clone();
+    // The lift goes up first and down last, when the arm is upright again: it would meet the floor.
+    let courses: [[f64; 5]; 4] = [
+        [100.0, 100.0, 100.0, 100.0, 100.0],
+        [100.0, -100.0, -100.0, -100.0, -100.0],
+        [100.0, 100.0, -100.0, -100.0, -100.0],
+        [-100.0, 100.0, -100.0, -100.0, -100.0],
+    ];
+    for course in courses {
+        for (joint, position) in arm.iter().zip(course) {
+            command.positions[*joint] = position;
+        }
+        for _ in 0..60 * 6 {
+            world.step(&command);
+            let observed = world.observe();
+            for joint in &arm {
+                let limits = &world.kinematics().joints()[*joint];
+                let (position, speed) = (observed.positions[*joint], observed.velocities[*joint].abs());
+                assert!((limits.lower - 0.01..limits.upper + 0.01).contains(&position), "{} {position}", limits.name);
+                assert!(speed < 1.15 * limits.velocity, "{} moves with {speed}", limits.name);
+            }
+        }
+        for joint in &arm {
+            let limits = &world.kinematics().joints()[*joint];
+            let end = if command.positions[*joint] > 0.0 { limits.upper } else { limits.lower };
+            let position = world.observe().positions[*joint];
+            assert!((position - end).abs() < 0.01, "{} is at {position} instead of {end}", limits.name);
+        }
+    }
+}
+
+/// The arm stands where it is told to within a tenth of what it would sag without gravity compensation.
+#[test]
+fn gravity_is_compensated() {
+    let mut world = world(Vec::new());
+    let mut command = world.hold();
+    let arm = world.layout().arm.clone();
+    for (joint, position) in arm.iter().zip([0.3, -1.5, 0.4, -0.5, 0.3]) {
+        command.positions[*joint] = position;
+    }
+    for _ in 0..60 * 4 {
+        world.step(&command);
+    }
+    let positions = world.observe().positions;
+    let needed = world.kinematics().holding_efforts(&positions);
+    assert!(needed[arm[1]].abs() > 5.0, "the posture has to load the shoulder: {} N·m", needed[arm[1]]);
+    // The motors' stiffness is all effort at an error of 0.02 rad: the shoulder would sag by that much without.
+    let shoulder = &world.kinematics().joints()[arm[1]];
+    let sag = needed[arm[1]].abs() / shoulder.effort * 0.02;
+    let error_of = |joint: usize| (positions[joint] - command.positions[joint]).abs();
+    assert!(error_of(arm[1]) < 0.1 * sag, "shoulder: {} rad of {sag} rad", error_of(arm[1]));
+    // The lift's motor is so stiff that the engine's own step error is the larger part.
+    assert!(error_of(arm[0]) < 5e-4, "lift: {} m", error_of(arm[0]));
+}
+
+#[test]
+fn the_same_scene_gives_the_same_bits() {
+    let scene = on_table(shipped("glass"), 0.3, 0.45);
+    let (first, again) = (pick(&scene, |_| {}), pick(&scene, |_| {}));
+    assert_eq!(first, again);
+    let mut other = scene.clone();
+    other.objects[1].mass_kg += 1e-4;
+    assert_ne!(first.hash, pick(&other, |_| {}).hash);
+}
+
+#[test]
+fn a_state_that_is_not_a_number_ends_the_action_as_broken() {
+    let scene = on_table(shipped("glass"), 0.3, 0.45);
+    let trace = pick(&scene, |world| assert!(world.poison("thing_1", Poison::NotFinite)));
+    assert_eq!(trace.actions[0].end, ActionEnd::Broken("the state of thing_1 is not a number".to_owned()));
+    assert_eq!(trace.actions[0].report, None);
+    assert_eq!(trace.snapshots.len(), 2);
+}
+
+#[test]
+fn a_body_that_leaves_the_world_ends_the_action_as_broken() {
+    let scene = on_table(shipped("glass"), 0.3, 0.45);
+    let trace = pick(&scene, |world| assert!(world.poison("thing_1", Poison::Teleport([0.0, 0.0, -2.0]))));
+    let ActionEnd::Broken(reason) = &trace.actions[0].end else { panic!("{:?}", trace.actions[0].end) };
+    assert!(reason.starts_with("thing_1 left the world at"), "{reason}");
+}
+
+#[test]
+fn an_object_on_the_floor_is_no_fault_and_one_that_falls_while_settling_is_reported() {
+    let mut scene = on_table(shipped("glass"), 0.3, 0.45);
+    // Half of it is over the edge.
+    scene.objects[1].pose = Pose::upright([0.33, 0.0, 0.706], 0.0);
+    let mut world = build(&scene).expect("the scene is right");
+    let settling = world.settle();
+    assert!(!settling.settled);
+    assert_eq!(settling.left, ["thing_1"]);
+    assert_eq!(world.fault(), None);
+}
