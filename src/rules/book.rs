@@ -220,6 +220,10 @@ impl Preparing {
         let triples: Vec<[TermId; 3]> =
             ontology.triples.iter().map(|triple| triple.clone().map(|term| self.terms.intern(term))).collect();
         let mut indexes = Indexes::new(&predicates);
+        let has_sparql = ontology.properties.values().any(|p| p.rule.language == RuleLanguage::Sparql);
+        // Faults of rules that nobody needs are faults all the same.
+        self.plan(library.clone(), &predicates, &mut Indexes::new(&predicates));
+        let library = needed(library, programs.values(), has_sparql, &predicates);
         let (fixed, moving) = split_fixed(library, &predicates);
         let fixed = self.plan(fixed, &predicates, &mut indexes);
         let libraries = self.plan(moving, &predicates, &mut indexes);
@@ -244,7 +248,6 @@ impl Preparing {
         }
         let given = Given::new(&predicates, phases);
         let own = given.load_ontology(&triples, &predicates, &indexes);
-        let has_sparql = properties.values().any(|judge| matches!(judge.rules, JudgeRules::Sparql(_)));
         let statements = Statements::new(if has_sparql { &triples } else { &[] }, &mut self.terms);
         let fixed_tables = self.close_fixed(&fixed, own, &predicates, &indexes)?;
         Ok(RuleBook {
@@ -349,6 +352,36 @@ fn gather(predicates: &mut Predicates, terms: &mut Terms) -> Vec<Rule> {
         });
     }
     rules
+}
+
+/// The library's rules that some property reads, directly or through each other. SPARQL reads all snapshots.
+fn needed<'p>(
+    mut library: Program,
+    properties: impl Iterator<Item = &'p Program>,
+    snapshots: bool,
+    predicates: &Predicates,
+) -> Program {
+    let bodies = |rules: &[Rule]| -> Vec<usize> {
+        rules.iter().flat_map(|rule| rule.body.iter().filter_map(Literal::atom).map(|atom| atom.predicate)).collect()
+    };
+    let mut needed: BTreeSet<usize> = properties.flat_map(|program| bodies(&program.rules)).collect();
+    if snapshots {
+        needed.extend((0..predicates.len()).filter(|id| predicates.get(*id).name == "state"));
+    }
+    loop {
+        let before = needed.len();
+        for rule in &library.rules {
+            if needed.contains(&rule.head.predicate) {
+                needed.extend(bodies(std::slice::from_ref(rule)));
+            }
+        }
+        if needed.len() == before {
+            break;
+        }
+    }
+    library.rules.retain(|rule| needed.contains(&rule.head.predicate));
+    library.facts.retain(|predicate, _| needed.contains(predicate));
+    library
 }
 
 /// Rules that read the ontology only, directly or through each other, and the rest.
