@@ -147,3 +147,20 @@ fn file_names_with_spaces_and_signs_are_found() {
     let ontology = ontology::load(&Files::Disk, &path).unwrap();
     assert_eq!(ontology.properties["http://actions#Up"].rule.path, "my rules/50% höher.rls");
 }
+
+/// A user's ontology adds a property to the shipped ones, far away from this repository.
+#[test]
+fn the_carried_ontology_can_be_imported_from_anywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("quick.rls"), "success(1) .").unwrap();
+    let text = "@prefix act: <http://actions#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
+                <> a owl:Ontology ; owl:imports <https://w3id.org/actcheck/ontology> .\n\
+                act:Quick a act:Property ; act:verifiedBy <quick.rls> .\nact:Pick act:successProperty act:Quick .\n";
+    std::fs::write(folder.path().join("mine.ttl"), text).unwrap();
+    let mine = ontology::load(&Files::Disk, &folder.path().join("mine.ttl")).unwrap_or_else(|found| panic!("{found}"));
+    assert_eq!(mine.actions["Pick"].success_properties.len(), 6);
+    let source = |name: &str| mine.properties[&names::act(name)].rule.source.name.to_string();
+    assert_eq!(source("MovedObject"), "built-in:rules/moved_object.rls");
+    assert!(source("Quick").ends_with("quick.rls") && !source("Quick").starts_with("built-in:"));
+    assert!(mine.libraries.iter().all(|library| library.source.name.starts_with("built-in:rules/lib/")));
+}

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names};
 use crate::ontology::graph::{Graph, rdfs};
@@ -24,9 +25,8 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     if found.has_errors() {
         return Err(found);
     }
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let libraries = libraries(files, folder, &graph, &mut found);
-    let mut rules = property_rules(files, folder, &graph, &mut found);
+    let libraries = libraries(&graph, &mut found);
+    let mut rules = property_rules(&graph, &mut found);
     let properties: BTreeMap<String, Property> = graph
         .individuals(&names::act("Property"))
         .into_iter()
@@ -64,11 +64,11 @@ fn in_order_of_place(found: Diagnostics, sources: &[Source]) -> Diagnostics {
 }
 
 /// Libraries in the order of their paths, each once.
-fn libraries(files: &Files, folder: &Path, graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
+fn libraries(graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
     let predicate = names::act("ruleLibrary");
-    let mut libraries: BTreeMap<String, RuleFile> = BTreeMap::new();
+    let mut libraries: BTreeMap<(String, Arc<str>), RuleFile> = BTreeMap::new();
     for statement in graph.statements().iter().filter(|statement| *statement.predicate == *predicate) {
-        let Some(library) = rule_files::read(files, folder, graph, statement, found) else { continue };
+        let Some(library) = rule_files::read(graph, statement, found) else { continue };
         if library.language != RuleLanguage::Datalog
             && let Some((source, span)) = &library.linked_at
         {
@@ -76,20 +76,20 @@ fn libraries(files: &Files, folder: &Path, graph: &Graph, found: &mut Diagnostic
             found
                 .push(Diagnostic::error("O010", message).at(source, span.clone()).help("a library's ending is `.rls`"));
         }
-        libraries.insert(library.path.clone(), library);
+        libraries.insert((library.path.clone(), Arc::clone(&library.source.name)), library);
     }
     libraries.into_values().collect()
 }
 
 /// The one rule file of each property.
-fn property_rules(files: &Files, folder: &Path, graph: &Graph, found: &mut Diagnostics) -> BTreeMap<String, RuleFile> {
+fn property_rules(graph: &Graph, found: &mut Diagnostics) -> BTreeMap<String, RuleFile> {
     let mut rules = BTreeMap::new();
     for iri in graph.individuals(&names::act("Property")) {
         let links: Vec<&Statement> = graph.stated(&iri, &names::act("verifiedBy")).collect();
         match links.as_slice() {
             [] => found.push(check::unverified(graph, &iri)),
             [link] => {
-                if let Some(rule) = rule_files::read(files, folder, graph, link, found) {
+                if let Some(rule) = rule_files::read(graph, link, found) {
                     rules.insert(iri, rule);
                 }
             }

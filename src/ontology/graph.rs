@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::{Source, Span, Term, names};
-use crate::ontology::read::{Reading, Statement};
+use crate::ontology::read::{Home, Reading, Statement};
 
 /// Questions that assembling an ontology asks of its statements.
 pub(super) struct Graph {
@@ -82,6 +82,11 @@ impl Graph {
     /// Text and place of a statement's mention of an IRI.
     pub(super) fn place(&self, statement: &Statement, iri: &str) -> (&Source, Span) {
         (&self.reading.sources[statement.text], self.reading.place(statement, iri))
+    }
+
+    /// What relative paths in a statement's text are relative to.
+    pub(super) fn home(&self, statement: &Statement) -> &Home {
+        &self.reading.homes[statement.text]
     }
 
     fn means(&self, predicate: &str, wanted: &str) -> bool {

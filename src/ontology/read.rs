@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -12,6 +12,10 @@ use oxigraph::io::{RdfFormat, RdfParseError, RdfParser};
 use crate::base::{Diagnostic, Diagnostics, Files, Source, Span, Term, names};
 use crate::ontology::{file_iri, literal};
 
+/// Importing this IRI adds the ontology that the program carries, wherever the importing file lies.
+const SHIPPED: &str = "https://w3id.org/actcheck/ontology";
+const SHIPPED_FOLDER: &str = "ontology";
+const SHIPPED_ROOT: &str = "actions.ttl";
 /// Beyond this many, syntax errors of one text are echoes of the first ones.
 const MOST_SYNTAX_ERRORS: usize = 5;
 /// Imports beyond this are a mistake.
@@ -34,22 +38,42 @@ pub(super) struct Statement {
 #[derive(Debug, Default)]
 pub(super) struct Reading {
     pub(super) sources: Vec<Source>,
+    /// For each text, what relative paths in it are relative to.
+    pub(super) homes: Vec<Home>,
     pub(super) statements: Vec<Statement>,
 }
 
-/// Reads a file and what it imports by relative paths, each once. Absolute imports are left alone: nothing is fetched.
+/// Where a text comes from: relative paths of its statements are relative to this folder.
+#[derive(Debug, Clone)]
+pub(super) struct Home {
+    pub(super) files: Files,
+    pub(super) folder: PathBuf,
+}
+
+/// A text that is still to be read.
+struct Waiting {
+    home: Home,
+    /// Path from the home's folder, as an IRI writes it.
+    relative: String,
+    importer: Option<(usize, Span)>,
+}
+
+/// Reads a file and what it imports, each once: by relative paths, and [`SHIPPED`] from inside the program. All other
+/// imports are left alone: nothing is fetched.
 pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Reading {
     let mut reading = Reading::default();
-    let folder = root.parent().unwrap_or(Path::new(""));
+    let home = Home { files: files.clone(), folder: root.parent().unwrap_or(Path::new("")).to_path_buf() };
     let name = root.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let mut waiting: Vec<(String, Option<(usize, Span)>)> = vec![(file_iri::encoded(&name), None)];
-    let mut seen: BTreeSet<String> = BTreeSet::new();
-    while let Some((relative, importer)) = waiting.pop() {
-        if !seen.insert(relative.clone()) || seen.len() > MOST_FILES {
+    let mut waiting = vec![Waiting { home, relative: file_iri::encoded(&name), importer: None }];
+    let mut seen: BTreeSet<PathBuf> = BTreeSet::new();
+    while let Some(Waiting { home, relative, importer }) = waiting.pop() {
+        let path = file_iri::on_disk(&home.folder, &relative);
+        // A carried file and one on disk may have one path, but not one name.
+        let key = if home.files == Files::Shipped { Path::new("built-in:").join(&path) } else { path.clone() };
+        if !seen.insert(key) || seen.len() > MOST_FILES {
             continue;
         }
-        let path = file_iri::on_disk(folder, &relative);
-        let source = match files.read(&path) {
+        let source = match home.files.read(&path) {
             Ok(source) => source,
             Err(reason) => {
                 found.push(unreadable(&path, &reason, importer.map(|(text, span)| (&reading.sources[text], span))));
@@ -59,6 +83,7 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
         let text = reading.sources.len();
         parse(&source, text, &file_iri::base_of(&relative), &mut reading.statements, found);
         reading.sources.push(source);
+        reading.homes.push(home);
         let mut imports = imports_of(&reading, text);
         imports.reverse();
         waiting.extend(imports);
@@ -79,14 +104,20 @@ fn unreadable(path: &Path, reason: &str, importer: Option<(&Source, Span)>) -> D
     }
 }
 
-fn imports_of(reading: &Reading, text: usize) -> Vec<(String, Option<(usize, Span)>)> {
+fn imports_of(reading: &Reading, text: usize) -> Vec<Waiting> {
     let imports = format!("{}imports", names::OWL);
     let of_text =
         reading.statements.iter().filter(|statement| statement.text == text && *statement.predicate == *imports);
     of_text
         .filter_map(|statement| {
-            let relative = file_iri::relative_of(statement.object.as_iri()?)?;
-            Some((relative, Some((text, reading.place(statement, statement.object.as_iri()?)))))
+            let iri = statement.object.as_iri()?;
+            let importer = Some((text, reading.place(statement, iri)));
+            if iri == SHIPPED {
+                let home = Home { files: Files::Shipped, folder: PathBuf::from(SHIPPED_FOLDER) };
+                return Some(Waiting { home, relative: SHIPPED_ROOT.to_owned(), importer });
+            }
+            let home = reading.homes[text].clone();
+            Some(Waiting { home, relative: file_iri::relative_of(iri)?, importer })
         })
         .collect()
 }

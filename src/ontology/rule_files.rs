@@ -11,13 +11,7 @@ use crate::ontology::{RuleFile, RuleLanguage};
 /// Reads the rule file that a statement's object names: an IRI or a string, relative to the ontology file.
 ///
 /// Faults: it is not relative (O011), has neither ending (O010), or can't be read (O009).
-pub(super) fn read(
-    files: &Files,
-    folder: &Path,
-    graph: &Graph,
-    statement: &Statement,
-    found: &mut Diagnostics,
-) -> Option<RuleFile> {
+pub(super) fn read(graph: &Graph, statement: &Statement, found: &mut Diagnostics) -> Option<RuleFile> {
     let mention = match &statement.object {
         Term::Iri(text) | Term::String(text) => text.to_string(),
         other => other.to_string(),
@@ -36,15 +30,16 @@ pub(super) fn read(
         fault("O010", format!("the rule file `{path}` has neither ending of a rule language"), help.to_owned());
         return None;
     };
-    let place = beside(folder, &path);
-    match files.read(&place) {
+    let home = graph.home(statement);
+    let place = beside(&home.folder, &path);
+    match home.files.read(&place) {
         Ok(text) => {
             let digest = digest_of(&text.text);
             Some(RuleFile { source: text, language, path, digest, linked_at: Some((source.clone(), span.clone())) })
         }
         Err(reason) => {
             let message = format!("cannot read the rule file `{path}`: {reason}");
-            fault("O009", message, help_for_missing(files, &place));
+            fault("O009", message, help_for_missing(&home.files, &place));
             None
         }
     }
