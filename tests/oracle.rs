@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use actcheck::base::{Source, Term};
 use actcheck::rules::Budget;
-use actcheck::rules::standalone::{Engine, Program, run};
+use actcheck::rules::explain::{Premise, Proof, Support};
+use actcheck::rules::standalone::{Closure, Engine, Program, run};
 use proptest::prelude::*;
 
 /// A rule or fact of a random program, as text.
@@ -86,9 +87,78 @@ proptest! {
     }
 
     #[test]
+    fn every_proof_is_one(statements in statements()) {
+        let text = statements.join("\n");
+        let program = load(&text);
+        let budget = Budget { tuples: 2_000, secs: 20.0 };
+        let Ok(closure) = program.close(Engine::Naive, &budget) else { return Ok(()) };
+        for predicate in closure.predicates() {
+            for tuple in closure.tuples(predicate).into_iter().step_by(7).take(5) {
+                let args: Vec<String> = tuple.iter().map(Term::to_string).collect();
+                let statement = format!("{predicate}({})", args.join(", "));
+                let explanation = program.explain(&statement, &budget).unwrap();
+                prop_assert_eq!(explanation.proofs.len(), 1, "{} in\n{}", statement, text);
+                if let Err(reason) = checked(&explanation.proofs[0], &closure, &text, &mut Vec::new()) {
+                    prop_assert!(false, "{}: {}\n{}\n{}", statement, reason, explanation.to_text(), text);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn the_parser_never_panics(text in "[?!$#@%~(){}\\[\\]<>:=,. \\n\"\\\\a-cw0-9_^*/+-]{0,80}") {
         let _ = Program::load(&Source::new("random.rls", text), Path::new(""));
     }
+}
+
+/// Checks a proof without its maker: facts stand in the text, and a rule alone derives its conclusion from its premises.
+fn checked(proof: &Proof, closure: &Closure, text: &str, above: &mut Vec<String>) -> Result<(), String> {
+    let holds = |statement: &str| {
+        let (name, args) = statement.trim_end_matches(')').split_once('(').unwrap();
+        closure.tuples(name).iter().any(|tuple| tuple.iter().map(Term::to_string).collect::<Vec<_>>().join(", ") == args)
+    };
+    let statement = &proof.statement;
+    if !holds(statement) {
+        return Err(format!("{statement} does not hold"));
+    }
+    if above.contains(statement) {
+        return Err(format!("{statement} proves itself"));
+    }
+    let Support::Rule { rule, premises } = &proof.support else {
+        let stated = text.contains(&format!("{statement} ."));
+        return if stated || proof.support != Support::Fact { Ok(()) } else { Err(format!("{statement} is no fact")) };
+    };
+    above.push(statement.clone());
+    let mut alone = format!("{}\n", rule.text);
+    for premise in premises {
+        match premise {
+            Premise::Proof(inner) => {
+                checked(inner, closure, text, above)?;
+                alone.push_str(&format!("{} .\n", inner.statement));
+            }
+            Premise::Absent(pattern) => {
+                let explained = load(text).explain(pattern, &Budget::default()).map_err(|fault| fault.to_string())?;
+                if !explained.proofs.is_empty() {
+                    return Err(format!("{pattern} is not absent"));
+                }
+            }
+            Premise::Computed(_) => {}
+        }
+    }
+    above.pop();
+    let derived = load(&alone).explain(statement, &Budget::default()).map_err(|fault| fault.to_string())?;
+    if derived.proofs.is_empty() { Err(format!("{statement} does not follow from\n{alone}")) } else { Ok(()) }
+}
+
+#[test]
+fn a_program_explains_what_it_lacks() {
+    let program = load("e(1, 2) . e(2, 3) . p(?x, ?y) :- e(?x, ?y) . p(?x, ?z) :- p(?x, ?y), e(?y, ?z), ?z < 3 .");
+    let explanation = program.explain("p(1, 3)", &Budget::default()).unwrap();
+    let text = explanation.to_text();
+    assert!(text.contains("missing ?z < 3, with 3 < 3"), "{text}");
+    assert!(program.explain("q(1)", &Budget::default()).is_err());
+    assert!(program.explain("p(1", &Budget::default()).is_err());
+    assert!(program.explain("p(9, _)", &Budget::default()).unwrap().proofs.is_empty());
 }
 
 #[test]

@@ -142,19 +142,36 @@ fn outcome(case: &Path) -> String {
     }
 }
 
+/// Compares with a file of the case, or rewrites it.
+fn differs(file: &Path, got: &str) -> Option<String> {
+    if std::env::var_os("UPDATE_EXPECT").is_some() {
+        std::fs::write(file, got).unwrap();
+    }
+    let expected = std::fs::read_to_string(file).unwrap_or_default();
+    (got != expected).then(|| format!("== {}\n-- expected\n{expected}-- got\n{got}", file.display()))
+}
+
+fn cases() -> Vec<PathBuf> {
+    list(&root()).into_iter().filter(|path| path.is_dir()).collect()
+}
+
 #[test]
 fn every_case_has_its_findings() {
+    let wrong: Vec<String> = cases().iter().filter_map(|case| differs(&case.join("expected"), &outcome(case))).collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Each shipped property, and each case that has a file `explained`.
+#[test]
+fn every_explanation_is_as_expected() {
     let mut wrong = Vec::new();
-    for case in list(&root()).into_iter().filter(|path| path.is_dir()) {
-        let got = outcome(&case);
-        let file = case.join("expected");
-        if std::env::var_os("UPDATE_EXPECT").is_some() {
-            std::fs::write(&file, &got).unwrap();
-        }
-        let expected = std::fs::read_to_string(&file).unwrap_or_default();
-        if got != expected {
-            wrong.push(format!("== {}\n-- expected\n{expected}-- got\n{got}", case.display()));
-        }
+    for case in cases().iter().filter(|case| case.join("shipped").is_file() || case.join("explained").is_file()) {
+        let book = RuleBook::prepare(&ontology_of(case)).unwrap();
+        let facts = facts_of(case);
+        let explanation = book.explain(&facts.action(0).unwrap(), TESTED, &Budget::default()).unwrap();
+        wrong.extend(differs(&case.join("explained"), &explanation.to_text()));
+        assert!(explanation.to_dot().ends_with("}\n"));
+        assert_eq!(explanation.to_json()["holds"], explanation.findings.unwrap().holds);
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -29,6 +29,8 @@ pub struct RuleBook {
     pub(crate) given: Given,
     /// Rules that read the ontology only: evaluated when the book is prepared.
     pub(crate) fixed: Tables,
+    /// The ontology's statements alone, of those that rules read.
+    pub(crate) fixed_facts: Tables,
     pub(crate) fixed_rules: Planned,
     pub(crate) libraries: Planned,
     pub(crate) properties: BTreeMap<String, Judge>,
@@ -222,7 +224,9 @@ impl Preparing {
         let mut indexes = Indexes::new(&predicates);
         let has_sparql = ontology.properties.values().any(|p| p.rule.language == RuleLanguage::Sparql);
         // Faults of rules that nobody needs are faults all the same.
+        let known = self.diagnostics.len();
         self.plan(library.clone(), &predicates, &mut Indexes::new(&predicates));
+        let library = if self.diagnostics.len() > known { Program::default() } else { library };
         let library = needed(library, programs.values(), has_sparql, &predicates);
         let (fixed, moving) = split_fixed(library, &predicates);
         let fixed = self.plan(fixed, &predicates, &mut indexes);
@@ -248,6 +252,7 @@ impl Preparing {
         }
         let given = Given::new(&predicates, phases);
         let own = given.load_ontology(&triples, &predicates, &indexes);
+        let fixed_facts = given.load_ontology(&triples, &predicates, &indexes);
         let statements = Statements::new(if has_sparql { &triples } else { &[] }, &mut self.terms);
         let fixed_tables = self.close_fixed(&fixed, own, &predicates, &indexes)?;
         Ok(RuleBook {
@@ -256,6 +261,7 @@ impl Preparing {
             indexes,
             given,
             fixed: fixed_tables,
+            fixed_facts,
             fixed_rules: fixed,
             libraries,
             properties,

@@ -1,12 +1,12 @@
 //! Semi-naive evaluation, stratum by stratum, on datafrog relations.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use crate::base::TermId;
 use crate::rules::aggregate::{aggregate, projection};
 use crate::rules::join::{Join, Sink};
 use crate::rules::meter::{Meter, Stop};
-use crate::rules::plan::{Indexes, Op, RulePlan, Sizes, Variant, plan_rule};
+use crate::rules::plan::{Indexes, Op, Part, RulePlan, Sizes, Variant, plan_rule};
 use crate::rules::program::{PredicateId, Predicates, Program, Rule};
 use crate::rules::relation::{Batch, Finished, Growing, finished, growing};
 use crate::rules::stratify::Stratum;
@@ -91,6 +91,10 @@ pub(crate) struct Stopped {
     pub(crate) rule: Option<usize>,
 }
 
+/// The round in which each tuple of a recursive stratum was first derived. A proof that takes premises of smaller rounds
+/// only can't go in circles.
+pub(crate) type Rounds = HashMap<(PredicateId, Vec<TermId>), u32>;
+
 /// Evaluates a program over what is in the layers; its results go to the layers' own tables.
 pub(crate) fn evaluate(
     planned: &Planned,
@@ -100,7 +104,20 @@ pub(crate) fn evaluate(
     universe: &mut Universe<'_>,
     meter: &mut Meter,
 ) -> Result<(), Stopped> {
-    let mut run = Run { planned, predicates, indexes, universe, meter };
+    evaluate_noting(planned, predicates, indexes, layers, universe, meter, None)
+}
+
+/// Evaluates a program and notes the round of each tuple, for explanations.
+pub(crate) fn evaluate_noting(
+    planned: &Planned,
+    predicates: &Predicates,
+    indexes: &Indexes,
+    layers: &mut Layers<'_>,
+    universe: &mut Universe<'_>,
+    meter: &mut Meter,
+    rounds: Option<&mut Rounds>,
+) -> Result<(), Stopped> {
+    let mut run = Run { planned, predicates, indexes, universe, meter, rounds };
     run.facts(layers);
     for stratum in &planned.strata {
         run.meter.look().map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
@@ -119,6 +136,7 @@ struct Run<'a, 'u, 't> {
     indexes: &'a Indexes,
     universe: &'u mut Universe<'t>,
     meter: &'u mut Meter,
+    rounds: Option<&'u mut Rounds>,
 }
 
 /// The growing tuples of a stratum, in the order of its predicates.
@@ -162,7 +180,7 @@ impl Run<'_, '_, '_> {
         for rule in &stratum.rules {
             self.insert_all(*rule, false, stratum, layers, &grown)?;
         }
-        loop {
+        for round in 0.. {
             let mut changed = false;
             for growing in &mut grown {
                 changed |= growing.changed();
@@ -170,6 +188,7 @@ impl Run<'_, '_, '_> {
             if !changed {
                 break;
             }
+            self.note(round, stratum, &grown);
             let found = grown.iter().map(|growing| growing.recent_len()).sum();
             let culprit = || stratum.rules.iter().copied().find(|rule| self.is_recursive(*rule));
             let rule = culprit();
@@ -183,6 +202,19 @@ impl Run<'_, '_, '_> {
             layers.own.set(*predicate, growing.complete());
         }
         Ok(())
+    }
+
+    /// Notes the round of what is recent, where somebody wants to know.
+    fn note(&mut self, round: u32, stratum: &Stratum, grown: &Grown) {
+        let Some(rounds) = &mut self.rounds else { return };
+        for (predicate, growing) in stratum.predicates.iter().zip(grown) {
+            let mut batches = Vec::new();
+            growing.batches(Part::Recent, 0, &mut batches);
+            let width = self.predicates.get(*predicate).width;
+            for row in batches.iter().flat_map(|batch| batch.chunks_exact(width)) {
+                rounds.insert((*predicate, row.to_vec()), round);
+            }
+        }
     }
 
     fn is_recursive(&self, rule: usize) -> bool {
@@ -257,7 +289,7 @@ impl Run<'_, '_, '_> {
         for op in &variant.ops {
             let (predicate, part, index) = match op {
                 Op::Scan { predicate, part, index, .. } => (*predicate, *part, *index),
-                Op::Absent { predicate, index, .. } => (*predicate, crate::rules::plan::Part::All, *index),
+                Op::Absent { predicate, index, .. } => (*predicate, Part::All, *index),
                 _ => {
                     batches.push(Vec::new());
                     widths.push(1);

@@ -12,6 +12,7 @@ mod builtins;
 mod check;
 mod dataset;
 mod evaluate;
+pub mod explain;
 mod expression;
 mod findings;
 mod given;

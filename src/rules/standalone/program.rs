@@ -15,7 +15,7 @@ use crate::rules::plan::Indexes;
 use crate::rules::program::{PredicateId, Predicates};
 use crate::rules::standalone::import::{define_imports, import};
 use crate::rules::stratify::stratify;
-use crate::rules::syntax::{Statement, Syntax};
+use crate::rules::syntax::{ExpressionKind, Statement, Syntax};
 use crate::rules::universe::Universe;
 
 /// Which evaluator closes a program.
@@ -137,6 +137,28 @@ impl Program {
         let made = universe.into_made();
         let terms = (0..self.terms.len()).map(|id| self.terms.term(id as TermId).clone()).chain(made).collect();
         Ok(Closure { terms, tables })
+    }
+
+    /// A statement's predicate and arguments; nothing in the place of `_`.
+    pub(crate) fn pattern(&self, statement: &str) -> Result<(String, Vec<Option<Term>>), String> {
+        let prefixes: String =
+            self.syntax.prefixes.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
+        let statement = statement.trim().trim_end_matches('.');
+        let (syntax, faults) = parse(&Source::new("statement", format!("{prefixes}{statement} .")));
+        if let Some(fault) = faults.iter().next() {
+            return Err(fault.message.clone());
+        }
+        let rule = syntax.statements.iter().find_map(|statement| match statement {
+            Statement::Rule(rule) if rule.body.is_empty() => rule.heads.first(),
+            _ => None,
+        });
+        let head = rule.ok_or("a statement reads `p(1, _)`")?;
+        let args = head.args.iter().map(|arg| match &arg.kind {
+            ExpressionKind::Constant(term) => Ok(Some(term.clone())),
+            ExpressionKind::Anonymous | ExpressionKind::Variable(_) => Ok(None),
+            _ => Err("a statement has constants and `_` only".to_owned()),
+        });
+        Ok((head.predicate.clone(), args.collect::<Result<_, _>>()?))
     }
 
     fn naive(

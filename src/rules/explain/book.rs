@@ -1,0 +1,168 @@
+//! Explanations of properties and of the tuples of a stand-alone program.
+
+use crate::facts::ActionFacts;
+use crate::rules::book::{JudgeRules, RuleBook, fault};
+use crate::rules::evaluate::{Layers, Planned, Rounds, Tables, evaluate_noting};
+use crate::rules::explain::model::Explanation;
+use crate::rules::explain::proof::Prover;
+use crate::rules::explain::search::Ground;
+use crate::rules::findings::{Budget, Findings, RuleFault};
+use crate::rules::meter::Meter;
+use crate::rules::program::Rule;
+use crate::rules::reading::{Verdict, findings};
+use crate::rules::universe::Universe;
+
+/// Proofs shown; the rest are like them.
+const PROOFS_SHOWN: usize = 3;
+
+impl RuleBook {
+    /// Why a property (by IRI) holds in an action, or why not.
+    ///
+    /// # Errors
+    /// The property is unknown, a value is wrong, or the budget was spent.
+    pub fn explain(&self, facts: &ActionFacts<'_>, property: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
+        let judge =
+            self.properties.get(property).ok_or_else(|| RuleFault::Value(format!("no property {property} is known")))?;
+        match &judge.rules {
+            JudgeRules::Datalog { planned, verdict } => self.explain_datalog(facts, &judge.label, planned, verdict, budget),
+            JudgeRules::Sparql(_) => {
+                let results = self.judge(facts, &[property.to_owned()], budget).remove(property);
+                let findings = results.unwrap_or_else(|| Err(RuleFault::Value("nothing was judged".into())))?;
+                Ok(of_query(&judge.label, findings))
+            }
+        }
+    }
+
+    fn explain_datalog(
+        &self,
+        facts: &ActionFacts<'_>,
+        label: &str,
+        planned: &Planned,
+        verdict: &Verdict,
+        budget: &Budget,
+    ) -> Result<Explanation, RuleFault> {
+        let mut universe = Universe::new(&self.terms, Some(facts.terms));
+        let (mut rounds, mut meter) = (Rounds::new(), Meter::new(budget));
+        let given = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
+        let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
+        let mut enriched = Layers { own, below: vec![&self.fixed] };
+        let (predicates, indexes) = (&self.predicates, &self.indexes);
+        evaluate_noting(&self.libraries, predicates, indexes, &mut enriched, &mut universe, &mut meter, Some(&mut rounds))
+            .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
+        let mut layers = Layers { own: Tables::default(), below: vec![&enriched.own, &self.fixed] };
+        evaluate_noting(planned, predicates, indexes, &mut layers, &mut universe, &mut meter, Some(&mut rounds))
+            .map_err(|stopped| fault(&meter, stopped, planned))?;
+        let findings = findings(verdict, &layers, &universe)?;
+        let rules: Vec<&Rule> =
+            planned.rules.iter().chain(&self.libraries.rules).chain(&self.fixed_rules.rules).collect();
+        let stated = stated(&[planned, &self.libraries, &self.fixed_rules], self);
+        let ground = Ground {
+            predicates,
+            rules,
+            layers: vec![&layers.own, &enriched.own, &self.fixed],
+            facts: vec![&given, &self.fixed_facts, &stated],
+            rounds: &rounds,
+            universe: &universe,
+        };
+        Ok(explained(label, findings, verdict, &ground))
+    }
+}
+
+/// Facts that stand in the texts of rules.
+fn stated(programs: &[&Planned], book: &RuleBook) -> Tables {
+    let mut tables = Tables::default();
+    for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
+        let width = book.predicates.get(*predicate).width;
+        let table = crate::rules::relation::finished(width, rows.clone(), book.indexes.of(*predicate).clone());
+        tables.set(*predicate, table);
+    }
+    tables
+}
+
+fn explained(label: &str, findings: Findings, verdict: &Verdict, ground: &Ground<'_>) -> Explanation {
+    let mut explanation =
+        Explanation { title: label.to_owned(), findings: None, proofs: Vec::new(), miss: None, notes: Vec::new() };
+    if let Some(decisive) = &verdict.decisive {
+        let mut prover = Prover::new(ground);
+        let mut rows: Vec<&[u32]> = ground.rows(decisive.predicate).collect();
+        rows.truncate(PROOFS_SHOWN);
+        explanation.proofs = rows.into_iter().map(|row| prover.prove(decisive.predicate, row, 0)).collect();
+        if explanation.proofs.is_empty() {
+            explanation.miss = ground.miss(decisive.predicate, &vec![None; decisive.arity], 0);
+        }
+        let shown = explanation.proofs.len();
+        if findings.witness_count > shown {
+            explanation.notes.push(format!("and {} more like this", findings.witness_count - shown));
+        }
+    }
+    if !findings.applicable {
+        explanation.notes.push("it is inapplicable here: `applicable` has no tuple".to_owned());
+    }
+    explanation.findings = Some(findings);
+    explanation
+}
+
+/// A query has no proof tree: its rows speak.
+fn of_query(label: &str, findings: Findings) -> Explanation {
+    let notes = findings
+        .witness
+        .iter()
+        .map(|row| {
+            let values: Vec<String> = row.values.iter().map(|(name, term)| format!("?{name} = {term}")).collect();
+            format!("row: {}", values.join(", "))
+        })
+        .chain(["a SPARQL property is explained by its rows; in Datalog it would have a proof".to_owned()])
+        .collect();
+    Explanation { title: label.to_owned(), findings: Some(findings), proofs: Vec::new(), miss: None, notes }
+}
+
+impl crate::rules::standalone::Program {
+    /// Why the program derives a statement such as `p(1, "a")`, or why not. `_` stands for anything.
+    ///
+    /// # Errors
+    /// The statement can't be read, or the budget was spent.
+    pub fn explain(&self, statement: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
+        let (name, pattern) = self.pattern(statement).map_err(RuleFault::Value)?;
+        let mut universe = Universe::new(&self.terms, None);
+        let (mut rounds, mut meter) = (Rounds::new(), Meter::new(budget));
+        let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
+        let planned = &self.planned;
+        evaluate_noting(planned, &self.predicates, &self.indexes, &mut layers, &mut universe, &mut meter, Some(&mut rounds))
+            .map_err(|stopped| fault(&meter, stopped, planned))?;
+        let mut facts = Tables::default();
+        for (predicate, rows) in &planned.facts {
+            let width = self.predicates.get(*predicate).width;
+            facts.set(*predicate, crate::rules::relation::finished(width, rows.clone(), self.indexes.of(*predicate).clone()));
+        }
+        let ground = Ground {
+            predicates: &self.predicates,
+            rules: planned.rules.iter().collect(),
+            layers: vec![&layers.own],
+            facts: vec![&facts],
+            rounds: &rounds,
+            universe: &universe,
+        };
+        let Some(predicate) = self.predicates.find(0, &name, None) else {
+            return Err(RuleFault::Value(format!("the program has no predicate `{name}`")));
+        };
+        // A value that nothing has can't be matched.
+        let known: Option<Vec<Option<u32>>> =
+            pattern.iter().map(|term| term.as_ref().map_or(Some(None), |term| universe.id(term).map(Some))).collect();
+        let fits = |row: &&[u32]| {
+            known.as_ref().is_some_and(|known| known.iter().zip(*row).all(|(k, v)| k.is_none_or(|k| k == *v)))
+        };
+        let mut prover = Prover::new(&ground);
+        let proofs: Vec<_> = ground
+            .rows(predicate)
+            .filter(fits)
+            .take(PROOFS_SHOWN)
+            .map(|row| prover.prove(predicate, row, 0))
+            .collect();
+        let miss = match &known {
+            Some(known) if proofs.is_empty() => ground.miss(predicate, known, 0),
+            _ => None,
+        };
+        let notes = if proofs.is_empty() && miss.is_none() { vec!["no rule derives it and no fact states it".to_owned()] } else { Vec::new() };
+        Ok(Explanation { title: statement.trim().to_owned(), findings: None, proofs, miss, notes })
+    }
+}

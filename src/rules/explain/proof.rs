@@ -1,0 +1,141 @@
+//! Proofs: a tuple, the rule instance that derives it, and so on down to facts.
+
+use std::cell::Cell;
+use std::collections::BTreeSet;
+
+use crate::base::TermId;
+use crate::rules::explain::model::{Premise, Proof, Support};
+use crate::rules::explain::search::{Binding, Ground, STEP_LIMIT, reading_order};
+use crate::rules::naive::unify;
+use crate::rules::program::{Literal, PredicateId, Rule};
+
+/// Deeper proofs are cut: nobody reads on, and the tree stays small.
+const DEPTH_LIMIT: usize = 40;
+/// Matches of an aggregate that are shown.
+const MATCHES_SHOWN: usize = 3;
+
+/// A walk that proves tuples; each derived one once.
+pub(super) struct Prover<'g, 'a> {
+    ground: &'g Ground<'a>,
+    shown: BTreeSet<(PredicateId, Vec<TermId>)>,
+    steps: Cell<usize>,
+}
+
+impl<'g, 'a> Prover<'g, 'a> {
+    pub(super) fn new(ground: &'g Ground<'a>) -> Self {
+        Self { ground, shown: BTreeSet::new(), steps: Cell::new(0) }
+    }
+
+    /// The proof of a tuple that holds.
+    pub(super) fn prove(&mut self, predicate: PredicateId, row: &[TermId], depth: usize) -> Proof {
+        let statement = self.ground.statement(predicate, row);
+        if self.ground.is_fact(predicate, row) {
+            return Proof { statement, support: Support::Fact };
+        }
+        if depth >= DEPTH_LIMIT || !self.shown.insert((predicate, row.to_vec())) {
+            return Proof { statement, support: Support::Cut };
+        }
+        let round = self.ground.round(predicate, row);
+        let rules: Vec<&Rule> = self.ground.rules_of(predicate).collect();
+        for rule in rules {
+            let Some(binding) = self.ground.head_binding(rule, row) else { continue };
+            let support = match &rule.aggregation {
+                Some(_) => self.aggregate(rule, row, depth),
+                None => self.instance(rule, binding, round).map(|binding| Support::Rule {
+                    rule: self.ground.rule_ref(rule),
+                    premises: self.premises(rule, &binding, depth),
+                }),
+            };
+            if let Some(support) = support {
+                return Proof { statement, support };
+            }
+        }
+        Proof { statement, support: Support::Cut }
+    }
+
+    /// A binding that satisfies a rule's body, with premises of smaller rounds only.
+    fn instance(&self, rule: &Rule, mut binding: Binding, round: Option<u32>) -> Option<Binding> {
+        let order = reading_order(rule, &binding);
+        self.satisfy(rule, &order, &mut binding, round, &mut |_| true).then_some(binding)
+    }
+
+    /// Goes through the ways to satisfy conditions until `found` says that one is enough.
+    fn satisfy(
+        &self,
+        rule: &Rule,
+        order: &[usize],
+        binding: &mut Binding,
+        round: Option<u32>,
+        found: &mut dyn FnMut(&Binding) -> bool,
+    ) -> bool {
+        let Some((first, rest)) = order.split_first() else { return found(binding) };
+        let literal = &rule.body[*first];
+        let Literal::Positive(atom) = literal else {
+            let before = binding.clone();
+            if self.ground.tested(literal, binding) == Some(true) && self.satisfy(rule, rest, binding, round, found) {
+                return true;
+            }
+            *binding = before;
+            return false;
+        };
+        for row in self.ground.candidates(atom, binding) {
+            self.steps.set(self.steps.get() + 1);
+            if self.steps.get() > STEP_LIMIT {
+                return false;
+            }
+            let before = binding.clone();
+            let earlier = match (round, self.ground.round(atom.predicate, row)) {
+                (Some(limit), Some(round)) => round < limit,
+                _ => true,
+            };
+            if earlier && unify(atom, row, binding) && self.satisfy(rule, rest, binding, round, found) {
+                return true;
+            }
+            *binding = before;
+        }
+        false
+    }
+
+    fn premises(&mut self, rule: &Rule, binding: &Binding, depth: usize) -> Vec<Premise> {
+        let mut premises = Vec::new();
+        // In the order of the text.
+        let mut order: Vec<&Literal> = rule.body.iter().collect();
+        order.sort_by_key(|literal| literal.span().start);
+        for literal in order {
+            premises.push(match literal {
+                Literal::Positive(atom) => {
+                    let row = self.ground.candidates(atom, binding).find(|row| unify(atom, row, &mut binding.clone()));
+                    match row {
+                        Some(row) => Premise::Proof(self.prove(atom.predicate, row, depth + 1)),
+                        None => Premise::Computed(self.ground.literal(rule, literal, binding)),
+                    }
+                }
+                Literal::Negative(atom) => Premise::Absent(self.ground.pattern(atom, binding)),
+                _ => Premise::Computed(self.ground.literal(rule, literal, binding)),
+            });
+        }
+        premises
+    }
+
+    /// The matches of the group that a head row of an aggregating rule stands for.
+    fn aggregate(&mut self, rule: &Rule, row: &[TermId], depth: usize) -> Option<Support> {
+        let aggregation = rule.aggregation.as_ref()?;
+        let mut binding = self.ground.head_binding(rule, row)?;
+        for (variable, slot) in binding.iter_mut().enumerate() {
+            if !aggregation.group.contains(&variable) {
+                *slot = None;
+            }
+        }
+        let order = reading_order(rule, &binding);
+        let (mut count, mut first) = (0, Vec::new());
+        self.satisfy(rule, &order, &mut binding, None, &mut |binding| {
+            count += 1;
+            if first.len() < MATCHES_SHOWN {
+                first.push(binding.clone());
+            }
+            false
+        });
+        let premises = first.iter().flat_map(|binding| self.premises(rule, binding, depth)).collect();
+        (count > 0).then(|| Support::Aggregate { rule: self.ground.rule_ref(rule), matches: count, premises })
+    }
+}

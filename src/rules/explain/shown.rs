@@ -1,0 +1,115 @@
+//! Rules' parts with the values of a binding, as people read them.
+
+use crate::base::{Term, TermId, names};
+use crate::rules::expression::Expr;
+use crate::rules::explain::model::RuleRef;
+use crate::rules::explain::search::{Binding, Ground};
+use crate::rules::given::property_place;
+use crate::rules::program::{Atom, Literal, Operand, PredicateId, Rule};
+
+impl Ground<'_> {
+    /// A tuple as a statement.
+    pub(super) fn statement(&self, predicate: PredicateId, row: &[TermId]) -> String {
+        let args = row.iter().map(|id| self.term(*id)).collect();
+        self.written(predicate, args)
+    }
+
+    /// An atom with what is bound of it; `_` for the rest.
+    pub(super) fn pattern(&self, atom: &Atom, binding: &Binding) -> String {
+        let args = atom
+            .args
+            .iter()
+            .map(|arg| match arg {
+                Operand::Constant(id) => self.term(*id),
+                Operand::Variable(variable) => binding[*variable].map_or("_".into(), |id| self.term(id)),
+                Operand::Any => "_".into(),
+            })
+            .collect();
+        self.written(atom.predicate, args)
+    }
+
+    /// A predicate with its arguments as in the rule text: the property back in its place, the phase as a shorthand.
+    fn written(&self, predicate: PredicateId, mut args: Vec<String>) -> String {
+        let predicate = self.predicates.get(predicate);
+        let mut name = predicate.name.as_str();
+        args.truncate(predicate.arity);
+        if let (Some(property), Some(place)) = (predicate.property, property_place(name)) {
+            args.insert(place.min(args.len()), self.term(property));
+        }
+        if name == "state"
+            && let Some(phase @ ("before" | "after" | "during")) = args.first().and_then(|phase| phase.strip_prefix("act:"))
+        {
+            let phase = phase.to_owned();
+            args.remove(0);
+            return format!("{phase}({})", args.join(", "));
+        }
+        if name.contains('~') {
+            name = "(helper)";
+        }
+        let name = if name.contains(':') { names::shorten(name) } else { name.to_owned() };
+        format!("{name}({})", args.join(", "))
+    }
+
+    /// A term, doubles with no more digits than people can use.
+    pub(super) fn term(&self, id: TermId) -> String {
+        shown(self.universe.term(id))
+    }
+
+    /// A condition with its values.
+    pub(super) fn literal(&self, rule: &Rule, literal: &Literal, binding: &Binding) -> String {
+        match literal {
+            Literal::Positive(atom) => self.pattern(atom, binding),
+            Literal::Negative(atom) => format!("not {}", self.pattern(atom, binding)),
+            Literal::Assign { variable, span, .. } => {
+                let value = binding[*variable].map_or("nothing".into(), |id| self.term(id));
+                let name = &rule.variables[*variable];
+                let text = self.source_text(rule, span.clone());
+                if name.is_empty() { format!("{text} is {value}") } else { format!("{text}, so ?{name} is {value}") }
+            }
+            Literal::Compare { op, left, right, span } => {
+                let values = [left, right].map(|side| self.value(side, binding).map_or("nothing".into(), |term| shown(&term)));
+                let text = self.source_text(rule, span.clone());
+                format!("{text}, with {} {} {}", values[0], op.symbol(), values[1])
+            }
+            Literal::Test { span, .. } => self.source_text(rule, span.clone()),
+        }
+    }
+
+    /// The value of an expression, where its variables are bound.
+    pub(super) fn value(&self, expr: &Expr, binding: &Binding) -> Option<Term> {
+        let mut used = Vec::new();
+        expr.variables(&mut used);
+        if used.iter().any(|variable| binding[*variable].is_none()) {
+            return None;
+        }
+        let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
+        expr.value(&values, self.universe).map(std::borrow::Cow::into_owned)
+    }
+
+    fn source_text(&self, rule: &Rule, span: crate::base::Span) -> String {
+        let text = rule.origin.source.text.get(span).unwrap_or_default();
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    /// A rule, for people to find.
+    pub(super) fn rule_ref(&self, rule: &Rule) -> RuleRef {
+        RuleRef {
+            name: rule.origin.name.clone(),
+            comment: rule.origin.comment.clone(),
+            place: rule.origin.place(),
+            text: self.source_text(rule, rule.origin.span.clone()),
+        }
+    }
+}
+
+fn shown(term: &Term) -> String {
+    match term {
+        // Six significant digits: a micrometre in a room.
+        Term::Double(value) if *value != 0.0 && value.is_finite() => {
+            let digits = (5.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+            let text = format!("{value:.digits$}");
+            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+        }
+        term => term.to_string(),
+    }
+}

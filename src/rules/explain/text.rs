@@ -1,0 +1,98 @@
+//! An explanation as text.
+
+use std::fmt::Write as _;
+
+use crate::rules::explain::model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};
+
+impl Explanation {
+    /// Indented text, one statement a line.
+    pub fn to_text(&self) -> String {
+        let mut out = String::new();
+        let holds = self.findings.as_ref().map(|findings| findings.holds);
+        let verdict = match (holds, self.miss.is_some()) {
+            (Some(true), _) => "holds",
+            (Some(false), _) => "does not hold",
+            (None, true) => "is not derived",
+            (None, false) => "is derived",
+        };
+        line(&mut out, 0, &format!("{}: {verdict}", self.title));
+        for because in self.findings.iter().flat_map(|findings| &findings.because) {
+            line(&mut out, 1, because);
+        }
+        for proof in &self.proofs {
+            write_proof(&mut out, 1, proof);
+        }
+        if let Some(miss) = &self.miss {
+            write_miss(&mut out, 1, miss);
+        }
+        for note in &self.notes {
+            line(&mut out, 1, note);
+        }
+        out
+    }
+}
+
+fn line(out: &mut String, depth: usize, text: &str) {
+    // Writing to a string can't fail.
+    let _ = writeln!(out, "{:width$}{text}", "", width = depth * 2);
+}
+
+fn cited(rule: &RuleRef) -> String {
+    match rule.name.as_ref().or(rule.comment.as_ref()) {
+        Some(words) => format!("by {}: {words}", rule.place),
+        None => format!("by {}", rule.place),
+    }
+}
+
+fn write_proof(out: &mut String, depth: usize, proof: &Proof) {
+    match &proof.support {
+        Support::Fact => line(out, depth, &format!("{}  (fact)", proof.statement)),
+        Support::Cut => line(out, depth, &format!("{}  (shown above)", proof.statement)),
+        Support::Rule { rule, premises } => {
+            line(out, depth, &format!("{}  {}", proof.statement, cited(rule)));
+            write_premises(out, depth + 1, premises);
+        }
+        Support::Aggregate { rule, matches, premises } => {
+            line(out, depth, &format!("{}  over {matches} matches {}", proof.statement, cited(rule)));
+            write_premises(out, depth + 1, premises);
+        }
+    }
+}
+
+fn write_premises(out: &mut String, depth: usize, premises: &[Premise]) {
+    for premise in premises {
+        match premise {
+            Premise::Proof(proof) => write_proof(out, depth, proof),
+            Premise::Absent(text) => line(out, depth, &format!("nothing like {text}")),
+            Premise::Computed(text) => line(out, depth, text),
+        }
+    }
+}
+
+fn write_miss(out: &mut String, depth: usize, miss: &Miss) {
+    match &miss.rule {
+        Some(rule) => line(out, depth, &format!("{} came closest {}", miss.goal, cited(rule))),
+        None => line(out, depth, &format!("no rule derives {}", miss.goal)),
+    }
+    for text in &miss.satisfied {
+        line(out, depth + 1, &format!("ok      {text}"));
+    }
+    line(out, depth + 1, &format!("missing {}", miss.failed));
+    match &miss.failure {
+        Failure::NoMatch { nearest, because } => {
+            for fact in nearest {
+                line(out, depth + 2, &format!("nearest {fact}"));
+            }
+            if let Some(miss) = because {
+                write_miss(out, depth + 2, miss);
+            }
+        }
+        Failure::Comparison { distance: Some(distance) } => line(out, depth + 2, &format!("missed by {distance:.6}")),
+        Failure::Comparison { distance: None } => {}
+        Failure::Blocked(proof) => {
+            line(out, depth + 2, "blocked by");
+            write_proof(out, depth + 3, proof);
+        }
+        Failure::NoValue => line(out, depth + 2, "it has no value for these arguments"),
+    }
+}
