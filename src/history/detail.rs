@@ -21,7 +21,7 @@ pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageE
         seed: node.count("act:seed").unwrap_or_default(),
         reason: node.text("act:reason"),
         wall_secs: node.number("act:wallSeconds").unwrap_or_default(),
-        world: node.text("act:world").unwrap_or_default(),
+        world: node.text("act:worldName").unwrap_or_default(),
         program_version: node.text("act:program").unwrap_or_default(),
         robot_base: ["w:baseX", "w:baseY", "w:baseYaw"].map(|property| node.number(property).unwrap_or_default()),
         noise: noise(&node),

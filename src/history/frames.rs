@@ -1,18 +1,19 @@
 //! The course of all bodies in few bytes: column by column, each value as its difference from what was to be expected.
 //!
-//! Lossless. Values that are multiples of [`GRAIN`] (a recorder may round to it) take about a byte each, what does not move takes
-//! nothing, and all others about three.
+//! Every value comes back (a negative zero as zero). Columns whose values are multiples of one of the [`GRAINS`], to which a
+//! recorder may round, take about a byte a value, what does not move takes nothing, and all others take about three.
 
-/// A power of two near a tenth of a millimetre (and a hundredth of a degree for quaternions): finer than any picture shows.
-const GRAIN: f32 = 1.0 / 8192.0;
+/// Coarse ones first. The last is a power of two, which singles hold exactly.
+const GRAINS: [f64; 3] = [2e-4, 1e-4, 1.0 / 8192.0];
 /// Values of one run at most; a damaged file must not ask for more memory than this. A long run has under a million.
 const MOST_VALUES: usize = 1 << 26;
 
 const RAGGED: u8 = 0;
 const COLUMNS: u8 = 1;
 const CONSTANT: u8 = 0;
-const GRAINS: u8 = 1;
-const BITS: u8 = 2;
+const BITS: u8 = 1;
+/// And behind it one for each of [`GRAINS`].
+const IN_GRAINS: u8 = 2;
 
 /// Rows of a table of numbers as bytes.
 pub(super) fn encode(rows: &[Vec<f32>]) -> Vec<u8> {
@@ -67,13 +68,13 @@ fn encode_column(values: &[f32], out: &mut Vec<u8>) {
     if values.iter().all(|value| value.to_bits() == first.to_bits()) {
         out.push(CONSTANT);
         out.extend(first.to_bits().to_le_bytes());
-    } else if let Some(grains) = values.iter().map(|value| in_grains(*value)).collect::<Option<Vec<i32>>>() {
-        out.push(GRAINS);
+    } else if let Some((kind, counts)) = counts_of(values) {
+        out.push(IN_GRAINS + kind);
         let (mut last, mut step) = (0i64, 0i64);
-        for grain in grains.into_iter().map(i64::from) {
+        for count in counts.into_iter().map(i64::from) {
             // Bodies move evenly: the next value is expected one step further.
-            put_u64(out, zigzag(grain - (last + step)));
-            (last, step) = (grain, grain - last);
+            put_u64(out, zigzag(count - (last + step)));
+            (last, step) = (count, count - last);
         }
     } else {
         out.push(BITS);
@@ -102,19 +103,20 @@ fn decode_column(height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
     }
     match rest.byte()? {
         CONSTANT => Some(vec![f32::from_bits(rest.bits()?); height]),
-        GRAINS => {
-            let (mut last, mut step) = (0i64, 0i64);
-            (0..height)
-                .map(|_| {
-                    let grain = last.checked_add(step)?.checked_add(unzigzag(rest.u64()?))?;
-                    (last, step) = (grain, grain.checked_sub(last)?);
-                    i32::try_from(grain).ok().map(from_grains)
-                })
-                .collect()
-        }
         BITS => decode_bits(height, rest),
-        _ => None,
+        kind => decode_counts(*GRAINS.get(usize::from(kind - IN_GRAINS))?, height, rest),
     }
+}
+
+fn decode_counts(grain: f64, height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
+    let (mut last, mut step) = (0i64, 0i64);
+    (0..height)
+        .map(|_| {
+            let count = last.checked_add(step)?.checked_add(unzigzag(rest.u64()?))?;
+            (last, step) = (count, count.checked_sub(last)?);
+            i32::try_from(count).ok().map(|count| of_grains(count, grain))
+        })
+        .collect()
 }
 
 fn decode_bits(height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
@@ -131,18 +133,24 @@ fn decode_bits(height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
     )
 }
 
-/// A value as a count of grains, where it is exactly that.
-fn in_grains(value: f32) -> Option<i32> {
-    let count = value / GRAIN;
-    #[expect(clippy::cast_possible_truncation, reason = "what does not come back the same is refused below")]
-    let grains = count as i32;
-    // Below 2^24 every whole number is a single.
-    (grains.abs() < 1 << 24 && from_grains(grains).to_bits() == value.to_bits()).then_some(grains)
+/// Values as counts of the first grain of which all are multiples, with its number.
+fn counts_of(values: &[f32]) -> Option<(u8, Vec<i32>)> {
+    (0u8..).zip(GRAINS).find_map(|(kind, grain)| {
+        let counts = values.iter().map(|value| in_grains(*value, grain)).collect::<Option<Vec<i32>>>()?;
+        Some((kind, counts))
+    })
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts of grains are below 2^24, or a damaged file's")]
-fn from_grains(grains: i32) -> f32 {
-    grains as f32 * GRAIN
+/// A value as a count of grains, where it is exactly that.
+fn in_grains(value: f32, grain: f64) -> Option<i32> {
+    #[expect(clippy::cast_possible_truncation, reason = "what does not come back the same is refused below")]
+    let count = (f64::from(value) / grain).round() as i32;
+    (of_grains(count, grain) == value).then_some(count)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "values are singles")]
+fn of_grains(count: i32, grain: f64) -> f32 {
+    (f64::from(count) * grain) as f32
 }
 
 fn zigzag(value: i64) -> u64 {
@@ -219,7 +227,7 @@ mod tests {
         let tables = [
             Vec::new(),
             vec![Vec::new(); 3],
-            (0..50).map(|i| vec![i as f32 * 0.125, 0.5, (i as f32).sin(), wild[i % 8]]).collect(),
+            (0..50).map(|i| vec![i as f32 * 0.125, 0.5, (i as f32).sin(), wild[i % 8], i as f32 * 1e-4]).collect(),
             vec![vec![1.0], vec![1.0, 2.0], Vec::new()],
         ];
         for rows in tables {
@@ -244,7 +252,11 @@ mod tests {
 
     #[test]
     fn what_is_rounded_to_grains_takes_about_a_byte() {
-        let rows: Vec<Vec<f32>> = (0..400).map(|i| vec![(((i as f32) * 0.02).sin() / GRAIN).round() * GRAIN]).collect();
-        assert!(encode(&rows).len() < 450, "{}", encode(&rows).len());
+        for grain in GRAINS {
+            let round = |value: f64| ((value / grain).round() * grain) as f32;
+            let rows: Vec<Vec<f32>> = (0..400).map(|i| vec![round((f64::from(i) * 0.02).sin())]).collect();
+            assert!(encode(&rows).len() < 450, "{}", encode(&rows).len());
+            assert_eq!(decode(&encode(&rows)).unwrap(), rows);
+        }
     }
 }

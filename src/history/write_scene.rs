@@ -43,7 +43,7 @@ pub(super) fn write(record: &RunRecord, run: &NamedNode, statements: &mut Statem
     let standing = scene.objects.iter().filter(|object| object.role != Role::Platform).count();
     let mut about = statements.about(run.clone());
     about
-        .text("act:world", &scene.world)
+        .text("act:worldName", &scene.world)
         .text("act:robot", &scene.robot.profile.name)
         .has("act:objectCount", Literal::from(standing as u64));
     for (property, value) in ["w:baseX", "w:baseY", "w:baseYaw"].into_iter().zip(scene.robot.base) {
