@@ -1,0 +1,63 @@
+//! How sure a rate is.
+
+use serde::Serialize;
+
+/// Quantile of the normal distribution that leaves 2.5 % above: intervals are of 95 %.
+const Z: f64 = 1.959_963_984_540_054;
+
+/// A rate with its 95 % confidence interval. All three lie in [0, 1].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interval {
+    /// Successes by trials.
+    pub rate: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Wilson's score interval (1927), which holds for few trials and at 0 and 1; nothing where there was no trial.
+///
+/// More successes than trials count as all of them.
+pub fn wilson(successes: u64, trials: u64) -> Option<Interval> {
+    if trials == 0 {
+        return None;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "counts of runs are far below 2^52")]
+    let (successes, trials) = (successes.min(trials) as f64, trials as f64);
+    let rate = successes / trials;
+    let denominator = 1.0 + Z * Z / trials;
+    let centre = (rate + Z * Z / (2.0 * trials)) / denominator;
+    let half = Z / denominator * libm::sqrt(rate * (1.0 - rate) / trials + Z * Z / (4.0 * trials * trials));
+    // At 0 and 1 the ends meet the rate exactly, but for rounding.
+    let low = if rate == 0.0 { 0.0 } else { (centre - half).max(0.0) };
+    let high = if successes == trials { 1.0 } else { (centre + half).min(1.0) };
+    Some(Interval { rate, low, high })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Examples of Newcombe (1998), "Two-sided confidence intervals for the single proportion", table I, method 3.
+    #[test]
+    fn published_intervals_come_out() {
+        for (successes, trials, low, high) in
+            [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)]
+        {
+            let interval = wilson(successes, trials).unwrap();
+            assert!((interval.low - low).abs() < 5e-5, "{interval:?}");
+            assert!((interval.high - high).abs() < 5e-5, "{interval:?}");
+        }
+    }
+
+    #[test]
+    fn the_ends_are_whole() {
+        let all = wilson(20, 20).unwrap();
+        assert_eq!((all.rate, all.high), (1.0, 1.0));
+        assert!((all.low - (1.0 - 0.1611)).abs() < 5e-5);
+        assert_eq!(wilson(0, 20).unwrap().low, 0.0);
+        assert_eq!(wilson(0, 0), None);
+        assert_eq!(wilson(3, 2), wilson(2, 2));
+    }
+}
