@@ -98,7 +98,7 @@ proptest! {
                 let statement = format!("{predicate}({})", args.join(", "));
                 let explanation = program.explain(&statement, &budget).unwrap();
                 prop_assert_eq!(explanation.proofs.len(), 1, "{} in\n{}", statement, text);
-                if let Err(reason) = checked(&explanation.proofs[0], &closure, &text, &mut Vec::new()) {
+                if let Err(reason) = checked(&explanation.proofs[0], &closure, &text, &mut Vec::new(), &mut Vec::new()) {
                     prop_assert!(false, "{}: {}\n{}\n{}", statement, reason, explanation.to_text(), text);
                 }
             }
@@ -112,7 +112,7 @@ proptest! {
 }
 
 /// Checks a proof without its maker: facts stand in the text, and a rule alone derives its conclusion from its premises.
-fn checked(proof: &Proof, closure: &Closure, text: &str, above: &mut Vec<String>) -> Result<(), String> {
+fn checked(proof: &Proof, closure: &Closure, text: &str, above: &mut Vec<String>, proved: &mut Vec<String>) -> Result<(), String> {
     let holds = |statement: &str| {
         let (name, args) = statement.trim_end_matches(')').split_once('(').unwrap();
         closure.tuples(name).iter().any(|tuple| tuple.iter().map(Term::to_string).collect::<Vec<_>>().join(", ") == args)
@@ -125,17 +125,26 @@ fn checked(proof: &Proof, closure: &Closure, text: &str, above: &mut Vec<String>
         return Err(format!("{statement} proves itself"));
     }
     let Support::Rule { rule, premises } = &proof.support else {
-        let stated = text.contains(&format!("{statement} ."));
-        return if stated || proof.support != Support::Fact { Ok(()) } else { Err(format!("{statement} is no fact")) };
+        return match proof.support {
+            Support::Fact if !text.contains(&format!("{statement} .")) => Err(format!("{statement} is no fact")),
+            // What is cut must be proved elsewhere in the same tree.
+            Support::Cut if !proved.contains(statement) => Err(format!("{statement} is proved nowhere")),
+            _ => {
+                proved.push(statement.clone());
+                Ok(())
+            }
+        };
     };
     above.push(statement.clone());
     let mut alone = format!("{}\n", rule.text);
     for premise in premises {
         match premise {
             Premise::Proof(inner) => {
-                checked(inner, closure, text, above)?;
+                checked(inner, closure, text, above, proved)?;
                 alone.push_str(&format!("{} .\n", inner.statement));
             }
+            // The same variable twice: the statement can't say that.
+            Premise::Absent(pattern) if pattern.contains('?') => {}
             Premise::Absent(pattern) => {
                 let explained = load(text).explain(pattern, &Budget::default()).map_err(|fault| fault.to_string())?;
                 if !explained.proofs.is_empty() {
@@ -146,6 +155,7 @@ fn checked(proof: &Proof, closure: &Closure, text: &str, above: &mut Vec<String>
         }
     }
     above.pop();
+    proved.push(statement.clone());
     let derived = load(&alone).explain(statement, &Budget::default()).map_err(|fault| fault.to_string())?;
     if derived.proofs.is_empty() { Err(format!("{statement} does not follow from\n{alone}")) } else { Ok(()) }
 }

@@ -91,9 +91,20 @@ pub(crate) struct Stopped {
     pub(crate) rule: Option<usize>,
 }
 
-/// The round in which each tuple of a recursive stratum was first derived. A proof that takes premises of smaller rounds
-/// only can't go in circles.
-pub(crate) type Rounds = HashMap<(PredicateId, Vec<TermId>), u32>;
+/// The round in which each tuple of a recursive stratum was first derived, counted over all strata. A proof that takes
+/// premises of smaller rounds only can't go in circles.
+#[derive(Debug, Default)]
+pub(crate) struct Rounds {
+    of: HashMap<(PredicateId, Vec<TermId>), u32>,
+    next: u32,
+}
+
+impl Rounds {
+    /// The round of a tuple; nothing for one of a stratum that does not read itself.
+    pub(crate) fn of(&self, predicate: PredicateId, row: &[TermId]) -> Option<u32> {
+        self.of.get(&(predicate, row.to_vec())).copied()
+    }
+}
 
 /// Evaluates a program over what is in the layers; its results go to the layers' own tables.
 pub(crate) fn evaluate(
@@ -180,7 +191,7 @@ impl Run<'_, '_, '_> {
         for rule in &stratum.rules {
             self.insert_all(*rule, false, stratum, layers, &grown)?;
         }
-        for round in 0.. {
+        loop {
             let mut changed = false;
             for growing in &mut grown {
                 changed |= growing.changed();
@@ -188,7 +199,7 @@ impl Run<'_, '_, '_> {
             if !changed {
                 break;
             }
-            self.note(round, stratum, &grown);
+            self.note(stratum, &grown);
             let found = grown.iter().map(|growing| growing.recent_len()).sum();
             let culprit = || stratum.rules.iter().copied().find(|rule| self.is_recursive(*rule));
             let rule = culprit();
@@ -205,14 +216,15 @@ impl Run<'_, '_, '_> {
     }
 
     /// Notes the round of what is recent, where somebody wants to know.
-    fn note(&mut self, round: u32, stratum: &Stratum, grown: &Grown) {
+    fn note(&mut self, stratum: &Stratum, grown: &Grown) {
         let Some(rounds) = &mut self.rounds else { return };
+        rounds.next += 1;
         for (predicate, growing) in stratum.predicates.iter().zip(grown) {
             let mut batches = Vec::new();
             growing.batches(Part::Recent, 0, &mut batches);
             let width = self.predicates.get(*predicate).width;
             for row in batches.iter().flat_map(|batch| batch.chunks_exact(width)) {
-                rounds.insert((*predicate, row.to_vec()), round);
+                rounds.of.insert((*predicate, row.to_vec()), rounds.next);
             }
         }
     }

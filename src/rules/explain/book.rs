@@ -42,7 +42,7 @@ impl RuleBook {
         budget: &Budget,
     ) -> Result<Explanation, RuleFault> {
         let mut universe = Universe::new(&self.terms, Some(facts.terms));
-        let (mut rounds, mut meter) = (Rounds::new(), Meter::new(budget));
+        let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
         let given = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let mut enriched = Layers { own, below: vec![&self.fixed] };
@@ -124,7 +124,7 @@ impl crate::rules::standalone::Program {
     pub fn explain(&self, statement: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
         let (name, pattern) = self.pattern(statement).map_err(RuleFault::Value)?;
         let mut universe = Universe::new(&self.terms, None);
-        let (mut rounds, mut meter) = (Rounds::new(), Meter::new(budget));
+        let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
         let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
         let planned = &self.planned;
         evaluate_noting(planned, &self.predicates, &self.indexes, &mut layers, &mut universe, &mut meter, Some(&mut rounds))

@@ -43,7 +43,7 @@ impl<'g, 'a> Prover<'g, 'a> {
                 Some(_) => self.aggregate(rule, row, depth),
                 None => self.instance(rule, binding, round).map(|binding| Support::Rule {
                     rule: self.ground.rule_ref(rule),
-                    premises: self.premises(rule, &binding, depth),
+                    premises: self.premises(rule, &binding, round, depth),
                 }),
             };
             if let Some(support) = support {
@@ -84,11 +84,7 @@ impl<'g, 'a> Prover<'g, 'a> {
                 return false;
             }
             let before = binding.clone();
-            let earlier = match (round, self.ground.round(atom.predicate, row)) {
-                (Some(limit), Some(round)) => round < limit,
-                _ => true,
-            };
-            if earlier && unify(atom, row, binding) && self.satisfy(rule, rest, binding, round, found) {
+            if self.earlier(atom.predicate, row, round) && unify(atom, row, binding) && self.satisfy(rule, rest, binding, round, found) {
                 return true;
             }
             *binding = before;
@@ -96,7 +92,15 @@ impl<'g, 'a> Prover<'g, 'a> {
         false
     }
 
-    fn premises(&mut self, rule: &Rule, binding: &Binding, depth: usize) -> Vec<Premise> {
+    /// Whether a tuple was there before a round.
+    fn earlier(&self, predicate: PredicateId, row: &[TermId], round: Option<u32>) -> bool {
+        match (round, self.ground.round(predicate, row)) {
+            (Some(limit), Some(round)) => round < limit,
+            _ => true,
+        }
+    }
+
+    fn premises(&mut self, rule: &Rule, binding: &Binding, round: Option<u32>, depth: usize) -> Vec<Premise> {
         let mut premises = Vec::new();
         // In the order of the text.
         let mut order: Vec<&Literal> = rule.body.iter().collect();
@@ -104,13 +108,15 @@ impl<'g, 'a> Prover<'g, 'a> {
         for literal in order {
             premises.push(match literal {
                 Literal::Positive(atom) => {
-                    let row = self.ground.candidates(atom, binding).find(|row| unify(atom, row, &mut binding.clone()));
+                    let row = self.ground.candidates(atom, binding).find(|row| {
+                        self.earlier(atom.predicate, row, round) && unify(atom, row, &mut binding.clone())
+                    });
                     match row {
                         Some(row) => Premise::Proof(self.prove(atom.predicate, row, depth + 1)),
                         None => Premise::Computed(self.ground.literal(rule, literal, binding)),
                     }
                 }
-                Literal::Negative(atom) => Premise::Absent(self.ground.pattern(atom, binding)),
+                Literal::Negative(atom) => Premise::Absent(self.ground.negated(rule, atom, binding)),
                 _ => Premise::Computed(self.ground.literal(rule, literal, binding)),
             });
         }
@@ -135,7 +141,7 @@ impl<'g, 'a> Prover<'g, 'a> {
             }
             false
         });
-        let premises = first.iter().flat_map(|binding| self.premises(rule, binding, depth)).collect();
+        let premises = first.iter().flat_map(|binding| self.premises(rule, binding, None, depth)).collect();
         (count > 0).then(|| Support::Aggregate { rule: self.ground.rule_ref(rule), matches: count, premises })
     }
 }

@@ -67,7 +67,7 @@ impl<'a> Ground<'a> {
 
     /// The round of a tuple of a recursive stratum.
     pub(super) fn round(&self, predicate: PredicateId, row: &[TermId]) -> Option<u32> {
-        self.rounds.get(&(predicate, row.to_vec())).copied()
+        self.rounds.of(predicate, row)
     }
 
     /// Rules that derive a predicate.

@@ -31,7 +31,7 @@ impl Ground<'_> {
     /// A predicate with its arguments as in the rule text: the property back in its place, the phase as a shorthand.
     fn written(&self, predicate: PredicateId, mut args: Vec<String>) -> String {
         let predicate = self.predicates.get(predicate);
-        let mut name = predicate.name.as_str();
+        let name = predicate.name.as_str();
         args.truncate(predicate.arity);
         if let (Some(property), Some(place)) = (predicate.property, property_place(name)) {
             args.insert(place.min(args.len()), self.term(property));
@@ -42,9 +42,6 @@ impl Ground<'_> {
             let phase = phase.to_owned();
             args.remove(0);
             return format!("{phase}({})", args.join(", "));
-        }
-        if name.contains('~') {
-            name = "(helper)";
         }
         let name = if name.contains(':') { names::shorten(name) } else { name.to_owned() };
         format!("{name}({})", args.join(", "))
@@ -59,7 +56,7 @@ impl Ground<'_> {
     pub(super) fn literal(&self, rule: &Rule, literal: &Literal, binding: &Binding) -> String {
         match literal {
             Literal::Positive(atom) => self.pattern(atom, binding),
-            Literal::Negative(atom) => format!("not {}", self.pattern(atom, binding)),
+            Literal::Negative(atom) => format!("not {}", self.negated(rule, atom, binding)),
             Literal::Assign { variable, span, .. } => {
                 let value = binding[*variable].map_or("nothing".into(), |id| self.term(id));
                 let name = &rule.variables[*variable];
@@ -73,6 +70,14 @@ impl Ground<'_> {
             }
             Literal::Test { span, .. } => self.source_text(rule, span.clone()),
         }
+    }
+
+    /// What a negation says is not there. A helper predicate is no predicate of the text, which then speaks for itself.
+    pub(super) fn negated(&self, rule: &Rule, atom: &Atom, binding: &Binding) -> String {
+        if self.predicates.get(atom.predicate).name.contains('~') {
+            return self.source_text(rule, atom.span.clone());
+        }
+        self.pattern(atom, binding)
     }
 
     /// The value of an expression, where its variables are bound.
