@@ -100,7 +100,7 @@ fn judgement(property: &str, outcome: Outcome) -> Judgement {
 /// A run; every third has a property that failed.
 pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
     let trace = sample_trace(index);
-    let failed = index % 3 == 0;
+    let failed = index.is_multiple_of(3);
     let outcome = |property: &str| {
         if failed && property == "ObjectInGripper" { Outcome::Failed } else { Outcome::Passed }
     };
@@ -513,22 +513,43 @@ fn folders_that_are_no_histories_are_refused() {
 }
 
 #[test]
-fn a_place_that_nobody_may_write_to_is_told() {
+fn a_place_where_nothing_can_be_made_is_told() {
     // Permission bits don't stop root, so this is a place where nobody can make a folder.
     let fault = code(History::open(Path::new("/proc/actcheck")));
-    assert!(fault.contains("/proc/actcheck") && fault.starts_with('H'), "{fault}");
+    assert!(fault.starts_with("H001") && fault.contains("/proc/actcheck"), "{fault}");
+}
+
+/// Runs a test on a small file system of its own, which is gone afterwards; says so where that is not permitted.
+fn on_small_disk(test: impl FnOnce(&Path) + std::panic::UnwindSafe) {
     let folder = tempfile::tempdir().unwrap();
-    let dir = folder.path().join("history");
-    drop(History::open(&dir).unwrap());
-    let mut permissions = std::fs::metadata(&dir).unwrap().permissions();
-    std::os::unix::fs::PermissionsExt::set_mode(&mut permissions, 0o555);
-    std::fs::set_permissions(dir.join("lock"), permissions.clone()).unwrap();
-    if std::fs::OpenOptions::new().write(true).open(dir.join("lock")).is_ok() {
-        eprintln!("permission bits don't hold for this user: not tested further");
+    let path = folder.path().to_str().unwrap();
+    if !ran(&["mount", "-t", "tmpfs", "-o", "size=12m", "tmpfs", path]) {
+        eprintln!("a small file system can't be mounted here: not tested");
         return;
     }
-    let fault = code(History::open(&dir));
-    assert!(fault.starts_with("H001") && fault.contains("not permitted"), "{fault}");
+    let outcome = std::panic::catch_unwind(|| test(folder.path()));
+    assert!(ran(&["umount", path]));
+    if let Err(panic) = outcome {
+        std::panic::resume_unwind(panic);
+    }
+}
+
+fn ran(command: &[&str]) -> bool {
+    let output = std::process::Command::new(command[0]).args(&command[1..]).output();
+    output.is_ok_and(|output| output.status.success())
+}
+
+#[test]
+fn a_read_only_place_is_told() {
+    on_small_disk(|disk| {
+        let dir = disk.join("history");
+        drop(History::open(&dir).unwrap());
+        assert!(ran(&["mount", "-o", "remount,ro", disk.to_str().unwrap()]));
+        for result in [History::open(&dir), History::open_existing(&dir), History::open(&disk.join("new"))] {
+            let fault = code(result);
+            assert!(fault.starts_with("H001") && fault.contains("read-only"), "{fault}");
+        }
+    });
 }
 
 #[test]
@@ -557,18 +578,7 @@ fn traces_without_a_run_are_cleaned_up() {
 
 #[test]
 fn a_full_disk_is_told_and_keeps_what_was_there() {
-    let folder = tempfile::tempdir().unwrap();
-    let mount = |arguments: &[&str]| {
-        std::process::Command::new(arguments[0]).args(&arguments[1..]).status().is_ok_and(|status| status.success())
-    };
-    let path = folder.path().to_str().unwrap();
-    if !mount(&["mount", "-t", "tmpfs", "-o", "size=12m", "tmpfs", path]) {
-        eprintln!("a small file system can't be mounted here: not tested");
-        return;
-    }
-    let checked = std::panic::catch_unwind(|| fill_up(&folder.path().join("history")));
-    assert!(mount(&["umount", path]));
-    checked.unwrap();
+    on_small_disk(|disk| fill_up(&disk.join("history")));
 }
 
 fn fill_up(dir: &Path) {

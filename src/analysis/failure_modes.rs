@@ -111,7 +111,7 @@ mod tests {
             row("k-4", "b", Broken),
             row("k-5", "a", Failed),
         ];
-        let modes = failure_modes(&rows).unwrap();
+        let modes = failure_modes(&rows).expect("a table");
         let plain: Vec<(Vec<&str>, Vec<&str>)> = modes
             .iter()
             .map(|mode| {
@@ -119,8 +119,8 @@ mod tests {
             })
             .collect();
         assert_eq!(plain, [(vec!["a", "b"], vec!["k-1", "k-3"]), (vec![], vec!["k-2"]), (vec!["a"], vec!["k-5"])]);
-        assert_eq!(modes[0].share, wilson(2, 4).unwrap());
-        assert!(failure_modes(&[]).unwrap().is_empty());
-        assert!(failure_modes(&rows[7..9]).unwrap().is_empty());
+        assert_eq!(modes[0].share, wilson(2, 4).expect("four runs"));
+        assert!(failure_modes(&[]).expect("an empty table").is_empty());
+        assert!(failure_modes(&rows[7..9]).expect("an empty table").is_empty());
     }
 }

@@ -45,7 +45,7 @@ mod tests {
         for (successes, trials, low, high) in
             [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)]
         {
-            let interval = wilson(successes, trials).unwrap();
+            let interval = wilson(successes, trials).expect("there are trials");
             assert!((interval.low - low).abs() < 5e-5, "{interval:?}");
             assert!((interval.high - high).abs() < 5e-5, "{interval:?}");
         }
@@ -53,10 +53,10 @@ mod tests {
 
     #[test]
     fn the_ends_are_whole() {
-        let all = wilson(20, 20).unwrap();
+        let all = wilson(20, 20).expect("there are trials");
         assert_eq!((all.rate, all.high), (1.0, 1.0));
         assert!((all.low - (1.0 - 0.1611)).abs() < 5e-5);
-        assert_eq!(wilson(0, 20).unwrap().low, 0.0);
+        assert_eq!(wilson(0, 20).expect("there are trials").low, 0.0);
         assert_eq!(wilson(0, 0), None);
         assert_eq!(wilson(3, 2), wilson(2, 2));
     }

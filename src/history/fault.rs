@@ -87,6 +87,7 @@ fn failed(dir: &Path, doing: &str, kind: ErrorKind, text: &str) -> Diagnostics {
         ErrorKind::ReadOnlyFilesystem => unusable(dir, "it lies on a read-only file system"),
         _ if has(&["Permission denied"]) => unusable(dir, "writing there is not permitted"),
         _ if has(&["Read-only file system"]) => unusable(dir, "it lies on a read-only file system"),
+        ErrorKind::NotFound => unusable(dir, "a part of its path is not there and can't be made"),
         ErrorKind::NotADirectory | ErrorKind::AlreadyExists => unusable(dir, "a file stands in its place"),
         _ => Diagnostic::error("H006", format!("{doing} failed in the history `{}`: {}", dir.display(), lower(text)))
             .help("see to the disk and run again: what was kept before is whole")

@@ -231,7 +231,7 @@ mod tests {
             vec![vec![1.0], vec![1.0, 2.0], Vec::new()],
         ];
         for rows in tables {
-            assert_eq!(bits(&decode(&encode(&rows)).unwrap()), bits(&rows));
+            assert_eq!(bits(&decode(&encode(&rows)).expect("it was just encoded")), bits(&rows));
         }
     }
 
@@ -256,7 +256,7 @@ mod tests {
             let round = |value: f64| ((value / grain).round() * grain) as f32;
             let rows: Vec<Vec<f32>> = (0..400).map(|i| vec![round((f64::from(i) * 0.02).sin())]).collect();
             assert!(encode(&rows).len() < 450, "{}", encode(&rows).len());
-            assert_eq!(decode(&encode(&rows)).unwrap(), rows);
+            assert_eq!(decode(&encode(&rows)).expect("it was just encoded"), rows);
         }
     }
 }
