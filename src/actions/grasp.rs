@@ -75,7 +75,9 @@ fn from_above(thing: &Sighting, heading: f64) -> Vec<(f64, Grasp)> {
         (turn, Grasp { approach: Approach::Top, pose, heading, opening_m: 0.0, penalty })
     };
     let mut found: Vec<(f64, Grasp)> = (0..4)
-        .map(|eighth| grasp(heading + std::f64::consts::FRAC_PI_4 * f64::from(eighth), std::f64::consts::FRAC_PI_2, 0.0))
+        .map(|eighth| {
+            grasp(heading + std::f64::consts::FRAC_PI_4 * f64::from(eighth), std::f64::consts::FRAC_PI_2, 0.0)
+        })
         .collect();
     found.push(grasp(heading, SLANT_RAD, SLANT_PENALTY));
     found

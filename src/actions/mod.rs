@@ -13,6 +13,4 @@ mod trace;
 
 pub use call::{ActionCall, UnknownSkill, known_skill, reference_skills};
 pub use perform::perform;
-pub use trace::{
-    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace,
-};
+pub use trace::{ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace};

@@ -114,9 +114,14 @@ impl<'a> Planner<'a> {
                 (vec![before], vec![at_thing.clone()])
             }
             // Above it, which is where it will be lifted to.
-            Approach::Top => (vec![lifted.clone()], lift.iter().rev().skip(1).cloned().chain([at_thing.clone()]).collect()),
+            Approach::Top => {
+                (vec![lifted.clone()], lift.iter().rev().skip(1).cloned().chain([at_thing.clone()]).collect())
+            }
         };
-        let reach = self.moved(near.last()?, &(back * (way - if grasp.approach == Approach::Side { APPROACH_M.min(way) } else { 0.0 })));
+        let reach = self.moved(
+            near.last()?,
+            &(back * (way - if grasp.approach == Approach::Side { APPROACH_M.min(way) } else { 0.0 })),
+        );
         let drive = self.drive(&reach)?;
         let retreat = vec![self.moved(&lifted, &(back * way))];
         let mut plan = Plan { drive, reach, near, approach, lift, retreat, cost: 0.0 };

@@ -54,8 +54,7 @@ impl Block {
     fn corners(&self, out: f64) -> [Point2<f64>; 4] {
         // On the diagonal, so that a circle of radius `out` clears the corner.
         let (x, y) = (self.half[0] + out * 0.8, self.half[1] + out * 0.8);
-        [(x, y), (x, -y), (-x, y), (-x, -y)]
-            .map(|(x, y)| (self.from_world.inverse() * Point3::new(x, y, 0.0)).xy())
+        [(x, y), (x, -y), (-x, y), (-x, -y)].map(|(x, y)| (self.from_world.inverse() * Point3::new(x, y, 0.0)).xy())
     }
 }
 
@@ -149,7 +148,8 @@ impl Ground {
     fn room(&self, at: &Point2<f64>) -> f64 {
         let point = Point3::new(at.x, at.y, 0.0);
         let blocks = self.blocks.iter().map(|block| block.beside(&point));
-        let pillars = self.pillars.iter().map(|pillar| length(at.x - pillar.centre.x, at.y - pillar.centre.y) - pillar.radius);
+        let pillars =
+            self.pillars.iter().map(|pillar| length(at.x - pillar.centre.x, at.y - pillar.centre.y) - pillar.radius);
         blocks.chain(pillars).fold(f64::INFINITY, f64::min) - self.radius - ROOM_M
     }
 }

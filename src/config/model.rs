@@ -110,9 +110,9 @@ impl Shape {
         let leaning = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), slant);
         (0..staves)
             .map(|idx| {
-                let turned =
-                    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * half_angle * f64::from(idx));
-                let at = Isometry3::from_parts(Translation3::from(turned * Vector3::new(reach, 0.0, 0.0)), turned * leaning);
+                let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * half_angle * f64::from(idx));
+                let at =
+                    Isometry3::from_parts(Translation3::from(turned * Vector3::new(reach, 0.0, 0.0)), turned * leaning);
                 Part { pose: Pose::from_isometry(&at), shape: Self::Box { size } }
             })
             .collect()
@@ -181,16 +181,24 @@ pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
     let friction = table.number("friction", 0.0..=2.0);
     let restitution = table.number("restitution", 0.0..=1.0).unwrap_or(0.0);
     let size_m = table.numbers("size_m", POSITIVE);
-    let parts: Vec<Part> =
-        table.tables("parts").into_iter().filter_map(|part| read_part(part, &mut found)).collect();
+    let parts: Vec<Part> = table.tables("parts").into_iter().filter_map(|part| read_part(part, &mut found)).collect();
     let surface = table.table("surface").and_then(|surface| read_surface(surface, &mut found));
     table.finish(&mut found);
     let (Some(category), Some(mass_kg), Some(friction), Some(size_m)) = (category, mass_kg, friction, size_m) else {
         return Err(found);
     };
     let digest = digest_of(&source.text);
-    let model =
-        ObjectModel { name: stem(&source.name), category, mass_kg, friction, restitution, size_m, parts, surface, digest };
+    let model = ObjectModel {
+        name: stem(&source.name),
+        category,
+        mass_kg,
+        friction,
+        restitution,
+        size_m,
+        parts,
+        surface,
+        digest,
+    };
     if !found.has_errors() {
         found.extend(check_size(&model, source));
     }

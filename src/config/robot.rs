@@ -155,8 +155,11 @@ mod tests {
     fn a_profile_that_is_not_there_or_incomplete_is_refused() {
         let found = read(&Files::Disk, Path::new("no/such/robot.toml")).expect_err("there is no such file");
         assert_eq!(found.iter().map(|d| d.code).collect::<Vec<_>>(), ["W010"]);
-        let source = Source::new("r.toml", "name = \"r\"\nurdf = \"r.urdf\"\narm_joints = [\"a\", \"b\"]\nhome = [0]\n\
-            finger_joints = [\"left\"]\n");
+        let source = Source::new(
+            "r.toml",
+            "name = \"r\"\nurdf = \"r.urdf\"\narm_joints = [\"a\", \"b\"]\nhome = [0]\n\
+            finger_joints = [\"left\"]\n",
+        );
         let mut table = Table::parse(&source).expect("it is TOML");
         let mut found = Diagnostics::new();
         let profile = read_table(&mut table, &source, &mut found, |_| Err("cannot read it".to_owned()));

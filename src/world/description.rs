@@ -186,10 +186,14 @@ impl<'a> Folding<'a> {
             return Err(WorldError::Urdf { name: self.out.name.clone(), reason });
         };
         let inertial = at * isometry(&source.inertial.origin);
-        let added = Mass { mass: source.inertial.mass.value, com: inertial.translation.vector, inertia: {
-            let turned = inertial.rotation.to_rotation_matrix();
-            turned.matrix() * matrix(&source.inertial.inertia) * turned.matrix().transpose()
-        } };
+        let added = Mass {
+            mass: source.inertial.mass.value,
+            com: inertial.translation.vector,
+            inertia: {
+                let turned = inertial.rotation.to_rotation_matrix();
+                turned.matrix() * matrix(&source.inertial.inertia) * turned.matrix().transpose()
+            },
+        };
         let solids: Vec<Part> = source
             .collision
             .iter()

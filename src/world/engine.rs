@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use rapier3d::prelude::{
-    ColliderBuilder, CoefficientCombineRule, IntegrationParameters, PhysicsWorld, SpringCoefficients,
+    CoefficientCombineRule, ColliderBuilder, IntegrationParameters, PhysicsWorld, SpringCoefficients,
 };
 
 use crate::config::{Part, Physics, Shape};
@@ -95,13 +95,10 @@ pub fn add_floor(engine: &mut PhysicsWorld) {
 pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> Option<ColliderBuilder> {
     let mut pose = solid.pose.to_isometry();
     let builder = match solid.shape {
-        Shape::Box { size: [x, y, z] } => {
-            ColliderBuilder::cuboid(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0))
-        }
+        Shape::Box { size: [x, y, z] } => ColliderBuilder::cuboid(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0)),
         Shape::Cylinder { radius, height } => {
             // The engine's cylinders stand along y.
-            pose.rotation *=
-                nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+            pose.rotation *= nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
             ColliderBuilder::cylinder(to_real(height / 2.0), to_real(radius))
         }
         Shape::Sphere { radius } => ColliderBuilder::ball(to_real(radius)),

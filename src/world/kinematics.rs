@@ -110,10 +110,9 @@ fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
         JointKind::Prismatic => {
             Isometry3::from_parts(Translation3::from(joint.axis.into_inner() * position), UnitQuaternion::identity())
         }
-        JointKind::Revolute => Isometry3::from_parts(
-            Translation3::identity(),
-            UnitQuaternion::from_axis_angle(&joint.axis, position),
-        ),
+        JointKind::Revolute => {
+            Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&joint.axis, position))
+        }
     }
 }
 
@@ -134,7 +133,8 @@ fn spread(shape: &Shape, spacing: f64) -> Vec<Point3<f64>> {
         Shape::Cylinder { radius, height } => {
             let around = steps(std::f64::consts::TAU, spacing / radius.max(1e-6));
             let rings = steps(height, spacing);
-            let ring = |z: f64| around.iter().map(move |a| Point3::new(radius * libm::cos(*a), radius * libm::sin(*a), z));
+            let ring =
+                |z: f64| around.iter().map(move |a| Point3::new(radius * libm::cos(*a), radius * libm::sin(*a), z));
             rings.iter().flat_map(|z| ring(*z)).collect()
         }
         Shape::Sphere { radius } => {

@@ -134,17 +134,11 @@ impl Robot {
             None => Pose::upright([start.base[0], start.base[1], 0.0], start.base[2]).to_isometry(),
         };
         let kinematics = Kinematics::new(model.clone(), root, named.grasp);
-        let bodies = insert_links(engine, &model, &kinematics.links(&positions), named.finger_links, profile.finger_friction);
+        let bodies =
+            insert_links(engine, &model, &kinematics.links(&positions), named.finger_links, profile.finger_friction);
         let motors = insert_joints(engine, &model, &bodies, &named, &profile)?;
-        let mut robot = Self {
-            profile,
-            model,
-            kinematics,
-            bodies,
-            layout: named.layout,
-            finger_links: named.finger_links,
-            motors,
-        };
+        let mut robot =
+            Self { profile, model, kinematics, bodies, layout: named.layout, finger_links: named.finger_links, motors };
         robot.couple_mimics(engine);
         robot.move_to(engine, &positions);
         Ok(robot)
@@ -280,8 +274,7 @@ impl Robot {
 
 /// Home posture with the base where it starts and the fingers half open.
 fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, base: [f64; 3]) -> Vec<f64> {
-    let mut positions: Vec<f64> =
-        model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
     for (idx, position) in named.layout.arm.iter().zip(&profile.home) {
         positions[*idx] = position.clamp(model.joints[*idx].lower, model.joints[*idx].upper);
     }
@@ -306,13 +299,18 @@ fn insert_links(
         let builder = if idx == 0 { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
         let inertia = link.inertia.map(to_real);
         let matrix = rapier3d::math::Matrix::from_cols_array(&[
-            inertia.m11, inertia.m21, inertia.m31, inertia.m12, inertia.m22, inertia.m32, inertia.m13, inertia.m23,
+            inertia.m11,
+            inertia.m21,
+            inertia.m31,
+            inertia.m12,
+            inertia.m22,
+            inertia.m32,
+            inertia.m13,
+            inertia.m23,
             inertia.m33,
         ]);
         let mass = MassProperties::with_inertia_matrix(to_vector(&link.com), to_real(link.mass), matrix);
-        let body = engine.insert_body(
-            builder.pose(to_pose(pose)).additional_mass_properties(mass).can_sleep(false),
-        );
+        let body = engine.insert_body(builder.pose(to_pose(pose)).additional_mass_properties(mass).can_sleep(false));
         let friction = if finger_links.contains(&idx) { finger_friction } else { LINK_FRICTION };
         for solid in &link.solids {
             if let Some(collider) = collider(solid, Owner::Link(idx), friction, 0.0) {
@@ -335,9 +333,13 @@ fn insert_joints(
     for (idx, joint) in model.joints.iter().enumerate() {
         let is_finger = named.layout.fingers.contains(&idx);
         let (data, axis) = engine_joint(joint);
-        let handle = engine.multibody_joints.insert(bodies[joint.parent], bodies[idx + 1], data, true).ok_or_else(|| {
-            WorldError::Urdf { name: profile.urdf.name.to_string(), reason: format!("joint `{}` closes a loop", joint.name) }
-        })?;
+        let handle =
+            engine.multibody_joints.insert(bodies[joint.parent], bodies[idx + 1], data, true).ok_or_else(|| {
+                WorldError::Urdf {
+                    name: profile.urdf.name.to_string(),
+                    reason: format!("joint `{}` closes a loop", joint.name),
+                }
+            })?;
         if let Some((multibody, link)) = engine.multibody_joints.get_mut(handle) {
             multibody.set_self_contacts_enabled(false);
             let dof = multibody.link(link).map(rapier3d::prelude::MultibodyLink::assembly_id);

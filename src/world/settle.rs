@@ -59,9 +59,8 @@ impl World {
 
     fn left(&self) -> Vec<String> {
         let gone = |object: &&super::simulation::Object| {
-            let way = self.pose_of(object).translation.vector - object.placed.translation.vector;
-            // A NaN distance counts as gone.
-            !(way.norm() <= LEFT_M)
+            let way = (self.pose_of(object).translation.vector - object.placed.translation.vector).norm();
+            way.is_nan() || way > LEFT_M
         };
         self.objects.iter().filter(gone).map(|o| o.id.clone()).collect()
     }

@@ -118,8 +118,7 @@ fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object
     let density = object.mass_kg / object.model.volume().max(1e-9);
     for solid in object.model.solids() {
         if let Some(collider) = collider(&solid, Owner::Object(idx), object.friction, object.restitution) {
-            let collider =
-                collider.density(to_real(density)).restitution_combine_rule(CoefficientCombineRule::Average);
+            let collider = collider.density(to_real(density)).restitution_combine_rule(CoefficientCombineRule::Average);
             engine.insert_collider(collider, Some(body));
         }
     }
@@ -289,7 +288,8 @@ impl World {
 
     fn find_fault(&self) -> Option<Fault> {
         let objects = self.objects.iter().map(|object| (object.id.as_str(), object.body));
-        let links = self.robot.model.links.iter().zip(&self.robot.bodies).map(|(link, body)| (link.name.as_str(), *body));
+        let links =
+            self.robot.model.links.iter().zip(&self.robot.bodies).map(|(link, body)| (link.name.as_str(), *body));
         let quarantined = self.engine.quarantine().bodies();
         for (id, handle) in objects.chain(links) {
             let Some(body) = self.engine.bodies.get(handle) else { continue };
