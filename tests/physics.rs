@@ -178,9 +178,7 @@ fn pick(scene: &Scene, disturb: impl FnOnce(&mut World)) -> Trace {
     let mut world = build(scene).expect("the scene is right");
     assert!(world.settle().settled);
     disturb(&mut world);
-    let parameters = BTreeMap::from([("pickObject".to_owned(), vec!["thing_1".to_owned()])]);
-    let calls = [ActionCall { action: "Pick".to_owned(), parameters }];
-    perform(&calls, &mut world, &mut Choices::random(1, 0), &Budget { action_secs: 60.0 })
+    perform(&[call("Pick")], &mut world, &mut Choices::random(1, 0), &Budget { action_secs: 60.0 })
 }
 
 /// A thing alone on a coffee table, a metre in front of the robot.
@@ -324,6 +322,43 @@ fn a_body_that_leaves_the_world_ends_the_action_as_broken() {
     let trace = pick(&scene, |world| assert!(world.poison("thing_1", Poison::Teleport([0.0, 0.0, -2.0]))));
     let ActionEnd::Broken(reason) = &trace.actions[0].end else { panic!("{:?}", trace.actions[0].end) };
     assert!(reason.starts_with("thing_1 left the world at"), "{reason}");
+}
+
+fn call(action: &str) -> ActionCall {
+    let parameters = BTreeMap::from([("pickObject".to_owned(), vec!["thing_1".to_owned()])]);
+    ActionCall { action: action.to_owned(), parameters }
+}
+
+#[test]
+fn a_spent_budget_and_an_unknown_action_end_the_run_as_data() {
+    let scene = on_table(shipped("glass"), 0.3, 0.45);
+    for (action, budget) in [("Pick", 2.0), ("Juggle", 60.0)] {
+        let mut world = build(&scene).expect("the scene is right");
+        let calls = [call(action), call("Pick")];
+        let trace = perform(&calls, &mut world, &mut Choices::random(1, 0), &Budget { action_secs: budget });
+        let ends: Vec<&ActionEnd> = trace.actions.iter().map(|action| &action.end).collect();
+        match action {
+            "Pick" => assert!(matches!(ends[0], ActionEnd::Timeout(reason) if reason.contains("2 s")), "{ends:?}"),
+            _ => assert!(matches!(ends[0], ActionEnd::Broken(reason) if reason.contains("`Juggle`")), "{ends:?}"),
+        }
+        assert_eq!(*ends[1], ActionEnd::NotReached);
+        assert_eq!(trace.snapshots.len(), 2);
+    }
+}
+
+/// What the skill sees and where it believes to be are wrong by the same error, so that it still meets the thing.
+#[test]
+fn a_wrong_localisation_alone_does_not_make_a_pick_miss() {
+    let mut scene = on_table(shipped("glass"), 0.3, 0.45);
+    scene.sensing.localisation_noise_m = 0.1;
+    scene.sensing.heading_noise_rad = 0.1;
+    let trace = pick(&scene, |_| {});
+    let (before, after) = (&trace.snapshots[0], &trace.snapshots[1]);
+    let [true_x, true_y, _] = before.robot.base_true;
+    let [x, y, _] = before.robot.base_believed;
+    assert!((x - true_x).abs() + (y - true_y).abs() > 0.02, "the noise has to show");
+    assert_eq!(after.robot.left_touches, ["thing_1"]);
+    assert_eq!(after.robot.right_touches, ["thing_1"]);
 }
 
 #[test]

@@ -50,10 +50,9 @@ impl Block {
         self.beside(point).max(point.z - self.height)
     }
 
-    /// Points around its corners at a distance.
+    /// Points beyond its corners: the straight lines between neighbours keep the distance.
     fn corners(&self, out: f64) -> [Point2<f64>; 4] {
-        // On the diagonal, so that a circle of radius `out` clears the corner.
-        let (x, y) = (self.half[0] + out * 0.8, self.half[1] + out * 0.8);
+        let (x, y) = (self.half[0] + out, self.half[1] + out);
         [(x, y), (x, -y), (-x, y), (-x, -y)].map(|(x, y)| (self.from_world.inverse() * Point3::new(x, y, 0.0)).xy())
     }
 }
@@ -75,7 +74,7 @@ impl Pillar {
     }
 
     fn corners(&self, out: f64) -> [Point2<f64>; 4] {
-        let reach = (self.radius + out) * 0.8;
+        let reach = self.radius + out;
         [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
             .map(|(x, y)| Point2::new(self.centre.x + x * reach, self.centre.y + y * reach))
     }

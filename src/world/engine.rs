@@ -113,3 +113,15 @@ pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> 
             .user_data(owner.to_tag()),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn owners_come_back_from_their_numbers() {
+        for owner in [Owner::Floor, Owner::Object(0), Owner::Object(7), Owner::Link(0), Owner::Link(12)] {
+            assert_eq!(Owner::from_tag(owner.to_tag()), owner);
+        }
+    }
+}

@@ -391,3 +391,107 @@ fn x_onto(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
         |rotation| UnitQuaternion::from_rotation_matrix(&rotation),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::path::Path;
+
+    use super::*;
+    use crate::base::{Choices, Files};
+    use crate::config::{Physics, Sensing};
+    use crate::scenario::Scene;
+    use crate::world::convert::from_pose;
+    use crate::world::{World, build, ik};
+
+    fn lonely() -> World {
+        let path = Path::new("models/robots/mobile_manipulator.toml");
+        let profile = Arc::new(crate::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right"));
+        let one = (1.0, 1.0);
+        let scene = Scene {
+            world: "empty".to_owned(),
+            objects: Vec::new(),
+            robot: RobotStart { profile, base: [-1.0, 0.3, 0.4] },
+            designators: BTreeMap::new(),
+            sensing: Sensing {
+                position_noise_m: 0.0,
+                height_noise_m: 0.0,
+                yaw_noise_rad: 0.0,
+                size_noise_m: 0.0,
+                localisation_noise_m: 0.0,
+                heading_noise_rad: 0.0,
+                gripper_noise_m: 0.0,
+            },
+            physics: Physics {
+                mass_scale: one,
+                friction_scale: one,
+                restitution: (0.0, 0.0),
+                steps_per_second: 240,
+                iterations: 2,
+            },
+        };
+        build(&scene).expect("the scene is right")
+    }
+
+    /// A posture within the limits, by choice.
+    fn posture(world: &World, choices: &mut Choices) -> Vec<f64> {
+        let joints = world.kinematics().joints().iter();
+        joints.map(|joint| choices.real("q", joint.lower.max(-2.0), joint.upper.min(2.0), 0.0)).collect()
+    }
+
+    #[test]
+    fn the_engine_and_our_kinematics_put_the_links_in_the_same_places() {
+        let mut world = lonely();
+        let mut choices = Choices::random(3, 0);
+        for _ in 0..20 {
+            let positions = posture(&world, &mut choices);
+            let robot = &mut world.robot;
+            let (now, _) = robot.state(&world.engine);
+            let change: Vec<f64> = positions.iter().zip(&now).map(|(to, from)| to - from).collect();
+            robot.move_to(&mut world.engine, &change);
+            let (reached, _) = robot.state(&world.engine);
+            let poses = robot.kinematics.links(&reached);
+            for (body, pose) in robot.bodies.iter().zip(&poses) {
+                let simulated = from_pose(world.engine.bodies[*body].position());
+                assert!((simulated.translation.vector - pose.translation.vector).norm() < 1e-5);
+                assert!(simulated.rotation.angle_to(&pose.rotation) < 2e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn inverse_kinematics_reaches_what_it_says_within_the_limits() {
+        let world = lonely();
+        let mut choices = Choices::random(5, 0);
+        let (kinematics, layout) = (world.kinematics(), world.layout());
+        let mut mobility = vec![0.0; kinematics.joints().len()];
+        for idx in layout.arm.iter().chain(layout.base.iter().flatten()) {
+            mobility[*idx] = 1.0;
+        }
+        let mut n_solved = 0;
+        for _ in 0..100 {
+            let target = kinematics.grasp(&posture(&world, &mut choices));
+            let seed = posture(&world, &mut choices);
+            let reach = ik::Reach { target, mobility: mobility.clone() };
+            let Some(found) = ik::solve(kinematics, &seed, &reach) else { continue };
+            n_solved += 1;
+            let miss = kinematics.grasp(&found).translation.vector - target.translation.vector;
+            assert!(miss.norm() < 1e-3);
+            for (position, joint) in found.iter().zip(kinematics.joints()) {
+                assert!((joint.lower..=joint.upper).contains(position), "{} at {position}", joint.name);
+            }
+            assert_eq!(found[layout.fingers[0]], seed[layout.fingers[0]]);
+        }
+        assert!(n_solved >= 60, "solved {n_solved} of 100 from random postures");
+    }
+
+    #[test]
+    fn a_profile_that_names_a_missing_joint_is_refused_with_help() {
+        let mut profile = lonely().robot.profile.as_ref().clone();
+        profile.arm_joints[1] = "arm_flx_joint".to_owned();
+        let refused = check_robot(&profile).expect_err("there is no such joint").diagnostic();
+        assert_eq!((refused.code, refused.help.as_deref()), ("W021", Some("did you mean `arm_flex_joint`?")));
+        profile.urdf.text = "<robot".into();
+        assert_eq!(check_robot(&profile).expect_err("it is no URDF").diagnostic().code, "W020");
+    }
+}
