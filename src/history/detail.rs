@@ -22,7 +22,7 @@ pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageE
         reason: node.text("act:reason"),
         wall_secs: node.number("act:wallSeconds").unwrap_or_default(),
         world: node.text("act:worldName").unwrap_or_default(),
-        program_version: node.text("act:program").unwrap_or_default(),
+        program_version: version(&node),
         robot_base: ["w:baseX", "w:baseY", "w:baseYaw"].map(|property| node.number(property).unwrap_or_default()),
         noise: noise(&node),
         designators: designators(&node),
@@ -52,6 +52,12 @@ pub(super) fn status(word: Option<&str>) -> RunStatus {
 /// The outcome of a word; what is no outcome is nobody's success.
 pub(super) fn outcome(word: Option<&str>) -> Outcome {
     word.and_then(Outcome::from_word).unwrap_or(Outcome::Broken)
+}
+
+/// The version in a program's name and version.
+pub(super) fn version(node: &Node) -> String {
+    let program = node.text("act:program").unwrap_or_default();
+    program.rsplit(' ').next().unwrap_or_default().to_owned()
 }
 
 fn noise(node: &Node) -> BTreeMap<String, f64> {

@@ -14,13 +14,9 @@ use crate::history::terms::to_store;
 
 /// Properties of the world vocabulary that the graphs leave out.
 ///
-/// `w:yaw` and `w:tilt` say how a body is turned, `w:minZ` and `w:maxZ` how high it reaches; mass, friction, restitution and
-/// what is fixed are said once, of the objects of the scene; the limits of joints belong to the robot.
-pub(super) const LEFT_OUT: [&str; 17] = [
-    "qx",
-    "qy",
-    "qz",
-    "qw",
+/// `w:minZ` and `w:maxZ` say how high a body reaches, which is what questions are about; mass, friction, restitution and what is
+/// fixed (a platform) are said once, of the objects of the scene; the limits of joints belong to the robot.
+pub(super) const LEFT_OUT: [&str; 13] = [
     "minX",
     "minY",
     "maxX",

@@ -6,7 +6,7 @@ use oxigraph::model::{Literal, Term};
 use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::Store;
 
-use crate::history::detail::{outcome, status};
+use crate::history::detail::{outcome, status, version};
 use crate::history::read::{Node, id_of, select, text_of};
 use crate::history::write_campaign::campaign_node;
 use crate::history::{CampaignRow, OutcomeRow, RunFilter, RunRow};
@@ -79,7 +79,7 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
             .into_iter()
             .filter_map(|outcome| Some((outcome, node.count(&format!("act:{outcome}Count"))?)))
             .collect(),
-        program_version: text("act:program"),
+        program_version: version(node),
         config_digest: text("act:configDigest"),
         ontology_digest: text("act:ontologyDigest"),
     }

@@ -107,7 +107,7 @@ pub struct RunDetail {
     pub wall_secs: f64,
     /// Name of the world.
     pub world: String,
-    /// Program and version that ran it.
+    /// Version of the program that ran it.
     pub program_version: String,
     /// Where the base stood at first. Units: metres, metres, radians. Shape: x, y, heading.
     pub robot_base: [f64; 3],
