@@ -11,7 +11,9 @@ use std::path::{Path, PathBuf};
 use actcheck::base::{Files, Source, Term, digest_of, names};
 use actcheck::facts::{ActionFacts, RunFacts};
 use actcheck::ontology::{self, Ontology, Property, RuleFile, RuleLanguage};
-use actcheck::rules::{Budget, Findings, RuleBook, RuleFault};
+use actcheck::rules::explain::Support;
+use actcheck::rules::standalone::Program;
+use actcheck::rules::{Budget, Findings, RuleBook, RuleFault, owl_closure};
 
 const TESTED: &str = "http://actions#Tested";
 
@@ -174,4 +176,80 @@ fn every_explanation_is_as_expected() {
         assert_eq!(explanation.to_json()["holds"], explanation.findings.unwrap().holds);
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Statements of one line, read as Turtle; a final statement with a literal as subject is read by itself.
+fn statements(text: &str) -> Vec<[Term; 3]> {
+    let mut prefixes: String = names::PREFIXES.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
+    prefixes.push_str("@prefix : <https://example.org/> .\n");
+    let text = format!("{prefixes}{text} .");
+    oxigraph::io::RdfParser::from_format(oxigraph::io::RdfFormat::Turtle)
+        .for_slice(&text)
+        .map(|quad| {
+            let quad = quad.unwrap_or_else(|error| panic!("{error} in {text}"));
+            [quad.subject.into(), quad.predicate.into(), quad.object].map(|part| term(&part))
+        })
+        .collect()
+}
+
+fn owl(triples: &[[Term; 3]]) -> Program {
+    let text = std::fs::read_to_string(root().join("../../rules/lib/owl-rl.rls")).unwrap();
+    let mut program = Program::load(&Source::new("owl-rl.rls", text), Path::new("")).unwrap();
+    program.add_facts("triple", triples.iter().map(|triple| triple.as_slice())).unwrap();
+    program
+}
+
+#[test]
+fn every_rule_of_owl_2_rl_derives_what_it_should() {
+    let text = std::fs::read_to_string(root().join("owl-rl.txt")).unwrap();
+    let rules = std::fs::read_to_string(root().join("../../rules/lib/owl-rl.rls")).unwrap();
+    let mut tested = 0;
+    for line in text.lines().filter(|line| !line.starts_with('#') && !line.is_empty()) {
+        let [name, given, wanted] = line.split(" | ").collect::<Vec<_>>()[..] else { panic!("{line}") };
+        let given = statements(given);
+        let program = owl(&given);
+        assert!(name == "dt-eq" || rules.contains(&format!("#[name(\"{name}\")]")), "{name} is no rule");
+        if wanted == "contradiction" {
+            let found = program.explain(&format!("contradiction(\"{name}\", _, _)"), &Budget::default()).unwrap();
+            assert!(!found.proofs.is_empty(), "{line}");
+            assert!(owl_closure(&given).unwrap_err().to_string().contains(name), "{line}");
+            for left_out in 0..given.len() {
+                // What makes up a list or a double value stays.
+                let rest: Vec<_> = given.iter().enumerate().filter(|(idx, _)| *idx != left_out).map(|(_, t)| t.clone()).collect();
+                let part_of_list = given[left_out][1].to_string().contains("rdf:");
+                assert!(part_of_list || owl_closure(&rest).is_ok(), "{line} without {:?}", given[left_out]);
+            }
+        } else {
+            let goal = match wanted.split_once(" a ").or(wanted.split_once(" owl:sameAs ")) {
+                // A literal is no subject in Turtle.
+                Some((literal, object)) if literal == "1" => {
+                    let property = if wanted.contains(" a ") { "rdf:type" } else { "owl:sameAs" };
+                    format!("t(1, {property}, {object})")
+                }
+                _ => {
+                    let wanted = statements(wanted).remove(0);
+                    format!("t({}, {}, {})", wanted[0], wanted[1], wanted[2])
+                }
+            };
+            let found = program.explain(&goal, &Budget::default()).unwrap();
+            let [proof] = found.proofs.as_slice() else { panic!("{line}: {}", found.to_text()) };
+            if let Support::Rule { rule, .. } = &proof.support {
+                let same = rule.name.as_deref() == Some(name) || name == "dt-eq";
+                assert!(same, "{line}: by {:?}\n{}", rule.name, found.to_text());
+            }
+        }
+        tested += 1;
+    }
+    // Every named rule has a line, and dt-eq, which needs no rule.
+    let named: std::collections::BTreeSet<&str> =
+        rules.match_indices("#[name(\"").map(|(at, mark)| rules[at + mark.len()..].split('"').next().unwrap()).collect();
+    assert_eq!(tested, named.len() + 1);
+}
+
+#[test]
+fn an_ontology_that_contradicts_itself_is_refused_with_the_proof() {
+    let mut ontology = ontology_of(&root().join("moved_object_passes"));
+    ontology.triples.extend(statements("w:Body owl:disjointWith w:Robot . w:robot a w:Body"));
+    let faults = RuleBook::prepare(&ontology).unwrap_err().to_string();
+    assert!(faults.contains("R080") && faults.contains("cax-dw") && faults.contains("t(w:robot, rdf:type, w:Body)"), "{faults}");
 }

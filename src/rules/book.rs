@@ -11,6 +11,7 @@ use crate::rules::findings::{Budget, Findings, RuleFault};
 use crate::rules::given::{Phases, add_given};
 use crate::rules::load::Given;
 use crate::rules::meter::Meter;
+use crate::rules::owl::owl_closure;
 use crate::rules::parse::parse;
 use crate::rules::plan::Indexes;
 use crate::rules::program::{Atom, Literal, Operand, Origin, Predicates, Program, Rule};
@@ -219,8 +220,12 @@ impl Preparing {
         syntaxes: &[(usize, &Property, Syntax)],
         predicates: Predicates,
     ) -> Result<RuleBook, Diagnostics> {
+        let closed = owl_closure(&ontology.triples).unwrap_or_else(|found| {
+            self.diagnostics.extend(found);
+            Vec::new()
+        });
         let triples: Vec<[TermId; 3]> =
-            ontology.triples.iter().map(|triple| triple.clone().map(|term| self.terms.intern(term))).collect();
+            closed.into_iter().map(|triple| triple.map(|term| self.terms.intern(term))).collect();
         let mut indexes = Indexes::new(&predicates);
         let has_sparql = ontology.properties.values().any(|p| p.rule.language == RuleLanguage::Sparql);
         // Faults of rules that nobody needs are faults all the same.

@@ -21,6 +21,7 @@ mod lex;
 mod load;
 mod meter;
 mod naive;
+mod owl;
 mod parse;
 mod parse_expression;
 mod plan;
@@ -39,3 +40,4 @@ mod values;
 
 pub use book::RuleBook;
 pub use findings::{Budget, Findings, RuleFault, WitnessRow};
+pub use owl::owl_closure;

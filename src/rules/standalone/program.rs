@@ -111,6 +111,23 @@ impl Program {
         diagnostics.clone().or(Self { syntax, terms, predicates, indexes, planned, warnings: diagnostics })
     }
 
+    /// Adds facts of a predicate that the program speaks of.
+    ///
+    /// # Errors
+    /// The program has no such predicate, or a row has another number of terms.
+    pub fn add_facts<'t>(&mut self, predicate: &str, rows: impl IntoIterator<Item = &'t [Term]>) -> Result<(), String> {
+        let id = self.predicates.find(0, predicate, None).ok_or_else(|| format!("the program has no predicate `{predicate}`"))?;
+        let width = self.predicates.get(id).arity;
+        let facts = self.planned.facts.entry(id).or_default();
+        for row in rows {
+            if row.len() != width || width == 0 {
+                return Err(format!("a row of `{predicate}` has {} terms instead of {width}", row.len()));
+            }
+            facts.extend(row.iter().map(|term| self.terms.intern(term.clone())));
+        }
+        Ok(())
+    }
+
     /// Derives everything that the rules say.
     ///
     /// # Errors

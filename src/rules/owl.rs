@@ -1,0 +1,57 @@
+//! The ontology closed under OWL 2 RL, by rules in our own language.
+
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics, Files, Term, names};
+use crate::rules::findings::Budget;
+use crate::rules::standalone::{Engine, Program};
+
+/// The rules, as every copy of the program carries them.
+const RULES: &str = "rules/lib/owl-rl.rls";
+/// Contradictions told; each comes with its proof.
+const TOLD: usize = 5;
+
+/// Everything that follows from some statements under OWL 2 RL, themselves included, sorted.
+///
+/// What is true of any term (`?x owl:sameAs ?x`) and what RDF can't say (a literal as subject) is left out.
+///
+/// # Errors
+/// `R080` for each contradiction, with the rule of the W3C profile that finds it and its proof.
+pub fn owl_closure(triples: &[[Term; 3]]) -> Result<Vec<[Term; 3]>, Diagnostics> {
+    let unusable = |reason: String| Diagnostics::from(Diagnostic::error("R090", reason));
+    let source = Files::Shipped.read(Path::new(RULES)).map_err(|reason| unusable(format!("{RULES}: {reason}")))?;
+    let mut program = Program::load(&source, Path::new(""))?;
+    program.add_facts("triple", triples.iter().map(|triple| triple.as_slice())).map_err(unusable)?;
+    let closure = program.close(Engine::Fast, &Budget::default()).map_err(|fault| unusable(fault.to_string()))?;
+    let contradictions = closure.tuples("contradiction");
+    if !contradictions.is_empty() {
+        return Err(told(&program, &contradictions));
+    }
+    let same = names::OWL.to_owned() + "sameAs";
+    let mut statements: Vec<[Term; 3]> = closure
+        .tuples_unsorted("t")
+        .filter_map(|tuple| match tuple.as_slice() {
+            [s, p, o] => Some([*s, *p, *o]),
+            _ => None,
+        })
+        .filter(|[s, p, o]| matches!(s, Term::Iri(_) | Term::Blank(_)) && !(s == o && p.as_iri() == Some(same.as_str())))
+        .map(|triple| triple.map(Term::clone))
+        .collect();
+    statements.sort();
+    Ok(statements)
+}
+
+fn told(program: &Program, contradictions: &[Vec<Term>]) -> Diagnostics {
+    let mut diagnostics = Diagnostics::new();
+    for tuple in contradictions.iter().take(TOLD) {
+        let args: Vec<String> = tuple.iter().map(Term::to_string).collect();
+        let about = args.iter().skip(1).cloned().collect::<Vec<_>>().join(" and ");
+        let rule = tuple.first().map_or(String::new(), crate::rules::values::lexical);
+        let proof = program
+            .explain(&format!("contradiction({})", args.join(", ")), &Budget::default())
+            .map_or(String::new(), |explanation| explanation.to_text());
+        let message = format!("the ontology contradicts itself about {about} (rule {rule} of OWL 2 RL)");
+        diagnostics.push(Diagnostic::error("R080", message).help(format!("take back one of the facts of this proof:\n{proof}")));
+    }
+    diagnostics
+}
