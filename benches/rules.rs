@@ -73,7 +73,11 @@ fn closure_against_datafrog() {
     let ours = fastest(3, || tuples.0 = program.close(Engine::Fast, &BUDGET).expect("in its budget").count("p"));
     let hand = fastest(3, || tuples.1 = closure_by_hand(&edges));
     assert_eq!(tuples.0, tuples.1);
-    println!("transitive closure, {} tuples: {ours:.2} s, by hand {hand:.2} s, ratio {:.2} (at most 3)", tuples.0, ours / hand);
+    println!(
+        "transitive closure, {} tuples: {ours:.2} s, by hand {hand:.2} s, ratio {:.2} (at most 3)",
+        tuples.0,
+        ours / hand
+    );
     if let Some(peak) = peak_bytes() {
         println!("  peak memory of the process so far: {:.0} bytes a tuple (at most 100)", peak / tuples.0 as f64);
     }
@@ -103,7 +107,8 @@ fn facts(bodies: usize) -> RunFacts {
         for body in 0..bodies {
             let name = names::obj(&format!("thing_{body}"));
             let mut say = |property: &str, value: Term| {
-                let triple = [Term::iri(&name), Term::iri(names::w(property)), value].map(|term| facts.terms.intern(term));
+                let triple =
+                    [Term::iri(&name), Term::iri(names::w(property)), value].map(|term| facts.terms.intern(term));
                 triples.push(triple);
             };
             let moved = if phase == 1 && body % 3 == 0 { 0.05 } else { 0.0 };
@@ -159,7 +164,8 @@ because(?t) :- groups(?a, ?n), ?n > 100, ?t = CONCAT(STR(?a), " touches all") .
 "#;
 
 fn book(rules: Option<&str>) -> (RuleBook, Vec<String>) {
-    let mut ontology = ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).expect("the shipped ontology is right");
+    let mut ontology =
+        ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).expect("the shipped ontology is right");
     if let Some(text) = rules {
         ontology.libraries.clear();
         let mut property = ontology.properties.values().next().expect("it has properties").clone();

@@ -2,5 +2,16 @@
 
 mod broken;
 mod campaign;
+mod config;
+mod diagnostics;
+mod facts;
 mod floors;
+mod history;
+mod no_panic;
+mod ontology;
+mod oracle;
+mod physics;
+mod readme;
+mod rules;
+mod scenario;
 mod support;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::actions;
-use crate::base::{Diagnostic, Diagnostics};
+use crate::base::Diagnostics;
 use crate::config::{self, Campaign, Launcher, Overrides};
 use crate::history::CampaignRecord;
 use crate::ontology::{self, Ontology};
@@ -87,26 +87,26 @@ impl Env {
 
 fn check_launcher(campaign: &Campaign, faults: &mut Diagnostics) {
     if let Launcher::Program(text) = &campaign.launcher {
-        let place = campaign.source.text.find(text.as_str()).map_or(0..0, |start| start..start + text.len());
         faults.push(
-            Diagnostic::error("S020", format!("`test_launcher = \"{text}\"` names a program, and none can be started yet"))
-                .at(&campaign.source, place)
-                .help("use `test_launcher = \"reference\"`: the skills that come with the program"),
+            campaign
+                .fault("S020", "test_launcher", format!("`{text}` would be a program, and none can be started yet"))
+                .help("use `test_launcher = \"reference\"`: the skills that come with actcheck"),
         );
     }
 }
 
 /// An action that the ontology has and no skill performs; names that the ontology lacks are the scene space's matter.
 fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnostics) {
-    let mut told: Vec<&str> = Vec::new();
-    for action in campaign.tests.iter().flatten().filter(|action| ontology.actions.contains_key(*action)) {
-        if let Err(unknown) = actions::known_skill(action)
-            && !told.contains(&action.as_str())
-        {
-            told.push(action);
-            let quoted = format!("\"{action}\"");
-            let place = campaign.source.text.find(&quoted).map_or(0..0, |start| start..start + quoted.len());
-            faults.push(Diagnostic::error("S021", unknown.to_string()).at(&campaign.source, place).help(unknown.help()));
+    for (test, listed) in campaign.tests.iter().enumerate() {
+        for (step, action) in listed.iter().enumerate() {
+            if let (true, Err(unknown)) = (ontology.actions.contains_key(action), actions::known_skill(action)) {
+                let diagnostic = unknown.diagnostic();
+                let fault = campaign.fault(diagnostic.code, &format!("tests.{test}.{step}"), unknown.to_string());
+                faults.push(match diagnostic.help {
+                    Some(help) => fault.help(help),
+                    None => fault,
+                });
+            }
         }
     }
 }

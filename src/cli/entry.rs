@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::cli::args::{Arguments, Command};
-use crate::cli::{check, list, output, query, run, show};
+use crate::cli::{check, list, output, query, show};
 
 /// Parses the process's arguments and does what they ask.
 ///
@@ -14,7 +14,7 @@ pub fn run() -> ExitCode {
     // clap prints help, version and its own errors; for the last it exits with 2.
     let arguments = Arguments::parse();
     let done = match arguments.command {
-        Command::Run(args) => run::run(&args),
+        Command::Run(args) => crate::cli::run::run(&args),
         Command::Check(args) => check::check(&args).map(|()| 0),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),

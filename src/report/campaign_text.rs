@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{Attribute, Cell, Color, ContentArrangement, presets};
+use comfy_table::{Attribute, Cell, Color};
 
 use crate::base::names;
+use crate::report::table::ruled;
 use crate::report::{CampaignSummary, RunSummary, Share};
 use crate::verdict::Outcome;
 
@@ -27,8 +28,7 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
     if summary.runs.is_empty() {
         return;
     }
-    let mut table = comfy_table::Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    let mut table = ruled();
     if colour {
         table.enforce_styling();
     } else {
@@ -82,8 +82,7 @@ fn outcomes_cell(run: &RunSummary, property: &str) -> Cell {
 }
 
 fn properties_table(out: &mut String, summary: &CampaignSummary) {
-    let mut table = comfy_table::Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    let mut table = ruled();
     table.force_no_tty();
     let counted = Outcome::ALL.map(|outcome| outcome.word().to_owned());
     table.set_header(["property".to_owned(), "pass rate [95 % interval]".to_owned()].into_iter().chain(counted));

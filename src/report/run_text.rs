@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{ContentArrangement, presets};
 use serde_json::{Value, json};
 
 use crate::base::names;
 use crate::history::{ActionDetail, ObjectDetail, RunDetail};
+use crate::report::table::ruled;
 
 /// Everything about a run: its scene, what the actions reported, every outcome with margin and witness.
 ///
@@ -40,7 +40,7 @@ pub fn run_text(run: &RunDetail) -> String {
 }
 
 fn scene(out: &mut String, run: &RunDetail) {
-    let mut table = plain_table();
+    let mut table = ruled();
     table.set_header(["object", "category", "role", "x m", "y m", "yaw °", "mass kg", "friction", "moved cm", "max tilt °"]);
     for object in &run.objects {
         table.add_row(object_row(object));
@@ -84,7 +84,7 @@ fn action_text(out: &mut String, action: &ActionDetail) {
         action.duration_secs,
         action.score
     );
-    let mut table = plain_table();
+    let mut table = ruled();
     table.set_header(["property", "outcome", "margin", "witness"]);
     for judgement in &action.judgements {
         let margin = judgement.margin.map_or_else(String::new, |margin| format!("{margin:+.4}"));
@@ -96,12 +96,6 @@ fn action_text(out: &mut String, action: &ActionDetail) {
         ]);
     }
     let _ = writeln!(out, "{table}");
-}
-
-fn plain_table() -> comfy_table::Table {
-    let mut table = comfy_table::Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
-    table
 }
 
 /// The same for programs.

@@ -1,6 +1,6 @@
 //! One table, three formats.
 
-use comfy_table::{ContentArrangement, presets};
+use comfy_table::{ContentArrangement, TableComponent, presets};
 use serde_json::{Map, Value};
 
 /// How a table is printed.
@@ -40,8 +40,7 @@ impl Table {
     }
 
     fn text(&self) -> String {
-        let mut table = comfy_table::Table::new();
-        table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+        let mut table = ruled();
         table.set_header(&self.columns);
         for row in &self.rows {
             table.add_row(row.iter().map(plain));
@@ -71,6 +70,17 @@ impl Table {
             .collect();
         format!("{:#}\n", Value::Array(rows))
     }
+}
+
+/// A table for the terminal: a rule below the header and at both ends, none between rows.
+pub(super) fn ruled() -> comfy_table::Table {
+    let mut table = comfy_table::Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    table.remove_style(TableComponent::HorizontalLines).remove_style(TableComponent::MiddleIntersections);
+    table.remove_style(TableComponent::LeftBorderIntersections).remove_style(TableComponent::RightBorderIntersections);
+    table.set_style(TableComponent::HeaderLines, '─').set_style(TableComponent::MiddleHeaderIntersections, '─');
+    table.set_style(TableComponent::LeftHeaderIntersection, '─').set_style(TableComponent::RightHeaderIntersection, '─');
+    table
 }
 
 /// A cell as text: strings without quotes, nothing for `null`.
