@@ -281,3 +281,16 @@ fn a_world_that_broke_is_still_told() {
     let empty = Trace { snapshots: Vec::new(), ..sample_trace(1) };
     assert!(extract(&empty).action(0).is_none());
 }
+
+#[test]
+fn every_term_of_the_facts_is_described_in_the_vocabulary() {
+    let text = std::fs::read_to_string(crate::support::root().join("ontology/world.ttl")).unwrap();
+    let described: BTreeSet<&str> = text.lines().filter_map(|line| Some(line.split_once(" a ")?.0)).collect();
+    let facts = extract(&sample_trace(1));
+    let named = |term: &Term| term.to_string().strip_prefix("w:").map(|local| format!("w:{local}"));
+    let missing: Vec<String> = (0..facts.terms.len())
+        .filter_map(|id| named(facts.terms.term(id as TermId)))
+        .filter(|term| !described.contains(term.as_str()))
+        .collect();
+    assert!(missing.is_empty(), "not described: {missing:?}");
+}
