@@ -18,7 +18,9 @@ fn statements() -> impl Strategy<Value = Vec<String>> {
 /// Predicates `e0 … e3` have facts, `p0 … p5` are derived. A rule negates and aggregates only over smaller numbers, and reads
 /// equal or smaller ones positively, so that every program is stratified and many are recursive.
 fn rule() -> impl Strategy<Value = String> {
-    let variable = || prop_oneof![Just("?x"), Just("?y"), Just("?z"), Just("?u"), Just("_"), Just("1"), Just("2.5"), Just("\"a\"")];
+    let variable = || {
+        prop_oneof![Just("?x"), Just("?y"), Just("?z"), Just("?u"), Just("_"), Just("1"), Just("2.5"), Just("\"a\"")]
+    };
     let atom = move || (0..10usize, variable(), variable());
     (0..6usize, proptest::collection::vec(atom(), 1..4), proptest::option::of(atom()), 0..14usize).prop_map(
         |(head, atoms, negated, extra)| {
@@ -26,10 +28,8 @@ fn rule() -> impl Strategy<Value = String> {
                 number if number < 4 => format!("e{number}"),
                 number => format!("p{}", (number - 4).min(limit)),
             };
-            let mut body: Vec<String> =
-                atoms.iter().map(|(p, a, b)| format!("{}({a}, {b})", name(*p, head))).collect();
-            let bound: Vec<&str> =
-                atoms.iter().flat_map(|(_, a, b)| [*a, *b]).filter(|v| v.starts_with('?')).collect();
+            let mut body: Vec<String> = atoms.iter().map(|(p, a, b)| format!("{}({a}, {b})", name(*p, head))).collect();
+            let bound: Vec<&str> = atoms.iter().flat_map(|(_, a, b)| [*a, *b]).filter(|v| v.starts_with('?')).collect();
             let first = bound.first().copied().unwrap_or("3");
             let last = bound.last().copied().unwrap_or("4");
             if let Some((p, a, b)) = negated.filter(|_| head > 0) {
@@ -112,10 +112,19 @@ proptest! {
 }
 
 /// Checks a proof without its maker: facts stand in the text, and a rule alone derives its conclusion from its premises.
-fn checked(proof: &Proof, closure: &Closure, text: &str, above: &mut Vec<String>, proved: &mut Vec<String>) -> Result<(), String> {
+fn checked(
+    proof: &Proof,
+    closure: &Closure,
+    text: &str,
+    above: &mut Vec<String>,
+    proved: &mut Vec<String>,
+) -> Result<(), String> {
     let holds = |statement: &str| {
         let (name, args) = statement.trim_end_matches(')').split_once('(').unwrap();
-        closure.tuples(name).iter().any(|tuple| tuple.iter().map(Term::to_string).collect::<Vec<_>>().join(", ") == args)
+        closure
+            .tuples(name)
+            .iter()
+            .any(|tuple| tuple.iter().map(Term::to_string).collect::<Vec<_>>().join(", ") == args)
     };
     let statement = &proof.statement;
     if !holds(statement) {
@@ -173,7 +182,8 @@ fn a_program_explains_what_it_lacks() {
 
 #[test]
 fn recursion_closes_a_chain() {
-    let program = load("e(1, 2) . e(2, 3) . e(3, 1) . e(3, 4) . p(?x, ?y) :- e(?x, ?y) . p(?x, ?z) :- p(?x, ?y), e(?y, ?z) .");
+    let program =
+        load("e(1, 2) . e(2, 3) . e(3, 1) . e(3, 4) . p(?x, ?y) :- e(?x, ?y) . p(?x, ?z) :- p(?x, ?y), e(?y, ?z) .");
     let closure = program.close(Engine::Fast, &Budget::default()).unwrap();
     assert_eq!(closure.count("p"), 12);
     assert!(closure.tuples("p").contains(&vec![Term::Integer(1), Term::Integer(1)]));
@@ -194,7 +204,10 @@ fn a_program_that_never_ends_is_stopped_at_its_rule() {
 /// Nemo's programs that don't give its tables, with the reason.
 const NEMO_DEVIATIONS: [(&str, &str); 2] = [
     ("data-formats/json/authors", "imports JSON"),
-    ("basic/encodings", "Nemo writes the datatype of integers over 64 bits as `xsd:integer`, unexpanded; we write its IRI"),
+    (
+        "basic/encodings",
+        "Nemo writes the datatype of integers over 64 bits as `xsd:integer`, unexpanded; we write its IRI",
+    ),
 ];
 
 /// Runs the programs of a checkout of knowsys/nemo: `NEMO=path/to/nemo cargo test --release nemo`. Without it, nothing to do.
@@ -221,7 +234,9 @@ fn nemo_programs_give_their_tables() {
     }
     let unexplained: Vec<_> = wrong
         .iter()
-        .filter(|(name, reason)| reason != "existential rules" && !NEMO_DEVIATIONS.iter().any(|(known, _)| known == name))
+        .filter(|(name, reason)| {
+            reason != "existential rules" && !NEMO_DEVIATIONS.iter().any(|(known, _)| known == name)
+        })
         .collect();
     assert!(unexplained.is_empty(), "{} without a reason", unexplained.len());
 }

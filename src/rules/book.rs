@@ -1,25 +1,20 @@
 //! The rules of an ontology, prepared once and used by every worker for every run.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use crate::base::{Diagnostic, Diagnostics, Digest, TermId, Terms};
+use crate::base::{Diagnostics, Terms};
 use crate::facts::ActionFacts;
-use crate::ontology::{Ontology, Property, RuleLanguage};
-use crate::rules::check::{Checking, Role, used_names};
+use crate::ontology::Ontology;
+use crate::rules::dataset::Statements;
 use crate::rules::evaluate::{Layers, Planned, Stopped, Tables, evaluate};
 use crate::rules::findings::{Budget, Findings, RuleFault};
-use crate::rules::given::{Phases, add_given};
 use crate::rules::load::Given;
 use crate::rules::meter::Meter;
-use crate::rules::owl::owl_closure;
-use crate::rules::parse::parse;
 use crate::rules::plan::Indexes;
-use crate::rules::program::{Atom, Literal, Operand, Origin, Predicates, Program, Rule};
+use crate::rules::prepare::Preparing;
+use crate::rules::program::Predicates;
 use crate::rules::reading::{Verdict, findings};
-use crate::rules::dataset::Statements;
 use crate::rules::sparql::Query;
-use crate::rules::stratify::stratify;
-use crate::rules::syntax::Syntax;
 use crate::rules::universe::Universe;
 
 /// Every property's rules with the libraries, parsed, checked and planned. Shared between threads.
@@ -36,7 +31,7 @@ pub struct RuleBook {
     pub(crate) libraries: Planned,
     pub(crate) properties: BTreeMap<String, Judge>,
     pub(crate) statements: Statements,
-    warnings: Diagnostics,
+    pub(crate) warnings: Diagnostics,
 }
 
 impl std::fmt::Debug for RuleBook {
@@ -49,7 +44,6 @@ impl std::fmt::Debug for RuleBook {
 pub(crate) struct Judge {
     pub(crate) digest: String,
     pub(crate) label: String,
-    pub(crate) unit: Option<String>,
     pub(crate) rules: JudgeRules,
 }
 
@@ -144,303 +138,4 @@ impl RuleBook {
 /// A fault that names the rule.
 pub(crate) fn fault(meter: &Meter, stopped: Stopped, planned: &Planned) -> RuleFault {
     meter.fault(stopped.stop, stopped.rule.map(|rule| &planned.rules[rule]))
-}
-
-/// The state of preparing a book.
-#[derive(Default)]
-struct Preparing {
-    terms: Terms,
-    diagnostics: Diagnostics,
-    /// Properties that libraries add to the snapshots.
-    derived: BTreeSet<String>,
-}
-
-impl Preparing {
-    fn run(mut self, ontology: &Ontology) -> Result<RuleBook, Diagnostics> {
-        let phases = Phases::intern(&mut self.terms);
-        let (libraries, properties) = self.parse(ontology);
-        let mut checking = Checking::new(&mut self.terms, Some(&ontology.vocabulary));
-        for syntax in &libraries {
-            checking.define(syntax, Role::Library);
-        }
-        for (scope, _, syntax) in &properties {
-            checking.define(syntax, Role::Property(*scope));
-        }
-        let mut library = Program::default();
-        for syntax in &libraries {
-            extend(&mut library, checking.rules(syntax, Role::Library));
-        }
-        let mut programs = BTreeMap::new();
-        for (scope, property, syntax) in &properties {
-            programs.insert(*scope, checking.rules(syntax, Role::Property(*scope)));
-            warn_unused(&mut checking, syntax, *scope);
-            let _ = property;
-        }
-        let (mut predicates, split, found) = (checking.predicates, checking.split, checking.diagnostics);
-        self.derived = checking.derived_terms;
-        self.diagnostics.extend(found);
-        if split {
-            library.rules.extend(gather(&mut predicates, &mut self.terms));
-        }
-        self.assemble(ontology, phases, library, programs, &properties, predicates)
-    }
-
-    /// The syntax of all libraries and of all properties in Datalog; these with a scope each, from 1 on.
-    fn parse<'o>(&mut self, ontology: &'o Ontology) -> (Vec<Syntax>, Vec<(usize, &'o Property, Syntax)>) {
-        let mut libraries = Vec::new();
-        for file in &ontology.libraries {
-            if file.language == RuleLanguage::Sparql {
-                let help = "write it in Datalog, in a file that ends in `.rls`";
-                self.diagnostics.push(
-                    Diagnostic::error("R034", "a rule library can't be a SPARQL query").in_source(&file.source).help(help),
-                );
-                continue;
-            }
-            let (syntax, found) = parse(&file.source);
-            self.diagnostics.extend(found);
-            libraries.push(syntax);
-        }
-        let mut properties = Vec::new();
-        for (idx, property) in ontology.properties.values().enumerate() {
-            if property.rule.language == RuleLanguage::Datalog {
-                let (syntax, found) = parse(&property.rule.source);
-                self.diagnostics.extend(found);
-                properties.push((idx + 1, property, syntax));
-            }
-        }
-        (libraries, properties)
-    }
-
-    fn assemble(
-        mut self,
-        ontology: &Ontology,
-        phases: Phases,
-        library: Program,
-        mut programs: BTreeMap<usize, Program>,
-        syntaxes: &[(usize, &Property, Syntax)],
-        predicates: Predicates,
-    ) -> Result<RuleBook, Diagnostics> {
-        let closed = owl_closure(&ontology.triples).unwrap_or_else(|found| {
-            self.diagnostics.extend(found);
-            Vec::new()
-        });
-        let triples: Vec<[TermId; 3]> =
-            closed.into_iter().map(|triple| triple.map(|term| self.terms.intern(term))).collect();
-        let mut indexes = Indexes::new(&predicates);
-        let has_sparql = ontology.properties.values().any(|p| p.rule.language == RuleLanguage::Sparql);
-        // Faults of rules that nobody needs are faults all the same.
-        let known = self.diagnostics.len();
-        self.plan(library.clone(), &predicates, &mut Indexes::new(&predicates));
-        let library = if self.diagnostics.len() > known { Program::default() } else { library };
-        let library = needed(library, programs.values(), has_sparql, &predicates);
-        let (fixed, moving) = split_fixed(library, &predicates);
-        let fixed = self.plan(fixed, &predicates, &mut indexes);
-        let libraries = self.plan(moving, &predicates, &mut indexes);
-        let mut properties = BTreeMap::new();
-        for (scope, property, _) in syntaxes {
-            let program = programs.remove(scope).unwrap_or_default();
-            let verdict = Verdict::new(&program, &predicates, *scope);
-            let planned = Box::new(self.plan(program, &predicates, &mut indexes));
-            let rules = JudgeRules::Datalog { planned, verdict };
-            properties.insert(property.iri.clone(), judge(ontology, property, rules));
-        }
-        for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
-            match Query::prepare(&property.rule.source, ontology, &self.derived) {
-                Ok(query) => {
-                    properties.insert(property.iri.clone(), judge(ontology, property, JudgeRules::Sparql(Box::new(query))));
-                }
-                Err(found) => self.diagnostics.extend(found),
-            }
-        }
-        if self.diagnostics.has_errors() {
-            return Err(self.diagnostics);
-        }
-        let given = Given::new(&predicates, phases);
-        let own = given.load_ontology(&triples, &predicates, &indexes);
-        let fixed_facts = given.load_ontology(&triples, &predicates, &indexes);
-        let statements = Statements::new(if has_sparql { &triples } else { &[] }, &mut self.terms);
-        let fixed_tables = self.close_fixed(&fixed, own, &predicates, &indexes)?;
-        Ok(RuleBook {
-            terms: self.terms,
-            predicates,
-            indexes,
-            given,
-            fixed: fixed_tables,
-            fixed_facts,
-            fixed_rules: fixed,
-            libraries,
-            properties,
-            statements,
-            warnings: self.diagnostics,
-        })
-    }
-
-    fn plan(&mut self, program: Program, predicates: &Predicates, indexes: &mut Indexes) -> Planned {
-        let universe = Universe::new(&self.terms, None);
-        match stratify(&program.rules, predicates, &universe) {
-            Ok(strata) => Planned::new(program, strata, indexes, &|_| None),
-            Err(found) => {
-                self.diagnostics.extend(found);
-                Planned::new(Program::default(), Vec::new(), indexes, &|_| None)
-            }
-        }
-    }
-
-    /// Evaluates what only the ontology decides. Terms that this makes become terms of the book.
-    fn close_fixed(
-        &mut self,
-        fixed: &Planned,
-        own: Tables,
-        predicates: &Predicates,
-        indexes: &Indexes,
-    ) -> Result<Tables, Diagnostics> {
-        let book = self.terms.clone();
-        let mut universe = Universe::new(&book, None);
-        let mut layers = Layers { own, below: Vec::new() };
-        let mut meter = Meter::new(&Budget::default());
-        if let Err(stopped) = evaluate(fixed, predicates, indexes, &mut layers, &mut universe, &mut meter) {
-            let message = fault(&meter, stopped, fixed).to_string();
-            let help = "the rules over the ontology alone must come to an end";
-            self.diagnostics.push(Diagnostic::error("R090", message).help(help));
-            return Err(std::mem::take(&mut self.diagnostics));
-        }
-        // Made terms follow the book's in the same order, so their numbers stay right.
-        for term in universe.into_made() {
-            self.terms.intern(term);
-        }
-        Ok(layers.own)
-    }
-}
-
-fn extend(program: &mut Program, more: Program) {
-    program.rules.extend(more.rules);
-    for (predicate, rows) in more.facts {
-        program.facts.entry(predicate).or_default().extend(rows);
-    }
-}
-
-fn judge(ontology: &Ontology, property: &Property, rules: JudgeRules) -> Judge {
-    let mut digest = Digest::new();
-    digest.update(property.rule.digest.as_bytes());
-    for library in &ontology.libraries {
-        digest.update(library.path.as_bytes());
-        digest.update(library.digest.as_bytes());
-    }
-    Judge { digest: digest.finish(), label: property.label.clone(), unit: property.unit.clone(), rules }
-}
-
-/// Where some rule reads `state` or `ontology` for a variable property, what is derived for single ones counts too:
-///
-/// ```prolog
-/// state(?phase, ?s, p, ?o) :- state_p(?phase, ?s, ?o) .
-/// ```
-fn gather(predicates: &mut Predicates, terms: &mut Terms) -> Vec<Rule> {
-    let mut rules = Vec::new();
-    let name = "state";
-    if predicates.find(0, name, None).is_none() {
-        return rules;
-    }
-    let general = add_given(predicates, name, None);
-    let single: Vec<(usize, TermId)> = predicates
-        .list
-        .iter()
-        .enumerate()
-        .filter(|(_, p)| p.given && p.name == name)
-        .filter_map(|(id, p)| Some((id, p.property?)))
-        .collect();
-    let _ = &terms;
-    for (id, property) in single {
-        let variables = [Operand::Variable(0), Operand::Variable(1), Operand::Variable(2)];
-        let args = vec![variables[0], variables[1], Operand::Constant(property), variables[2]];
-        let source = crate::base::Source::new("(given)", "");
-        rules.push(Rule {
-            head: Atom { predicate: general, args, span: 0..0 },
-            body: vec![Literal::Positive(Atom { predicate: id, args: variables.to_vec(), span: 0..0 })],
-            aggregation: None,
-            variables: vec!["phase".into(), "s".into(), "o".into()],
-            head_names: vec!["phase".into(), "s".into(), String::new(), "o".into()],
-            origin: Origin { source, span: 0..0, name: None, comment: None },
-        });
-    }
-    rules
-}
-
-/// The library's rules that some property reads, directly or through each other. SPARQL reads all snapshots.
-fn needed<'p>(
-    mut library: Program,
-    properties: impl Iterator<Item = &'p Program>,
-    snapshots: bool,
-    predicates: &Predicates,
-) -> Program {
-    let bodies = |rules: &[Rule]| -> Vec<usize> {
-        rules.iter().flat_map(|rule| rule.body.iter().filter_map(Literal::atom).map(|atom| atom.predicate)).collect()
-    };
-    let mut needed: BTreeSet<usize> = properties.flat_map(|program| bodies(&program.rules)).collect();
-    if snapshots {
-        needed.extend((0..predicates.len()).filter(|id| predicates.get(*id).name == "state"));
-    }
-    loop {
-        let before = needed.len();
-        for rule in &library.rules {
-            if needed.contains(&rule.head.predicate) {
-                needed.extend(bodies(std::slice::from_ref(rule)));
-            }
-        }
-        if needed.len() == before {
-            break;
-        }
-    }
-    library.rules.retain(|rule| needed.contains(&rule.head.predicate));
-    library.facts.retain(|predicate, _| needed.contains(predicate));
-    library
-}
-
-/// Rules that read the ontology only, directly or through each other, and the rest.
-fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) {
-    let mut moving: BTreeSet<usize> =
-        (0..predicates.len()).filter(|id| predicates.get(*id).given && predicates.get(*id).name != "ontology").collect();
-    loop {
-        let before = moving.len();
-        for rule in &program.rules {
-            let reads_moving = rule.body.iter().filter_map(Literal::atom).any(|atom| moving.contains(&atom.predicate));
-            if reads_moving {
-                moving.insert(rule.head.predicate);
-            }
-        }
-        if moving.len() == before {
-            break;
-        }
-    }
-    let (mut fixed, mut rest) = (Program::default(), Program::default());
-    for rule in program.rules {
-        if moving.contains(&rule.head.predicate) { rest.rules.push(rule) } else { fixed.rules.push(rule) }
-    }
-    for (predicate, rows) in program.facts {
-        let target = if moving.contains(&predicate) { &mut rest } else { &mut fixed };
-        target.facts.insert(predicate, rows);
-    }
-    (fixed, rest)
-}
-
-/// Predicates of a property's file that nothing reads and no verdict needs.
-fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
-    let used = used_names(syntax);
-    let verdict = crate::rules::given::VERDICT.map(|(name, _)| name);
-    let mut unused = BTreeMap::new();
-    for statement in &syntax.statements {
-        if let crate::rules::syntax::Statement::Rule(rule) = statement {
-            for head in &rule.heads {
-                if !used.contains(head.predicate.as_str()) && !verdict.contains(&head.predicate.as_str()) {
-                    unused.entry(head.predicate.clone()).or_insert(head.name_span.clone());
-                }
-            }
-        }
-    }
-    for (name, span) in unused {
-        let known = checking.defined.contains_key(&(scope, name.clone()));
-        if known {
-            let help = crate::base::did_you_mean(&name, verdict);
-            checking.warning("R040", &syntax.source, &span, format!("nothing uses `{name}`"), help);
-        }
-    }
 }

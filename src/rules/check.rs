@@ -101,7 +101,13 @@ impl<'a> Checking<'a> {
                     rules += 1;
                     if rules == RULE_LIMIT + 1 && role != Role::Standalone {
                         let help = "keep tables of facts outside rule files";
-                        self.error("R006", source, &rule.span, format!("more than {RULE_LIMIT} rules in one file"), help);
+                        self.error(
+                            "R006",
+                            source,
+                            &rule.span,
+                            format!("more than {RULE_LIMIT} rules in one file"),
+                            help,
+                        );
                     }
                     if rule.body.len() > LITERAL_LIMIT {
                         let message = format!("rule with more than {LITERAL_LIMIT} conditions");
@@ -218,18 +224,15 @@ impl<'a> Checking<'a> {
         } else if !success && !violation {
             let own: Vec<String> =
                 self.defined.keys().filter(|(known, _)| *known == scope).map(|(_, name)| name.clone()).collect();
-            let near = own.iter().find(|name| {
-                crate::base::nearest(name, ["success", "violation"]).is_some()
-            });
+            let near = own.iter().find(|name| crate::base::nearest(name, ["success", "violation"]).is_some());
             let help = match near {
-                Some(name) => format!(
-                    "`{name}` is none of them: {}",
-                    did_you_mean(name, ["success", "violation"])
-                ),
+                Some(name) => format!("`{name}` is none of them: {}", did_you_mean(name, ["success", "violation"])),
                 None => "add a rule such as `success(?o) :- parameter(act:pickObject, ?o), … .`".to_owned(),
             };
             self.diagnostics.push(
-                Diagnostic::error("R026", "the file defines neither `success` nor `violation`").in_source(source).help(help),
+                Diagnostic::error("R026", "the file defines neither `success` nor `violation`")
+                    .in_source(source)
+                    .help(help),
             );
         }
         for (name, columns) in [("margin", 1), ("because", 1)] {
@@ -278,7 +281,11 @@ impl<'a> Checking<'a> {
 
     /// Names that an atom may have in a file, for "did you mean".
     pub(crate) fn known_names(&self, role: Role) -> Vec<String> {
-        let own = self.defined.keys().filter(|(scope, _)| *scope == 0 || *scope == role.scope()).map(|(_, name)| name.clone());
+        let own = self
+            .defined
+            .keys()
+            .filter(|(scope, _)| *scope == 0 || *scope == role.scope())
+            .map(|(_, name)| name.clone());
         let given = GIVEN.iter().filter(|_| role != Role::Standalone).map(|(name, ..)| (*name).to_owned());
         own.chain(given).collect()
     }
@@ -301,7 +308,9 @@ fn place_of(syntax: &Syntax, name: &str) -> Span {
         .statements
         .iter()
         .find_map(|statement| match statement {
-            Statement::Rule(rule) => rule.heads.iter().find(|head| head.predicate == name).map(|head| head.span.clone()),
+            Statement::Rule(rule) => {
+                rule.heads.iter().find(|head| head.predicate == name).map(|head| head.span.clone())
+            }
             _ => None,
         })
         .unwrap_or(0..0)

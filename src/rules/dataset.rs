@@ -193,13 +193,13 @@ pub(crate) fn to_rdf(term: &Term) -> RdfTerm {
         Term::Iri(text) => iri(text).into(),
         Term::Blank(label) => BlankNode::new_unchecked(label.as_ref()).into(),
         Term::String(text) => Literal::new_simple_literal(text.as_ref()).into(),
-        Term::LangString(text, tag) => Literal::new_language_tagged_literal_unchecked(text.as_ref(), tag.as_ref()).into(),
+        Term::LangString(text, tag) => {
+            Literal::new_language_tagged_literal_unchecked(text.as_ref(), tag.as_ref()).into()
+        }
         Term::Integer(value) => Literal::from(*value).into(),
         Term::Double(value) => Literal::from(*value).into(),
         Term::Boolean(value) => Literal::from(*value).into(),
-        Term::Decimal(text) => {
-            Literal::new_typed_literal(text.as_ref(), iri(&format!("{}decimal", names::XSD))).into()
-        }
+        Term::Decimal(text) => Literal::new_typed_literal(text.as_ref(), iri(&format!("{}decimal", names::XSD))).into(),
         Term::Literal(text, datatype) => Literal::new_typed_literal(text.as_ref(), iri(datatype)).into(),
     }
 }

@@ -141,6 +141,9 @@ pub(crate) fn evaluate_noting(
     Ok(())
 }
 
+/// Matches of an aggregating rule's body that are kept at once. Unit: 4 bytes; 1 GiB.
+const AGGREGATE_LIMIT: usize = 1 << 28;
+
 struct Run<'a, 'u, 't> {
     planned: &'a Planned,
     predicates: &'a Predicates,
@@ -286,16 +289,13 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// The head rows that one variant finds.
-    fn variant(
-        &mut self,
-        rule: usize,
+    /// The rows that each step of a variant reads, and their widths; nothing where an atom has none to match.
+    fn sources<'b>(
+        &self,
         variant: &Variant,
-        layers: &Layers<'_>,
-        grown: Option<(&Stratum, &Grown)>,
-        flush: &mut dyn FnMut(&mut Sink, usize) -> Result<(), Stop>,
-    ) -> Result<Vec<TermId>, Stop> {
-        let rule = &self.planned.rules[rule];
+        layers: &'b Layers<'_>,
+        grown: Option<(&Stratum, &'b Grown)>,
+    ) -> Option<(Vec<Vec<Batch<'b>>>, Vec<usize>)> {
         let mut batches = Vec::with_capacity(variant.ops.len());
         let mut widths = Vec::with_capacity(variant.ops.len());
         for op in &variant.ops {
@@ -309,18 +309,32 @@ impl Run<'_, '_, '_> {
                 }
             };
             let mut found = Vec::new();
-            let place = grown.and_then(|(stratum, grown)| Some((stratum.predicates.binary_search(&predicate).ok()?, grown)));
+            let place =
+                grown.and_then(|(stratum, grown)| Some((stratum.predicates.binary_search(&predicate).ok()?, grown)));
             match place {
                 Some((place, grown)) => grown[place].batches(part, index, &mut found),
                 None => found.extend(layers.get(predicate).map(|table| Batch::Plain(table.index(index)))),
             }
-            // A rule that must match something that is not there can't hold.
             if matches!(op, Op::Scan { .. }) && found.iter().all(|batch| batch.is_empty()) {
-                return Ok(Vec::new());
+                return None;
             }
             batches.push(found);
             widths.push(self.predicates.get(predicate).width);
         }
+        Some((batches, widths))
+    }
+
+    /// The head rows that one variant finds.
+    fn variant(
+        &mut self,
+        rule: usize,
+        variant: &Variant,
+        layers: &Layers<'_>,
+        grown: Option<(&Stratum, &Grown)>,
+        flush: &mut dyn FnMut(&mut Sink, usize) -> Result<(), Stop>,
+    ) -> Result<Vec<TermId>, Stop> {
+        let rule = &self.planned.rules[rule];
+        let Some((batches, widths)) = self.sources(variant, layers, grown) else { return Ok(Vec::new()) };
         let operands = match &rule.aggregation {
             Some(aggregation) => projection(aggregation),
             None => rule.head.args.clone(),
@@ -336,7 +350,11 @@ impl Run<'_, '_, '_> {
             universe: self.universe,
             meter: self.meter,
             sink: &mut sink,
-            flush: &mut |sink| if aggregating { Ok(()) } else { flush(sink, left) },
+            flush: &mut |sink| match aggregating {
+                true if sink.rows.len() > AGGREGATE_LIMIT => Err(Stop::Tuples),
+                true => Ok(()),
+                false => flush(sink, left),
+            },
         }
         .run(0)?;
         Ok(match &rule.aggregation {

@@ -44,13 +44,16 @@ impl Expr {
                 [a] => (builtin.apply)(&[a.value(binding, terms)?]),
                 [a, b] => (builtin.apply)(&[a.value(binding, terms)?, b.value(binding, terms)?]),
                 _ => {
-                    let args: Vec<Value<'a>> = args.iter().map(|arg| arg.value(binding, terms)).collect::<Option<_>>()?;
+                    let args: Vec<Value<'a>> =
+                        args.iter().map(|arg| arg.value(binding, terms)).collect::<Option<_>>()?;
                     (builtin.apply)(&args)
                 }
             }
             .map(Cow::Owned),
             Self::Matches(arg, pattern) => match arg.value(binding, terms)?.as_ref() {
-                Term::String(text) | Term::LangString(text, _) => Some(Cow::Owned(Term::Boolean(pattern.is_match(text)))),
+                Term::String(text) | Term::LangString(text, _) => {
+                    Some(Cow::Owned(Term::Boolean(pattern.is_match(text))))
+                }
                 _ => None,
             },
             Self::Format(parts) => {

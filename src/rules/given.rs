@@ -1,7 +1,7 @@
 //! The predicates that rules are given: the snapshots, the designators, the ontology.
 
-use crate::base::{TermId, Terms, names};
 use crate::base::Term;
+use crate::base::{TermId, Terms, names};
 use crate::rules::program::{Predicate, PredicateId, Predicates};
 
 /// Given predicates with their arguments, as people read them.

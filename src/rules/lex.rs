@@ -59,20 +59,17 @@ pub struct Spanned {
     pub span: Span,
 }
 
-/// F-strings in f-strings deeper than this are refused.
-const FORMAT_DEPTH: usize = 8;
-
 /// Cuts a text into tokens. Faults are noted and skipped; the last token is always [`Token::End`].
 pub fn lex(source: &Source, diagnostics: &mut Diagnostics) -> Vec<Spanned> {
     Lexer { source, text: &source.text, at: 0, end: source.text.len(), depth: 0, diagnostics }.run()
 }
 
-struct Lexer<'a> {
-    source: &'a Source,
-    text: &'a str,
-    at: usize,
-    end: usize,
-    depth: usize,
+pub(crate) struct Lexer<'a> {
+    pub(crate) source: &'a Source,
+    pub(crate) text: &'a str,
+    pub(crate) at: usize,
+    pub(crate) end: usize,
+    pub(crate) depth: usize,
     diagnostics: &'a mut Diagnostics,
 }
 
@@ -98,11 +95,11 @@ impl Lexer<'_> {
         }
     }
 
-    fn rest(&self) -> &str {
+    pub(crate) fn rest(&self) -> &str {
         &self.text[self.at..self.end]
     }
 
-    fn peek(&self) -> Option<char> {
+    pub(crate) fn peek(&self) -> Option<char> {
         self.rest().chars().next()
     }
 
@@ -116,12 +113,12 @@ impl Lexer<'_> {
         taken
     }
 
-    fn error(&mut self, code: &'static str, span: Span, message: String, help: &str) {
+    pub(crate) fn error(&mut self, code: &'static str, span: Span, message: String, help: &str) {
         self.diagnostics.push(Diagnostic::error(code, message).at(self.source, span).help(help));
     }
 
     /// White space and comments of every form.
-    fn skip_blank(&mut self) {
+    pub(crate) fn skip_blank(&mut self) {
         loop {
             self.take_while(char::is_whitespace);
             if self.rest().starts_with('%') {
@@ -141,7 +138,7 @@ impl Lexer<'_> {
         }
     }
 
-    fn next(&mut self, before: Option<&Spanned>) -> Option<Token> {
+    pub(crate) fn next(&mut self, before: Option<&Spanned>) -> Option<Token> {
         let start = self.at;
         let first = self.peek()?;
         match first {
@@ -172,7 +169,12 @@ impl Lexer<'_> {
                 self.at += 1;
                 if self.peek().is_some_and(continues_name) {
                     self.take_while(continues_name);
-                    self.error("R002", start..self.at, "a name can't begin with `_`".into(), "write `_` alone for any value");
+                    self.error(
+                        "R002",
+                        start..self.at,
+                        "a name can't begin with `_`".into(),
+                        "write `_` alone for any value",
+                    );
                 }
                 Some(Token::Anonymous)
             }
@@ -217,7 +219,9 @@ impl Lexer<'_> {
     /// A name in which `%20` and the like may stand. (Any other `%` begins a comment.)
     fn name_with_escapes(&mut self) -> String {
         let mut name = self.take_while(continues_name);
-        while self.rest().starts_with('%') && self.rest().chars().skip(1).take(2).filter(char::is_ascii_hexdigit).count() == 2 {
+        while self.rest().starts_with('%')
+            && self.rest().chars().skip(1).take(2).filter(char::is_ascii_hexdigit).count() == 2
+        {
             self.at += 1;
             name.push('%');
             name.push_str(&self.take_while(continues_name));
@@ -285,141 +289,6 @@ impl Lexer<'_> {
             self.at += 1;
         }
         Token::Number(self.text[start..self.at].to_owned())
-    }
-
-    fn string(&mut self) -> Option<Token> {
-        let start = self.at;
-        let triple = self.rest().starts_with("\"\"\"");
-        self.at += if triple { 3 } else { 1 };
-        let mut out = String::new();
-        loop {
-            if triple && self.rest().starts_with("\"\"\"") {
-                self.at += 3;
-                return Some(Token::String(out));
-            }
-            match self.peek() {
-                Some('"') if !triple => {
-                    self.at += 1;
-                    return Some(Token::String(out));
-                }
-                None => break,
-                Some('\n') if !triple => break,
-                Some('\\') => self.escape(&mut out),
-                Some(c) => {
-                    out.push(c);
-                    self.at += c.len_utf8();
-                }
-            }
-        }
-        let help = "close it with `\"`; a string over several lines stands in `\"\"\"`";
-        self.error("R003", start..start + 1, "string has no end".into(), help);
-        Some(Token::String(out))
-    }
-
-    fn escape(&mut self, out: &mut String) {
-        let start = self.at;
-        self.at += 1;
-        let Some(c) = self.peek() else { return };
-        self.at += c.len_utf8();
-        let digits = match c {
-            'n' => return out.push('\n'),
-            't' => return out.push('\t'),
-            'r' => return out.push('\r'),
-            'b' => return out.push('\u{8}'),
-            'f' => return out.push('\u{c}'),
-            '"' | '\\' | '\'' => return out.push(c),
-            'u' => 4,
-            'U' => 8,
-            _ => {
-                let help = "known escapes: \\n \\t \\r \\b \\f \\\" \\' \\\\ \\uXXXX \\UXXXXXXXX";
-                return self.error("R004", start..self.at, format!("unknown escape `\\{c}`"), help);
-            }
-        };
-        let hex: String = self.rest().chars().take(digits).take_while(char::is_ascii_hexdigit).collect();
-        self.at += hex.len();
-        match u32::from_str_radix(&hex, 16).ok().filter(|_| hex.len() == digits).and_then(char::from_u32) {
-            Some(c) => out.push(c),
-            None => {
-                let help = "give the number of a Unicode character in 4 (\\u) or 8 (\\U) hexadecimal digits";
-                self.error("R004", start..self.at, "no such character".into(), help);
-            }
-        }
-    }
-
-    /// `f"…{code}…"`; `{{` and `}}` stand for braces.
-    fn format(&mut self) -> Option<Token> {
-        let start = self.at;
-        let triple = self.rest().starts_with("f\"\"\"");
-        let close = if triple { "\"\"\"" } else { "\"" };
-        self.at += 1 + close.len();
-        let mut pieces = Vec::new();
-        let mut text = String::new();
-        loop {
-            if self.rest().starts_with(close) {
-                self.at += close.len();
-                pieces.push(FormatPiece::Text(text));
-                return Some(Token::Format(pieces));
-            }
-            if self.rest().starts_with("{{") || self.rest().starts_with("}}") {
-                text.push_str(&self.rest()[..1].to_owned());
-                self.at += 2;
-                continue;
-            }
-            match self.peek() {
-                None => break,
-                Some('\n') if !triple => break,
-                Some('{') => {
-                    pieces.push(FormatPiece::Text(std::mem::take(&mut text)));
-                    pieces.push(FormatPiece::Code(self.format_code()?));
-                }
-                Some('\\') => self.escape(&mut text),
-                Some(c) => {
-                    text.push(c);
-                    self.at += c.len_utf8();
-                }
-            }
-        }
-        self.error("R003", start..start + 2, "string has no end".into(), "close it with `\"`");
-        pieces.push(FormatPiece::Text(text));
-        Some(Token::Format(pieces))
-    }
-
-    /// The tokens between `{` and its `}`.
-    fn format_code(&mut self) -> Option<Vec<Spanned>> {
-        let start = self.at;
-        self.at += 1;
-        if self.depth >= FORMAT_DEPTH {
-            self.at = self.end;
-            let help = "compute the inner text in an assignment of its own";
-            self.error("R005", start..start + 1, "f-strings are nested too deeply".into(), help);
-            return None;
-        }
-        self.depth += 1;
-        let mut tokens: Vec<Spanned> = Vec::new();
-        let mut open = 0usize;
-        loop {
-            self.skip_blank();
-            let at = self.at;
-            if self.at >= self.end || self.peek() == Some('\n') {
-                self.error("R003", start..start + 1, "`{` has no end".into(), "close it with `}`, or write `{{` for a brace");
-                break;
-            }
-            if self.peek() == Some('}') && open == 0 {
-                self.at += 1;
-                break;
-            }
-            if let Some(token) = self.next(tokens.last()) {
-                match token {
-                    Token::Symbol("{") => open += 1,
-                    Token::Symbol("}") => open = open.saturating_sub(1),
-                    _ => {}
-                }
-                tokens.push(Spanned { token, span: at..self.at });
-            }
-        }
-        self.depth -= 1;
-        tokens.push(Spanned { token: Token::End, span: self.at.saturating_sub(1)..self.at });
-        Some(tokens)
     }
 }
 

@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use crate::base::{TermId, Terms};
+use crate::base::TermId;
 use crate::facts::{ActionFacts, Triple};
 use crate::rules::evaluate::Tables;
-use crate::rules::given::{Phases, property_place};
+use crate::rules::given::Phases;
 use crate::rules::plan::Indexes;
 use crate::rules::program::{PredicateId, Predicates};
 use crate::rules::relation::finished;
@@ -48,7 +48,6 @@ impl Given {
                 _ => given.parameter = Some(id),
             }
         }
-        debug_assert!(property_place("state").is_some());
         given
     }
 
@@ -78,7 +77,7 @@ impl Given {
         let mut readers = Readers { given: self, of_property: vec![None; facts.terms.len()] };
         for (phase, triples) in self.graphs(facts) {
             for [s, p, o] in triples {
-                let reader = readers.of(*p, facts.terms, universe);
+                let reader = readers.of(*p, universe);
                 if let Some(predicate) = reader {
                     let (s, o) = (universe.of_run(*s), universe.of_run(*o));
                     rows[predicate].extend([phase, s, o]);
@@ -115,10 +114,6 @@ impl Given {
     pub(crate) fn any_state(&self) -> Option<PredicateId> {
         self.any_state
     }
-
-    pub(crate) fn phases(&self) -> Phases {
-        self.phases
-    }
 }
 
 /// Which predicate reads the facts of a property; looked up once for each property of a run.
@@ -128,7 +123,7 @@ struct Readers<'a> {
 }
 
 impl Readers<'_> {
-    fn of(&mut self, property: TermId, _terms: &Terms, universe: &mut Universe<'_>) -> Option<PredicateId> {
+    fn of(&mut self, property: TermId, universe: &mut Universe<'_>) -> Option<PredicateId> {
         let slot = &mut self.of_property[property as usize];
         *slot.get_or_insert_with(|| self.given.state.get(&universe.of_run(property)).copied())
     }

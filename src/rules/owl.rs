@@ -34,7 +34,9 @@ pub fn owl_closure(triples: &[[Term; 3]]) -> Result<Vec<[Term; 3]>, Diagnostics>
             [s, p, o] => Some([*s, *p, *o]),
             _ => None,
         })
-        .filter(|[s, p, o]| matches!(s, Term::Iri(_) | Term::Blank(_)) && !(s == o && p.as_iri() == Some(same.as_str())))
+        .filter(|[s, p, o]| {
+            matches!(s, Term::Iri(_) | Term::Blank(_)) && !(s == o && p.as_iri() == Some(same.as_str()))
+        })
         .map(|triple| triple.map(Term::clone))
         .collect();
     statements.sort();
@@ -51,7 +53,9 @@ fn told(program: &Program, contradictions: &[Vec<Term>]) -> Diagnostics {
             .explain(&format!("contradiction({})", args.join(", ")), &Budget::default())
             .map_or(String::new(), |explanation| explanation.to_text());
         let message = format!("the ontology contradicts itself about {about} (rule {rule} of OWL 2 RL)");
-        diagnostics.push(Diagnostic::error("R080", message).help(format!("take back one of the facts of this proof:\n{proof}")));
+        diagnostics.push(
+            Diagnostic::error("R080", message).help(format!("take back one of the facts of this proof:\n{proof}")),
+        );
     }
     diagnostics
 }

@@ -2,7 +2,9 @@
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 use crate::rules::lex::{Spanned, Token, lex};
-use crate::rules::syntax::{AtomSyntax, Comparison, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer};
+use crate::rules::syntax::{
+    AtomSyntax, Comparison, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer,
+};
 
 /// Directives of the language.
 const DIRECTIVES: [&str; 7] = ["base", "declare", "export", "import", "output", "parameter", "prefix"];
@@ -26,8 +28,7 @@ pub fn parse(source: &Source) -> (Syntax, Diagnostics) {
         return (syntax, diagnostics);
     }
     let tokens = lex(source, &mut diagnostics);
-    let mut parser =
-        Parser { source, tokens: &tokens, at: 0, prefixes: Vec::new(), base: None, depth: 0, diagnostics };
+    let mut parser = Parser { source, tokens: &tokens, at: 0, prefixes: Vec::new(), base: None, depth: 0, diagnostics };
     while !matches!(parser.token(), Token::End) && parser.diagnostics.len() < FAULT_LIMIT {
         let start = parser.at;
         match parser.statement() {
@@ -88,7 +89,13 @@ impl Parser<'_> {
         if self.take(symbol) { Ok(()) } else { Err(self.unexpected(&format!("`{symbol}` {place}"))) }
     }
 
-    pub(crate) fn fault(&mut self, code: &'static str, span: Span, message: impl Into<String>, help: impl Into<String>) -> Lost {
+    pub(crate) fn fault(
+        &mut self,
+        code: &'static str,
+        span: Span,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Lost {
         self.diagnostics.push(Diagnostic::error(code, message).at(self.source, span).help(help));
         Lost
     }
@@ -243,7 +250,7 @@ impl Parser<'_> {
             "base" => self.base()?,
             "parameter" => Some(self.parameter(start.start)?),
             "import" | "export" => Some(Statement::Transfer(self.transfer(name == "import", start.start)?)),
-            "output" => Some(self.output(start.start)?),
+            "output" => Some(self.output()?),
             "declare" => Some(self.declare(start.start)?),
             _ => {
                 let help = did_you_mean(name, DIRECTIVES);
@@ -330,12 +337,12 @@ impl Parser<'_> {
         Ok(Transfer { import, predicate, format, options, bindings, span: start..self.end() })
     }
 
-    fn output(&mut self, start: usize) -> Result<Statement, Lost> {
+    fn output(&mut self) -> Result<Statement, Lost> {
         let mut predicates = vec![self.predicate("a predicate")?];
         while self.take(",") {
             predicates.push(self.predicate("a predicate")?);
         }
-        Ok(Statement::Output { predicates, span: start..self.end() })
+        Ok(Statement::Output { predicates })
     }
 
     fn declare(&mut self, start: usize) -> Result<Statement, Lost> {

@@ -191,8 +191,9 @@ impl Parser<'_> {
         for piece in pieces {
             match piece {
                 FormatPiece::Text(text) if text.is_empty() => {}
-                FormatPiece::Text(text) => parts
-                    .push(Expression { kind: ExpressionKind::Constant(Term::string(text)), span: span.clone() }),
+                FormatPiece::Text(text) => {
+                    parts.push(Expression { kind: ExpressionKind::Constant(Term::string(text)), span: span.clone() })
+                }
                 FormatPiece::Code(tokens) => {
                     let mut inner = Parser {
                         source: self.source,

@@ -78,10 +78,23 @@ pub(crate) enum Op {
         once: bool,
     },
     /// Only if no tuple begins with the key.
-    Absent { predicate: PredicateId, index: usize, key: Vec<Operand> },
-    Assign { variable: Variable, value: Expr },
-    Compare { op: Comparison, left: Expr, right: Expr },
-    Test { value: Expr },
+    Absent {
+        predicate: PredicateId,
+        index: usize,
+        key: Vec<Operand>,
+    },
+    Assign {
+        variable: Variable,
+        value: Expr,
+    },
+    Compare {
+        op: Comparison,
+        left: Expr,
+        right: Expr,
+    },
+    Test {
+        value: Expr,
+    },
 }
 
 /// One way to evaluate a rule: with all tuples, or with one condition restricted to recent ones.

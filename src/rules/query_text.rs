@@ -41,12 +41,12 @@ pub(crate) fn scan(text: &str) -> Vec<Word> {
                 _ => at += 1,
             },
             c if c.is_alphanumeric() || "?$_:".contains(c) => {
-                let length = text[at..].find(|c: char| !(c.is_alphanumeric() || "?$_:-".contains(c))).unwrap_or(text.len() - at);
+                let length =
+                    text[at..].find(|c: char| !(c.is_alphanumeric() || "?$_:-".contains(c))).unwrap_or(text.len() - at);
                 at += length;
                 let word = text[start..at].to_owned();
-                let iri = word
-                    .split_once(':')
-                    .and_then(|(prefix, local)| Some(format!("{}{local}", prefixes.get(prefix)?)));
+                let iri =
+                    word.split_once(':').and_then(|(prefix, local)| Some(format!("{}{local}", prefixes.get(prefix)?)));
                 words.push(Word { word, iri, span: start..at });
             }
             c => at += c.len_utf8(),

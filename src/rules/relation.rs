@@ -13,8 +13,6 @@ use crate::rules::plan::{Order, Part};
 pub(crate) trait Finished: Send + Sync {
     /// The rows in the order of an index, which is made when it is first asked for.
     fn index(&self, index: usize) -> &[TermId];
-    /// How many tuples there are.
-    fn len(&self) -> usize;
 }
 
 /// Tuples of a predicate that its own rules still add to.
@@ -72,10 +70,6 @@ impl<const W: usize> Finished for FinishedOf<W> {
     fn index(&self, index: usize) -> &[TermId] {
         let relation = self.indexes[index].get_or_init(|| permuted(self.primary(), &self.orders[index]));
         relation.elements.as_flattened()
-    }
-
-    fn len(&self) -> usize {
-        self.primary().len()
     }
 }
 
@@ -174,9 +168,8 @@ fn relation_of<const W: usize>(rows: Vec<TermId>) -> Relation<[TermId; W]> {
 fn sort<const W: usize>(rows: &mut [[TermId; W]]) {
     match W {
         2 => rows.sort_unstable_by_key(|row| (u64::from(row[0]) << 32) | u64::from(row[1])),
-        3 => rows.sort_unstable_by_key(|row| {
-            (u128::from(row[0]) << 64) | (u128::from(row[1]) << 32) | u128::from(row[2])
-        }),
+        3 => rows
+            .sort_unstable_by_key(|row| (u128::from(row[0]) << 64) | (u128::from(row[1]) << 32) | u128::from(row[2])),
         _ => rows.sort_unstable(),
     }
 }

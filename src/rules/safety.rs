@@ -12,7 +12,6 @@ pub(crate) fn order(
     syntax: &RuleSyntax,
     head: &Atom,
     aggregation: Option<&Aggregation>,
-    _body_variables: usize,
 ) -> bool {
     let mut bound = vec![false; rule.variables.len()];
     let mut sorted = Vec::new();
@@ -40,6 +39,15 @@ pub(crate) fn order(
         sorted.push(Literal::Negative(atom));
     }
     rule.body = sorted;
+    safe &= head_bound(rule, head, aggregation, &bound);
+    if safe {
+        warn_lonely(rule, syntax);
+    }
+    safe
+}
+
+/// Notes a fault for each variable of the head, or of its aggregates, that has no value.
+fn head_bound(rule: &mut Translation<'_, '_>, head: &Atom, aggregation: Option<&Aggregation>, bound: &[bool]) -> bool {
     let derived: Vec<Variable> = aggregation
         .iter()
         .flat_map(|a| a.aggregates.iter().map(|g| g.output).chain(a.after.iter().map(|(variable, _)| *variable)))
@@ -51,22 +59,17 @@ pub(crate) fn order(
         Operand::Variable(variable) => Some(*variable),
         _ => None,
     });
-    let mut missing: Vec<Variable> =
-        heads.chain(inputs).filter(|v| !bound[*v] && !derived.contains(v)).collect();
+    let mut missing: Vec<Variable> = heads.chain(inputs).filter(|v| !bound[*v] && !derived.contains(v)).collect();
     missing.sort_unstable();
     missing.dedup();
-    for variable in missing {
-        let (name, span) = rule.variables[variable].clone();
+    for variable in &missing {
+        let (name, span) = rule.variables[*variable].clone();
         if !name.is_empty() {
             let help = format!("use `?{name}` in a positive atom of the body, or give it a value with `?{name} = …`");
             rule.error("R020", &span, format!("variable `?{name}` of the head is not bound in the body"), help);
         }
-        safe = false;
     }
-    if safe {
-        warn_lonely(rule, syntax);
-    }
-    safe
+    missing.is_empty()
 }
 
 fn mark(atom: &Atom, bound: &mut [bool]) {
@@ -166,9 +169,9 @@ fn warn_lonely(rule: &mut Translation<'_, '_>, syntax: &RuleSyntax) {
     let text = rule.source.text.get(syntax.span.clone()).unwrap_or_default().to_owned();
     for (name, span) in rule.variables.clone() {
         let word = format!("?{name}");
-        let uses = text.match_indices(&word).filter(|(at, _)| {
-            !text[at + word.len()..].starts_with(|c: char| c.is_alphanumeric() || c == '_')
-        });
+        let uses = text
+            .match_indices(&word)
+            .filter(|(at, _)| !text[at + word.len()..].starts_with(|c: char| c.is_alphanumeric() || c == '_'));
         if !name.is_empty() && uses.count() == 1 {
             let help = "write `_` where any value will do";
             let source = rule.source.clone();

@@ -15,9 +15,9 @@ use crate::rules::builtins;
 use crate::rules::dataset::{Graph, Snapshot, TimeSpent, View, from_rdf, to_rdf};
 use crate::rules::evaluate::Tables;
 use crate::rules::findings::{Budget, Findings, RuleFault, WitnessRow};
+use crate::rules::query_text::{first_group, groups, scan, variables};
 use crate::rules::universe::Universe;
 use crate::rules::values::{Number, lexical};
-use crate::rules::query_text::{first_group, groups, scan, variables};
 
 /// A prepared query.
 pub(crate) struct Query {
@@ -26,7 +26,11 @@ pub(crate) struct Query {
 
 impl Query {
     /// Parses a query, checks its terms, and binds designators that it uses as variables.
-    pub(crate) fn prepare(source: &Source, ontology: &Ontology, derived: &BTreeSet<String>) -> Result<Self, Diagnostics> {
+    pub(crate) fn prepare(
+        source: &Source,
+        ontology: &Ontology,
+        derived: &BTreeSet<String>,
+    ) -> Result<Self, Diagnostics> {
         let mut diagnostics = Diagnostics::new();
         check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
         if let Err(error) = evaluator().parse_query(source.text.as_ref()) {
@@ -40,18 +44,26 @@ impl Query {
         })?;
         if !first_word_is_ask_or_select(&source.text) {
             let help = "write `ASK { … }` (true is passed) or `SELECT … { … }` (every row is a violation)";
-            diagnostics.push(Diagnostic::error("R061", "the query is neither ASK nor SELECT").in_source(source).help(help));
+            diagnostics
+                .push(Diagnostic::error("R061", "the query is neither ASK nor SELECT").in_source(source).help(help));
         }
         diagnostics.or(Self { prepared })
     }
 
     /// Judges an action: `ASK` holds when true, `SELECT` when it has no row.
-    pub(crate) fn judge(&self, book: &RuleBook, snapshot: &Snapshot, universe: &Universe<'_>, budget: &Budget) -> Result<Findings, RuleFault> {
+    pub(crate) fn judge(
+        &self,
+        book: &RuleBook,
+        snapshot: &Snapshot,
+        universe: &Universe<'_>,
+        budget: &Budget,
+    ) -> Result<Findings, RuleFault> {
         let lookups = Cell::new(0);
         let deadline =
             Duration::try_from_secs_f64(budget.secs.max(0.0)).ok().and_then(|time| Instant::now().checked_add(time));
         let view = View { snapshot, statements: &book.statements, universe, deadline, lookups: &lookups };
-        let results = self.prepared.clone().on_queryable_dataset(view).execute().map_err(|error| fault(&error, budget))?;
+        let results =
+            self.prepared.clone().on_queryable_dataset(view).execute().map_err(|error| fault(&error, budget))?;
         match results {
             QueryResults::Boolean(holds) => Ok(Findings {
                 applicable: true,
@@ -67,7 +79,12 @@ impl Query {
     }
 
     /// Every row is a violation.
-    fn rows(&self, rows: QuerySolutionIter<'_>, deadline: Option<Instant>, budget: &Budget) -> Result<Findings, RuleFault> {
+    fn rows(
+        &self,
+        rows: QuerySolutionIter<'_>,
+        deadline: Option<Instant>,
+        budget: &Budget,
+    ) -> Result<Findings, RuleFault> {
         let mut witness = Vec::new();
         let (mut margin, mut because) = (None::<f64>, BTreeSet::new());
         for row in rows {
@@ -149,13 +166,16 @@ fn evaluator() -> SparqlEvaluator {
         };
     }
     for name in builtins::builtin_names() {
-        let (Some(local), Some(function)) = (name.strip_prefix("geo3d:"), builtins::builtin_in_words(name)) else { continue };
+        let (Some(local), Some(function)) = (name.strip_prefix("geo3d:"), builtins::builtin_in_words(name)) else {
+            continue;
+        };
         let iri = NamedNode::new_unchecked(format!("{}{local}", builtins::GEO3D));
         evaluator = evaluator.with_custom_function(iri, move |args: &[RdfTerm]| {
             if !(function.least..=function.most).contains(&args.len()) {
                 return None;
             }
-            let args: Vec<builtins::Value<'_>> = args.iter().map(|arg| std::borrow::Cow::Owned(from_rdf(arg))).collect();
+            let args: Vec<builtins::Value<'_>> =
+                args.iter().map(|arg| std::borrow::Cow::Owned(from_rdf(arg))).collect();
             (function.apply)(&args).map(|term| to_rdf(&term))
         });
     }
@@ -235,12 +255,18 @@ fn expected(message: &str) -> String {
 }
 
 /// Terms of our namespaces must be in the vocabulary, as in Datalog.
-fn check_vocabulary(source: &Source, vocabulary: &Vocabulary, derived: &BTreeSet<String>, diagnostics: &mut Diagnostics) {
+fn check_vocabulary(
+    source: &Source,
+    vocabulary: &Vocabulary,
+    derived: &BTreeSet<String>,
+    diagnostics: &mut Diagnostics,
+) {
     for token in scan(&source.text) {
         let Some(iri) = &token.iri else { continue };
         let Some(namespace) = [names::W, names::ACT].into_iter().find(|n| iri.starts_with(n)) else { continue };
         let local = &iri[namespace.len()..];
-        let ours = namespace == names::ACT && matches!(local, "" | "before" | "after" | "during" | "parameters" | "ontology" | "value");
+        let ours = namespace == names::ACT
+            && matches!(local, "" | "before" | "after" | "during" | "parameters" | "ontology" | "value");
         if ours || local.is_empty() || vocabulary.terms.contains_key(iri) || derived.contains(iri) {
             continue;
         }

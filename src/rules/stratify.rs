@@ -30,7 +30,11 @@ struct Edge {
 ///
 /// # Errors
 /// `R050` for each predicate that depends on its own negation or aggregate, with the way around.
-pub(crate) fn stratify(rules: &[Rule], predicates: &Predicates, terms: &Universe<'_>) -> Result<Vec<Stratum>, Diagnostics> {
+pub(crate) fn stratify(
+    rules: &[Rule],
+    predicates: &Predicates,
+    terms: &Universe<'_>,
+) -> Result<Vec<Stratum>, Diagnostics> {
     let graph = graph(rules, predicates.len());
     let component = components(&graph);
     let mut diagnostics = Diagnostics::new();

@@ -37,8 +37,6 @@ pub enum Statement {
     Output {
         /// Predicates to write.
         predicates: Vec<String>,
-        /// The whole directive.
-        span: Span,
     },
     /// `@declare p(any, any) .`: kept for its predicate's name and arity.
     Declare {

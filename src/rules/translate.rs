@@ -6,13 +6,13 @@ use crate::base::{Source, Span, Term, TermId, Terms, did_you_mean};
 use crate::rules::builtins;
 use crate::rules::check::{Checking, Role, counted};
 use crate::rules::expression::Expr;
+use crate::rules::expressions::{contains_aggregate, push_new};
 use crate::rules::given::{GIVEN, add_given, phase_of, property_place};
-use crate::rules::program::{
-    Aggregate, AggregateKind, Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule, Variable,
-};
+use crate::rules::options::globals;
+use crate::rules::program::{Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule, Variable};
 use crate::rules::safety;
 use crate::rules::syntax::{
-    AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer,
+    AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax,
 };
 use crate::rules::universe::Universe;
 
@@ -42,91 +42,18 @@ pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role
     program
 }
 
-/// The values of a file's parameters, each computed from those above it.
-fn globals(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> BTreeMap<String, Term> {
-    let mut globals: BTreeMap<String, Term> = BTreeMap::new();
-    for statement in &syntax.statements {
-        let Statement::Parameter { name, value, span } = statement else { continue };
-        let mut rule = Translation::new(checking, &syntax.source, role, &globals);
-        let value = match value {
-            Some(value) => rule.ground(value),
-            None => {
-                let help = format!("write `@parameter ${name} = … .`");
-                rule.error("R036", span, format!("`${name}` has no value"), help);
-                None
-            }
-        };
-        globals.insert(name.clone(), value.unwrap_or(Term::Boolean(false)));
-    }
-    globals
-}
-
-/// The values of an import's or export's options, after its assignments.
-pub(crate) fn options(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transfer) -> BTreeMap<String, OptionValue> {
-    // What is wrong with a parameter is said when the rules are translated.
-    let before = std::mem::take(&mut checking.diagnostics);
-    let globals = globals(checking, syntax, Role::Standalone);
-    checking.diagnostics = before;
-    let mut known: BTreeMap<String, Term> = BTreeMap::new();
-    for (name, value) in &transfer.bindings {
-        let value = substituted(value, &known);
-        if let Some(term) = Translation::new(checking, &syntax.source, Role::Standalone, &globals).ground(&value) {
-            known.insert(name.clone(), term);
-        }
-    }
-    let mut values = BTreeMap::new();
-    for (name, value) in &transfer.options {
-        let mut ground = |value: &Expression| {
-            Translation::new(checking, &syntax.source, Role::Standalone, &globals).ground(&substituted(value, &known))
-        };
-        let found = match &value.kind {
-            ExpressionKind::Tuple(items) => items.iter().map(&mut ground).collect::<Option<_>>().map(OptionValue::Many),
-            _ => ground(value).map(OptionValue::One),
-        };
-        if let Some(found) = found {
-            values.insert(name.clone(), found);
-        }
-    }
-    values
-}
-
-/// The value of an option.
-#[derive(Debug, Clone)]
-pub(crate) enum OptionValue {
-    One(Term),
-    Many(Vec<Term>),
-}
-
-/// An expression with known variables replaced by their values.
-fn substituted(expression: &Expression, known: &BTreeMap<String, Term>) -> Expression {
-    let all = |args: &[Expression]| args.iter().map(|arg| substituted(arg, known)).collect::<Vec<_>>();
-    let one = |arg: &Expression| Box::new(substituted(arg, known));
-    let kind = match &expression.kind {
-        ExpressionKind::Variable(name) => match known.get(name) {
-            Some(term) => ExpressionKind::Constant(term.clone()),
-            None => ExpressionKind::Variable(name.clone()),
-        },
-        ExpressionKind::Call(name, args) => ExpressionKind::Call(name.clone(), all(args)),
-        ExpressionKind::Format(args) => ExpressionKind::Format(all(args)),
-        ExpressionKind::Arithmetic(op, left, right) => ExpressionKind::Arithmetic(*op, one(left), one(right)),
-        ExpressionKind::Negative(inner) => ExpressionKind::Negative(one(inner)),
-        other => other.clone(),
-    };
-    Expression { kind, span: expression.span.clone() }
-}
-
 /// The state of translating one rule.
 pub(crate) struct Translation<'c, 'a> {
     pub(crate) checking: &'c mut Checking<'a>,
     pub(crate) source: &'c Source,
     role: Role,
-    globals: &'c BTreeMap<String, Term>,
+    pub(crate) globals: &'c BTreeMap<String, Term>,
     /// Name and first place of each variable; made ones have no name.
     pub(crate) variables: Vec<(String, Span)>,
     pub(crate) body: Vec<Literal>,
     /// Rules for what a body atom can't say by itself.
     extra: Vec<Rule>,
-    faulty: bool,
+    pub(crate) faulty: bool,
 }
 
 impl<'c, 'a> Translation<'c, 'a> {
@@ -136,10 +63,25 @@ impl<'c, 'a> Translation<'c, 'a> {
         role: Role,
         globals: &'c BTreeMap<String, Term>,
     ) -> Self {
-        Self { checking, source, role, globals, variables: Vec::new(), body: Vec::new(), extra: Vec::new(), faulty: false }
+        Self {
+            checking,
+            source,
+            role,
+            globals,
+            variables: Vec::new(),
+            body: Vec::new(),
+            extra: Vec::new(),
+            faulty: false,
+        }
     }
 
-    pub(crate) fn error(&mut self, code: &'static str, span: &Span, message: impl Into<String>, help: impl Into<String>) {
+    pub(crate) fn error(
+        &mut self,
+        code: &'static str,
+        span: &Span,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) {
         self.faulty = true;
         self.checking.error(code, self.source, span, message, help);
     }
@@ -149,7 +91,6 @@ impl<'c, 'a> Translation<'c, 'a> {
         for literal in &rule.body {
             self.literal(literal);
         }
-        let body_variables = self.variables.len();
         let (predicate, args) = match self.predicate(head, true) {
             Some(found) => found,
             None => return Vec::new(),
@@ -165,7 +106,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         let Some(operands) = operands.filter(|_| !self.faulty) else { return Vec::new() };
         let head = Atom { predicate, args: self.pad(predicate, operands), span: head.span.clone() };
         let aggregation = has_aggregate.then_some(aggregation);
-        if !safety::order(&mut self, rule, &head, aggregation.as_ref(), body_variables) {
+        if !safety::order(&mut self, rule, &head, aggregation.as_ref()) {
             return Vec::new();
         }
         let origin = Origin {
@@ -194,7 +135,7 @@ impl<'c, 'a> Translation<'c, 'a> {
     }
 
     /// The value of an expression without variables.
-    fn ground(&mut self, expression: &Expression) -> Option<Term> {
+    pub(crate) fn ground(&mut self, expression: &Expression) -> Option<Term> {
         let expr = self.expression(expression)?;
         let mut variables = Vec::new();
         expr.variables(&mut variables);
@@ -231,7 +172,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         }
     }
 
-    fn made_variable(&mut self, span: &Span) -> Variable {
+    pub(crate) fn made_variable(&mut self, span: &Span) -> Variable {
         self.variables.push((String::new(), span.clone()));
         self.variables.len() - 1
     }
@@ -272,7 +213,11 @@ impl<'c, 'a> Translation<'c, 'a> {
     }
 
     /// The predicate of an atom and those of its arguments that are columns.
-    fn predicate<'e>(&mut self, atom: &'e AtomSyntax, head: bool) -> Option<(PredicateId, Vec<std::borrow::Cow<'e, Expression>>)> {
+    fn predicate<'e>(
+        &mut self,
+        atom: &'e AtomSyntax,
+        head: bool,
+    ) -> Option<(PredicateId, Vec<std::borrow::Cow<'e, Expression>>)> {
         use std::borrow::Cow;
         let name = atom.predicate.as_str();
         let args: Vec<Cow<'e, Expression>> = atom.args.iter().map(Cow::Borrowed).collect();
@@ -290,7 +235,12 @@ impl<'c, 'a> Translation<'c, 'a> {
             let Some(definition) = self.checking.defined.get(&(scope, name.to_owned())) else { continue };
             if definition.arity != args.len() {
                 if !head {
-                    let message = format!("`{name}` has {} here and {} in {}", counted(args.len()), definition.arity, definition.place);
+                    let message = format!(
+                        "`{name}` has {} here and {} in {}",
+                        counted(args.len()),
+                        definition.arity,
+                        definition.place
+                    );
                     self.error("R022", &atom.span, message, "give it the same number everywhere, or another name");
                 }
                 self.faulty = true;
@@ -333,9 +283,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         };
         let property = match &args[place].kind {
             ExpressionKind::Constant(Term::Iri(iri)) => Some(iri.to_string()),
-            ExpressionKind::Global(global) => {
-                self.globals.get(global).and_then(Term::as_iri).map(str::to_owned)
-            }
+            ExpressionKind::Global(global) => self.globals.get(global).and_then(Term::as_iri).map(str::to_owned),
             _ => None,
         };
         if let Some(iri) = &property {
@@ -382,7 +330,12 @@ impl<'c, 'a> Translation<'c, 'a> {
                 value => {
                     let made = self.made_variable(&arg.span);
                     let left = Expr::Variable(made);
-                    self.body.push(Literal::Compare { op: Comparison::Equal, left, right: value, span: arg.span.clone() });
+                    self.body.push(Literal::Compare {
+                        op: Comparison::Equal,
+                        left,
+                        right: value,
+                        span: arg.span.clone(),
+                    });
                     Some(Operand::Variable(made))
                 }
             },
@@ -423,175 +376,12 @@ impl<'c, 'a> Translation<'c, 'a> {
         }
     }
 
-    /// An expression of a head around aggregates: the variables outside of them group.
-    fn aggregated(&mut self, expression: &Expression, aggregation: &mut Aggregation) -> Option<Expr> {
-        match &expression.kind {
-            ExpressionKind::Aggregate(name, args) => self.aggregate(name, args, &expression.span, aggregation),
-            ExpressionKind::Arithmetic(op, left, right) => {
-                let left = self.aggregated(left, aggregation)?;
-                let right = self.aggregated(right, aggregation)?;
-                Some(Expr::Call(builtins::builtin(operator(*op))?, vec![left, right]))
-            }
-            ExpressionKind::Negative(inner) => {
-                Some(Expr::Call(builtins::builtin("INVERSE")?, vec![self.aggregated(inner, aggregation)?]))
-            }
-            ExpressionKind::Call(name, args) => {
-                let mut values = Vec::new();
-                for arg in args {
-                    values.push(self.aggregated(arg, aggregation)?);
-                }
-                self.call(name, values, &expression.span)
-            }
-            _ => {
-                let value = self.expression(expression)?;
-                let mut used = Vec::new();
-                value.variables(&mut used);
-                used.into_iter().for_each(|variable| push_new(&mut aggregation.group, variable));
-                Some(value)
-            }
-        }
-    }
-
-    fn aggregate(&mut self, name: &str, args: &[Expression], span: &Span, aggregation: &mut Aggregation) -> Option<Expr> {
-        const KINDS: [(&str, AggregateKind); 4] = [
-            ("count", AggregateKind::Count),
-            ("sum", AggregateKind::Sum),
-            ("min", AggregateKind::Min),
-            ("max", AggregateKind::Max),
-        ];
-        let Some((_, kind)) = KINDS.into_iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) else {
-            let help = did_you_mean(name, KINDS.map(|(known, _)| known));
-            self.error("R032", span, format!("unknown aggregate `#{name}`"), help);
-            return None;
-        };
-        if let Some(inner) = args.iter().find(|arg| contains_aggregate(arg)) {
-            let help = "compute the inner one in a rule of its own";
-            self.error("R032", &inner.span, "an aggregate in an aggregate", help);
-            return None;
-        }
-        let mut inputs = Vec::new();
-        for arg in args {
-            inputs.push(match &arg.kind {
-                ExpressionKind::Variable(name) => self.variable(name, &arg.span),
-                _ => {
-                    let value = self.expression(arg)?;
-                    let variable = self.made_variable(&arg.span);
-                    self.body.push(Literal::Assign { variable, value, span: arg.span.clone() });
-                    variable
-                }
-            });
-        }
-        let Some((input, distinct)) = inputs.split_first() else {
-            self.error("R032", span, format!("`#{name}` of nothing"), format!("write `#{name}(?x)`"));
-            return None;
-        };
-        let output = self.made_variable(span);
-        aggregation.aggregates.push(Aggregate { kind, input: *input, distinct: distinct.to_vec(), output });
-        Some(Expr::Variable(output))
-    }
-
-    /// A checked expression; nothing where a fault was noted.
-    fn expression(&mut self, expression: &Expression) -> Option<Expr> {
-        let span = &expression.span;
-        match &expression.kind {
-            ExpressionKind::Constant(term) => {
-                if let Term::Iri(iri) = term {
-                    self.checking.vocabulary(self.source, iri, span, false);
-                }
-                Some(Expr::Constant(term.clone()))
-            }
-            ExpressionKind::Variable(name) => Some(Expr::Variable(self.variable(name, span))),
-            ExpressionKind::Global(name) => match self.globals.get(name) {
-                Some(value) => Some(Expr::Constant(value.clone())),
-                None => {
-                    let help = format!("set it with `@parameter ${name} = … .` above this rule");
-                    self.error("R036", span, format!("unknown parameter `${name}`"), help);
-                    None
-                }
-            },
-            ExpressionKind::Call(name, args) => {
-                let args = self.all(args)?;
-                self.call(name, args, span)
-            }
-            ExpressionKind::Arithmetic(op, left, right) => {
-                let (left, right) = (self.expression(left), self.expression(right));
-                Some(Expr::Call(builtins::builtin(operator(*op))?, vec![left?, right?]))
-            }
-            ExpressionKind::Negative(inner) => Some(Expr::Call(builtins::builtin("INVERSE")?, vec![self.expression(inner)?])),
-            ExpressionKind::Format(parts) => self.all(parts).map(Expr::Format),
-            _ => self.no_expression(expression),
-        }
-    }
-
-    fn all(&mut self, expressions: &[Expression]) -> Option<Vec<Expr>> {
-        let values: Vec<Option<Expr>> = expressions.iter().map(|arg| self.expression(arg)).collect();
-        values.into_iter().collect()
-    }
-
-    fn no_expression(&mut self, expression: &Expression) -> Option<Expr> {
-        let span = &expression.span;
-        match &expression.kind {
-            ExpressionKind::Anonymous => self.error("R035", span, "`_` has no value to compute with", "use a variable"),
-            ExpressionKind::Existential(name) => {
-                let help = "this engine derives facts about known things only: existential rules are not supported";
-                self.error("R039", span, format!("existential variable `!{name}`"), help);
-            }
-            ExpressionKind::Aggregate(name, _) => {
-                let help = "aggregates stand in heads: derive the value in a rule of its own and use that here";
-                self.error("R032", span, format!("`#{name}` in a body"), help);
-            }
-            ExpressionKind::Tuple(_) => self.error("R012", span, "tuples are not supported", "use one argument for each part"),
-            // The parser has said it already.
-            _ => self.faulty = true,
-        }
-        None
-    }
-
-    fn call(&mut self, name: &str, args: Vec<Expr>, span: &Span) -> Option<Expr> {
-        let Some(builtin) = builtins::builtin(name) else {
-            if name.starts_with("geo3d:") {
-                // The prefix is unknown, which the parser has said.
-                self.faulty = true;
-                return None;
-            }
-            let shown = name.strip_prefix(builtins::GEO3D).map_or(name.to_owned(), |local| format!("geo3d:{local}"));
-            let help = match crate::base::nearest(&shown, builtins::builtin_names()) {
-                Some(found) => format!("did you mean `{found}`?"),
-                None => "built-in functions are listed in rules/README.md".to_owned(),
-            };
-            self.error("R027", span, format!("unknown function `{shown}`"), help);
-            return None;
-        };
-        if !(builtin.least..=builtin.most).contains(&args.len()) {
-            let wanted = match (builtin.least, builtin.most) {
-                (least, usize::MAX) => format!("at least {least}"),
-                (least, most) if least == most => least.to_string(),
-                (least, most) => format!("{least} to {most}"),
-            };
-            let message = format!("`{}` has {}, needs {wanted}", builtin.name, counted(args.len()));
-            self.error("R027", span, message, "functions and their arguments are listed in rules/README.md");
-            return None;
-        }
-        if let ("REGEX", [_, Expr::Constant(Term::String(pattern))]) = (builtin.name, args.as_slice()) {
-            return match builtins::compile_pattern(pattern) {
-                Ok(pattern) => args.into_iter().next().map(|text| Expr::Matches(Box::new(text), Box::new(pattern))),
-                Err(reason) => {
-                    self.error("R033", span, format!("the pattern can't be read: {reason}"), "see https://docs.rs/regex/#syntax");
-                    None
-                }
-            };
-        }
-        Some(Expr::Call(builtin, args))
-    }
-
     /// A helper rule that keeps what a negated atom says about the variables that are bound elsewhere.
     pub(crate) fn helper(&mut self, negated: Atom, bound: &[Variable]) -> Atom {
-        let name = format!("{}~{}", self.checking.predicates.get(negated.predicate).name, self.checking.predicates.len());
-        let kept: Vec<Variable> = bound
-            .iter()
-            .copied()
-            .filter(|variable| negated.args.contains(&Operand::Variable(*variable)))
-            .collect();
+        let name =
+            format!("{}~{}", self.checking.predicates.get(negated.predicate).name, self.checking.predicates.len());
+        let kept: Vec<Variable> =
+            bound.iter().copied().filter(|variable| negated.args.contains(&Operand::Variable(*variable))).collect();
         let span = negated.span.clone();
         self.checking.define_predicate(self.source, &name, kept.len(), &span, self.role);
         let predicate = self.checking.predicates.find(self.role.scope(), &name, None).unwrap_or(negated.predicate);
@@ -615,36 +405,9 @@ pub(crate) fn unit(terms: &mut Terms) -> TermId {
     terms.intern(Term::Boolean(true))
 }
 
-fn push_new(list: &mut Vec<Variable>, variable: Variable) {
-    if !list.contains(&variable) {
-        list.push(variable);
-    }
-}
-
-fn operator(symbol: char) -> &'static str {
-    match symbol {
-        '+' => "SUM",
-        '-' => "MINUS",
-        '*' => "PRODUCT",
-        _ => "DIVISION",
-    }
-}
-
 fn variable_name(expression: &Expression) -> Option<&str> {
     match &expression.kind {
         ExpressionKind::Variable(name) => Some(name),
         _ => None,
-    }
-}
-
-fn contains_aggregate(expression: &Expression) -> bool {
-    match &expression.kind {
-        ExpressionKind::Aggregate(..) => true,
-        ExpressionKind::Call(_, args) | ExpressionKind::Format(args) | ExpressionKind::Tuple(args) => {
-            args.iter().any(contains_aggregate)
-        }
-        ExpressionKind::Arithmetic(_, left, right) => contains_aggregate(left) || contains_aggregate(right),
-        ExpressionKind::Negative(inner) => contains_aggregate(inner),
-        _ => false,
     }
 }

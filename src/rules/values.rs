@@ -40,9 +40,9 @@ impl Number {
     pub(crate) fn term(self) -> Option<Term> {
         match self {
             Self::Integer(value) => Some(Term::Integer(value)),
-            Self::Float(value) => {
-                value.is_finite().then(|| Term::Literal(value.to_string().into(), format!("{}float", names::XSD).into()))
-            }
+            Self::Float(value) => value
+                .is_finite()
+                .then(|| Term::Literal(value.to_string().into(), format!("{}float", names::XSD).into())),
             Self::Double(value) => value.is_finite().then(|| double_term(value)),
         }
     }

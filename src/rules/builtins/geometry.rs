@@ -50,8 +50,7 @@ pub(super) fn dot(args: &[Value<'_>]) -> Option<Term> {
 /// Angle between two vectors, in [0, π]; no result for a vector without length.
 pub(super) fn angle(args: &[Value<'_>]) -> Option<Term> {
     let [x1, y1, z1, x2, y2, z2] = numbers(args)?;
-    let (dot, cross) =
-        (x1 * x2 + y1 * y2 + z1 * z2, length(y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2));
+    let (dot, cross) = (x1 * x2 + y1 * y2 + z1 * z2, length(y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2));
     let lengths = length(x1, y1, z1) * length(x2, y2, z2);
     if lengths > 0.0 { finite(libm::atan2(cross, dot)) } else { None }
 }

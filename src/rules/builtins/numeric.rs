@@ -24,12 +24,7 @@ pub(super) fn ordered(args: &[Value<'_>], holds: fn(Ordering) -> bool) -> Option
 }
 
 /// Applies to two numbers of one type, or to both as doubles.
-fn pair(
-    a: &Term,
-    b: &Term,
-    integers: fn(i64, i64) -> Option<i64>,
-    doubles: fn(f64, f64) -> f64,
-) -> Option<Number> {
+fn pair(a: &Term, b: &Term, integers: fn(i64, i64) -> Option<i64>, doubles: fn(f64, f64) -> f64) -> Option<Number> {
     Some(match (Number::of(a)?, Number::of(b)?) {
         (Integer(a), Integer(b)) => Integer(integers(a, b)?),
         (Float(a), Float(b)) => Float(doubles(f64::from(a), f64::from(b)) as f32),
@@ -47,11 +42,7 @@ fn single(a: &Term, integer: fn(i64) -> Option<i64>, double: fn(f64) -> f64) -> 
 }
 
 /// Folds any number of arguments, all of one type or all as doubles.
-fn fold(
-    args: &[Value<'_>],
-    integers: fn(i64, i64) -> Option<i64>,
-    doubles: fn(f64, f64) -> f64,
-) -> Option<Term> {
+fn fold(args: &[Value<'_>], integers: fn(i64, i64) -> Option<i64>, doubles: fn(f64, f64) -> f64) -> Option<Term> {
     let numbers: Vec<Number> = args.iter().map(|a| Number::of(a)).collect::<Option<_>>()?;
     let first = *numbers.first()?;
     let alike = numbers.iter().all(|n| std::mem::discriminant(n) == std::mem::discriminant(&first));

@@ -1,4 +1,4 @@
-//! Explanations of properties and of the tuples of a stand-alone program.
+//! Explanations of properties.
 
 use crate::facts::ActionFacts;
 use crate::rules::book::{JudgeRules, RuleBook, fault};
@@ -13,7 +13,7 @@ use crate::rules::reading::{Verdict, findings};
 use crate::rules::universe::Universe;
 
 /// Proofs shown; the rest are like them.
-const PROOFS_SHOWN: usize = 3;
+pub(super) const PROOFS_SHOWN: usize = 3;
 
 impl RuleBook {
     /// Why a property (by IRI) holds in an action, or why not.
@@ -21,10 +21,14 @@ impl RuleBook {
     /// # Errors
     /// The property is unknown, a value is wrong, or the budget was spent.
     pub fn explain(&self, facts: &ActionFacts<'_>, property: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
-        let judge =
-            self.properties.get(property).ok_or_else(|| RuleFault::Value(format!("no property {property} is known")))?;
+        let judge = self
+            .properties
+            .get(property)
+            .ok_or_else(|| RuleFault::Value(format!("no property {property} is known")))?;
         match &judge.rules {
-            JudgeRules::Datalog { planned, verdict } => self.explain_datalog(facts, &judge.label, planned, verdict, budget),
+            JudgeRules::Datalog { planned, verdict } => {
+                self.explain_datalog(facts, &judge.label, planned, verdict, budget)
+            }
             JudgeRules::Sparql(_) => {
                 let results = self.judge(facts, &[property.to_owned()], budget).remove(property);
                 let findings = results.unwrap_or_else(|| Err(RuleFault::Value("nothing was judged".into())))?;
@@ -47,8 +51,16 @@ impl RuleBook {
         let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let mut enriched = Layers { own, below: vec![&self.fixed] };
         let (predicates, indexes) = (&self.predicates, &self.indexes);
-        evaluate_noting(&self.libraries, predicates, indexes, &mut enriched, &mut universe, &mut meter, Some(&mut rounds))
-            .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
+        evaluate_noting(
+            &self.libraries,
+            predicates,
+            indexes,
+            &mut enriched,
+            &mut universe,
+            &mut meter,
+            Some(&mut rounds),
+        )
+        .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
         let mut layers = Layers { own: Tables::default(), below: vec![&enriched.own, &self.fixed] };
         evaluate_noting(planned, predicates, indexes, &mut layers, &mut universe, &mut meter, Some(&mut rounds))
             .map_err(|stopped| fault(&meter, stopped, planned))?;
@@ -114,55 +126,4 @@ fn of_query(label: &str, findings: Findings) -> Explanation {
         .chain(["a SPARQL property is explained by its rows; in Datalog it would have a proof".to_owned()])
         .collect();
     Explanation { title: label.to_owned(), findings: Some(findings), proofs: Vec::new(), miss: None, notes }
-}
-
-impl crate::rules::standalone::Program {
-    /// Why the program derives a statement such as `p(1, "a")`, or why not. `_` stands for anything.
-    ///
-    /// # Errors
-    /// The statement can't be read, or the budget was spent.
-    pub fn explain(&self, statement: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
-        let (name, pattern) = self.pattern(statement).map_err(RuleFault::Value)?;
-        let mut universe = Universe::new(&self.terms, None);
-        let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
-        let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
-        let planned = &self.planned;
-        evaluate_noting(planned, &self.predicates, &self.indexes, &mut layers, &mut universe, &mut meter, Some(&mut rounds))
-            .map_err(|stopped| fault(&meter, stopped, planned))?;
-        let mut facts = Tables::default();
-        for (predicate, rows) in &planned.facts {
-            let width = self.predicates.get(*predicate).width;
-            facts.set(*predicate, crate::rules::relation::finished(width, rows.clone(), self.indexes.of(*predicate).clone()));
-        }
-        let ground = Ground {
-            predicates: &self.predicates,
-            rules: planned.rules.iter().collect(),
-            layers: vec![&layers.own],
-            facts: vec![&facts],
-            rounds: &rounds,
-            universe: &universe,
-        };
-        let Some(predicate) = self.predicates.find(0, &name, None) else {
-            return Err(RuleFault::Value(format!("the program has no predicate `{name}`")));
-        };
-        // A value that nothing has can't be matched.
-        let known: Option<Vec<Option<u32>>> =
-            pattern.iter().map(|term| term.as_ref().map_or(Some(None), |term| universe.id(term).map(Some))).collect();
-        let fits = |row: &&[u32]| {
-            known.as_ref().is_some_and(|known| known.iter().zip(*row).all(|(k, v)| k.is_none_or(|k| k == *v)))
-        };
-        let mut prover = Prover::new(&ground);
-        let proofs: Vec<_> = ground
-            .rows(predicate)
-            .filter(fits)
-            .take(PROOFS_SHOWN)
-            .map(|row| prover.prove(predicate, row, 0))
-            .collect();
-        let miss = match &known {
-            Some(known) if proofs.is_empty() => ground.miss(predicate, known, 0),
-            _ => None,
-        };
-        let notes = if proofs.is_empty() && miss.is_none() { vec!["no rule derives it and no fact states it".to_owned()] } else { Vec::new() };
-        Ok(Explanation { title: statement.trim().to_owned(), findings: None, proofs, miss, notes })
-    }
 }

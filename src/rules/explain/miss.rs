@@ -160,11 +160,14 @@ impl<'a> Ground<'a> {
             if depth < DEPTH_LIMIT { self.miss(atom.predicate, &known, depth + 1).map(Box::new) } else { None };
         let mut near: Vec<(usize, &[TermId])> = self
             .rows(atom.predicate)
-            .map(|row| (known.iter().zip(row).filter(|(known, value)| known.is_some_and(|k| k == **value)).count(), row))
+            .map(|row| {
+                (known.iter().zip(row).filter(|(known, value)| known.is_some_and(|k| k == **value)).count(), row)
+            })
             .filter(|(agreeing, _)| *agreeing > 0)
             .collect();
         near.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(b.1)));
-        let nearest = near.into_iter().take(NEAREST_SHOWN).map(|(_, row)| self.statement(atom.predicate, row)).collect();
+        let nearest =
+            near.into_iter().take(NEAREST_SHOWN).map(|(_, row)| self.statement(atom.predicate, row)).collect();
         Failure::NoMatch { nearest, because }
     }
 }

@@ -6,11 +6,10 @@ mod book;
 mod export;
 mod miss;
 mod model;
+mod program;
 mod proof;
 mod search;
 mod shown;
 mod text;
-
-pub(crate) use search::Ground;
 
 pub use model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};

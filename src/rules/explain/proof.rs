@@ -84,7 +84,10 @@ impl<'g, 'a> Prover<'g, 'a> {
                 return false;
             }
             let before = binding.clone();
-            if self.earlier(atom.predicate, row, round) && unify(atom, row, binding) && self.satisfy(rule, rest, binding, round, found) {
+            if self.earlier(atom.predicate, row, round)
+                && unify(atom, row, binding)
+                && self.satisfy(rule, rest, binding, round, found)
+            {
                 return true;
             }
             *binding = before;
@@ -108,9 +111,10 @@ impl<'g, 'a> Prover<'g, 'a> {
         for literal in order {
             premises.push(match literal {
                 Literal::Positive(atom) => {
-                    let row = self.ground.candidates(atom, binding).find(|row| {
-                        self.earlier(atom.predicate, row, round) && unify(atom, row, &mut binding.clone())
-                    });
+                    let row = self
+                        .ground
+                        .candidates(atom, binding)
+                        .find(|row| self.earlier(atom.predicate, row, round) && unify(atom, row, &mut binding.clone()));
                     match row {
                         Some(row) => Premise::Proof(self.prove(atom.predicate, row, depth + 1)),
                         None => Premise::Computed(self.ground.literal(rule, literal, binding)),

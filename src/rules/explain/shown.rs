@@ -1,9 +1,9 @@
 //! Rules' parts with the values of a binding, as people read them.
 
 use crate::base::{Term, TermId, names};
-use crate::rules::expression::Expr;
 use crate::rules::explain::model::RuleRef;
 use crate::rules::explain::search::{Binding, Ground};
+use crate::rules::expression::Expr;
 use crate::rules::given::property_place;
 use crate::rules::program::{Atom, Literal, Operand, PredicateId, Rule};
 
@@ -37,7 +37,8 @@ impl Ground<'_> {
             args.insert(place.min(args.len()), self.term(property));
         }
         if name == "state"
-            && let Some(phase @ ("before" | "after" | "during")) = args.first().and_then(|phase| phase.strip_prefix("act:"))
+            && let Some(phase @ ("before" | "after" | "during")) =
+                args.first().and_then(|phase| phase.strip_prefix("act:"))
         {
             let phase = phase.to_owned();
             args.remove(0);
@@ -64,7 +65,8 @@ impl Ground<'_> {
                 if name.is_empty() { format!("{text} is {value}") } else { format!("{text}, so ?{name} is {value}") }
             }
             Literal::Compare { op, left, right, span } => {
-                let values = [left, right].map(|side| self.value(side, binding).map_or("nothing".into(), |term| shown(&term)));
+                let values =
+                    [left, right].map(|side| self.value(side, binding).map_or("nothing".into(), |term| shown(&term)));
                 let text = self.source_text(rule, span.clone());
                 format!("{text}, with {} {} {}", values[0], op.symbol(), values[1])
             }

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::base::{Diagnostic, Diagnostics, did_you_mean};
+use crate::rules::options::{OptionValue, options};
 use crate::rules::standalone::program::{Closure, Program};
 use crate::rules::standalone::table::delimiter_of;
 use crate::rules::syntax::{Statement, Syntax, Transfer};
-use crate::rules::translate::{OptionValue, options};
 use crate::rules::values;
 
 const FORMATS: [&str; 3] = ["csv", "dsv", "tsv"];
@@ -28,7 +28,7 @@ pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<E
             Statement::Transfer(transfer) if !transfer.import => {
                 found.extend(export(program, syntax, transfer, diagnostics));
             }
-            Statement::Output { predicates, .. } => found.extend(predicates.iter().map(|predicate| Export {
+            Statement::Output { predicates } => found.extend(predicates.iter().map(|predicate| Export {
                 predicate: predicate.clone(),
                 path: PathBuf::from(format!("{}.csv", file_name(syntax, predicate))),
                 delimiter: b',',
@@ -54,7 +54,8 @@ fn export(program: &Program, syntax: &Syntax, transfer: &Transfer, diagnostics: 
         Some(OptionValue::One(term)) => Some(values::lexical(term)),
         _ => None,
     };
-    let path = text("resource").unwrap_or_else(|| format!("{}.{}", file_name(syntax, &transfer.predicate), transfer.format));
+    let path =
+        text("resource").unwrap_or_else(|| format!("{}.{}", file_name(syntax, &transfer.predicate), transfer.format));
     let relative = Path::new(&path);
     let inside = relative.is_relative() && !relative.components().any(|c| matches!(c, std::path::Component::ParentDir));
     if !inside {

@@ -9,10 +9,11 @@ use oxigraph::model::GraphName;
 use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, TermId, Terms, did_you_mean};
 use crate::rules::check::{Checking, Role, counted};
 use crate::rules::dataset::from_rdf;
+use crate::rules::options::{OptionValue, options};
 use crate::rules::program::{Predicates, Program};
 use crate::rules::standalone::table::{ColumnKind, LeftOut, delimiter_of, read_table};
 use crate::rules::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
-use crate::rules::translate::{OptionValue, options};
+use crate::rules::values::lexical;
 
 /// Formats of imports.
 const FORMATS: [&str; 9] = ["csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];
@@ -57,28 +58,9 @@ pub(super) fn define_imports(checking: &mut Checking<'_>, syntax: &Syntax, folde
 
 fn define_import(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transfer, folder: &Path) -> Option<Import> {
     let source = &syntax.source;
-    if matches!(transfer.format.as_str(), "json" | "sparql") {
-        let message = format!("imports from {} are not supported", transfer.format);
-        let help = format!("formats: {}", FORMATS.join(", "));
-        checking.error("R070", source, &transfer.span, message, help);
-        return None;
-    }
-    if !FORMATS.contains(&transfer.format.as_str()) {
-        let message = format!("unknown format `{}`", transfer.format);
-        checking.error("R070", source, &transfer.span, message, did_you_mean(&transfer.format, FORMATS));
-        return None;
-    }
-    for (name, value) in &transfer.options {
-        if !OPTIONS.contains(&name.as_str()) {
-            checking.error("R071", source, &value.span, format!("unknown option `{name}`"), did_you_mean(name, OPTIONS));
-        }
-    }
+    known_words(checking, source, transfer)?;
     let options = options(checking, syntax, transfer);
-    let text = |name: &str| match options.get(name) {
-        Some(OptionValue::One(term)) => Some(super::super::values::lexical(term)),
-        _ => None,
-    };
-    let Some(resource) = text("resource") else {
+    let Some(resource) = text(&options, "resource") else {
         let help = "write `csv{resource = \"file.csv\"}`";
         checking.error("R071", source, &transfer.span, "the import names no resource", help);
         return None;
@@ -89,37 +71,87 @@ fn define_import(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transf
         return None;
     }
     let path = folder.join(&resource);
-    let used = arity_in_rules(checking, syntax, &transfer.predicate);
-    let is_table = matches!(transfer.format.as_str(), "csv" | "dsv" | "tsv");
-    let (content, arity) = if is_table {
-        let flag = |name: &str, usual: bool| text(name).map_or(usual, |value| value == "true");
-        let (quoting, headers) = (flag("quoting", true), flag("ignore_headers", false));
-        let delimiter = delimiter_of(&transfer.format, text("delimiter").as_deref());
-        let columns = match columns(&options) {
-            Ok(columns) => columns,
-            Err(word) => {
-                let help = did_you_mean(&word, ColumnKind::NAMES);
-                checking.error("R071", source, &transfer.span, format!("unknown column format `{word}`"), help);
-                return None;
-            }
-        };
-        let columns = columns.or_else(|| used.map(|arity| vec![ColumnKind::Any; arity]));
-        let columns = columns.or_else(|| Some(vec![ColumnKind::Any; columns_of_file(&path, delimiter)?])).unwrap_or_default();
-        let arity = columns.iter().filter(|column| **column != ColumnKind::Skip).count();
-        (Content::Table { delimiter, quoting, headers, columns }, arity)
-    } else {
-        let format = rdf_format(&transfer.format, &path);
-        let Some(format) = format else {
-            let help = "name the format: ntriples, nquads, turtle, trig or rdfxml";
-            checking.error("R070", source, &transfer.span, format!("`{resource}` does not tell its format"), help);
-            return None;
-        };
-        let arity = if format.supports_datasets() { 4 } else { 3 };
-        (Content::Rdf { format, base: text("base") }, arity)
+    let (content, arity) = match transfer.format.as_str() {
+        "csv" | "dsv" | "tsv" => table(checking, syntax, transfer, &options, &path)?,
+        _ => rdf(checking, source, transfer, &options, &path)?,
     };
-    let limit = text("limit").and_then(|limit| limit.parse().ok()).unwrap_or(usize::MAX);
+    let limit = text(&options, "limit").and_then(|limit| limit.parse().ok()).unwrap_or(usize::MAX);
     let predicate = transfer.predicate.clone();
     Some(Import { source: source.clone(), span: transfer.span.clone(), predicate, arity, path, content, limit })
+}
+
+type Options = std::collections::BTreeMap<String, OptionValue>;
+
+fn text(options: &Options, name: &str) -> Option<String> {
+    match options.get(name) {
+        Some(OptionValue::One(term)) => Some(lexical(term)),
+        _ => None,
+    }
+}
+
+/// Notes formats and options that this engine does not have; nothing where it can't go on.
+fn known_words(checking: &mut Checking<'_>, source: &Source, transfer: &Transfer) -> Option<()> {
+    let format = transfer.format.as_str();
+    if !FORMATS.contains(&format) {
+        let (message, help) = match format {
+            "json" | "sparql" => {
+                (format!("imports from {format} are not supported"), format!("formats: {}", FORMATS.join(", ")))
+            }
+            _ => (format!("unknown format `{format}`"), did_you_mean(format, FORMATS)),
+        };
+        checking.error("R070", source, &transfer.span, message, help);
+        return None;
+    }
+    for (name, value) in transfer.options.iter().filter(|(name, _)| !OPTIONS.contains(&name.as_str())) {
+        let message = format!("unknown option `{name}`");
+        checking.error("R071", source, &value.span, message, did_you_mean(name, OPTIONS));
+    }
+    Some(())
+}
+
+/// How a table is read, and how many columns of it are kept.
+fn table(
+    checking: &mut Checking<'_>,
+    syntax: &Syntax,
+    transfer: &Transfer,
+    options: &Options,
+    path: &Path,
+) -> Option<(Content, usize)> {
+    let flag = |name: &str, usual: bool| text(options, name).map_or(usual, |value| value == "true");
+    let (quoting, headers) = (flag("quoting", true), flag("ignore_headers", false));
+    let delimiter = delimiter_of(&transfer.format, text(options, "delimiter").as_deref());
+    let stated = match columns(options) {
+        Ok(columns) => columns,
+        Err(word) => {
+            let help = did_you_mean(&word, ColumnKind::NAMES);
+            checking.error("R071", &syntax.source, &transfer.span, format!("unknown column format `{word}`"), help);
+            return None;
+        }
+    };
+    let columns = stated.unwrap_or_else(|| {
+        let used = arity_in_rules(checking, syntax, &transfer.predicate);
+        vec![ColumnKind::Any; used.or_else(|| columns_of_file(path, delimiter)).unwrap_or(0)]
+    });
+    let arity = columns.iter().filter(|column| **column != ColumnKind::Skip).count();
+    Some((Content::Table { delimiter, quoting, headers, columns }, arity))
+}
+
+/// Which RDF format a file has, and whether it holds statements or quads.
+fn rdf(
+    checking: &mut Checking<'_>,
+    source: &Source,
+    transfer: &Transfer,
+    options: &Options,
+    path: &Path,
+) -> Option<(Content, usize)> {
+    let Some(format) = rdf_format(&transfer.format, path) else {
+        let help = "name the format: ntriples, nquads, turtle, trig or rdfxml";
+        let message = format!("`{}` does not tell its format", path.display());
+        checking.error("R070", source, &transfer.span, message, help);
+        return None;
+    };
+    let arity = if format.supports_datasets() { 4 } else { 3 };
+    Some((Content::Rdf { format, base: text(options, "base") }, arity))
 }
 
 /// Arguments of a predicate as the program uses it anywhere.
@@ -129,21 +161,23 @@ fn arity_in_rules(checking: &Checking<'_>, syntax: &Syntax, predicate: &str) -> 
     }
     syntax.statements.iter().find_map(|statement| match statement {
         Statement::Rule(rule) => rule.body.iter().find_map(|literal| match literal {
-            LiteralSyntax::Atom(atom) | LiteralSyntax::Negated(atom) if atom.predicate == predicate => Some(atom.args.len()),
+            LiteralSyntax::Atom(atom) | LiteralSyntax::Negated(atom) if atom.predicate == predicate => {
+                Some(atom.args.len())
+            }
             _ => None,
         }),
         _ => None,
     })
 }
 
-fn columns(options: &std::collections::BTreeMap<String, OptionValue>) -> Result<Option<Vec<ColumnKind>>, String> {
+fn columns(options: &Options) -> Result<Option<Vec<ColumnKind>>, String> {
     let terms = match options.get("format") {
         None => return Ok(None),
         Some(OptionValue::One(term)) => std::slice::from_ref(term),
         Some(OptionValue::Many(terms)) => terms.as_slice(),
     };
     let kinds = terms.iter().map(|term| {
-        let word = super::super::values::lexical(term);
+        let word = lexical(term);
         ColumnKind::from_word(&word).ok_or(word)
     });
     kinds.collect::<Result<Vec<_>, _>>().map(Some)
@@ -152,7 +186,8 @@ fn columns(options: &std::collections::BTreeMap<String, OptionValue>) -> Result<
 /// Columns of the first row; nothing for an empty file.
 fn columns_of_file(path: &Path, delimiter: u8) -> Option<usize> {
     let reader = open(path).ok()?;
-    let mut table = csv::ReaderBuilder::new().delimiter(delimiter).has_headers(false).flexible(true).from_reader(reader);
+    let mut table =
+        csv::ReaderBuilder::new().delimiter(delimiter).has_headers(false).flexible(true).from_reader(reader);
     table.records().next()?.ok().map(|row| row.len())
 }
 
@@ -193,7 +228,9 @@ pub(super) fn import(
 ) {
     let Some(id) = predicates.find(0, &import.predicate, None) else { return };
     let arity = predicates.get(id).arity;
-    let fault = |message: String, help: &str| Diagnostic::error("R072", message).at(&import.source, import.span.clone()).help(help);
+    let fault = |message: String, help: &str| {
+        Diagnostic::error("R072", message).at(&import.source, import.span.clone()).help(help)
+    };
     if arity != import.arity {
         let message = format!("`{}` has {}, the file has {}", import.predicate, counted(arity), import.arity);
         diagnostics.push(fault(message, "use every column, or skip some with `format = (any, skip, …)`"));

@@ -66,7 +66,8 @@ impl Closure {
     /// The tuples of a predicate, in no particular order.
     pub fn tuples_unsorted(&self, predicate: &str) -> impl Iterator<Item = Vec<&Term>> {
         let (arity, rows) = self.tables.get(predicate).map_or((0, &[][..]), |(arity, rows)| (*arity, rows.as_slice()));
-        rows.chunks_exact(arity.max(1)).map(move |row| row[..arity].iter().map(|id| &self.terms[*id as usize]).collect())
+        rows.chunks_exact(arity.max(1))
+            .map(move |row| row[..arity].iter().map(|id| &self.terms[*id as usize]).collect())
     }
 
     /// The tuples of a predicate, sorted.
@@ -116,7 +117,10 @@ impl Program {
     /// # Errors
     /// The program has no such predicate, or a row has another number of terms.
     pub fn add_facts<'t>(&mut self, predicate: &str, rows: impl IntoIterator<Item = &'t [Term]>) -> Result<(), String> {
-        let id = self.predicates.find(0, predicate, None).ok_or_else(|| format!("the program has no predicate `{predicate}`"))?;
+        let id = self
+            .predicates
+            .find(0, predicate, None)
+            .ok_or_else(|| format!("the program has no predicate `{predicate}`"))?;
         let width = self.predicates.get(id).arity;
         let facts = self.planned.facts.entry(id).or_default();
         for row in rows {

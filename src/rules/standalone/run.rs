@@ -33,7 +33,8 @@ pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diag
         return Err(diagnostics);
     }
     let closure = program.close(Engine::Fast, budget).map_err(|fault| {
-        let help = "a rule that makes new values from its own results may never end; give it a limit such as `?x < 100`";
+        let help =
+            "a rule that makes new values from its own results may never end; give it a limit such as `?x < 100`";
         Diagnostic::error("R090", fault.to_string()).in_source(&source).help(help)
     })?;
     let mut summary = Summary { warnings: program.warnings, ..Summary::default() };

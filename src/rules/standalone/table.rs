@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use crate::base::{Term, TermId, Terms, names};
-use crate::rules::values::{double_term, literal};
+use crate::rules::values::{Number, double_term, literal};
 
 /// How the fields of a column are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,9 +126,9 @@ fn any(field: &str) -> Term {
         return Term::iri(iri);
     }
     if field.starts_with(|c: char| c.is_ascii_digit() || c == '+' || c == '-') {
-        match literal(field, &format!("{}decimal", names::XSD)) {
-            number @ (Term::Integer(_) | Term::Decimal(_)) => return number,
-            _ => {}
+        let number = literal(field, &format!("{}decimal", names::XSD));
+        if Number::of(&number).is_some() {
+            return number;
         }
     }
     if field.starts_with('"')

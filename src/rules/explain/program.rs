@@ -1,0 +1,86 @@
+//! Explanations of the tuples of a stand-alone program.
+
+use crate::base::Term;
+use crate::rules::book::fault;
+use crate::rules::evaluate::{Layers, Rounds, Tables, evaluate_noting};
+use crate::rules::explain::book::PROOFS_SHOWN;
+use crate::rules::explain::model::Explanation;
+use crate::rules::explain::proof::Prover;
+use crate::rules::explain::search::Ground;
+use crate::rules::findings::{Budget, RuleFault};
+use crate::rules::meter::Meter;
+use crate::rules::program::PredicateId;
+use crate::rules::relation::finished;
+use crate::rules::standalone::Program;
+use crate::rules::universe::Universe;
+
+impl Program {
+    /// Why the program derives a statement such as `p(1, "a")`, or why not. `_` stands for anything.
+    ///
+    /// # Errors
+    /// The statement can't be read, or the budget was spent.
+    pub fn explain(&self, statement: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
+        let (name, pattern) = self.pattern(statement).map_err(RuleFault::Value)?;
+        let mut universe = Universe::new(&self.terms, None);
+        let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
+        let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
+        let planned = &self.planned;
+        evaluate_noting(
+            planned,
+            &self.predicates,
+            &self.indexes,
+            &mut layers,
+            &mut universe,
+            &mut meter,
+            Some(&mut rounds),
+        )
+        .map_err(|stopped| fault(&meter, stopped, planned))?;
+        let facts = self.stated();
+        let ground = Ground {
+            predicates: &self.predicates,
+            rules: planned.rules.iter().collect(),
+            layers: vec![&layers.own],
+            facts: vec![&facts],
+            rounds: &rounds,
+            universe: &universe,
+        };
+        let Some(predicate) = self.predicates.find(0, &name, None) else {
+            return Err(RuleFault::Value(format!("the program has no predicate `{name}`")));
+        };
+        Ok(explained(statement, predicate, &pattern, &ground))
+    }
+
+    /// The program's facts alone.
+    fn stated(&self) -> Tables {
+        let mut facts = Tables::default();
+        for (predicate, rows) in &self.planned.facts {
+            let width = self.predicates.get(*predicate).width;
+            facts.set(*predicate, finished(width, rows.clone(), self.indexes.of(*predicate).clone()));
+        }
+        facts
+    }
+}
+
+fn explained(statement: &str, predicate: PredicateId, pattern: &[Option<Term>], ground: &Ground<'_>) -> Explanation {
+    // A value that nothing has can't be matched.
+    let known: Option<Vec<Option<u32>>> = pattern
+        .iter()
+        .map(|term| term.as_ref().map_or(Some(None), |term| ground.universe.id(term).map(Some)))
+        .collect();
+    let fits = |row: &&[u32]| {
+        known.as_ref().is_some_and(|known| known.iter().zip(*row).all(|(k, v)| k.is_none_or(|k| k == *v)))
+    };
+    let mut prover = Prover::new(ground);
+    let proofs: Vec<_> =
+        ground.rows(predicate).filter(fits).take(PROOFS_SHOWN).map(|row| prover.prove(predicate, row, 0)).collect();
+    let miss = match &known {
+        Some(known) if proofs.is_empty() => ground.miss(predicate, known, 0),
+        _ => None,
+    };
+    let notes = if proofs.is_empty() && miss.is_none() {
+        vec!["no rule derives it and no fact states it".to_owned()]
+    } else {
+        Vec::new()
+    };
+    Explanation { title: statement.trim().to_owned(), findings: None, proofs, miss, notes }
+}
