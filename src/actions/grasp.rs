@@ -36,7 +36,7 @@ const SIDE_HEIGHT_M: (f64, f64) = (0.055, 0.11);
 /// How far below the top the hand goes from above. Unit: metres.
 const TOP_DEPTH_M: f64 = 0.03;
 /// Lowest place of the grasp link from above: its fingers reach 2.5 cm further. Unit: metres.
-const TOP_LOWEST_M: f64 = 0.03;
+const TOP_LOWEST_M: f64 = 0.0275;
 /// Room that the widest opening has to leave beside a thing, both sides together. Unit: metres.
 const LEAST_ROOM_M: f64 = 0.012;
 /// Sides that differ by less are taken for a round body. Unit: metres. Sensing gets sizes wrong by some millimetres.

@@ -34,8 +34,8 @@ const APPROACH_M: f64 = 0.12;
 const OFF_EDGE_M: f64 = 0.1;
 /// Longest way from there to the thing. Unit: metres.
 const LONGEST_WAY_M: f64 = 1.2;
-/// Clearance to furniture that a plan must have; what is seen of it is as noisy as anything. Unit: metres.
-const FURNITURE_CLEAR_M: f64 = 0.01;
+/// Clearance to furniture that a plan must have: fingertips go down to it to take flat things. Unit: metres.
+const FURNITURE_CLEAR_M: f64 = 0.002;
 /// Clearance to other things that is as good as any more. Unit: metres.
 const AMPLE_CLEAR_M: f64 = 0.04;
 /// Clearance to other things without which a plan is hopeless: the hand would go through their middle. Unit: metres.
