@@ -37,9 +37,8 @@ fn rule_file(path: &Path) -> RuleFile {
 
 /// The shipped ontology with one property, the case's, in place of its own.
 fn ontology_of(case: &Path) -> Ontology {
-    let repository = root().join("../..");
-    let mut ontology = ontology::load(&Files::Disk, &repository.join("ontology/actions.ttl")).unwrap();
-    let shipped = repository.join("rules");
+    let mut ontology = shipped_ontology();
+    let shipped = root().join("../../rules");
     let mut libraries: Vec<PathBuf> = list(case).into_iter().filter(|path| is_library(path)).collect();
     if libraries.is_empty() {
         libraries = list(&shipped.join("lib"))
@@ -55,6 +54,15 @@ fn ontology_of(case: &Path) -> Ontology {
             rule_file(&["rules.rls", "rules.rq"].map(|name| case.join(name)).into_iter().find(|p| p.is_file()).unwrap())
         }
     };
+    ontology.properties = tested(rule);
+    ontology
+}
+
+fn shipped_ontology() -> Ontology {
+    ontology::load(&Files::Disk, &root().join("../../ontology/actions.ttl")).unwrap()
+}
+
+fn tested(rule: RuleFile) -> std::collections::BTreeMap<String, Property> {
     let property = Property {
         iri: TESTED.into(),
         name: "Tested".into(),
@@ -64,8 +72,7 @@ fn ontology_of(case: &Path) -> Ontology {
         needs: Default::default(),
         unit: Some("m".into()),
     };
-    ontology.properties = [(TESTED.to_owned(), property)].into();
-    ontology
+    [(TESTED.to_owned(), property)].into()
 }
 
 fn is_library(path: &Path) -> bool {
@@ -277,4 +284,96 @@ fn an_ontology_that_contradicts_itself_is_refused_with_the_proof() {
         faults.contains("R080") && faults.contains("cax-dw") && faults.contains("t(w:robot, rdf:type, w:Body)"),
         "{faults}"
     );
+}
+
+/// The fenced blocks of the README: the words behind the fence, and the text.
+fn examples() -> Vec<(String, String)> {
+    let text = std::fs::read_to_string(root().join("../../rules/README.md")).unwrap();
+    let parts: Vec<&str> = text.split("```").collect();
+    parts
+        .chunks(2)
+        .filter_map(|pair| pair.get(1))
+        .map(|block| {
+            let (words, text) = block.split_once('\n').unwrap();
+            (words.to_owned(), text.to_owned())
+        })
+        .collect()
+}
+
+/// Every example of `rules/README.md` does what it is for, on the scene of a successful pick.
+#[test]
+fn every_example_of_the_readme_runs() {
+    let facts = facts_of(&root().join("moved_object_passes"));
+    let mut counts = std::collections::BTreeMap::new();
+    for (words, text) in examples() {
+        *counts.entry(words.clone()).or_insert(0) += 1;
+        let file = |name: &str| RuleFile {
+            source: Source::new(name, text.clone()),
+            language: if words.starts_with("sparql") { RuleLanguage::Sparql } else { RuleLanguage::Datalog },
+            path: name.to_owned(),
+            digest: digest_of(&text),
+            linked_at: None,
+        };
+        let mut ontology = shipped_ontology();
+        match words.as_str() {
+            "prolog property" | "sparql property" => {
+                ontology.properties = tested(file("example"));
+                let book = RuleBook::prepare(&ontology).unwrap_or_else(|faults| panic!("{faults}\n{text}"));
+                let findings = judged(&book, &facts.action(0).unwrap()).unwrap();
+                assert!(
+                    findings.holds && book.warnings().is_empty(),
+                    "{}{}\n{text}",
+                    shown(&findings),
+                    book.warnings()
+                );
+            }
+            "prolog library" => {
+                ontology.libraries.push(file("library"));
+                assert!(RuleBook::prepare(&ontology).is_ok());
+            }
+            "prolog program" => {
+                let program = Program::load(&Source::new("example", text.clone()), Path::new("")).unwrap();
+                let closure = program.close(actcheck::rules::standalone::Engine::Fast, &Budget::default()).unwrap();
+                assert_eq!(closure.tuples("whole"), [[Term::iri("https://example.org/set")]]);
+                assert_eq!(closure.tuples("told"), [[Term::string("set has 3 parts")]]);
+                assert!(program.warnings.is_empty(), "{}", program.warnings);
+            }
+            "turtle" => assert_eq!(statements(text.replace("<..", "<file:").trim_end().trim_end_matches('.')).len(), 6),
+            "text" => {}
+            other => panic!("what is {other}?"),
+        }
+    }
+    assert_eq!(counts["prolog property"], 3);
+}
+
+/// Large, deep and strange texts are refused or read, without a panic and soon.
+#[test]
+fn hostile_texts_are_bounded() {
+    let long_chain = format!("p(1) . q(?x) :- p(?y), ?x = {}1 .", "?y + ".repeat(20_000));
+    let many_rules: String =
+        (0..1000).map(|n| format!("p{}(?x) :- p{n}(?x) .\n", n + 1)).collect::<String>() + "p0(1) .";
+    let texts = [
+        long_chain,
+        many_rules,
+        format!("p({}1{}) .", "(".repeat(100_000), ")".repeat(100_000)),
+        format!("p({}1) .", "-".repeat(100_000)),
+        format!("p({}) .", "f\"{".repeat(1000)),
+        format!("p({}) .", "SQRT(".repeat(10_000)),
+        "p(".repeat(100_000),
+        "\u{feff}p(1) .".to_owned(),
+        "p(\"\\u12".to_owned(),
+        "/* ".repeat(1000),
+        format!("p({}) .", "1, ".repeat(10_000)),
+        format!("q(?x) :- {} .", "p(?x), ".repeat(5000)),
+        "p(1) . ".repeat(200_000),
+        "@".repeat(10_000),
+    ];
+    for text in texts {
+        let started = std::time::Instant::now();
+        let start: String = text.chars().take(40).collect();
+        if let Ok(program) = Program::load(&Source::new("hostile.rls", text), Path::new("")) {
+            let _ = program.close(actcheck::rules::standalone::Engine::Fast, &Budget::default());
+        }
+        assert!(started.elapsed().as_secs() < 20, "{start} took {:?}", started.elapsed());
+    }
 }

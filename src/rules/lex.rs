@@ -82,6 +82,9 @@ const SYMBOLS: [&str; 25] = [
 impl Lexer<'_> {
     fn run(mut self) -> Vec<Spanned> {
         let mut tokens = Vec::new();
+        if self.rest().starts_with('\u{feff}') {
+            self.at += '\u{feff}'.len_utf8();
+        }
         loop {
             self.skip_blank();
             let start = self.at;

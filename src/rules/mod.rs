@@ -1,7 +1,7 @@
 //! Rules, from their text to what they find: parsed, checked, stratified, planned, closed over the facts of an action.
 //!
 //! Two languages see the same facts: Datalog in `.rls` files (the language of Nemo) and SPARQL in `.rq` files.
-//! The stages in order: [`lex`] and [`parse`], [`check`] with `translate` and `safety`, `stratify`, `plan`, `evaluate`
+//! The stages in order: `lex` and `parse`, `check` with `translate` and `safety`, `stratify`, `plan`, `evaluate`
 //! (and `naive`, its oracle), `reading`.
 //!
 //! Never: decides an outcome, steps the simulation, writes to a history, or prints.

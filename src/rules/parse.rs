@@ -178,9 +178,12 @@ impl Parser<'_> {
 
     /// The comment lines that end right above a place.
     fn comment_above(&self, start: usize) -> Option<String> {
-        let before = self.source.text.get(..start)?;
+        let before = self.source.text.get(..start)?.trim_end_matches([' ', '\t']);
+        if !before.ends_with('\n') {
+            return None;
+        }
         let mut lines: Vec<&str> = Vec::new();
-        for line in before.trim_end_matches([' ', '\t']).lines().rev() {
+        for line in before.lines().rev() {
             let line = line.trim();
             match line.strip_prefix('%') {
                 Some(text) => lines.push(text.trim_start_matches(['%', '!']).trim()),
