@@ -47,7 +47,7 @@ pub struct Joint {
 /// A link with everything that is fixed to it.
 #[derive(Debug, Clone)]
 pub struct Link {
-    /// Name of the outermost of the links that were folded together.
+    /// Name of the link that the joint moves; those fixed to it are folded in.
     pub name: String,
     /// Unit: kilograms.
     pub mass: f64,
