@@ -291,6 +291,18 @@ impl<'a> Checking<'a> {
     }
 }
 
+/// The same without repetitions: a rule with several heads is checked once for each.
+pub(crate) fn unique(diagnostics: Diagnostics) -> Diagnostics {
+    let mut seen = BTreeSet::new();
+    let mut kept = Diagnostics::new();
+    for diagnostic in diagnostics {
+        if seen.insert((diagnostic.code, diagnostic.place(), diagnostic.message.clone())) {
+            kept.push(diagnostic);
+        }
+    }
+    kept
+}
+
 /// "1 argument", "2 arguments".
 pub(crate) fn counted(arguments: usize) -> String {
     if arguments == 1 { "1 argument".to_owned() } else { format!("{arguments} arguments") }

@@ -39,6 +39,7 @@ pub mod standalone;
 mod stratify;
 mod syntax;
 mod translate;
+mod units;
 mod universe;
 mod values;
 

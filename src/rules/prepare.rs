@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::base::{Diagnostic, Diagnostics, Digest, TermId, Terms};
 use crate::ontology::{Ontology, Property, RuleLanguage};
 use crate::rules::book::{Judge, JudgeRules, RuleBook, fault};
-use crate::rules::check::{Checking, Role, used_names};
+use crate::rules::check::{Checking, Role, unique, used_names};
 use crate::rules::dataset::Statements;
 use crate::rules::evaluate::{Layers, Planned, Tables, evaluate};
 use crate::rules::findings::Budget;
@@ -20,6 +20,7 @@ use crate::rules::reading::Verdict;
 use crate::rules::sparql::Query;
 use crate::rules::stratify::stratify;
 use crate::rules::syntax::Syntax;
+use crate::rules::units::Units;
 use crate::rules::universe::Universe;
 
 /// The state of preparing a book.
@@ -54,6 +55,7 @@ impl Preparing {
         let (mut predicates, split, found) = (checking.predicates, checking.split, checking.diagnostics);
         self.derived = checking.derived_terms;
         self.diagnostics.extend(found);
+        self.units(ontology, &library, &programs, &properties, &predicates);
         if split {
             library.rules.extend(gather(&mut predicates));
         }
@@ -113,6 +115,7 @@ impl Preparing {
             let rules = JudgeRules::Datalog { planned, verdict };
             properties.insert(property.iri.clone(), judge(ontology, property, rules));
         }
+        self.diagnostics = unique(self.diagnostics);
         if self.diagnostics.has_errors() {
             return Err(self.diagnostics);
         }
@@ -134,6 +137,28 @@ impl Preparing {
             statements,
             warnings: self.diagnostics,
         })
+    }
+
+    /// Notes units that don't match, in the libraries and in every property.
+    fn units(
+        &mut self,
+        ontology: &Ontology,
+        library: &Program,
+        programs: &BTreeMap<usize, Program>,
+        properties: &[(usize, &Property, Syntax)],
+        predicates: &Predicates,
+    ) {
+        let mut units = Units::new(predicates, &ontology.vocabulary, &self.terms);
+        units.learn(&library.rules);
+        units.check(&library.rules, &mut self.diagnostics);
+        for (scope, property, _) in properties {
+            let Some(program) = programs.get(scope) else { continue };
+            units.learn(&program.rules);
+            units.check(&program.rules, &mut self.diagnostics);
+            if let (Some(margin), Some(unit)) = (predicates.find(*scope, "margin", None), &property.unit) {
+                units.check_margin(&program.rules, margin, unit, &mut self.diagnostics);
+            }
+        }
     }
 
     /// The ontology's statements with all that follows from them.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::base::{Diagnostics, Source, Term, TermId, Terms};
 use crate::rules::book::fault;
-use crate::rules::check::{Checking, Role};
+use crate::rules::check::{Checking, Role, unique};
 use crate::rules::evaluate::{Layers, Planned, Tables, evaluate};
 use crate::rules::findings::{Budget, RuleFault};
 use crate::rules::meter::Meter;
@@ -94,6 +94,7 @@ impl Program {
         let mut program = checking.rules(&syntax, Role::Standalone);
         let (predicates, found) = (checking.predicates, checking.diagnostics);
         diagnostics.extend(found);
+        diagnostics = unique(diagnostics);
         if diagnostics.has_errors() {
             return Err(diagnostics);
         }
