@@ -75,8 +75,7 @@ fn by_stage(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
         return None;
     }
     let calls = [ActionCall { action: "Pick".into(), parameters: scene.designators.clone() }];
-    let trace =
-        costs.time("physics", || actions::perform(&calls, &mut built, &mut choices, &env.campaign.budget));
+    let trace = costs.time("physics", || actions::perform(&calls, &mut built, &mut choices, &env.campaign.budget));
     let run_facts = costs.time("facts", || facts::extract(&trace));
     let properties = &env.ontology.actions["Pick"].success_properties;
     let seen = run_facts.action(0)?;
@@ -92,7 +91,10 @@ fn print_costs(costs: &Costs, runs: u64, simulated_secs: f64, history_bytes: u64
         println!("{stage:10} {:12.3} {:7.2}%", secs * 1e3 / runs as f64, secs / total * 100.0);
     }
     println!("not physics: {:.2} % of the wall time (at most 15 %)", (1.0 - costs.of("physics") / total) * 100.0);
-    println!("facts and outcomes of one action: {:.3} ms (at most 2 ms)", (costs.of("facts") + costs.of("rules")) * 1e3 / runs as f64);
+    println!(
+        "facts and outcomes of one action: {:.3} ms (at most 2 ms)",
+        (costs.of("facts") + costs.of("rules")) * 1e3 / runs as f64
+    );
     println!("simulation: {:.1} × real time (at least 20 ×)", simulated_secs / costs.of("physics"));
     println!("history: {:.1} KB a run (at most 150 KB)", history_bytes as f64 / 1e3 / runs as f64);
 }

@@ -37,7 +37,7 @@ fn faults_of_simulation_are_broken_runs_and_the_campaign_goes_on() {
     assert!(matches!(end.ending, Ending::Finished), "{:?}", end.ending);
     runs.sort_by_key(|run| run.index);
     assert_eq!(runs.len(), 5);
-    let reasons = [(1, "not finite"), (2, "left the world"), (3, "a fault in the engine")];
+    let reasons = [(1, "not a number"), (2, "left the world"), (3, "a fault in the engine")];
     for (idx, words) in reasons {
         let run = &runs[idx];
         assert_eq!(run.status, RunStatus::Broken, "run {idx}: {run:?}");

@@ -89,7 +89,10 @@ fn a_lone_glass_and_perfect_senses_make_a_pick_that_works() {
     let project = project();
     let (code, json) = run_json(project.path(), &["--runs", "1", "--history", "warm"]);
     assert!(code <= 1 && json["finished_runs"] == 1);
-    let output = actcheck(project.path(), &["run", "configs/lone_glass.toml", "--runs", "60", "--history", "h", "--format", "json"]);
+    let output = actcheck(
+        project.path(),
+        &["run", "configs/lone_glass.toml", "--runs", "60", "--history", "h", "--format", "json"],
+    );
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     let passed = json["runs_passed"]["count"].as_u64().unwrap();
     assert!(passed >= 57, "{passed} of 60 runs passed fully with a lone object and no noise");

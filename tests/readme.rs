@@ -25,10 +25,16 @@ fn every_command_of_the_readme_works() {
     std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
     // The program as the README calls it, with its exit codes written down.
     let program = env!("CARGO_BIN_EXE_actcheck");
-    script(&folder.join("actcheck"), &format!("#!/bin/sh\n{program} \"$@\"\ncode=$?\necho \"$code $*\" >> codes\nexit $code\n"));
+    script(
+        &folder.join("actcheck"),
+        &format!("#!/bin/sh\n{program} \"$@\"\ncode=$?\necho \"$code $*\" >> codes\nexit $code\n"),
+    );
     // `make` compiles for half an hour; here it only shows that the target exists.
     std::fs::create_dir(folder.join("bin")).unwrap();
-    script(&folder.join("bin/make"), "#!/bin/sh\nPATH=${PATH#*:}\nmake -n \"$@\" > /dev/null; code=$?; echo \"$code make $*\" >> codes; exit $code\n");
+    script(
+        &folder.join("bin/make"),
+        "#!/bin/sh\nPATH=${PATH#*:}\nmake -n \"$@\" > /dev/null; code=$?; echo \"$code make $*\" >> codes; exit $code\n",
+    );
     let path = format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap());
     let blocks = blocks(&readme, "sh");
     assert!(blocks.len() >= 4, "the README shows too little");

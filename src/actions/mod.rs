@@ -14,3 +14,6 @@ mod trace;
 pub use call::{ActionCall, UnknownSkill, known_skill, reference_skills};
 pub use perform::perform;
 pub use trace::{ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace};
+
+// States are part of a trace: its readers meet them here.
+pub use crate::world::{BodyState, JointState, RobotState, Snapshot};

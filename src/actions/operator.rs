@@ -2,7 +2,7 @@
 
 use crate::actions::{Percept, Phase};
 use crate::base::Choices;
-use crate::config::RobotProfile;
+use crate::scenario::RobotProfile;
 use crate::world::{Command, Kinematics, Layout, Observation, Sighting, World};
 
 /// Why a skill has to stop.

@@ -5,7 +5,7 @@ use crate::actions::{
     ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Trace, known_skill, pick,
 };
 use crate::base::Choices;
-use crate::config::Budget;
+use crate::scenario::Budget;
 use crate::world::World;
 
 /// Performs the actions in order with the reference skills.

@@ -57,7 +57,8 @@ pub fn run_line(
 ) -> Result<RunRecord, Failure> {
     let (started, start_secs) = ((manner.clock.now)(), (manner.clock.secs)());
     let test = env.test_of(index);
-    let scene = scenario::draw(&env.space, test, &mut choices).map_err(|discard| Failure::Discard(discard.to_string()))?;
+    let scene =
+        scenario::draw(&env.space, test, &mut choices).map_err(|discard| Failure::Discard(discard.to_string()))?;
     let disturb = |world: &mut World| {
         if let Some(disturb) = manner.disturb {
             disturb(index, world);

@@ -57,7 +57,14 @@ pub fn run_all(
             let sender = sender.clone();
             let (next, halt) = (&next, &halt);
             scope.spawn(move |_| {
-                work(env, campaign, options, next, &|| stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed), &sender);
+                work(
+                    env,
+                    campaign,
+                    options,
+                    next,
+                    &|| stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed),
+                    &sender,
+                );
             });
         }
         // The workers hold the only senders now: the receiver ends when they do.
@@ -126,7 +133,11 @@ fn make_run(env: &Env, campaign: &str, index: u64, options: &Options) -> Vec<Mes
     });
     let fault = Diagnostic::error(
         "S030",
-        format!("no scene could be built for run {} in {SCENES_PER_RUN} draws; the last one: {}", index + 1, last.unwrap_or_default()),
+        format!(
+            "no scene could be built for run {} in {SCENES_PER_RUN} draws; the last one: {}",
+            index + 1,
+            last.unwrap_or_default()
+        ),
     )
     .at(&env.campaign.source, 0..0)
     .help("put fewer objects on the surface (`[surfaceObjects] count`), smaller ones, or a larger surface");

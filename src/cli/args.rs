@@ -32,7 +32,9 @@ pub enum Command {
     #[command(after_help = "Example:\n  actcheck list --format csv")]
     List(ListArgs),
     /// Show one run: its scene, and every property's outcome with margin and witness
-    #[command(after_help = "Example:\n  actcheck show k7f3-3    (an id that `actcheck list` prints; its beginning is enough)")]
+    #[command(
+        after_help = "Example:\n  actcheck show k7f3-3    (an id that `actcheck list` prints; its beginning is enough)"
+    )]
     Show(ShowArgs),
     /// Ask a history in SPARQL 1.1
     ///

@@ -45,9 +45,13 @@ fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
             Ok(Source::new("standard input", text))
         }
         (None, Some(file)) => Files::Disk.read(file).map_err(|why| {
-            Diagnostic::error("X005", format!("{}: {why}", file.display())).help("name a file with a SPARQL query").into()
+            Diagnostic::error("X005", format!("{}: {why}", file.display()))
+                .help("name a file with a SPARQL query")
+                .into()
         }),
-        (None, None) => Err(Diagnostic::error("X005", "no query was given").help("give its text, or a file with -f").into()),
+        (None, None) => {
+            Err(Diagnostic::error("X005", "no query was given").help("give its text, or a file with -f").into())
+        }
     }
 }
 

@@ -27,7 +27,8 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let mut progress = Progress::new(env.planned_runs());
     let bar = progress.bar();
     let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; Ctrl-C again stops at once"));
-    let options = Options { jobs: args.jobs.map_or_else(all_cores, usize::from), manner: Manner { clock, disturb: None } };
+    let options =
+        Options { jobs: args.jobs.map_or_else(all_cores, usize::from), manner: Manner { clock, disturb: None } };
     let mut runs = Vec::new();
     let end = quietly(|| {
         run_all(&env, &history, &id, &options, &stop, |record| {
@@ -95,7 +96,13 @@ fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureM
         .map_err(|error| Diagnostic::error("X020", format!("failure modes could not be computed: {error}")).into())
 }
 
-fn summarise(env: &Env, config: &Path, campaign: String, mut runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
+fn summarise(
+    env: &Env,
+    config: &Path,
+    campaign: String,
+    mut runs: Vec<RunSummary>,
+    end: &CampaignEnd,
+) -> CampaignSummary {
     runs.sort_by_key(|run| run.index);
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
     for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
@@ -128,7 +135,11 @@ fn warn_of_discards(end: &CampaignEnd) {
     {
         let fault = Diagnostic::warning(
             "S032",
-            format!("{} of {drawn} scenes were discarded; the first, for run {}: {reason}", end.discards.len(), index + 1),
+            format!(
+                "{} of {drawn} scenes were discarded; the first, for run {}: {reason}",
+                end.discards.len(),
+                index + 1
+            ),
         )
         .help("fewer or smaller objects, or a larger surface, waste less and bias the sample less");
         output::print_diagnostics(&fault.into());

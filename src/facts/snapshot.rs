@@ -1,6 +1,6 @@
 //! One moment as facts.
 
-use crate::world::{BodyState, JointState, RobotState, Snapshot};
+use crate::actions::{BodyState, JointState, RobotState, Snapshot};
 use crate::base::{Pose, TermId, names};
 use crate::facts::writer::Writer;
 

@@ -28,6 +28,5 @@ pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, R
 pub use store::History;
 
 // What the readers of a history meet in its products.
-pub use crate::actions::Trace;
+pub use crate::actions::{BodyState, Snapshot, Trace};
 pub use crate::scenario::Role;
-pub use crate::world::{BodyState, Snapshot};

@@ -9,10 +9,10 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
+use crate::actions::Snapshot;
 use crate::actions::{ActionTrace, Frames, Trace};
 use crate::base::Choice;
 use crate::history::frames;
-use crate::world::Snapshot;
 
 /// What each file begins with. The last letter is the format; it goes up whenever a type of the trace changes.
 const MAGIC: &[u8; 8] = b"actrace1";

@@ -18,7 +18,9 @@ pub fn answer_table(answer: &QueryAnswer, short: bool) -> Table {
             columns: columns.clone(),
             rows: rows
                 .iter()
-                .map(|row| row.iter().map(|cell| cell.as_ref().map_or(Value::Null, |term| value(term, short))).collect())
+                .map(|row| {
+                    row.iter().map(|cell| cell.as_ref().map_or(Value::Null, |term| value(term, short))).collect()
+                })
                 .collect(),
         },
         QueryAnswer::Graph(triples) => Table {

@@ -49,11 +49,8 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
     let left_out = summary.runs.len() - shown.len();
     if left_out > 0 {
         let passed = summary.runs.iter().filter(|run| run.passed()).count();
-        let _ = writeln!(
-            out,
-            "{left_out} more runs ({passed} of all passed): actcheck list --history {}",
-            summary.history
-        );
+        let _ =
+            writeln!(out, "{left_out} more runs ({passed} of all passed): actcheck list --history {}", summary.history);
     }
 }
 

@@ -2,19 +2,19 @@
 //!
 //! Never: decides an outcome, computes a statistic of its own, or writes to a stream.
 
+mod answer;
 mod campaign_json;
 mod campaign_table;
 mod campaign_text;
 mod picture;
 mod run_text;
-mod answer;
 mod summary;
 mod table;
 
+pub use answer::answer_table;
 pub use campaign_json::campaign_json;
 pub use campaign_table::campaign_table;
 pub use campaign_text::campaign_text;
-pub use answer::answer_table;
 pub use picture::run_picture;
 pub use run_text::{run_json, run_text};
 pub use summary::{ActionSummary, CampaignSummary, PropertyLine, RunSummary, Share};

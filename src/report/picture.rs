@@ -19,7 +19,8 @@ struct View {
     up: usize,
 }
 
-const VIEWS: [View; 2] = [View { title: "from above", across: 1, up: 0 }, View { title: "from the side", across: 0, up: 2 }];
+const VIEWS: [View; 2] =
+    [View { title: "from above", across: 1, up: 0 }, View { title: "from the side", across: 0, up: 2 }];
 
 /// The rectangle of the world that a view shows. Unit: metres.
 struct Window {
@@ -79,8 +80,7 @@ fn window(before: &Snapshot, after: &Snapshot, view: View, left_px: f64) -> Wind
 
 fn draw(out: &mut String, window: &Window, states: (&Snapshot, &Snapshot), trace: &Trace, target: Option<&str>) {
     let (x, y) = (window.left_px, 24.0 + PADDING);
-    let (width, height) =
-        ((window.high[0] - window.low[0]) * SCALE, (window.high[1] - window.low[1]) * SCALE);
+    let (width, height) = ((window.high[0] - window.low[0]) * SCALE, (window.high[1] - window.low[1]) * SCALE);
     let _ = writeln!(out, "<text x=\"{x:.1}\" y=\"{:.1}\" fill=\"#555\">{}</text>", y - 6.0, window.view.title);
     let _ = writeln!(
         out,

@@ -41,7 +41,18 @@ pub fn run_text(run: &RunDetail) -> String {
 
 fn scene(out: &mut String, run: &RunDetail) {
     let mut table = ruled();
-    table.set_header(["object", "category", "role", "x m", "y m", "yaw °", "mass kg", "friction", "moved cm", "max tilt °"]);
+    table.set_header([
+        "object",
+        "category",
+        "role",
+        "x m",
+        "y m",
+        "yaw °",
+        "mass kg",
+        "friction",
+        "moved cm",
+        "max tilt °",
+    ]);
     for object in &run.objects {
         table.add_row(object_row(object));
     }

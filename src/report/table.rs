@@ -50,8 +50,8 @@ impl Table {
 
     fn csv(&self) -> String {
         let mut writer = csv::WriterBuilder::new().from_writer(Vec::new());
-        let rows = std::iter::once(self.columns.clone())
-            .chain(self.rows.iter().map(|row| row.iter().map(plain).collect()));
+        let rows =
+            std::iter::once(self.columns.clone()).chain(self.rows.iter().map(|row| row.iter().map(plain).collect()));
         for row in rows {
             writer.write_record(&row).expect("writing to memory does not fail, and every row has all columns");
         }
@@ -72,14 +72,11 @@ impl Table {
     }
 }
 
-/// A table for the terminal: a rule below the header and at both ends, none between rows.
+/// A table for the terminal: columns, and a rule below the header.
 pub(super) fn ruled() -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
-    table.remove_style(TableComponent::HorizontalLines).remove_style(TableComponent::MiddleIntersections);
-    table.remove_style(TableComponent::LeftBorderIntersections).remove_style(TableComponent::RightBorderIntersections);
+    table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
     table.set_style(TableComponent::HeaderLines, '─').set_style(TableComponent::MiddleHeaderIntersections, '─');
-    table.set_style(TableComponent::LeftHeaderIntersection, '─').set_style(TableComponent::RightHeaderIntersection, '─');
     table
 }
 

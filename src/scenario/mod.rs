@@ -17,3 +17,6 @@ pub use draw::{Discard, draw};
 pub use overlap::{CLEARANCE_M, Solid};
 pub use scene::{RobotStart, Role, Scene, SceneObject};
 pub use space::Space;
+
+// What a scene is made of: its readers meet it here.
+pub use crate::config::{Budget, CONTROL_HZ, ObjectModel, Part, Physics, RobotProfile, Sensing, Shape, Surface};

@@ -69,10 +69,7 @@ fn unmet_precondition(
     })
 }
 
-fn outcome_of(
-    result: &Result<Findings, RuleFault>,
-    property: Option<&Property>,
-) -> (Outcome, Option<f64>, String) {
+fn outcome_of(result: &Result<Findings, RuleFault>, property: Option<&Property>) -> (Outcome, Option<f64>, String) {
     match result {
         Err(RuleFault::BudgetSpent(reason)) => (Outcome::Timeout, None, reason.clone()),
         Err(RuleFault::Value(reason)) => (Outcome::Broken, None, reason.clone()),
@@ -103,7 +100,9 @@ fn words(found: &Findings, property: Option<&Property>) -> String {
     let unit = property.and_then(|p| p.unit.as_deref()).unwrap_or("");
     match (found.holds, found.margin) {
         (true, _) => "nothing violates it".to_owned(),
-        (false, Some(margin)) => format!("no success was derived; missed by {} {unit}", short(-margin)).trim_end().to_owned(),
+        (false, Some(margin)) => {
+            format!("no success was derived; missed by {} {unit}", short(-margin)).trim_end().to_owned()
+        }
         (false, None) => "no success was derived".to_owned(),
     }
 }
@@ -141,7 +140,14 @@ mod tests {
     use super::*;
 
     fn found(holds: bool) -> Result<Findings, RuleFault> {
-        Ok(Findings { applicable: true, holds, witness: vec![], witness_count: 0, margin: Some(-0.016), because: vec![] })
+        Ok(Findings {
+            applicable: true,
+            holds,
+            witness: vec![],
+            witness_count: 0,
+            margin: Some(-0.016),
+            because: vec![],
+        })
     }
 
     #[test]

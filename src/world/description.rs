@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::base::{Pose, did_you_mean};
-use crate::config::{Part, RobotProfile, Shape};
+use crate::scenario::{Part, RobotProfile, Shape};
 use crate::world::WorldError;
 
 /// How a joint moves.

@@ -5,7 +5,7 @@ use rapier3d::prelude::{
     CoefficientCombineRule, ColliderBuilder, IntegrationParameters, PhysicsWorld, SpringCoefficients,
 };
 
-use crate::config::{Part, Physics, Shape};
+use crate::scenario::{Part, Physics, Shape};
 use crate::world::convert::{to_pose, to_real, to_vector};
 use crate::world::kinematics::GRAVITY;
 use crate::world::{WorldError, fault};

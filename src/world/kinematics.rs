@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::config::Shape;
+use crate::scenario::Shape;
 use crate::world::description::{Joint, JointKind, RobotModel};
 
 /// Earth's pull. Unit: m/s².

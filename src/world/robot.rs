@@ -9,7 +9,7 @@ use rapier3d::prelude::{
 };
 
 use crate::base::Pose;
-use crate::config::RobotProfile;
+use crate::scenario::RobotProfile;
 use crate::scenario::RobotStart;
 use crate::world::convert::{to_pose, to_real, to_vector};
 use crate::world::description::{Joint, JointKind, RobotModel};

@@ -6,16 +6,13 @@ use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::{CoefficientCombineRule, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 
 use crate::base::Pose;
-use crate::config::{ObjectModel, RobotProfile, Sensing};
-use crate::scenario::{Role, Scene, SceneObject};
+use crate::scenario::{CONTROL_HZ, ObjectModel, RobotProfile, Role, Scene, SceneObject, Sensing};
 use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
 use crate::world::engine::{Owner, add_floor, collider, engine};
 use crate::world::recorder::Recorder;
 use crate::world::robot::{Layout, Robot};
 use crate::world::{Fault, Kinematics, Poison, WorldError, fault};
 
-/// Control ticks in a second are as near to this as whole physics steps allow. A usual rate of arm controllers' inputs.
-const CONTROL_RATE_HZ: u32 = 60;
 /// A body slower than this may fall asleep. Unit: m/s of its farthest point.
 const SLEEP_SPEED: f32 = 0.02;
 /// Time below that speed until it does. Unit: seconds.
@@ -87,7 +84,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     let objects: Vec<Object> =
         scene.objects.iter().enumerate().map(|(idx, object)| insert(&mut engine, idx, object)).collect();
     let steps_per_second = scene.physics.steps_per_second;
-    let steps_per_tick = (steps_per_second / CONTROL_RATE_HZ).max(1);
+    let steps_per_tick = (steps_per_second / CONTROL_HZ).max(1);
     let tick_secs = f64::from(steps_per_tick) / f64::from(steps_per_second);
     let tracks = tracks(&objects, &robot);
     Ok(World {
