@@ -118,6 +118,7 @@ fn summarise(
         campaign,
         config: config.display().to_string(),
         history: env.campaign.history.display().to_string(),
+        program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
         properties,
         failure_modes: Vec::new(),
         runs,

@@ -17,7 +17,9 @@ const FAILURES_TOLD: usize = 20;
 pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
     let mut out = String::new();
     runs_table(&mut out, summary, colour);
+    out.push('\n');
     properties_table(&mut out, summary);
+    out.push('\n');
     scores(&mut out, summary);
     failure_modes(&mut out, summary);
     failures(&mut out, summary);
@@ -49,8 +51,11 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
     let left_out = summary.runs.len() - shown.len();
     if left_out > 0 {
         let passed = summary.runs.iter().filter(|run| run.passed()).count();
-        let _ =
-            writeln!(out, "{left_out} more runs ({passed} of all passed): actcheck list --history {}", summary.history);
+        let _ = writeln!(
+            out,
+            "{left_out} more runs ({passed} of all passed): {} list --history {}",
+            summary.program, summary.history
+        );
     }
 }
 
@@ -147,13 +152,14 @@ fn failures(out: &mut String, summary: &CampaignSummary) {
                 let _ = writeln!(out, "  {} failed: {label}: {}", action.name, judgement.witness);
             }
         }
-        let _ = writeln!(out, "  more: actcheck show {} --history {}", run.id, summary.history);
+        let _ = writeln!(out, "  more: {} show {} --history {}", summary.program, run.id, summary.history);
     }
     if told.len() > FAILURES_TOLD {
         let _ = writeln!(
             out,
-            "\n{} more runs did not pass: actcheck list --history {}",
+            "\n{} more runs did not pass: {} list --history {}",
             told.len() - FAILURES_TOLD,
+            summary.program,
             summary.history
         );
     }

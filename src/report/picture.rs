@@ -20,7 +20,7 @@ struct View {
 }
 
 const VIEWS: [View; 2] =
-    [View { title: "from above", across: 1, up: 0 }, View { title: "from the side", across: 0, up: 2 }];
+    [View { title: "from above", across: 0, up: 1 }, View { title: "from the side", across: 0, up: 2 }];
 
 /// The rectangle of the world that a view shows. Unit: metres.
 struct Window {

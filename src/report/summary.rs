@@ -13,6 +13,8 @@ pub struct CampaignSummary {
     pub config: String,
     /// Where the history lies, as the user named it.
     pub history: String,
+    /// How the user calls this program, for the commands that show more.
+    pub program: String,
     /// Every property that was judged, in order: IRI, label, unit of its margin.
     pub properties: Vec<(String, String, Option<String>)>,
     /// The runs, by index.
@@ -213,6 +215,7 @@ pub(super) mod tests {
             campaign: "k7f3".into(),
             config: "configs/pick.toml".into(),
             history: "configs/.actcheck".into(),
+            program: "actcheck".into(),
             properties: (0..2)
                 .map(|i| (format!("http://actions#P{i}"), format!("property {i}"), Some("m".to_owned())))
                 .collect(),
