@@ -71,6 +71,13 @@ pub struct World {
     n_steps: u64,
     steps_per_tick: u32,
     steps_per_second: u32,
+    watch: Option<Watch>,
+}
+
+/// Measures what the engine takes, by a clock of somebody else's.
+struct Watch {
+    clock_secs: fn() -> f64,
+    spent_secs: f64,
 }
 
 /// Builds the simulation of a scene. Nothing has moved yet: see [`World::settle`].
@@ -98,6 +105,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         n_steps: 0,
         steps_per_tick,
         steps_per_second,
+        watch: None,
     })
 }
 
@@ -186,7 +194,7 @@ impl World {
         let dt = 1.0 / f64::from(self.steps_per_second);
         for step in 0..self.steps_per_tick {
             self.robot.control(&mut self.engine, &holding, dt, self.steps_per_tick - step);
-            self.engine.step();
+            self.step_engine();
             self.n_steps += 1;
             self.fault = self.find_fault();
             if self.fault.is_some() {
@@ -194,6 +202,24 @@ impl World {
             }
         }
         self.record();
+    }
+
+    fn step_engine(&mut self) {
+        let start = self.watch.as_ref().map(|watch| (watch.clock_secs)());
+        self.engine.step();
+        if let (Some(watch), Some(start)) = (&mut self.watch, start) {
+            watch.spent_secs += (watch.clock_secs)() - start;
+        }
+    }
+
+    /// From now on the wall time that the engine's steps take is measured, by a clock that counts seconds.
+    pub fn watch(&mut self, clock_secs: fn() -> f64) {
+        self.watch = Some(Watch { clock_secs, spent_secs: 0.0 });
+    }
+
+    /// Wall time that the engine's steps took since [`World::watch`]; 0 without it. Unit: seconds.
+    pub fn watched_secs(&self) -> f64 {
+        self.watch.as_ref().map_or(0.0, |watch| watch.spent_secs)
     }
 
     /// What the robot measures of itself now.
