@@ -94,6 +94,18 @@ impl RuleBook {
         results
     }
 
+    /// Judges the state before an action as if nothing had happened since: a property that holds even so proves nothing about
+    /// the action.
+    pub fn held_before(
+        &self,
+        facts: &ActionFacts<'_>,
+        properties: &[String],
+        budget: &Budget,
+    ) -> BTreeMap<String, Result<Findings, RuleFault>> {
+        let unchanged = ActionFacts { after: facts.before, during: &[], ..*facts };
+        self.judge(&unchanged, properties, budget)
+    }
+
     /// Digest of a property's rule file together with all libraries; empty for a property that the ontology lacks.
     pub fn digest(&self, property: &str) -> &str {
         self.properties.get(property).map_or("", |judge| &judge.digest)

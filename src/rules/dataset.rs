@@ -1,7 +1,7 @@
 //! One action's facts as a SPARQL dataset: sorted numbers, looked up in place, nothing copied from the ontology.
 
 use std::cell::Cell;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use oxigraph::model::{BlankNode, Literal, NamedNode, Term as RdfTerm};
 use spareval::{InternalQuad, QueryableDataset};
@@ -86,8 +86,30 @@ pub(crate) struct View<'a> {
     pub(crate) snapshot: &'a Snapshot,
     pub(crate) statements: &'a Statements,
     pub(crate) universe: &'a Universe<'a>,
-    pub(crate) deadline: Option<Instant>,
-    pub(crate) lookups: &'a Cell<usize>,
+    pub(crate) clock: &'a Clock,
+}
+
+/// The time that a query may take, looked at while it reads.
+#[derive(Debug)]
+pub(crate) struct Clock {
+    deadline: Option<Instant>,
+    spent: Cell<bool>,
+}
+
+impl Clock {
+    /// A clock that runs out after some seconds; one too long for the system never does.
+    pub(crate) fn new(secs: f64) -> Self {
+        let time = Duration::try_from_secs_f64(secs.max(0.0)).ok();
+        let deadline = time.and_then(|time| Instant::now().checked_add(time));
+        Self { deadline, spent: Cell::new(false) }
+    }
+
+    /// Whether time is over. Once it is, it stays so.
+    pub(crate) fn spent(&self) -> bool {
+        let late = || self.deadline.is_some_and(|deadline| Instant::now() > deadline);
+        self.spent.set(self.spent.get() || late());
+        self.spent.get()
+    }
 }
 
 /// The query took too long.
@@ -99,7 +121,7 @@ pub(crate) struct TimeSpent;
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) enum ViewTerm {
     Known(TermId),
-    Made(RdfTerm),
+    Made(Box<RdfTerm>),
 }
 
 impl ViewTerm {
@@ -112,22 +134,10 @@ impl ViewTerm {
     }
 }
 
-/// Lookups between two looks at the clock.
-const LOOKUPS_PER_LOOK: usize = 256;
-
 impl<'a> View<'a> {
     fn graphs(&self) -> impl Iterator<Item = (TermId, &'a Graph)> + use<'a> {
         let statements = self.statements;
         self.snapshot.graphs.iter().map(|(name, graph)| (*name, graph)).chain([(statements.name, &statements.graph)])
-    }
-
-    fn look(&self) -> Result<(), TimeSpent> {
-        let count = self.lookups.get() + 1;
-        self.lookups.set(count);
-        match self.deadline {
-            Some(deadline) if count.is_multiple_of(LOOKUPS_PER_LOOK) && Instant::now() > deadline => Err(TimeSpent),
-            _ => Ok(()),
-        }
     }
 }
 
@@ -143,10 +153,6 @@ impl<'a> QueryableDataset<'a> for View<'a> {
         graph_name: Option<Option<&ViewTerm>>,
     ) -> impl Iterator<Item = Result<InternalQuad<ViewTerm>, TimeSpent>> + use<'a> {
         let mut found = Vec::new();
-        if let Err(spent) = self.look() {
-            found.push(Err(spent));
-            return found.into_iter();
-        }
         let parts = [subject, predicate, object];
         if parts.iter().flatten().all(|term| term.id().is_some()) {
             let [s, p, o] = parts.map(|part| part.and_then(ViewTerm::id));
@@ -157,13 +163,26 @@ impl<'a> QueryableDataset<'a> for View<'a> {
                     Some(Some(wanted)) if wanted.id() == Some(name) => true,
                     Some(Some(_)) => continue,
                 };
-                found.extend(graph.find(s, p, o).into_iter().map(|[s, p, o]| {
-                    let [subject, predicate, object] = [s, p, o].map(ViewTerm::Known);
-                    Ok(InternalQuad { subject, predicate, object, graph_name: named.then_some(ViewTerm::Known(name)) })
-                }));
+                found.extend(graph.find(s, p, o).into_iter().map(|triple| (triple, named.then_some(name))));
             }
         }
-        found.into_iter()
+        // When time is over, each pattern ends with a fault, so that the whole query soon does.
+        let (clock, mut over) = (self.clock, false);
+        let mut found = found.into_iter();
+        std::iter::from_fn(move || {
+            if over {
+                return None;
+            }
+            // Looked at for each statement: behind one, a product of patterns may have a second of work.
+            over = clock.spent();
+            if over {
+                return Some(Err(TimeSpent));
+            }
+            found.next().map(|(triple, graph)| {
+                let [subject, predicate, object] = triple.map(ViewTerm::Known);
+                Ok(InternalQuad { subject, predicate, object, graph_name: graph.map(ViewTerm::Known) })
+            })
+        })
     }
 
     fn internal_named_graphs(&self) -> impl Iterator<Item = Result<ViewTerm, TimeSpent>> + use<'a> {
@@ -175,13 +194,13 @@ impl<'a> QueryableDataset<'a> for View<'a> {
     }
 
     fn internalize_term(&self, term: RdfTerm) -> Result<ViewTerm, TimeSpent> {
-        Ok(self.universe.id(&from_rdf(&term)).map_or(ViewTerm::Made(term), ViewTerm::Known))
+        Ok(self.universe.id(&from_rdf(&term)).map_or_else(|| ViewTerm::Made(Box::new(term)), ViewTerm::Known))
     }
 
     fn externalize_term(&self, term: ViewTerm) -> Result<RdfTerm, TimeSpent> {
         Ok(match term {
             ViewTerm::Known(id) => to_rdf(self.universe.term(id)),
-            ViewTerm::Made(term) => term,
+            ViewTerm::Made(term) => *term,
         })
     }
 }

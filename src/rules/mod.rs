@@ -31,6 +31,7 @@ mod plan;
 mod prepare;
 mod program;
 mod query_text;
+mod ranges;
 mod reading;
 mod relation;
 mod safety;

@@ -16,6 +16,7 @@ use crate::rules::owl::owl_closure;
 use crate::rules::parse::parse;
 use crate::rules::plan::Indexes;
 use crate::rules::program::{Atom, Literal, Operand, Origin, Predicates, Program, Rule};
+use crate::rules::ranges::Ranges;
 use crate::rules::reading::Verdict;
 use crate::rules::sparql::Query;
 use crate::rules::stratify::stratify;
@@ -55,7 +56,7 @@ impl Preparing {
         let (mut predicates, split, found) = (checking.predicates, checking.split, checking.diagnostics);
         self.derived = checking.derived_terms;
         self.diagnostics.extend(found);
-        self.units(ontology, &library, &programs, &properties, &predicates);
+        self.types_and_units(ontology, &library, &programs, &properties, &predicates);
         if split {
             library.rules.extend(gather(&mut predicates));
         }
@@ -139,8 +140,8 @@ impl Preparing {
         })
     }
 
-    /// Notes units that don't match, in the libraries and in every property.
-    fn units(
+    /// Notes values that can't be and units that don't match, in the libraries and in every property.
+    fn types_and_units(
         &mut self,
         ontology: &Ontology,
         library: &Program,
@@ -148,6 +149,10 @@ impl Preparing {
         properties: &[(usize, &Property, Syntax)],
         predicates: &Predicates,
     ) {
+        let ranges = Ranges::new(ontology);
+        for program in std::iter::once(library).chain(programs.values()) {
+            ranges.check(&program.rules, predicates, &self.terms, &mut self.diagnostics);
+        }
         let mut units = Units::new(predicates, &ontology.vocabulary, &self.terms);
         units.learn(&library.rules);
         units.check(&library.rules, &mut self.diagnostics);

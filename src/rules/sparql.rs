@@ -1,8 +1,6 @@
 //! Properties written in SPARQL: prepared once, evaluated over an action's named graphs.
 
-use std::cell::Cell;
 use std::collections::BTreeSet;
-use std::time::{Duration, Instant};
 
 use oxigraph::model::{NamedNode, Term as RdfTerm};
 use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, QuerySolutionIter, SparqlEvaluator};
@@ -12,7 +10,7 @@ use crate::facts::ActionFacts;
 use crate::ontology::{Ontology, Vocabulary};
 use crate::rules::book::RuleBook;
 use crate::rules::builtins;
-use crate::rules::dataset::{Graph, Snapshot, TimeSpent, View, from_rdf, to_rdf};
+use crate::rules::dataset::{Clock, Graph, Snapshot, TimeSpent, View, from_rdf, to_rdf};
 use crate::rules::evaluate::Tables;
 use crate::rules::findings::{Budget, Findings, RuleFault, WitnessRow};
 use crate::rules::query_text::{first_group, groups, scan, variables};
@@ -51,6 +49,9 @@ impl Query {
     }
 
     /// Judges an action: `ASK` holds when true, `SELECT` when it has no row.
+    ///
+    /// Time is looked at for each statement that the query reads and for each row. A product of patterns that share no variable
+    /// is formed inside the evaluator, where nothing can stop it.
     pub(crate) fn judge(
         &self,
         book: &RuleBook,
@@ -58,13 +59,11 @@ impl Query {
         universe: &Universe<'_>,
         budget: &Budget,
     ) -> Result<Findings, RuleFault> {
-        let lookups = Cell::new(0);
-        let deadline =
-            Duration::try_from_secs_f64(budget.secs.max(0.0)).ok().and_then(|time| Instant::now().checked_add(time));
-        let view = View { snapshot, statements: &book.statements, universe, deadline, lookups: &lookups };
+        let clock = Clock::new(budget.secs);
+        let view = View { snapshot, statements: &book.statements, universe, clock: &clock };
         let results =
             self.prepared.clone().on_queryable_dataset(view).execute().map_err(|error| fault(&error, budget))?;
-        match results {
+        let findings = match results {
             QueryResults::Boolean(holds) => Ok(Findings {
                 applicable: true,
                 holds,
@@ -73,48 +72,48 @@ impl Query {
                 margin: None,
                 because: Vec::new(),
             }),
-            QueryResults::Solutions(rows) => self.rows(rows, deadline, budget),
+            QueryResults::Solutions(rows) => rows_found(rows, &clock, budget),
             QueryResults::Graph(_) => Err(RuleFault::Value("the query is neither ASK nor SELECT".into())),
-        }
+        };
+        // A query may swallow the fault of a pattern, as in OPTIONAL; what it then says means nothing.
+        if clock.spent() { Err(time_spent(budget)) } else { findings }
     }
+}
 
-    /// Every row is a violation.
-    fn rows(
-        &self,
-        rows: QuerySolutionIter<'_>,
-        deadline: Option<Instant>,
-        budget: &Budget,
-    ) -> Result<Findings, RuleFault> {
-        let mut witness = Vec::new();
-        let (mut margin, mut because) = (None::<f64>, BTreeSet::new());
-        for row in rows {
-            let row = row.map_err(|error| fault(&error, budget))?;
-            if witness.len() >= budget.tuples || deadline.is_some_and(|deadline| Instant::now() > deadline) {
-                return Err(RuleFault::BudgetSpent(format!("more than {} rows or {} s", budget.tuples, budget.secs)));
-            }
-            let mut values = Vec::new();
-            for (variable, term) in row.iter() {
-                let term = from_rdf(term);
-                match variable.as_str() {
-                    "margin" => {
-                        let value = Number::of(&term).map(Number::double).filter(|value| !value.is_nan());
-                        let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is no number")))?;
-                        margin = Some(margin.map_or(value, |least| least.min(value)));
-                    }
-                    "because" => {
-                        because.insert(lexical(&term));
-                    }
-                    name => values.push((name.to_owned(), term)),
-                }
-            }
-            witness.push(WitnessRow { predicate: "row".into(), values });
+/// Every row is a violation.
+fn rows_found(rows: QuerySolutionIter<'_>, clock: &Clock, budget: &Budget) -> Result<Findings, RuleFault> {
+    let mut witness = Vec::new();
+    let (mut margin, mut because) = (None::<f64>, BTreeSet::new());
+    for row in rows {
+        let row = row.map_err(|error| fault(&error, budget))?;
+        if witness.len() >= budget.tuples {
+            return Err(RuleFault::BudgetSpent(format!("more than {} rows", budget.tuples)));
         }
-        let witness_count = witness.len();
-        witness.sort_by(|a, b| a.values.cmp(&b.values));
-        witness.truncate(Findings::WITNESS_LIMIT);
-        let because = because.into_iter().collect();
-        Ok(Findings { applicable: true, holds: witness_count == 0, witness, witness_count, margin, because })
+        if clock.spent() {
+            return Err(time_spent(budget));
+        }
+        let mut values = Vec::new();
+        for (variable, term) in row.iter() {
+            let term = from_rdf(term);
+            match variable.as_str() {
+                "margin" => {
+                    let value = Number::of(&term).map(Number::double).filter(|value| !value.is_nan());
+                    let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is no number")))?;
+                    margin = Some(margin.map_or(value, |least| least.min(value)));
+                }
+                "because" => {
+                    because.insert(lexical(&term));
+                }
+                name => values.push((name.to_owned(), term)),
+            }
+        }
+        witness.push(WitnessRow { predicate: "row".into(), values });
     }
+    let witness_count = witness.len();
+    witness.sort_by(|a, b| a.values.cmp(&b.values));
+    witness.truncate(Findings::WITNESS_LIMIT);
+    let because = because.into_iter().collect();
+    Ok(Findings { applicable: true, holds: witness_count == 0, witness, witness_count, margin, because })
 }
 
 impl RuleBook {
@@ -182,11 +181,13 @@ fn evaluator() -> SparqlEvaluator {
     evaluator
 }
 
+fn time_spent(budget: &Budget) -> RuleFault {
+    RuleFault::BudgetSpent(format!("the query took more than {} s", budget.secs))
+}
+
 fn fault(error: &QueryEvaluationError, budget: &Budget) -> RuleFault {
     match error {
-        QueryEvaluationError::Dataset(inner) if inner.is::<TimeSpent>() => {
-            RuleFault::BudgetSpent(format!("the query took more than {} s", budget.secs))
-        }
+        QueryEvaluationError::Dataset(inner) if inner.is::<TimeSpent>() => time_spent(budget),
         other => RuleFault::Value(other.to_string()),
     }
 }

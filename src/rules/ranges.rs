@@ -1,0 +1,120 @@
+//! Conditions that no fact can satisfy, because the ontology gives the property's values another type.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Diagnostic, Diagnostics, Term, TermId, Terms, names};
+use crate::ontology::Ontology;
+use crate::rules::expression::Expr;
+use crate::rules::program::{Atom, Literal, Operand, Predicates, Rule, Variable};
+use crate::rules::syntax::Comparison;
+
+/// The one datatype of each property's values, by the property's IRI; of properties whose values are literals.
+pub(crate) struct Ranges {
+    datatypes: BTreeMap<String, String>,
+    /// Properties whose values are things.
+    of_things: BTreeSet<String>,
+}
+
+/// Literal types that facts are written in: a constant of another one is never equal to a fact's value.
+const TYPES: [&str; 4] = ["double", "integer", "boolean", "string"];
+
+impl Ranges {
+    pub(crate) fn new(ontology: &Ontology) -> Self {
+        let (range, kind) = (format!("{}range", names::RDFS), format!("{}type", names::RDF));
+        let things = format!("{}ObjectProperty", names::OWL);
+        let mut ranges = Self { datatypes: BTreeMap::new(), of_things: BTreeSet::new() };
+        for [s, p, o] in &ontology.triples {
+            let (Some(s), Some(p), Some(o)) = (s.as_iri(), p.as_iri(), o.as_iri()) else { continue };
+            if p == range && o.strip_prefix(names::XSD).is_some_and(|local| TYPES.contains(&local)) {
+                ranges.datatypes.insert(s.to_owned(), o.to_owned());
+            } else if p == kind && o == things {
+                ranges.of_things.insert(s.to_owned());
+            }
+        }
+        ranges
+    }
+
+    /// Notes `R043` for each condition of some rules that can't hold.
+    pub(crate) fn check(&self, rules: &[Rule], predicates: &Predicates, terms: &Terms, diagnostics: &mut Diagnostics) {
+        for rule in rules {
+            // Where a variable gets its values from: the property, with its only type.
+            let mut typed: BTreeMap<Variable, (&str, &str)> = BTreeMap::new();
+            for atom in rule.body.iter().filter_map(Literal::atom) {
+                let Some(property) = self.property(atom, predicates, terms) else { continue };
+                match (atom.args.last(), self.datatypes.get(property)) {
+                    (Some(Operand::Constant(id)), datatype) => {
+                        self.constant(rule, property, datatype.map(String::as_str), terms.term(*id), atom, diagnostics);
+                    }
+                    (Some(Operand::Variable(variable)), Some(datatype)) => {
+                        typed.insert(*variable, (property, datatype));
+                    }
+                    _ => {}
+                }
+            }
+            for literal in &rule.body {
+                let Literal::Compare { op: Comparison::Equal, left, right, span } = literal else { continue };
+                let ((Expr::Variable(variable), Expr::Constant(term))
+                | (Expr::Constant(term), Expr::Variable(variable))) = (left, right)
+                else {
+                    continue;
+                };
+                if let Some((property, datatype)) = typed.get(variable)
+                    && crate::rules::values::datatype(term) != *datatype
+                    && !same_integer(term, datatype)
+                {
+                    let fault = never(property, datatype, term);
+                    diagnostics.push(fault.at(&rule.origin.source, span.clone()));
+                }
+            }
+        }
+    }
+
+    /// The property that an atom is about.
+    fn property<'t>(&self, atom: &Atom, predicates: &Predicates, terms: &'t Terms) -> Option<&'t str> {
+        let property: TermId = predicates.get(atom.predicate).property?;
+        terms.term(property).as_iri()
+    }
+
+    fn constant(
+        &self,
+        rule: &Rule,
+        property: &str,
+        datatype: Option<&str>,
+        term: &Term,
+        atom: &Atom,
+        diagnostics: &mut Diagnostics,
+    ) {
+        let literal = !matches!(term, Term::Iri(_) | Term::Blank(_));
+        let fault = match datatype {
+            Some(datatype) if crate::rules::values::datatype(term) != datatype && !same_integer(term, datatype) => {
+                never(property, datatype, term)
+            }
+            None if literal && self.of_things.contains(property) => {
+                let message = format!("this can never hold: the values of `{}` are things", names::shorten(property));
+                Diagnostic::error("R043", message).help("write a thing, such as `obj:glass_1`, or a variable")
+            }
+            _ => return,
+        };
+        diagnostics.push(fault.at(&rule.origin.source, atom.span.clone()));
+    }
+}
+
+/// Small integers have narrower types of their own, but are integers.
+fn same_integer(term: &Term, datatype: &str) -> bool {
+    matches!(term, Term::Integer(_)) && datatype.ends_with("#integer")
+}
+
+fn never(property: &str, datatype: &str, term: &Term) -> Diagnostic {
+    let local = names::shorten(datatype);
+    let message =
+        format!("this can never hold: the values of `{}` are {local}, `{term}` is none", names::shorten(property));
+    let help = match (datatype.rsplit('#').next(), term) {
+        (Some("double"), Term::Integer(value)) => {
+            format!("`=` compares terms: write `{value}.0`, or compare with `<=` and `>=`")
+        }
+        (Some("boolean"), _) => "write `true` or `false`, without quotes".to_owned(),
+        (Some("string"), _) => "write it in double quotes".to_owned(),
+        _ => format!("write a value of type {local}"),
+    };
+    Diagnostic::error("R043", message).help(help)
+}
