@@ -137,29 +137,7 @@ pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
             let literal = &rule.body[*idx];
             !matches!(literal, Literal::Positive(_)) && literal.needs().iter().all(|v| bound[*v])
         });
-        let atom = || {
-            let mut best: Option<(usize, usize)> = None;
-            for idx in left.iter().copied() {
-                if let Literal::Positive(atom) = &rule.body[idx] {
-                    let open = atom
-                        .args
-                        .iter()
-                        .filter(|arg| matches!(arg, Operand::Variable(v) if !bound[*v]) || matches!(arg, Operand::Any))
-                        .count();
-                    // An atom that is fully known only tests; otherwise the order of the text tells a story.
-                    if open == 0 {
-                        return Some(idx);
-                    }
-                    let connected = atom.args.iter().any(|arg| matches!(arg, Operand::Variable(v) if bound[*v]));
-                    let rank = usize::from(!connected && !order_is_empty(&bound));
-                    if best.is_none_or(|(least, _)| rank < least) {
-                        best = Some((rank, idx));
-                    }
-                }
-            }
-            best.map(|(_, idx)| idx)
-        };
-        let chosen = ready.or_else(atom).unwrap_or(left[0]);
+        let chosen = ready.or_else(|| next_atom(rule, &left, &bound)).unwrap_or(left[0]);
         left.retain(|idx| *idx != chosen);
         match &rule.body[chosen] {
             Literal::Positive(atom) => {
@@ -177,6 +155,25 @@ pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
     order
 }
 
-fn order_is_empty(bound: &[bool]) -> bool {
-    bound.iter().all(|b| !b)
+/// An atom that is fully known, which only tests; otherwise the first that shares a variable with what is known, because the
+/// order of the text tells a story; otherwise the first.
+fn next_atom(rule: &Rule, left: &[usize], bound: &[bool]) -> Option<usize> {
+    let mut best: Option<(usize, usize)> = None;
+    for idx in left.iter().copied() {
+        let Literal::Positive(atom) = &rule.body[idx] else { continue };
+        let is_open = |arg: &Operand| match arg {
+            Operand::Variable(v) => !bound[*v],
+            Operand::Constant(_) => false,
+            Operand::Any => true,
+        };
+        if !atom.args.iter().any(is_open) {
+            return Some(idx);
+        }
+        let connected = atom.args.iter().any(|arg| matches!(arg, Operand::Variable(v) if bound[*v]));
+        let rank = usize::from(!connected && bound.contains(&true));
+        if best.is_none_or(|(least, _)| rank < least) {
+            best = Some((rank, idx));
+        }
+    }
+    best.map(|(_, idx)| idx)
 }
