@@ -79,9 +79,10 @@ impl Env {
         self.campaign.tests.len() as u64 * u64::from(self.campaign.test_count)
     }
 
-    /// Which test a run performs: all runs of the first one come first.
+    /// Which test a run performs: all runs of the first one come first. An index past the end means the last one.
     pub fn test_of(&self, index: u64) -> usize {
-        usize::try_from(index / u64::from(self.campaign.test_count.max(1))).unwrap_or(usize::MAX)
+        let last = self.campaign.tests.len().saturating_sub(1);
+        usize::try_from(index / u64::from(self.campaign.test_count.max(1))).map_or(last, |test| test.min(last))
     }
 }
 
