@@ -2,6 +2,7 @@
 
 mod broken;
 mod campaign;
+mod commands;
 mod config;
 mod diagnostics;
 mod facts;

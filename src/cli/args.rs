@@ -42,6 +42,17 @@ pub enum Command {
     /// lie in named graphs, one for each moment: `?execution act:before ?g . GRAPH ?g { … }`.
     #[command(after_help = "Example:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'")]
     Query(QueryArgs),
+    /// Say why a property holds in a run, or how near it came and what was missing
+    ///
+    /// Judges with the rules of today: those that the ontology links now.
+    #[command(after_help = "Example:\n  actcheck why k7f3-3 MovedObject    (an id that `actcheck list` prints)")]
+    Why(WhyArgs),
+    /// Write something new, ready to edit
+    #[command(after_help = "Example:\n  actcheck new property StaysUpright --for Pick")]
+    New(NewArgs),
+    /// Run a Datalog program of its own, with its imports and exports
+    #[command(after_help = "Example:\n  actcheck datalog program.rls -D results")]
+    Datalog(DatalogArgs),
 }
 
 /// `actcheck run`
@@ -127,6 +138,87 @@ pub struct QueryArgs {
     /// How the answer is printed (turtle: for CONSTRUCT and DESCRIBE)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: QueryFormat,
+}
+
+/// `actcheck why`
+#[derive(Debug, Args)]
+pub struct WhyArgs {
+    /// Id of the run, or its beginning
+    pub run: String,
+    /// Only this property, by its name in the ontology [default: all that were judged]
+    pub property: Option<String>,
+    /// The ontology whose rules explain [default: ontology/actions.ttl here, or the one that the program carries]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How explanations are printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: ProofFormat,
+}
+
+/// `actcheck new`
+#[derive(Debug, Args)]
+pub struct NewArgs {
+    /// What is new.
+    #[command(subcommand)]
+    pub kind: NewKind,
+}
+
+/// What can be new.
+#[derive(Debug, Subcommand)]
+pub enum NewKind {
+    /// A success property: its rule file and its entry in the ontology
+    #[command(after_help = "Example:\n  actcheck new property StaysUpright --for Pick")]
+    Property(NewPropertyArgs),
+}
+
+/// `actcheck new property`
+#[derive(Debug, Args)]
+pub struct NewPropertyArgs {
+    /// Its name, such as StaysUpright
+    pub name: String,
+    /// The action that it is a success property of
+    #[arg(long = "for", value_name = "ACTION")]
+    pub action: String,
+    /// The ontology that gets the entry; the rule file goes to `rules` beside its folder
+    #[arg(long, value_name = "FILE", default_value = "ontology/actions.ttl")]
+    pub ontology: PathBuf,
+}
+
+/// `actcheck datalog`
+#[derive(Debug, Args)]
+pub struct DatalogArgs {
+    /// The program (.rls)
+    pub file: PathBuf,
+    /// Folder for what it exports
+    #[arg(short = 'D', long = "export-dir", value_name = "DIR", default_value = "results")]
+    pub output: PathBuf,
+    /// Say why this statement holds or does not, such as 'p(1, _)', instead of exporting
+    #[arg(long, value_name = "FACT")]
+    pub trace: Option<String>,
+    /// How explanations are printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: ProofFormat,
+    /// Stop after so many derived tuples
+    #[arg(long, value_name = "N", default_value_t = 100_000_000)]
+    pub max_tuples: usize,
+    /// Stop after so many seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
+    pub max_secs: f64,
+}
+
+/// Formats of an explanation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum ProofFormat {
+    /// For people
+    #[default]
+    Text,
+    /// For programs
+    Json,
+    /// For Graphviz
+    Dot,
 }
 
 /// Formats of a table.

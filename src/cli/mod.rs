@@ -5,15 +5,18 @@
 mod args;
 mod check;
 mod clock;
+mod datalog;
 mod entry;
 mod history_dir;
 mod list;
+mod new;
 mod output;
 mod progress;
 mod query;
 mod run;
 mod show;
 mod stop;
+mod why;
 
 pub use args::Arguments;
 pub use entry::run;

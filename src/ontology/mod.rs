@@ -10,6 +10,8 @@ mod literal;
 mod model;
 mod read;
 mod rule_files;
+mod template;
 
 pub use assemble::load;
 pub use model::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
+pub use template::{Template, property_template};

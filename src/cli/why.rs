@@ -1,0 +1,68 @@
+//! `actcheck why`
+
+use std::path::{Path, PathBuf};
+
+use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
+use crate::cli::args::WhyArgs;
+use crate::cli::datalog::rendered;
+use crate::cli::{history_dir, output};
+use crate::history::{ActionDetail, RunDetail};
+use crate::ontology;
+use crate::rules::{Budget, RuleBook};
+
+/// Prints, for each outcome of a run that is asked for, the proof that a property holds or how near it came.
+pub fn why(args: &WhyArgs) -> Result<(), Diagnostics> {
+    let history = history_dir::open(&args.history)?;
+    let run = history.run(&args.run)?;
+    let facts = history.facts(&run.row.run)?;
+    let (files, path) = ontology_file(args.ontology.as_deref());
+    let rules = RuleBook::prepare(&ontology::load(&files, &path)?)?;
+    let mut told = 0;
+    for (step, action) in run.actions.iter().enumerate() {
+        let Some(seen) = facts.action(step) else { continue };
+        for property in asked(action, args.property.as_deref()) {
+            let title = format!("{} {}, {}", run.row.run, names::local(&action.action), names::local(&property));
+            let explained = rules.explain(&seen, &property, &Budget::default());
+            let explained = explained.map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
+            if args.format == crate::cli::args::ProofFormat::Text {
+                output::print(&format!("{title}\n"));
+            }
+            output::print(&format!("{}\n", rendered(&explained, args.format)));
+            told += 1;
+        }
+    }
+    if told == 0 { Err(nothing_to_tell(&run, args.property.as_deref()).into()) } else { Ok(()) }
+}
+
+/// The ontology that was named, or the one of this folder, or the one that the program carries.
+fn ontology_file(named: Option<&Path>) -> (Files, PathBuf) {
+    const USUAL: &str = "ontology/actions.ttl";
+    match named {
+        Some(path) => (Files::Disk, path.to_owned()),
+        None if Path::new(USUAL).is_file() => (Files::Disk, PathBuf::from(USUAL)),
+        None => (Files::Shipped, PathBuf::from(USUAL)),
+    }
+}
+
+/// The properties of an action that are meant: one by its name, or all that were judged.
+fn asked(action: &ActionDetail, named: Option<&str>) -> Vec<String> {
+    let all = action.judgements.iter().map(|judgement| judgement.property.clone());
+    all.filter(|iri| named.is_none_or(|named| names::local(iri) == named || iri == named)).collect()
+}
+
+fn nothing_to_tell(run: &RunDetail, named: Option<&str>) -> Diagnostic {
+    let judged: Vec<&str> = run
+        .actions
+        .iter()
+        .flat_map(|action| &action.judgements)
+        .map(|judgement| names::local(&judgement.property))
+        .collect();
+    match named {
+        Some(named) if !judged.contains(&named) => {
+            Diagnostic::error("X009", format!("no property `{named}` was judged in run {}", run.row.run))
+                .help(did_you_mean(named, judged))
+        }
+        _ => Diagnostic::error("X009", format!("run {} has no facts to explain", run.row.run))
+            .help("it was broken before its first action; `actcheck show` says why"),
+    }
+}
