@@ -9,6 +9,7 @@ use crate::config::Overrides;
 /// Says what a campaign would use, or everything that is wrong with it.
 pub fn check(args: &CheckArgs) -> Result<(), Diagnostics> {
     let env = Env::prepare(&args.config, &Overrides::default())?;
+    output::print_diagnostics(env.rules.warnings());
     output::print(&format!(
         "{}: {} tests, {} runs; {} actions and {} properties in {}; {} models; robot {}\n",
         args.config.display(),
