@@ -192,7 +192,7 @@ fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
         .spawn()
         .unwrap();
     std::thread::sleep(Duration::from_secs(4));
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let killed = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
     assert!(killed.success());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
