@@ -145,39 +145,50 @@ fn a_new_rule_file_is_judged_by_the_next_run_without_recompiling() {
     assert_eq!(new.unwrap()["counts"]["failed"], 2);
 }
 
+/// The largest number of runs that a progress bar has shown, from what it wrote to a terminal.
+fn runs_shown(typescript: &Path) -> usize {
+    let text = String::from_utf8_lossy(&std::fs::read(typescript).unwrap_or_default()).into_owned();
+    let counts = text.split("/400 runs").filter_map(|before| before.rsplit(' ').next()?.parse().ok());
+    counts.max().unwrap_or(0)
+}
+
 #[test]
 fn killing_a_campaign_loses_no_reported_run_and_leaves_no_half_one() {
     let project = project();
     for round in 0..3 {
-        let history = format!("h{round}");
-        let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
-            .args(["run", "configs/pick.toml", "--runs", "400", "--history", &history])
+        let (history, seen) = (format!("h{round}"), project.path().join(format!("seen{round}")));
+        let program = env!("CARGO_BIN_EXE_actcheck");
+        // Progress is shown to terminals only: `script` is one. The shell gives its process number to what it becomes.
+        let command =
+            format!("echo $$ > pid{round}; exec {program} run configs/pick.toml --runs 400 --history {history}");
+        let mut child = Command::new("script")
+            .args(["-qfc", &command, seen.to_str().unwrap()])
             .current_dir(project.path())
+            .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        // A run is reported once its trace lies in its place: wait for some, then kill without warning.
-        let traces = project.path().join(&history).join("traces");
         let start = Instant::now();
-        let reported = loop {
-            let seen = std::fs::read_dir(&traces).map_or(0, Iterator::count);
-            if seen > 3 + round {
-                break seen;
-            }
+        while runs_shown(&seen) < 3 + round {
             assert!(start.elapsed() < Duration::from_secs(120), "no runs in two minutes");
             std::thread::sleep(Duration::from_millis(20));
-        };
-        child.kill().unwrap();
+        }
+        let kill = format!("kill -9 $(cat pid{round})");
+        assert!(Command::new("sh").args(["-c", &kill]).current_dir(project.path()).status().unwrap().success());
         child.wait().unwrap();
+        let reported = runs_shown(&seen);
         let rows = listed(project.path(), &history);
-        // One trace may lie there whose transaction had not begun.
-        assert!(rows.len() + 2 >= reported, "{} of {reported} runs", rows.len());
-        let halves = "SELECT ?r WHERE { ?r a act:Run . FILTER NOT EXISTS { ?r act:score ?s ; act:traceHash ?h . \
-                      ?e act:ofRun ?r ; act:before ?b ; act:after ?a ; act:during ?d . \
-                      GRAPH ?a { ?x ?y ?z } ?assertion earl:subject ?e ; earl:result ?result } }";
-        let output = actcheck(project.path(), &["query", "--history", &history, "--format", "csv", halves]);
-        assert_eq!(stdout(&output), "r\n", "half-written runs\n{}", stderr(&output));
+        assert!(rows.len() >= reported, "{} of {reported} reported runs are in the history", rows.len());
+        assert!(rows.len() < 400, "the campaign was over before it was killed");
+        // A whole run has its score and hash, its three graphs, and an outcome of each of the five properties.
+        let whole = "SELECT ?r WHERE { ?r a act:Run ; act:score ?s ; act:traceHash ?h . \
+                     ?e act:ofRun ?r ; act:before ?b ; act:after ?a ; act:during ?d . \
+                     ?assertion earl:subject ?e ; earl:result/act:outcome ?o . \
+                     FILTER EXISTS { GRAPH ?b { ?x ?y ?z } } FILTER EXISTS { GRAPH ?a { ?x ?y ?z } } \
+                     FILTER EXISTS { GRAPH ?d { ?x ?y ?z } } } GROUP BY ?r HAVING (COUNT(?assertion) = 5)";
+        let output = actcheck(project.path(), &["query", "--history", &history, "--format", "csv", whole]);
+        assert_eq!(stdout(&output).lines().count(), rows.len() + 1, "half-written runs\n{}", stderr(&output));
     }
 }
 

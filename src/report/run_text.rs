@@ -9,7 +9,6 @@ use crate::history::{ActionDetail, ObjectDetail, RunDetail};
 use crate::report::table::ruled;
 
 /// Everything about a run: its scene, what the actions reported, every outcome with margin and witness.
-///
 pub fn run_text(run: &RunDetail) -> String {
     let mut out = String::new();
     let row = &run.row;
