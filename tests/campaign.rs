@@ -4,6 +4,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use actcheck::campaign::Env;
+use actcheck::config::Overrides;
+use actcheck::history::History;
 use serde_json::Value;
 
 use crate::support::{actcheck, edit, project, stderr, stdout};
@@ -278,4 +281,39 @@ fn a_reader_that_goes_away_is_no_panic() {
         .output()
         .unwrap();
     assert_eq!(stderr(&output), "");
+}
+
+/// What a campaign ran with comes back from the history, also where the project's folder has moved.
+#[test]
+fn a_campaign_is_recalled_with_its_configuration_of_then() {
+    let folder = tempfile::tempdir().unwrap();
+    let before = folder.path().join("before");
+    std::fs::create_dir(&before).unwrap();
+    let config = before.join("small.toml");
+    let text = "tests = [[\"Pick\"]]\ntest_count = 3\nseed = 4\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
+                [pickObject]\nmodel_list = [\"glass\"]\n[surfaceObjects]\nmodel_list = [\"mug\"]\ncount = 1\n";
+    std::fs::write(&config, text).unwrap();
+    let overrides = Overrides { runs: Some(2), seed: Some(9), ..Overrides::default() };
+    let env = Env::prepare(&config, &overrides).unwrap();
+    let record = {
+        let history = History::open(&env.campaign.history).unwrap();
+        let record = env.record("k7f3".to_owned(), "small".to_owned(), "2026-08-01T12:00:00Z".to_owned());
+        history.begin_campaign(&record).unwrap();
+        assert_eq!(history.campaign("k7f3").unwrap(), record);
+        record
+    };
+    assert_eq!(record.config_path, "../small.toml");
+    // Later edits change nothing of what was run, and a folder may move as a whole.
+    std::fs::write(&config, text.replace("glass", "mug")).unwrap();
+    let after = folder.path().join("after");
+    std::fs::rename(&before, &after).unwrap();
+    let history = History::open(&after.join(".actcheck")).unwrap();
+    let (again, recalled) = Env::recall(&history, "k7f3", None).unwrap();
+    assert_eq!(recalled, record);
+    assert_eq!((again.campaign.seed, again.planned_runs()), (9, 2));
+    assert_eq!(again.campaign.candidates["pickObject"], ["glass"]);
+    let edited = Env::recall(&history, "k7f3", Some(&after.join("small.toml"))).unwrap().0;
+    assert_eq!(edited.campaign.candidates["pickObject"], ["mug"]);
+    let fault = Env::recall(&history, "k7f4", None).err().expect("there is none").into_iter().next().unwrap();
+    assert_eq!((fault.code, fault.help.as_deref()), ("H014", Some("did you mean `k7f3`?")));
 }

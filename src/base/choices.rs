@@ -6,6 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
+/// Noise beyond so many standard deviations (one value in 16,000) is brought back to them.
+const FARTHEST: f64 = 4.0;
+
 /// What was chosen from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ChoiceKind {
@@ -51,35 +54,56 @@ pub struct Choices {
 #[derive(Debug, Clone)]
 enum Origin {
     Random(Box<ChaCha8Rng>),
-    /// Values by name, in order; a name that is not there (any more) gets its nominal value.
-    Recorded(BTreeMap<String, VecDeque<f64>>),
+    /// Values by name, in order; for a name that is not there (any more), what `rest` says.
+    Recorded {
+        values: BTreeMap<String, VecDeque<f64>>,
+        rest: Rest,
+    },
+    /// Quantiles by name, each for the first decision of that name; everything else is drawn.
+    Steered {
+        quantiles: BTreeMap<String, f64>,
+        generator: Box<ChaCha8Rng>,
+    },
+}
+
+/// What becomes of a decision that a record lacks.
+#[derive(Debug, Clone)]
+enum Rest {
+    Nominal,
+    Random(Box<ChaCha8Rng>),
 }
 
 impl Choices {
     /// Fresh decisions: the same seed and index give the same ones, on every machine.
     pub fn random(seed: u64, index: u64) -> Self {
-        let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        generator.set_stream(index);
-        Self { origin: Origin::Random(Box::new(generator)), made: Vec::new() }
+        Self { origin: Origin::Random(generator(seed, index)), made: Vec::new() }
     }
 
     /// The decisions of a record, by name. What the record lacks gets its nominal value.
     pub fn recorded(record: &[Choice]) -> Self {
-        let mut by_name: BTreeMap<String, VecDeque<f64>> = BTreeMap::new();
-        for choice in record {
-            by_name.entry(choice.name.clone()).or_default().push_back(choice.value);
-        }
-        Self { origin: Origin::Recorded(by_name), made: Vec::new() }
+        Self { origin: Origin::Recorded { values: by_name(record), rest: Rest::Nominal }, made: Vec::new() }
+    }
+
+    /// The decisions of a record, by name; what it lacks is drawn, as [`Choices::random`] does.
+    pub fn partly_recorded(record: &[Choice], seed: u64, index: u64) -> Self {
+        let rest = Rest::Random(generator(seed, index));
+        Self { origin: Origin::Recorded { values: by_name(record), rest }, made: Vec::new() }
+    }
+
+    /// Fresh decisions, but for the names of `quantiles`: the first decision of such a name is the value below which
+    /// this share of its distribution lies. Shape: each from 0 to 1; uniform ones give the nominal distribution.
+    pub fn steered(quantiles: &BTreeMap<String, f64>, seed: u64, index: u64) -> Self {
+        let origin = Origin::Steered { quantiles: quantiles.clone(), generator: generator(seed, index) };
+        Self { origin, made: Vec::new() }
     }
 
     /// One of `of` things, counted from 0. `of` must not be 0.
     pub fn index(&mut self, name: &str, of: usize) -> usize {
         debug_assert!(of > 0, "a choice needs something to choose from");
         let last = of.saturating_sub(1);
-        let value = self.decide(name, 0.0, |generator| {
-            // 53 random bits over a handful of things: the bias is under 1e-13.
-            ((unit(generator) * of as f64) as usize).min(last) as f64
-        });
+        // 53 random bits over a handful of things: the bias is under 1e-13.
+        let at = |share: f64| ((share * of as f64) as usize).min(last) as f64;
+        let value = self.decide(name, 0.0, at, |generator| at(unit(generator)));
         let value = (value.max(0.0) as usize).min(last);
         self.record(name, ChoiceKind::Index { of }, value as f64);
         value
@@ -88,18 +112,20 @@ impl Choices {
     /// A number between two bounds, both included; `nominal` is clamped to them.
     pub fn real(&mut self, name: &str, low: f64, high: f64, nominal: f64) -> f64 {
         let nominal = nominal.clamp(low, high);
-        let value = self.decide(name, nominal, |generator| low + (high - low) * unit(generator)).clamp(low, high);
+        let at = |share: f64| low + (high - low) * share;
+        let value = self.decide(name, nominal, at, |generator| at(unit(generator))).clamp(low, high);
         self.record(name, ChoiceKind::Real { low, high, nominal }, value);
         value
     }
 
     /// Normally distributed noise about 0 with the given standard deviation, at most 4 of them away.
     pub fn normal(&mut self, name: &str, sigma: f64) -> f64 {
-        let value = self.decide(name, 0.0, |generator| {
+        let at = |share: f64| normal_quantile(share) * sigma;
+        let value = self.decide(name, 0.0, at, |generator| {
             // Box–Muller, from libm so that every machine gets the same bits.
             let radius = libm::sqrt(-2.0 * libm::log(1.0 - unit(generator)));
             let angle = std::f64::consts::TAU * unit(generator);
-            (radius * libm::cos(angle)).clamp(-4.0, 4.0) * sigma
+            (radius * libm::cos(angle)).clamp(-FARTHEST, FARTHEST) * sigma
         });
         self.record(name, ChoiceKind::Normal { sigma }, value);
         value
@@ -115,16 +141,57 @@ impl Choices {
         self.made
     }
 
-    fn decide(&mut self, name: &str, nominal: f64, draw: impl FnOnce(&mut ChaCha8Rng) -> f64) -> f64 {
+    /// A decision: recorded, at a given quantile (by `at`), or drawn.
+    fn decide(
+        &mut self,
+        name: &str,
+        nominal: f64,
+        at: impl Fn(f64) -> f64,
+        draw: impl FnOnce(&mut ChaCha8Rng) -> f64,
+    ) -> f64 {
         match &mut self.origin {
             Origin::Random(generator) => draw(generator),
-            Origin::Recorded(values) => values.get_mut(name).and_then(VecDeque::pop_front).unwrap_or(nominal),
+            Origin::Recorded { values, rest } => match (values.get_mut(name).and_then(VecDeque::pop_front), rest) {
+                (Some(value), _) => value,
+                (None, Rest::Nominal) => nominal,
+                (None, Rest::Random(generator)) => draw(generator),
+            },
+            Origin::Steered { quantiles, generator } => match quantiles.remove(name) {
+                Some(share) => at(share.clamp(0.0, 1.0)),
+                None => draw(generator),
+            },
         }
     }
 
     fn record(&mut self, name: &str, kind: ChoiceKind, value: f64) {
         self.made.push(Choice { name: name.to_owned(), kind, value });
     }
+}
+
+fn generator(seed: u64, index: u64) -> Box<ChaCha8Rng> {
+    let mut generator = ChaCha8Rng::seed_from_u64(seed);
+    generator.set_stream(index);
+    Box::new(generator)
+}
+
+fn by_name(record: &[Choice]) -> BTreeMap<String, VecDeque<f64>> {
+    let mut by_name: BTreeMap<String, VecDeque<f64>> = BTreeMap::new();
+    for choice in record {
+        by_name.entry(choice.name.clone()).or_default().push_back(choice.value);
+    }
+    by_name
+}
+
+/// The standard normal value below which a share of the distribution lies, at most [`FARTHEST`] away from 0.
+fn normal_quantile(share: f64) -> f64 {
+    let below = |value: f64| 0.5 * libm::erfc(-value / std::f64::consts::SQRT_2);
+    let (mut low, mut high) = (-FARTHEST, FARTHEST);
+    // Bisection: 60 halvings of 8 leave less than the last bit.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if below(middle) < share { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
 }
 
 /// A number in [0, 1) from 53 random bits.
@@ -164,5 +231,30 @@ mod tests {
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
         assert!(mean.abs() < 0.06, "{mean}");
         assert!((variance.sqrt() - 2.0).abs() < 0.05, "{variance}");
+    }
+
+    #[test]
+    fn a_record_can_leave_the_rest_to_chance() {
+        let mut first = Choices::random(7, 3);
+        let drawn = draw(&mut first);
+        let scene = &first.made()[..2];
+        let again = draw(&mut Choices::partly_recorded(scene, 7, 9));
+        assert_eq!((again.0, again.1), (drawn.0, drawn.1));
+        assert_ne!(again.2, drawn.2);
+        assert_eq!(draw(&mut Choices::partly_recorded(scene, 7, 9)), again);
+    }
+
+    #[test]
+    fn steered_decisions_lie_at_their_quantiles_once() {
+        let quantiles =
+            BTreeMap::from([("model".to_owned(), 0.5), ("yaw".to_owned(), 0.75), ("noise".to_owned(), 0.975)]);
+        let mut choices = Choices::steered(&quantiles, 7, 3);
+        let (model, yaw, noise) = draw(&mut choices);
+        assert_eq!((model, yaw), (2, 0.5));
+        assert!((noise - 0.019_599_639_845).abs() < 1e-12, "{noise}");
+        assert_ne!(draw(&mut choices), (model, yaw, noise));
+        for end in [0.0, 1.0] {
+            assert!(normal_quantile(end).abs() <= FARTHEST);
+        }
     }
 }

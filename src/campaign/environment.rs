@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use crate::actions;
-use crate::base::Diagnostics;
+use crate::base::{Diagnostic, Diagnostics, Source};
 use crate::config::{self, Campaign, Launcher, Overrides};
-use crate::history::CampaignRecord;
+use crate::history::{CampaignRecord, History};
 use crate::ontology::{self, Ontology};
 use crate::rules::RuleBook;
 use crate::scenario::Space;
@@ -30,7 +30,43 @@ impl Env {
     /// All faults that can be found at once: first those of the configuration, then those of the ontology, then
     /// those of scene space, rules, robot and skills together.
     pub fn prepare(config: &Path, overrides: &Overrides) -> Result<Self, Diagnostics> {
-        let campaign = config::load(config, overrides)?;
+        Self::of(config::load(config, overrides)?)
+    }
+
+    /// What a campaign of the history ran with: its configuration's text as it was then, with the ontology, rules and
+    /// models that lie there now. `config` names a configuration to take instead.
+    ///
+    /// # Errors
+    /// `H014` there is no such campaign; else as [`Env::prepare`].
+    pub fn recall(
+        history: &History,
+        campaign: &str,
+        config: Option<&Path>,
+    ) -> Result<(Self, CampaignRecord), Diagnostics> {
+        let record = history.campaign(campaign)?;
+        let overrides = Overrides { runs: None, seed: Some(record.seed), history: Some(history.dir().to_path_buf()) };
+        let loaded = match config {
+            Some(config) => config::load(config, &overrides),
+            None => {
+                let path = config::beside(history.dir(), &record.config_path);
+                let source = Source::new(path.display().to_string(), record.config_text.as_str());
+                config::load_text(source, path.parent().unwrap_or(Path::new("")), &overrides).map_err(|mut faults| {
+                    let message = format!("this is the configuration of campaign {campaign}, as the history keeps it");
+                    faults.push(
+                        Diagnostic::warning("H015", message)
+                            .help("where its files have moved, name the configuration's new place with `--config`"),
+                    );
+                    faults
+                })
+            }
+        };
+        let mut loaded = loaded?;
+        let tests = loaded.tests.len().max(1) as u64;
+        loaded.test_count = u32::try_from(record.planned_runs / tests).unwrap_or(loaded.test_count).max(1);
+        Ok((Self::of(loaded)?, record))
+    }
+
+    fn of(campaign: Campaign) -> Result<Self, Diagnostics> {
         let (files, path) = &campaign.ontology;
         let ontology = ontology::load(files, path)?;
         let mut faults = Diagnostics::new();
@@ -64,6 +100,7 @@ impl Env {
             name,
             config_text: self.campaign.source.text.to_string(),
             config_digest: crate::base::digest_of(&self.campaign.source.text),
+            config_path: path_from(&self.campaign.history, Path::new(&*self.campaign.source.name)),
             ontology_digest: self.ontology.digest.clone(),
             rules,
             models,
@@ -84,6 +121,16 @@ impl Env {
         let last = self.campaign.tests.len().saturating_sub(1);
         usize::try_from(index / u64::from(self.campaign.test_count.max(1))).map_or(last, |test| test.min(last))
     }
+}
+
+/// A path as it is seen from a folder, so that both can move together; as it is where one of them is not there.
+fn path_from(folder: &Path, path: &Path) -> String {
+    let absolute = |path: &Path| std::fs::canonicalize(path).ok();
+    let seen = match (absolute(folder), absolute(path)) {
+        (Some(folder), Some(path)) => pathdiff::diff_paths(&path, folder).unwrap_or(path),
+        _ => path.to_path_buf(),
+    };
+    seen.display().to_string()
 }
 
 fn check_launcher(campaign: &Campaign, faults: &mut Diagnostics) {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Files, Span};
+use crate::base::{Diagnostic, Diagnostics, Files, Source, Span};
 use crate::config::designators::{self, Designators};
 use crate::config::{Campaign, Launcher, Overrides, Table, ranges, shelf};
 
@@ -24,7 +24,14 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics>
         Diagnostic::error("C001", format!("cannot read the configuration {}: {reason}", path.display()))
             .help("name a TOML file, such as configs/pick.toml")
     })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
+    load_text(source, path.parent().unwrap_or(Path::new("")), overrides)
+}
+
+/// The same for a text that has been read already: paths in it are relative to `folder`.
+///
+/// # Errors
+/// As [`load`], but for C001.
+pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics> {
     let mut table = Table::parse(&source)?;
     let mut found = Diagnostics::new();
 

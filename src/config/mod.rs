@@ -14,8 +14,8 @@ mod value;
 mod words;
 
 pub use campaign::{Budget, Campaign, Launcher, Overrides, Physics, Range, Sensing};
-pub(crate) use load::in_order_of_place;
-pub use load::load;
+pub(crate) use load::{beside, in_order_of_place};
+pub use load::{load, load_text};
 pub use model::{ObjectModel, Part, Shape, Surface};
 pub use ranges::CONTROL_HZ;
 pub use robot::RobotProfile;

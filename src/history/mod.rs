@@ -11,6 +11,7 @@ mod graphs;
 mod lists;
 mod query;
 mod read;
+mod read_campaign;
 mod record;
 mod rows;
 mod statements;

@@ -19,6 +19,8 @@ pub struct CampaignRecord {
     pub config_text: String,
     /// Digest of that text.
     pub config_digest: String,
+    /// Where the configuration lies, seen from the history's folder; absolute where there is no way from there.
+    pub config_path: String,
     /// Digest of the ontology.
     pub ontology_digest: String,
     /// Property IRI, rule path and digest of the rule file (with its libraries), sorted.

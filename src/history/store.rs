@@ -13,7 +13,6 @@ use crate::actions::Trace;
 use crate::base::{Choice, Diagnostic, Diagnostics, Digest, Source, nearest};
 use crate::facts::{RunFacts, extract};
 use crate::history::folder::{Folder, write_whole};
-use crate::history::lists;
 use crate::history::read::{short_id, subjects, text_of};
 use crate::history::statements::iri;
 use crate::history::write_campaign::{self, campaign_node};
@@ -22,6 +21,7 @@ use crate::history::{
     CampaignEnd, CampaignRecord, CampaignRow, Cancel, OutcomeRow, QueryAnswer, RunDetail, RunFilter, RunRecord, RunRow,
     detail, fault, query, trace_file,
 };
+use crate::history::{lists, read_campaign};
 
 /// A history that this process has open, and no other.
 ///
@@ -143,6 +143,27 @@ impl History {
     /// The store can't be read.
     pub fn campaigns(&self) -> Result<Vec<CampaignRow>, Diagnostics> {
         lists::campaigns(&self.store()?).map_err(|error| self.query_fault(&error))
+    }
+
+    /// What a campaign was asked for, judged by and simulated with.
+    ///
+    /// # Errors
+    /// `H014` there is no such campaign.
+    pub fn campaign(&self, id: &str) -> Result<CampaignRecord, Diagnostics> {
+        let record =
+            read_campaign::beginning(&self.store()?, id).map_err(|error| self.fault("reading a campaign", &error))?;
+        match record {
+            Some(record) => Ok(record),
+            None => {
+                let known = self.campaign_ids()?;
+                let help = match nearest(id, known.iter().map(String::as_str)) {
+                    Some(found) => format!("did you mean `{found}`?"),
+                    None => "`actcheck list` shows all runs with their campaigns".to_owned(),
+                };
+                let message = format!("the history `{}` has no campaign `{id}`", self.dir().display());
+                Err(Diagnostic::error("H014", message).help(help).into())
+            }
+        }
     }
 
     /// The runs that a filter lets through, by the start of their campaign, then by index.

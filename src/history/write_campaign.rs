@@ -22,6 +22,7 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .text("rdfs:label", &record.name)
         .text("act:configText", &record.config_text)
         .text("act:configDigest", &record.config_digest)
+        .text("act:configPath", &record.config_path)
         .text("act:ontologyDigest", &record.ontology_digest)
         .has("act:seed", count(record.seed))
         .has("act:plannedRuns", count(record.planned_runs))

@@ -1,0 +1,51 @@
+//! A campaign's beginning, read back as it was written.
+
+use oxigraph::model::Term;
+use oxigraph::store::{StorageError, Store};
+
+use crate::history::CampaignRecord;
+use crate::history::detail::version;
+use crate::history::read::Node;
+use crate::history::write_campaign::campaign_node;
+
+/// What was asked for, judged by and simulated with; nothing where the history has no such campaign.
+pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord>, StorageError> {
+    let node = Node::read(store, &campaign_node(id))?;
+    if node.properties().next().is_none() {
+        return Ok(None);
+    }
+    let text = |node: &Node, property: &str| node.text(property).unwrap_or_default();
+    let mut rules = Vec::new();
+    for rule in parts(store, &node, "act:usedRule")? {
+        rules.push((text(&rule, "act:verifies"), text(&rule, "act:rulePath"), text(&rule, "act:ruleDigest")));
+    }
+    rules.sort();
+    let mut models = Vec::new();
+    for model in parts(store, &node, "act:usedModel")? {
+        models.push((text(&model, "act:model"), text(&model, "act:digest")));
+    }
+    models.sort();
+    Ok(Some(CampaignRecord {
+        id: id.to_owned(),
+        name: text(&node, "rdfs:label"),
+        config_text: text(&node, "act:configText"),
+        config_digest: text(&node, "act:configDigest"),
+        config_path: text(&node, "act:configPath"),
+        ontology_digest: text(&node, "act:ontologyDigest"),
+        rules,
+        models,
+        seed: node.count("act:seed").unwrap_or_default(),
+        planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
+        started: text(&node, "prov:startedAtTime"),
+        program_version: version(&node),
+    }))
+}
+
+/// The things that a property names.
+fn parts(store: &Store, node: &Node, property: &str) -> Result<Vec<Node>, StorageError> {
+    let named = node.all(property).iter().filter_map(|term| match term {
+        Term::NamedNode(part) => Some(part),
+        _ => None,
+    });
+    named.map(|part| Node::read(store, part)).collect()
+}
