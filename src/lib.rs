@@ -18,6 +18,7 @@
 //! | module | what it does | its library |
 //! | --- | --- | --- |
 //! | [`base`] | sources and diagnostics, terms, poses, recorded choices, shipped files | |
+//! | [`search`] | where in a cube to look next, learnt from margins; failure rates whatever was looked at | statrs |
 //! | [`config`] | TOML text to a `Campaign` in which nothing is left to check | toml |
 //! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxigraph (parsers) |
 //! | [`scenario`] | recorded choices to one concrete `Scene`; what "simpler" means | parry3d (overlaps) |
@@ -39,6 +40,8 @@
 #![warn(missing_docs, clippy::unwrap_used)]
 
 pub mod base;
+
+pub mod search;
 
 pub mod config;
 

@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Each module, the modules that it may import, in the order of the line. `cli` may import all.
-const FLOORS: [(&str, &[&str]); 13] = [
+const FLOORS: [(&str, &[&str]); 14] = [
     ("base", &[]),
-    ("config", &["base"]),
+    ("search", &["base"]),
+    ("config", &["base", "search"]),
     ("ontology", &["base"]),
     ("scenario", &["base", "config", "ontology"]),
     ("world", &["base", "scenario"]),
@@ -18,15 +19,19 @@ const FLOORS: [(&str, &[&str]); 13] = [
     ("history", &["base", "ontology", "scenario", "facts", "verdict", "actions"]),
     (
         "campaign",
-        &["base", "config", "ontology", "scenario", "world", "actions", "facts", "rules", "verdict", "history"],
+        &[
+            "base", "search", "config", "ontology", "scenario", "world", "actions", "facts", "rules", "verdict",
+            "history",
+        ],
     ),
     ("analysis", &["base", "history", "verdict"]),
     ("report", &["base", "verdict", "history", "analysis"]),
 ];
 
 /// Libraries of the field and where they may be named.
-const FENCES: [(&str, &[&str]); 9] = [
+const FENCES: [(&str, &[&str]); 10] = [
     ("toml", &["config"]),
+    ("statrs", &["search"]),
     ("oxigraph", &["ontology", "rules", "history"]),
     ("rapier3d", &["world"]),
     ("parry3d", &["world", "scenario"]),

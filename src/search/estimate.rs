@@ -1,0 +1,110 @@
+//! How probable a failure is under the nominal distribution, from points that were drawn otherwise.
+
+use statrs::distribution::{ContinuousCDF, Gamma};
+
+/// Half of what a 95 % interval leaves out.
+const TAIL: f64 = 0.025;
+
+/// A probability with its 95 % confidence interval. All three lie in [0, 1].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The unbiased estimate, or 1 where that is above.
+    pub rate: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Sums over weighted points, some of which failed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Weighted {
+    points: u64,
+    largest: f64,
+    /// Sums of weights and of their squares: of those that failed, and of the others.
+    failed: [f64; 2],
+    passed: [f64; 2],
+}
+
+impl Weighted {
+    /// Takes one point: its weight, and the largest weight that any point drawn with it could have had.
+    pub fn add(&mut self, weight: f64, largest: f64, failed: bool) {
+        self.points += 1;
+        self.largest = self.largest.max(largest);
+        let sums = if failed { &mut self.failed } else { &mut self.passed };
+        sums[0] += weight;
+        sums[1] += weight * weight;
+    }
+
+    /// How many points there were.
+    pub fn points(&self) -> u64 {
+        self.points
+    }
+
+    /// The probability of failing; nothing where there was no point.
+    ///
+    /// Of the two events the one with less weight is counted, so that the interval holds for failures that are rare, for
+    /// passes that are, and where none was seen: what was never looked at may hide as much as the largest weight allows.
+    /// Source: the gamma interval for weighted sums of counts of Fay and Feuer (1997), which does not fall under its level.
+    pub fn estimate(&self) -> Option<Estimate> {
+        if self.points == 0 {
+            return None;
+        }
+        let points = self.points as f64;
+        let of = |sums: [f64; 2]| {
+            let (low, high) = gamma_interval(sums[0], sums[1], self.largest);
+            [sums[0], low, high].map(|sum| (sum / points).clamp(0.0, 1.0))
+        };
+        Some(if self.failed[0] <= self.passed[0] {
+            let [rate, low, high] = of(self.failed);
+            Estimate { rate, low, high }
+        } else {
+            // The rate stays the unbiased one of the failures; the ends come from the passes.
+            let [_, low, high] = of(self.passed);
+            let rate = (self.failed[0] / points).clamp(0.0, 1.0);
+            Estimate { rate, low: (1.0 - high).min(rate), high: (1.0 - low).max(rate) }
+        })
+    }
+}
+
+/// Ends of the interval of a weighted sum of counts with this variance.
+fn gamma_interval(sum: f64, variance: f64, largest: f64) -> (f64, f64) {
+    let quantile = |sum: f64, variance: f64, level: f64| {
+        let shape = sum * sum / variance;
+        Gamma::new(shape, 1.0).map_or(sum, |gamma| variance / sum * gamma.inverse_cdf(level))
+    };
+    let low = if sum > 0.0 { quantile(sum, variance, TAIL) } else { 0.0 };
+    (low.min(sum), quantile(sum + largest, variance + largest * largest, 1.0 - TAIL).max(sum))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counted(failed: u64, points: u64) -> Estimate {
+        let mut sums = Weighted::default();
+        (0..points).for_each(|index| sums.add(1.0, 1.0, index < failed));
+        sums.estimate().expect("there are points")
+    }
+
+    /// Garwood's exact limits of a Poisson mean, from his table of 1936, which the interval has for equal weights.
+    #[test]
+    fn equal_weights_give_the_exact_interval_of_a_count() {
+        for (count, low, high) in [(0, 0.0, 3.689), (1, 0.025_32, 5.572), (5, 1.623, 11.668), (10, 4.795, 18.390)] {
+            let found = counted(count, 1000);
+            assert!((found.low * 1000.0 - low).abs() < 2e-3, "{found:?}");
+            assert!((found.high * 1000.0 - high).abs() < 2e-3, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn ends_are_in_order_from_none_to_all() {
+        for failed in 0..=40 {
+            let found = counted(failed, 40);
+            assert!(0.0 <= found.low && found.low <= found.rate, "{found:?}");
+            assert!(found.rate <= found.high && found.high <= 1.0, "{found:?}");
+            assert!((found.rate - failed as f64 / 40.0).abs() < 1e-12);
+        }
+        assert_eq!(Weighted::default().estimate(), None);
+    }
+}

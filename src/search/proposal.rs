@@ -1,0 +1,155 @@
+//! Densities on the cube that can be drawn from.
+
+use rand_chacha::ChaCha8Rng;
+use statrs::function::erf::{erf, erf_inv};
+
+use super::fill::unit;
+use super::space::bucket;
+
+/// The largest number below 1, so that a point stays in the half-open cube.
+const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
+
+/// The distribution of one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Marginal {
+    /// Normal, cut off at 0 and 1.
+    Normal {
+        /// Mean before the cut, in [0, 1].
+        mean: f64,
+        /// Standard deviation before the cut, positive.
+        sigma: f64,
+    },
+    /// Constant in each of as many equal intervals as there are shares; the shares sum to 1.
+    Steps(Vec<f64>),
+}
+
+impl Marginal {
+    /// A distribution in steps, with shares in proportion to these numbers; uniform where they are no proportion.
+    pub fn steps(proportions: &[f64]) -> Self {
+        let sum: f64 = proportions.iter().sum();
+        if sum.is_finite() && sum > 0.0 && proportions.iter().all(|share| *share >= 0.0) {
+            Self::Steps(proportions.iter().map(|share| share / sum).collect())
+        } else {
+            Self::Steps(vec![1.0])
+        }
+    }
+
+    /// Against the uniform density.
+    fn density(&self, value: f64) -> f64 {
+        match self {
+            Self::Normal { mean, sigma } => {
+                let distance = (value - mean) / sigma;
+                let (low, high) = cut(*mean, *sigma);
+                let peak = 1.0 / (sigma * libm::sqrt(std::f64::consts::TAU));
+                peak * libm::exp(-0.5 * distance * distance) / (high - low)
+            }
+            Self::Steps(shares) => shares[bucket(value, shares.len())] * shares.len() as f64,
+        }
+    }
+
+    fn draw(&self, generator: &mut ChaCha8Rng) -> f64 {
+        let quantile = unit(generator);
+        let value = match self {
+            Self::Normal { mean, sigma } => {
+                let (low, high) = cut(*mean, *sigma);
+                let share = low + (high - low) * quantile;
+                mean + sigma * std::f64::consts::SQRT_2 * erf_inv(2.0 * share - 1.0)
+            }
+            Self::Steps(shares) => {
+                let mut below = 0.0;
+                let mut step = 0;
+                while step + 1 < shares.len() && below + shares[step] <= quantile {
+                    below += shares[step];
+                    step += 1;
+                }
+                let within = if shares[step] > 0.0 { (quantile - below) / shares[step] } else { 0.5 };
+                (step as f64 + within.clamp(0.0, 1.0)) / shares.len() as f64
+            }
+        };
+        value.clamp(0.0, BELOW_ONE)
+    }
+}
+
+/// The distribution function of a normal distribution at 0 and 1.
+fn cut(mean: f64, sigma: f64) -> (f64, f64) {
+    let below = |value: f64| 0.5 * (1.0 + erf((value - mean) / (sigma * std::f64::consts::SQRT_2)));
+    (below(0.0), below(1.0))
+}
+
+/// Independent axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Component(pub Vec<Marginal>);
+
+impl Component {
+    fn density(&self, point: &[f64]) -> f64 {
+        self.0.iter().zip(point).map(|(marginal, value)| marginal.density(*value)).product()
+    }
+
+    fn draw(&self, generator: &mut ChaCha8Rng) -> Vec<f64> {
+        self.0.iter().map(|marginal| marginal.draw(generator)).collect()
+    }
+}
+
+/// An even mixture of components. A mixture of none is the uniform distribution.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Proposal(pub Vec<Component>);
+
+impl Proposal {
+    /// Against the uniform density: its mean over the cube is 1.
+    pub fn density(&self, point: &[f64]) -> f64 {
+        if self.0.is_empty() {
+            return 1.0;
+        }
+        self.0.iter().map(|component| component.density(point)).sum::<f64>() / self.0.len() as f64
+    }
+
+    /// A point of its own for a generator.
+    pub(crate) fn draw(&self, generator: &mut ChaCha8Rng, width: usize) -> Vec<f64> {
+        let chosen = bucket(unit(generator), self.0.len());
+        match self.0.get(chosen) {
+            Some(component) => component.draw(generator),
+            None => (0..width).map(|_| unit(generator)).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fill::{random, stream};
+    use super::*;
+
+    fn skewed() -> Proposal {
+        let normal = |mean, sigma| Marginal::Normal { mean, sigma };
+        Proposal(vec![
+            Component(vec![normal(0.1, 0.2), Marginal::steps(&[1.0, 3.0, 0.5])]),
+            Component(vec![normal(0.9, 0.4), Marginal::steps(&[2.0, 1.0])]),
+        ])
+    }
+
+    #[test]
+    fn a_density_has_mean_one() {
+        let density = skewed();
+        let mean = (0..40_000).map(|index| density.density(&random(1, index, 2))).sum::<f64>() / 40_000.0;
+        assert!((mean - 1.0).abs() < 0.02, "{mean}");
+    }
+
+    /// What is drawn has the density that is told: weighted by its inverse, every quarter has its share.
+    #[test]
+    fn what_is_drawn_has_the_density() {
+        let density = skewed();
+        let mut generator = stream(3, 9, 0);
+        let mut quarters = [0.0; 4];
+        for _ in 0..40_000 {
+            let point = density.draw(&mut generator, 2);
+            quarters[bucket(point[0], 2) * 2 + bucket(point[1], 2)] += 1.0 / density.density(&point) / 40_000.0;
+        }
+        assert!(quarters.iter().all(|share| (share - 0.25).abs() < 0.01), "{quarters:?}");
+    }
+
+    #[test]
+    fn proportions_that_are_none_are_uniform() {
+        assert_eq!(Marginal::steps(&[0.0, 0.0]), Marginal::Steps(vec![1.0]));
+        assert_eq!(Marginal::steps(&[f64::NAN, 1.0]), Marginal::Steps(vec![1.0]));
+        assert_eq!(Proposal::default().density(&[0.3]), 1.0);
+    }
+}

@@ -1,0 +1,50 @@
+//! The cube that is searched.
+
+/// One axis of the cube.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// A quantile in [0, 1): near values mean near things.
+    Continuous,
+    /// One of so many values, none nearer to another: value `i` of `k` is the interval [i/k, (i+1)/k).
+    Categorical(usize),
+}
+
+/// The cube [0, 1)^d. Its nominal distribution is uniform.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Space {
+    dimensions: Vec<Dimension>,
+}
+
+impl Space {
+    /// The cube with these axes. An axis of no value counts as one of a single value.
+    pub fn new(dimensions: impl IntoIterator<Item = Dimension>) -> Self {
+        let whole = |dimension| match dimension {
+            Dimension::Categorical(count) => Dimension::Categorical(count.max(1)),
+            Dimension::Continuous => Dimension::Continuous,
+        };
+        Self { dimensions: dimensions.into_iter().map(whole).collect() }
+    }
+
+    /// The axes, in order.
+    pub fn dimensions(&self) -> &[Dimension] {
+        &self.dimensions
+    }
+
+    /// How far apart two points are: root mean square over the axes; two values of a categorical axis are 1 apart.
+    pub(crate) fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for ((dimension, a), b) in self.dimensions.iter().zip(a).zip(b) {
+            let gap = match dimension {
+                Dimension::Continuous => a - b,
+                Dimension::Categorical(count) => f64::from(u8::from(bucket(*a, *count) != bucket(*b, *count))),
+            };
+            sum += gap * gap;
+        }
+        libm::sqrt(sum / self.dimensions.len().max(1) as f64)
+    }
+}
+
+/// Which of `count` equal intervals of [0, 1) a number is in.
+pub(crate) fn bucket(value: f64, count: usize) -> usize {
+    ((value.max(0.0) * count as f64) as usize).min(count.saturating_sub(1))
+}
