@@ -94,6 +94,7 @@ fn judgement(property: &str, outcome: Outcome) -> Judgement {
         margin: (outcome == Outcome::Failed).then_some(-0.04),
         witness: format!("{property}: glass_1 \"moved\" 0.4 cm"),
         rule_digest: digest_of(property),
+        held_before: (outcome == Outcome::Passed).then_some(property == "CloseObject"),
     }
 }
 

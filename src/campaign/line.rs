@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use crate::actions::{self, ActionCall, ActionEnd, Trace};
 use crate::base::Choices;
 use crate::campaign::Env;
-use crate::facts::{self, RunFacts};
+use crate::facts::{self, ActionFacts, RunFacts};
 use crate::history::{RunRecord, RunStatus};
-use crate::rules::{Budget, Findings, RuleFault};
+use crate::rules::{Budget, Findings, RuleBook, RuleFault};
 use crate::scenario::{self, Scene};
-use crate::verdict::{Fate, Judgement, action_score, judge, run_score};
+use crate::verdict::{Fate, Judgement, Outcome, action_score, judge, run_score};
 use crate::world::{self, World};
 
 /// Time as the caller measures it: the stages have no clock.
@@ -171,7 +171,8 @@ fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Vec<Vec<Judgement>> 
                 ActionEnd::Timeout(reason) => Fate::Timeout(reason.clone()),
                 ActionEnd::NotReached => Fate::NotReached,
             };
-            let findings = match (&fate, facts.action(step)) {
+            let seen = facts.action(step);
+            let findings = match (&fate, seen) {
                 (Fate::Completed, Some(facts)) => {
                     let asked: Vec<String> =
                         action.success_properties.iter().chain(&action.preconditions).cloned().collect();
@@ -179,9 +180,33 @@ fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Vec<Vec<Judgement>> 
                 }
                 _ => BTreeMap::<String, Result<Findings, RuleFault>>::new(),
             };
-            judge(&env.ontology, action, &findings, &fate, |property| env.rules.digest(property).to_owned())
+            let mut judgements =
+                judge(&env.ontology, action, &findings, &fate, |property| env.rules.digest(property).to_owned());
+            if let Some(seen) = seen {
+                note_held_before(&env.rules, &seen, &mut judgements);
+            }
+            judgements
         })
         .collect()
+}
+
+/// Notes, of what passed and states success, whether it had held before the action already.
+fn note_held_before(rules: &RuleBook, facts: &ActionFacts<'_>, judgements: &mut [Judgement]) {
+    let asked: Vec<String> = judgements
+        .iter()
+        .filter(|judgement| judgement.outcome == Outcome::Passed && rules.states_success(&judgement.property))
+        .map(|judgement| judgement.property.clone())
+        .collect();
+    if asked.is_empty() {
+        return;
+    }
+    let before = rules.held_before(facts, &asked, &Budget::default());
+    for judgement in judgements {
+        // What could not be judged then says nothing either way.
+        if let Some(Ok(found)) = before.get(&judgement.property) {
+            judgement.held_before = Some(found.applicable && found.holds);
+        }
+    }
 }
 
 /// The run's own status: the first action that did not complete decides.

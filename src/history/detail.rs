@@ -154,6 +154,7 @@ fn judgements(store: &Store, execution: &Term) -> Result<Vec<Judgement>, Storage
             margin: result.number("act:margin"),
             witness: result.text("act:witness").unwrap_or_default(),
             rule_digest: result.text("act:ruleDigest").unwrap_or_default(),
+            held_before: result.truth("act:heldBefore"),
         });
     }
     judgements.sort_by(|a, b| a.property.cmp(&b.property));

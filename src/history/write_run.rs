@@ -128,7 +128,8 @@ fn write_assertion(judgement: &Judgement, execution: &NamedNode, statements: &mu
         .text("act:outcome", judgement.outcome.word())
         .may("act:margin", judgement.margin.map(Literal::from))
         .text("act:witness", &judgement.witness)
-        .text("act:ruleDigest", &judgement.rule_digest);
+        .text("act:ruleDigest", &judgement.rule_digest)
+        .may("act:heldBefore", judgement.held_before.map(Literal::from));
 }
 
 /// A blank node that is the same whenever the same is written.

@@ -196,6 +196,7 @@ pub(super) mod tests {
                 margin: Some(if *outcome == Outcome::Passed { 0.05 } else { -0.016 }),
                 witness: "glass_1 moved 0.4 cm, needs more than 2 cm".into(),
                 rule_digest: "d".into(),
+                held_before: None,
             })
             .collect();
         let score = crate::verdict::action_score(outcomes.iter().copied());

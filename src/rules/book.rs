@@ -106,6 +106,17 @@ impl RuleBook {
         self.judge(&unchanged, properties, budget)
     }
 
+    /// Whether a property states what must have come about (`success`, `ASK`), not what must not (`violation`, `SELECT`).
+    ///
+    /// What must not happen has not happened before an action: that it held then is no news.
+    pub fn states_success(&self, property: &str) -> bool {
+        match self.properties.get(property).map(|judge| &judge.rules) {
+            Some(JudgeRules::Datalog { verdict, .. }) => verdict.decisive.as_ref().is_some_and(|it| it.positive),
+            Some(JudgeRules::Sparql(query)) => query.asks,
+            None => false,
+        }
+    }
+
     /// Digest of a property's rule file together with all libraries; empty for a property that the ontology lacks.
     pub fn digest(&self, property: &str) -> &str {
         self.properties.get(property).map_or("", |judge| &judge.digest)

@@ -20,6 +20,8 @@ use crate::rules::values::{Number, lexical};
 /// A prepared query.
 pub(crate) struct Query {
     prepared: PreparedSparqlQuery,
+    /// Whether it is an `ASK`, which holds when true.
+    pub(crate) asks: bool,
 }
 
 impl Query {
@@ -40,12 +42,13 @@ impl Query {
             let help = "a variable with the name of a designator is bound to its value; use it in the first group";
             Diagnostics::from(Diagnostic::error("R060", error.to_string()).in_source(source).help(help))
         })?;
-        if !first_word_is_ask_or_select(&source.text) {
+        let form = form(&source.text);
+        if form.is_none() {
             let help = "write `ASK { … }` (true is passed) or `SELECT … { … }` (every row is a violation)";
             diagnostics
                 .push(Diagnostic::error("R061", "the query is neither ASK nor SELECT").in_source(source).help(help));
         }
-        diagnostics.or(Self { prepared })
+        diagnostics.or(Self { prepared, asks: form == Some(Form::Ask) })
     }
 
     /// Judges an action: `ASK` holds when true, `SELECT` when it has no row.
@@ -213,12 +216,23 @@ fn bind_designators(text: &str, designators: &BTreeSet<String>) -> String {
     out
 }
 
-fn first_word_is_ask_or_select(text: &str) -> bool {
-    let Some(group) = first_group(text) else { return false };
-    scan(text)
-        .into_iter()
-        .take_while(|token| token.span.start < group)
-        .any(|token| token.word.eq_ignore_ascii_case("ask") || token.word.eq_ignore_ascii_case("select"))
+/// The forms of a query that can judge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Ask,
+    Select,
+}
+
+/// The form of a query; nothing where it is another one.
+fn form(text: &str) -> Option<Form> {
+    let group = first_group(text)?;
+    scan(text).into_iter().take_while(|token| token.span.start < group).find_map(|token| {
+        match token.word.to_ascii_lowercase().as_str() {
+            "ask" => Some(Form::Ask),
+            "select" => Some(Form::Select),
+            _ => None,
+        }
+    })
 }
 
 /// A fault of the parser, whose words name line and column.

@@ -44,7 +44,7 @@ pub fn judge(
                 (None, None) => (Outcome::Broken, None, "no rule was evaluated for it".to_owned()),
             },
         };
-        Judgement { property: iri.clone(), outcome, margin, witness, rule_digest: rule_digest(iri) }
+        Judgement { property: iri.clone(), outcome, margin, witness, rule_digest: rule_digest(iri), held_before: None }
     };
     action.success_properties.iter().map(decide).collect()
 }

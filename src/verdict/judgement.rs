@@ -75,4 +75,10 @@ pub struct Judgement {
     pub witness: String,
     /// Digest of the rule file that decided (empty where none did).
     pub rule_digest: String,
+    /// Whether what passed had held before the action already: then it shows nothing about the action.
+    ///
+    /// Nothing where that was not looked at: where it did not pass, and for what states that something must not happen,
+    /// which has not happened before an action.
+    #[serde(default)]
+    pub held_before: Option<bool>,
 }
