@@ -16,3 +16,4 @@ mod readme;
 mod rules;
 mod scenario;
 mod support;
+mod trust;

@@ -47,6 +47,9 @@ pub enum Command {
     /// Judges with the rules of today: those that the ontology links now.
     #[command(after_help = "Example:\n  actcheck why k7f3-3 MovedObject    (an id that `actcheck list` prints)")]
     Why(WhyArgs),
+    /// List all properties: label, language, rule file, actions, and how often each passed in the history
+    #[command(after_help = "Example:\n  actcheck rules --format csv")]
+    Rules(crate::cli::rules::RulesArgs),
     /// Write something new, ready to edit
     #[command(after_help = "Example:\n  actcheck new property StaysUpright --for Pick")]
     New(NewArgs),

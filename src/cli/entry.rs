@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::cli::args::{Arguments, Command};
-use crate::cli::{check, datalog, list, new, output, query, show, why};
+use crate::cli::{check, datalog, list, new, output, query, rules, show, why};
 
 /// Parses the process's arguments and does what they ask.
 ///
@@ -19,6 +19,7 @@ pub fn run() -> ExitCode {
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Query(args) => query::query(&args).map(|()| 0),
+        Command::Rules(args) => rules::rules(&args).map(|()| 0),
         Command::Why(args) => why::why(&args).map(|()| 0),
         Command::New(args) => new::new(&args).map(|()| 0),
         Command::Datalog(args) => datalog::datalog(&args).map(|()| 0),

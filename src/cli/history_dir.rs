@@ -6,6 +6,9 @@ use crate::base::{Diagnostic, Diagnostics};
 use crate::cli::args::HistoryArgs;
 use crate::history::History;
 
+/// Code of the fault that there is no history.
+const NONE_FOUND: &str = "X002";
+
 /// Opens the history that was named, or the one that is found.
 ///
 /// # Errors
@@ -16,6 +19,17 @@ pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
         None => find(Path::new("."))?,
     };
     History::open_existing(&folder)
+}
+
+/// Opens the history that was named, or the one that is found; nothing where none was named and there is none.
+///
+/// # Errors
+/// Several are found, or it can't be opened.
+pub fn open_if_any(args: &HistoryArgs) -> Result<Option<History>, Diagnostics> {
+    match (&args.history, find(Path::new("."))) {
+        (None, Err(faults)) if faults.iter().all(|fault| fault.code == NONE_FOUND) => Ok(None),
+        _ => open(args).map(Some),
+    }
 }
 
 fn find(here: &Path) -> Result<PathBuf, Diagnostics> {
@@ -33,7 +47,7 @@ fn find(here: &Path) -> Result<PathBuf, Diagnostics> {
     found.sort();
     match found.as_slice() {
         [only] => Ok(only.clone()),
-        [] => Err(Diagnostic::error("X002", "no history was named, and there is none in this folder")
+        [] => Err(Diagnostic::error(NONE_FOUND, "no history was named, and there is none in this folder")
             .help("name one with `--history DIR`; a campaign writes `.actcheck` beside its configuration")
             .into()),
         several => {

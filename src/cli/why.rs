@@ -35,7 +35,7 @@ pub fn why(args: &WhyArgs) -> Result<(), Diagnostics> {
 }
 
 /// The ontology that was named, or the one of this folder, or the one that the program carries.
-fn ontology_file(named: Option<&Path>) -> (Files, PathBuf) {
+pub(super) fn ontology_file(named: Option<&Path>) -> (Files, PathBuf) {
     const USUAL: &str = "ontology/actions.ttl";
     match named {
         Some(path) => (Files::Disk, path.to_owned()),

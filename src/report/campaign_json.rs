@@ -16,6 +16,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
             json!({
                 "property": line.property, "label": line.label, "unit": unit,
                 "counts": line.counts, "pass_rate": line.rate.as_ref().map(share),
+                "held_before": line.held_before,
             })
         })
         .collect();
@@ -34,6 +35,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         "exit_code": summary.exit_code(),
         "properties": properties,
         "failure_modes": summary.failure_modes.iter().map(failure_mode).collect::<Vec<_>>(),
+        "remarks": summary.remarks_json(),
         "runs": summary.runs.iter().map(run).collect::<Vec<_>>(),
     })
 }
@@ -66,6 +68,7 @@ fn judgement(judgement: &Judgement) -> Value {
     json!({
         "property": judgement.property, "outcome": judgement.outcome,
         "margin": judgement.margin, "witness": judgement.witness,
+        "held_before": judgement.held_before,
     })
 }
 

@@ -22,6 +22,7 @@ pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
     out.push('\n');
     scores(&mut out, summary);
     failure_modes(&mut out, summary);
+    remarks(&mut out, summary);
     failures(&mut out, summary);
     out
 }
@@ -89,7 +90,7 @@ fn properties_table(out: &mut String, summary: &CampaignSummary) {
     let counted = Outcome::ALL.map(|outcome| outcome.word().to_owned());
     table.set_header(["property".to_owned(), "pass rate [95 % interval]".to_owned()].into_iter().chain(counted));
     for line in summary.property_lines() {
-        let rate = line.rate.as_ref().map_or_else(|| "nothing decided".to_owned(), percent);
+        let rate = line.rate.as_ref().map_or_else(|| "nothing decided".to_owned(), Share::to_string);
         let counts = Outcome::ALL.map(|outcome| line.counts.get(outcome).to_string());
         table.add_row([line.label, rate].into_iter().chain(counts));
     }
@@ -109,7 +110,7 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
         summary.discards,
     );
     if let Some(rate) = summary.pass_rate() {
-        let _ = writeln!(out, "runs in which everything passed: {}", percent(&rate));
+        let _ = writeln!(out, "runs in which everything passed: {}", rate);
     }
     if summary.interrupted {
         let _ = writeln!(
@@ -138,6 +139,14 @@ fn failure_modes(out: &mut String, summary: &CampaignSummary) {
     }
 }
 
+/// Properties whose outcomes say less than they seem to.
+fn remarks(out: &mut String, summary: &CampaignSummary) {
+    for remark in summary.remarks() {
+        let severity = if remark.warning { "warning" } else { "note" };
+        let _ = writeln!(out, "{severity}: {}", summary.remark_text(&remark));
+    }
+}
+
 fn failures(out: &mut String, summary: &CampaignSummary) {
     let told: Vec<&RunSummary> = summary.runs.iter().filter(|run| run.failed() || run.reason.is_some()).collect();
     for run in told.iter().take(FAILURES_TOLD) {
@@ -163,12 +172,6 @@ fn failures(out: &mut String, summary: &CampaignSummary) {
             summary.history
         );
     }
-}
-
-fn percent(share: &Share) -> String {
-    let interval = &share.interval;
-    let (rate, low, high) = (interval.rate * 100.0, interval.low * 100.0, interval.high * 100.0);
-    format!("{rate:.0} % [{low:.0}–{high:.0}] ({} of {})", share.count, share.of)
 }
 
 #[cfg(test)]

@@ -100,7 +100,10 @@ fn action_text(out: &mut String, action: &ActionDetail) {
         let margin = judgement.margin.map_or_else(String::new, |margin| format!("{margin:+.4}"));
         table.add_row([
             names::local(&judgement.property).to_owned(),
-            judgement.outcome.word().to_owned(),
+            match judgement.held_before {
+                Some(true) => format!("{}, held before", judgement.outcome),
+                _ => judgement.outcome.word().to_owned(),
+            },
             margin,
             judgement.witness.clone(),
         ]);
@@ -133,7 +136,7 @@ pub fn run_json(run: &RunDetail) -> Value {
                 "message": a.message, "duration_secs": a.duration_secs, "parameters": a.parameters,
                 "outcomes": a.judgements.iter().map(|j| json!({
                     "property": j.property, "outcome": j.outcome, "margin": j.margin, "witness": j.witness,
-                    "rule_digest": j.rule_digest,
+                    "rule_digest": j.rule_digest, "held_before": j.held_before,
                 })).collect::<Vec<_>>(),
             })
         })

@@ -88,6 +88,17 @@ pub struct PropertyLine {
     pub counts: Counts,
     /// Share of passed among the decided, with its 95 % Wilson interval; nothing where none was decided.
     pub rate: Option<Share>,
+    /// Those of the passed that had held before the action already.
+    pub held_before: u64,
+}
+
+impl std::fmt::Display for Share {
+    /// Such as `80 % [55–93] (12 of 15)`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let interval = &self.interval;
+        let (rate, low, high) = (interval.rate * 100.0, interval.low * 100.0, interval.high * 100.0);
+        write!(f, "{rate:.0} % [{low:.0}–{high:.0}] ({} of {})", self.count, self.of)
+    }
 }
 
 impl RunSummary {
@@ -162,9 +173,11 @@ impl CampaignSummary {
             .iter()
             .map(|(iri, label, _)| {
                 let judgements = self.runs.iter().flat_map(|run| &run.actions).flat_map(|action| &action.judgements);
-                let counts = Counts::of(judgements.filter(|j| j.property == *iri).map(|j| j.outcome));
+                let own: Vec<&Judgement> = judgements.filter(|judgement| judgement.property == *iri).collect();
+                let counts = Counts::of(own.iter().map(|judgement| judgement.outcome));
                 let rate = Share::new(counts.passed, counts.decided());
-                PropertyLine { property: iri.clone(), label: label.clone(), counts, rate }
+                let held_before = own.iter().filter(|judgement| judgement.held_before == Some(true)).count() as u64;
+                PropertyLine { property: iri.clone(), label: label.clone(), counts, rate, held_before }
             })
             .collect()
     }

@@ -1,0 +1,98 @@
+//! `actcheck rules`
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::Value;
+
+use crate::base::Diagnostics;
+use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::why::ontology_file;
+use crate::cli::{history_dir, output};
+use crate::history::RunFilter;
+use crate::ontology::{self, Action, Ontology, Property, RuleLanguage};
+use crate::report::{Share, Table};
+use crate::verdict::{Counts, Outcome};
+
+/// `actcheck rules`
+#[derive(Debug, Args)]
+pub struct RulesArgs {
+    /// The ontology whose properties are listed [default: ontology/actions.ttl here, or the one that the program carries]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How the table is printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Prints one line for each property of the ontology. Works without a history, then without pass rates.
+pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
+    let (files, path) = ontology_file(args.ontology.as_deref());
+    let ontology = ontology::load(&files, &path)?;
+    let mut judged: BTreeMap<String, Counts> = BTreeMap::new();
+    if let Some(history) = history_dir::open_if_any(&args.history)? {
+        for row in history.outcomes(&RunFilter::default())? {
+            judged.entry(row.property).or_default().add(row.outcome);
+        }
+    }
+    let counts = |property: &Property| judged.get(&property.iri).copied().unwrap_or_default();
+    let properties = ontology.properties.values();
+    let mut table = match args.format {
+        Format::Table => Table::new(["property", "label", "language", "file", "actions", "unit", "passed"]),
+        Format::Csv | Format::Json => Table::new(
+            ["property", "label", "language", "file", "actions", "precondition_of", "unit"]
+                .into_iter()
+                .chain(Outcome::ALL.map(Outcome::word))
+                .chain(["pass_rate", "low", "high"]),
+        ),
+    };
+    table.rows = match args.format {
+        Format::Table => properties.map(|property| for_people(property, &ontology, counts(property))).collect(),
+        Format::Csv | Format::Json => {
+            properties.map(|property| for_programs(property, &ontology, counts(property))).collect()
+        }
+    };
+    output::print(&table.render(args.format.into()));
+    Ok(())
+}
+
+fn for_people(property: &Property, ontology: &Ontology, counts: Counts) -> Vec<Value> {
+    let preconditions = named(ontology, |action| action.preconditions.contains(&property.iri));
+    let mut actions = named(ontology, |action| action.success_properties.contains(&property.iri));
+    actions.extend(preconditions.into_iter().map(|name| format!("{name} (before it)")));
+    let rate = Share::new(counts.passed, counts.decided()).map_or_else(|| "–".to_owned(), |share| share.to_string());
+    let unit = property.unit.clone().unwrap_or_default();
+    let [name, label, language, file] = described(property);
+    vec![name, label, language, file, actions.join(", ").into(), unit.into(), rate.into()]
+}
+
+fn for_programs(property: &Property, ontology: &Ontology, counts: Counts) -> Vec<Value> {
+    let actions = named(ontology, |action| action.success_properties.contains(&property.iri));
+    let preconditions = named(ontology, |action| action.preconditions.contains(&property.iri));
+    let share = Share::new(counts.passed, counts.decided());
+    let part = |part: fn(&Share) -> f64| Value::from(share.as_ref().map(part));
+    let mut row: Vec<Value> = described(property).into();
+    row.extend([actions.join(" ").into(), preconditions.join(" ").into(), property.unit.clone().into()]);
+    row.extend(Outcome::ALL.map(|outcome| counts.get(outcome).into()));
+    row.extend([part(|it| it.interval.rate), part(|it| it.interval.low), part(|it| it.interval.high)]);
+    row
+}
+
+/// Name, label, language and file.
+fn described(property: &Property) -> [Value; 4] {
+    let language = match property.rule.language {
+        RuleLanguage::Datalog => "Datalog",
+        RuleLanguage::Sparql => "SPARQL",
+    };
+    let file = &*property.rule.source.name;
+    [property.name.as_str(), property.label.as_str(), language, file].map(Value::from)
+}
+
+/// Names of the actions of which something is true.
+fn named(ontology: &Ontology, is: impl Fn(&Action) -> bool) -> Vec<String> {
+    ontology.actions.iter().filter(|(_, action)| is(action)).map(|(name, _)| name.clone()).collect()
+}

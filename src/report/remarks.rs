@@ -1,0 +1,172 @@
+//! What a campaign shows about its properties themselves: outcomes that say less than they seem to.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use crate::analysis::wilson;
+use crate::report::CampaignSummary;
+use crate::verdict::Outcome;
+
+/// Fewer judgements than this are no ground for "never": with 4 of 4 the interval still begins below a half.
+const LEAST_FOR_NEVER: u64 = 5;
+/// From here on "never failed" is a warning: a property that fails in a tenth of all scenes would have failed (0.9³⁰ = 4 %).
+const LEAST_FOR_SUSPICION: u64 = 30;
+
+/// A property, or several alike, whose outcomes say less than they seem to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remark {
+    /// What is odd.
+    pub oddity: Oddity,
+    /// IRI and label of each property.
+    pub properties: Vec<(String, String)>,
+    /// How many of the judgements are odd.
+    pub count: u64,
+    /// Of how many.
+    pub of: u64,
+    /// Whether something is to be done about it.
+    pub warning: bool,
+    /// The first run that shows it, where one does.
+    pub run: Option<String>,
+}
+
+/// What can be odd about a property's outcomes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Oddity {
+    /// It passed, but had held before the action already.
+    HeldBefore,
+    /// It was decided often and never passed.
+    NeverPassed,
+    /// It was decided often and never failed.
+    NeverFailed,
+}
+
+impl Oddity {
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::HeldBefore => "held before",
+            Self::NeverPassed => "never passed",
+            Self::NeverFailed => "never failed",
+        }
+    }
+}
+
+impl CampaignSummary {
+    /// What is odd about the properties; those that are alike together.
+    pub fn remarks(&self) -> Vec<Remark> {
+        let mut alike: BTreeMap<(Oddity, u64, u64), Vec<(String, String)>> = BTreeMap::new();
+        for line in self.property_lines() {
+            let (counts, decided) = (line.counts, line.counts.decided());
+            let odd = [
+                (Oddity::HeldBefore, line.held_before, counts.passed, line.held_before > 0),
+                (Oddity::NeverPassed, decided, decided, counts.passed == 0 && decided >= LEAST_FOR_NEVER),
+                (Oddity::NeverFailed, decided, decided, counts.failed == 0 && decided >= LEAST_FOR_NEVER),
+            ];
+            for (oddity, count, of, _) in odd.into_iter().filter(|(.., is)| *is) {
+                alike.entry((oddity, count, of)).or_default().push((line.property.clone(), line.label.clone()));
+            }
+        }
+        alike
+            .into_iter()
+            .map(|((oddity, count, of), properties)| Remark {
+                run: properties.first().and_then(|(property, _)| self.run_that_shows(oddity, property)),
+                warning: oddity != Oddity::NeverFailed || of >= LEAST_FOR_SUSPICION,
+                oddity,
+                properties,
+                count,
+                of,
+            })
+            .collect()
+    }
+
+    fn run_that_shows(&self, oddity: Oddity, property: &str) -> Option<String> {
+        let shows = |judgement: &&crate::verdict::Judgement| {
+            judgement.property == property
+                && match oddity {
+                    Oddity::HeldBefore => judgement.held_before == Some(true),
+                    Oddity::NeverPassed => judgement.outcome == Outcome::Failed,
+                    Oddity::NeverFailed => false,
+                }
+        };
+        let mut runs = self.runs.iter();
+        let run = runs.find(|run| run.actions.iter().flat_map(|action| &action.judgements).any(|j| shows(&j)));
+        run.map(|run| run.id.clone())
+    }
+
+    /// A remark in words, with what to do.
+    pub fn remark_text(&self, remark: &Remark) -> String {
+        let labels: Vec<&str> = remark.properties.iter().map(|(_, label)| label.as_str()).collect();
+        let names = labels.join(", ");
+        // Of the side that was never seen, at most so much can be left.
+        let most = wilson(0, remark.of).map_or(100.0, |interval| interval.high * 100.0);
+        let ask = match (&remark.run, labels.first()) {
+            (Some(run), Some(label)) => format!("{} why {run} {label} --history {}", self.program, self.history),
+            _ => String::new(),
+        };
+        let (count, of) = (remark.count, remark.of);
+        match remark.oddity {
+            Oddity::HeldBefore => format!(
+                "{names} held already before the action in {count} of {of} passes, which say nothing about it: \
+                 let the rule compare `after` with `before`, or require it to be false beforehand ({ask})"
+            ),
+            Oddity::NeverPassed => format!(
+                "{names} never passed in {of} judgements (so in at most {most:.0} % of such scenes): \
+                 is the rule right? ({ask})"
+            ),
+            Oddity::NeverFailed if remark.warning => format!(
+                "{names} never failed in {of} judgements (so in at most {most:.0} % of such scenes): \
+                 can it fail at all? Try scenes that make it hard"
+            ),
+            Oddity::NeverFailed => {
+                format!("{names} never failed in {of} judgements (so in at most {most:.0} % of such scenes)")
+            }
+        }
+    }
+
+    /// The remarks for programs.
+    pub(super) fn remarks_json(&self) -> Value {
+        let remark = |remark: &Remark| {
+            let properties: Vec<&str> = remark.properties.iter().map(|(iri, _)| iri.as_str()).collect();
+            json!({
+                "severity": if remark.warning { "warning" } else { "note" }, "oddity": remark.oddity.word(),
+                "properties": properties, "count": remark.count, "of": remark.of, "run": remark.run,
+                "text": self.remark_text(remark),
+            })
+        };
+        self.remarks().iter().map(remark).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::RunStatus;
+    use crate::report::summary::tests::{campaign, run};
+
+    fn told(runs: u64, outcomes: [Outcome; 2], held_before: Option<bool>) -> Vec<(Oddity, u64, u64, bool)> {
+        let runs = (0..runs).map(|index| {
+            let mut run = run(index, RunStatus::Completed, &outcomes);
+            // In every third run.
+            if index.is_multiple_of(3) {
+                run.actions[0].judgements[0].held_before = held_before;
+            }
+            run
+        });
+        let summary = campaign(runs.collect());
+        summary.remarks().iter().map(|r| (r.oddity, r.count, r.of, r.warning)).collect()
+    }
+
+    #[test]
+    fn what_says_less_than_it_seems_to_is_told() {
+        use Outcome::{Broken, Failed, Passed};
+        let never = |of, warning| vec![(Oddity::NeverPassed, of, of, true), (Oddity::NeverFailed, of, of, warning)];
+        assert_eq!(told(15, [Passed, Failed], None), never(15, false));
+        assert_eq!(told(30, [Passed, Failed], Some(false)), never(30, true));
+        assert_eq!(told(4, [Passed, Failed], None), []);
+        assert_eq!(told(40, [Broken, Broken], None), []);
+        assert_eq!(told(4, [Passed, Passed], Some(true)), [(Oddity::HeldBefore, 2, 4, true)]);
+        // Two properties alike make one remark.
+        assert_eq!(told(6, [Passed, Passed], None), [(Oddity::NeverFailed, 6, 6, false)]);
+    }
+}
