@@ -13,6 +13,7 @@ mod ontology;
 mod oracle;
 mod physics;
 mod readme;
+mod recheck;
 mod rules;
 mod scenario;
 mod support;

@@ -1,15 +1,13 @@
 //! The line, once, top to bottom: choices → scene → world → trace → facts → findings → verdict.
 
-use std::collections::BTreeMap;
-
 use crate::actions::{self, ActionCall, ActionEnd, Trace};
 use crate::base::Choices;
 use crate::campaign::Env;
-use crate::facts::{self, ActionFacts, RunFacts};
+use crate::campaign::judging::judge_action;
+use crate::facts::{self, RunFacts};
 use crate::history::{RunRecord, RunStatus};
-use crate::rules::{Budget, Findings, RuleBook, RuleFault};
 use crate::scenario::{self, Scene};
-use crate::verdict::{Fate, Judgement, Outcome, action_score, judge, run_score};
+use crate::verdict::{Judgement, action_score, run_score};
 use crate::world::{self, World};
 
 /// Time as the caller measures it: the stages have no clock.
@@ -165,48 +163,9 @@ fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Vec<Vec<Judgement>> 
         .enumerate()
         .map(|(step, performed)| {
             let action = &env.ontology.actions[&performed.action];
-            let fate = match &performed.end {
-                ActionEnd::Completed => Fate::Completed,
-                ActionEnd::Broken(reason) => Fate::Broken(reason.clone()),
-                ActionEnd::Timeout(reason) => Fate::Timeout(reason.clone()),
-                ActionEnd::NotReached => Fate::NotReached,
-            };
-            let seen = facts.action(step);
-            let findings = match (&fate, seen) {
-                (Fate::Completed, Some(facts)) => {
-                    let asked: Vec<String> =
-                        action.success_properties.iter().chain(&action.preconditions).cloned().collect();
-                    env.rules.judge(&facts, &asked, &Budget::default())
-                }
-                _ => BTreeMap::<String, Result<Findings, RuleFault>>::new(),
-            };
-            let mut judgements =
-                judge(&env.ontology, action, &findings, &fate, |property| env.rules.digest(property).to_owned());
-            if let Some(seen) = seen {
-                note_held_before(&env.rules, &seen, &mut judgements);
-            }
-            judgements
+            judge_action(&env.ontology, &env.rules, action, &performed.end, facts.action(step))
         })
         .collect()
-}
-
-/// Notes, of what passed and states success, whether it had held before the action already.
-fn note_held_before(rules: &RuleBook, facts: &ActionFacts<'_>, judgements: &mut [Judgement]) {
-    let asked: Vec<String> = judgements
-        .iter()
-        .filter(|judgement| judgement.outcome == Outcome::Passed && rules.states_success(&judgement.property))
-        .map(|judgement| judgement.property.clone())
-        .collect();
-    if asked.is_empty() {
-        return;
-    }
-    let before = rules.held_before(facts, &asked, &Budget::default());
-    for judgement in judgements {
-        // What could not be judged then says nothing either way.
-        if let Some(Ok(found)) = before.get(&judgement.property) {
-            judgement.held_before = Some(found.applicable && found.holds);
-        }
-    }
 }
 
 /// The run's own status: the first action that did not complete decides.

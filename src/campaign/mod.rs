@@ -1,13 +1,19 @@
-//! The conductor: prepares a campaign, takes each run down the line, and hands it to the history.
+//! The conductor: prepares a campaign, takes each run down the line, and hands it to the history; judges
+//! stored runs anew.
 //!
 //! Never: prints, reads the command line or a clock of its own, or knows how any stage does its work.
 
 mod environment;
+mod judging;
 mod line;
 mod outcome;
+mod recheck;
+mod rule_set;
 mod run_all;
 
 pub use environment::Env;
 pub use line::{Clock, Disturbance, Failure, Manner, run_line};
 pub use outcome::{CampaignEnd, Ending};
+pub use recheck::{RecheckEnd, RecheckOptions, recheck};
+pub use rule_set::RuleSet;
 pub use run_all::{Options, run_all};

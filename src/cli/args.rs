@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::cli::recheck::RecheckArgs;
 use crate::report::TableFormat;
 
 /// QuickCheck for robot actions: generated scenes, physics simulation, verdicts by rules that you edit.
@@ -42,6 +43,16 @@ pub enum Command {
     /// lie in named graphs, one for each moment: `?execution act:before ?g . GRAPH ?g { … }`.
     #[command(after_help = "Example:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'")]
     Query(QueryArgs),
+    /// Judge stored runs by today's rules, without simulating
+    ///
+    /// A property that is new since the runs is judged too. What is news is written beside the old outcomes, with the digest
+    /// of the rules that made it and the time; `list`, `show` and the rest keep to the outcomes of the campaign itself. The
+    /// newest ones are those in the graph act:rechecked that nothing supersedes (see ontology/history.ttl).
+    ///
+    /// Exit code: 0 nothing fails now, 1 a property fails now, 2 it could not be done or nothing could be decided,
+    /// 130 stopped by Ctrl-C (what was judged is kept).
+    #[command(after_help = "Example:\n  actcheck recheck MovedObject    (after `actcheck run configs/pick.toml`)")]
+    Recheck(RecheckArgs),
     /// Say why a property holds in a run, or how near it came and what was missing
     ///
     /// Judges with the rules of today: those that the ontology links now.

@@ -5,11 +5,11 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::cli::args::{Arguments, Command};
-use crate::cli::{check, datalog, list, new, output, query, rules, show, why};
+use crate::cli::{check, datalog, list, new, output, query, recheck, rules, show, why};
 
 /// Parses the process's arguments and does what they ask.
 ///
-/// Exit codes: 0 done (for `run`: everything passed), 1 a property failed, 2 it could not be done, 130 interrupted.
+/// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed, 2 it could not be done, 130 interrupted.
 pub fn run() -> ExitCode {
     // clap prints help, version and its own errors; for the last it exits with 2.
     let arguments = Arguments::parse();
@@ -20,6 +20,7 @@ pub fn run() -> ExitCode {
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Query(args) => query::query(&args).map(|()| 0),
         Command::Rules(args) => rules::rules(&args).map(|()| 0),
+        Command::Recheck(args) => recheck::recheck(&args),
         Command::Why(args) => why::why(&args).map(|()| 0),
         Command::New(args) => new::new(&args).map(|()| 0),
         Command::Datalog(args) => datalog::datalog(&args).map(|()| 0),

@@ -13,6 +13,7 @@ mod new;
 mod output;
 mod progress;
 mod query;
+mod recheck;
 mod rules;
 mod run;
 mod show;

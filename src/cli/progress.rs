@@ -37,6 +37,12 @@ impl Progress {
         self.bar.inc(1);
     }
 
+    /// So many more runs were judged; so many outcomes failed in all.
+    pub fn judged(&self, runs: u64, failed: u64) {
+        self.bar.set_message(format!("{failed} failed"));
+        self.bar.inc(runs);
+    }
+
     /// Takes the bar away.
     pub fn finish(&self) {
         self.bar.finish_and_clear();

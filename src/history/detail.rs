@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use oxigraph::model::{NamedNode, Term};
+use oxigraph::model::{GraphNameRef, NamedNode, Term};
 use oxigraph::store::{StorageError, Store};
 
 use crate::base::names;
@@ -143,20 +143,25 @@ fn judgements(store: &Store, execution: &Term) -> Result<Vec<Judgement>, Storage
     let mut judgements = Vec::new();
     for assertion in subjects(store, "earl:subject", execution.as_ref())? {
         let assertion = Node::read(store, &assertion)?;
-        let result = match assertion.all("earl:result").first() {
-            Some(Term::BlankNode(result)) => Node::read(store, result)?,
-            Some(Term::NamedNode(result)) => Node::read(store, result)?,
-            _ => Node::default(),
-        };
-        judgements.push(Judgement {
-            property: assertion.text("earl:test").unwrap_or_default(),
-            outcome: outcome(result.text("act:outcome").as_deref()),
-            margin: result.number("act:margin"),
-            witness: result.text("act:witness").unwrap_or_default(),
-            rule_digest: result.text("act:ruleDigest").unwrap_or_default(),
-            held_before: result.truth("act:heldBefore"),
-        });
+        judgements.push(judgement(store, &assertion, GraphNameRef::DefaultGraph)?);
     }
     judgements.sort_by(|a, b| a.property.cmp(&b.property));
     Ok(judgements)
+}
+
+/// What an assertion says, with its result from the same graph.
+pub(super) fn judgement(store: &Store, assertion: &Node, graph: GraphNameRef<'_>) -> Result<Judgement, StorageError> {
+    let result = match assertion.all("earl:result").first() {
+        Some(Term::BlankNode(result)) => Node::read_in(store, result, graph)?,
+        Some(Term::NamedNode(result)) => Node::read_in(store, result, graph)?,
+        _ => Node::default(),
+    };
+    Ok(Judgement {
+        property: assertion.text("earl:test").unwrap_or_default(),
+        outcome: outcome(result.text("act:outcome").as_deref()),
+        margin: result.number("act:margin"),
+        witness: result.text("act:witness").unwrap_or_default(),
+        rule_digest: result.text("act:ruleDigest").unwrap_or_default(),
+        held_before: result.truth("act:heldBefore"),
+    })
 }

@@ -12,6 +12,7 @@ mod lists;
 mod query;
 mod read;
 mod read_campaign;
+mod recheck;
 mod record;
 mod rows;
 mod statements;
@@ -24,6 +25,7 @@ mod write_run;
 mod write_scene;
 
 pub use answer::{Cancel, QueryAnswer};
+pub use recheck::{Recheck, StoredJudgement};
 pub use record::{CampaignEnd, CampaignRecord, RunRecord, RunStatus};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use store::History;

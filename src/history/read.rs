@@ -11,17 +11,26 @@ use crate::history::Cancel;
 use crate::history::query::evaluator;
 use crate::history::statements::iri;
 
-/// All that the default graph says of one thing.
+/// All that a graph says of one thing.
 #[derive(Debug, Default)]
 pub(super) struct Node {
     values: BTreeMap<String, Vec<Term>>,
 }
 
 impl Node {
-    /// Reads it; a thing of which nothing is said is empty.
+    /// Reads what the default graph says; a thing of which nothing is said is empty.
     pub(super) fn read<'a>(store: &Store, subject: impl Into<NamedOrBlankNodeRef<'a>>) -> Result<Self, StorageError> {
+        Self::read_in(store, subject, GraphNameRef::DefaultGraph)
+    }
+
+    /// The same for any graph.
+    pub(super) fn read_in<'a>(
+        store: &Store,
+        subject: impl Into<NamedOrBlankNodeRef<'a>>,
+        graph: GraphNameRef<'_>,
+    ) -> Result<Self, StorageError> {
         let mut node = Self::default();
-        for quad in store.quads_for_pattern(Some(subject.into()), None, None, Some(GraphNameRef::DefaultGraph)) {
+        for quad in store.quads_for_pattern(Some(subject.into()), None, None, Some(graph)) {
             let quad = quad?;
             node.values.entry(quad.predicate.into_string()).or_default().push(quad.object);
         }
@@ -86,16 +95,26 @@ pub(super) fn short_id(iri: &str) -> &str {
     [names::RUN, names::CAMPAIGN, names::OBJ].iter().find_map(|namespace| iri.strip_prefix(namespace)).unwrap_or(iri)
 }
 
-/// Things of which a property has a value, in no order that means anything.
+/// Things of which a property has a value in the default graph, in no order that means anything.
 pub(super) fn subjects<'a>(
     store: &Store,
     property: &str,
     value: impl Into<TermRef<'a>>,
 ) -> Result<Vec<NamedOrBlankNode>, StorageError> {
+    subjects_in(store, property, value, GraphNameRef::DefaultGraph)
+}
+
+/// The same for any graph.
+pub(super) fn subjects_in<'a>(
+    store: &Store,
+    property: &str,
+    value: impl Into<TermRef<'a>>,
+    graph: GraphNameRef<'_>,
+) -> Result<Vec<NamedOrBlankNode>, StorageError> {
     let property = iri(property);
     let property: NamedNodeRef<'_> = property.as_ref();
     store
-        .quads_for_pattern(None, Some(property), Some(value.into()), Some(GraphNameRef::DefaultGraph))
+        .quads_for_pattern(None, Some(property), Some(value.into()), Some(graph))
         .map(|quad| quad.map(|quad| quad.subject))
         .collect()
 }

@@ -91,7 +91,8 @@ fn write_execution(record: &RunRecord, step: usize, run: &NamedNode, statements:
         about.has("act:during", during_graph(run, step));
     }
     for judgement in record.judgements.get(step).into_iter().flatten() {
-        write_assertion(judgement, &node, statements);
+        let of = |part| unique(&[node.as_str(), &judgement.property, part]);
+        write_assertion(judgement, &node, [of("assertion"), of("result")], statements);
     }
 }
 
@@ -113,8 +114,13 @@ fn message(action: &ActionTrace) -> Option<&str> {
     }
 }
 
-fn write_assertion(judgement: &Judgement, execution: &NamedNode, statements: &mut Statements) {
-    let (assertion, result) = (blank(execution, judgement, "assertion"), blank(execution, judgement, "result"));
+/// States a judgement with the two nodes that it gets: the assertion and its result.
+pub(super) fn write_assertion(
+    judgement: &Judgement,
+    execution: &NamedNode,
+    [assertion, result]: [BlankNode; 2],
+    statements: &mut Statements,
+) {
     statements
         .about(assertion)
         .is_a("earl:Assertion")
@@ -133,9 +139,9 @@ fn write_assertion(judgement: &Judgement, execution: &NamedNode, statements: &mu
 }
 
 /// A blank node that is the same whenever the same is written.
-fn blank(execution: &NamedNode, judgement: &Judgement, part: &str) -> BlankNode {
+pub(super) fn unique(texts: &[&str]) -> BlankNode {
     let mut digest = Digest::new();
-    for text in [execution.as_str(), &judgement.property, part] {
+    for text in texts {
         digest.update(text.as_bytes());
     }
     // A digest is 32 hexadecimal digits.

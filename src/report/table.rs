@@ -60,15 +60,16 @@ impl Table {
     }
 
     fn json(&self) -> String {
-        let rows: Vec<Value> = self
-            .rows
-            .iter()
-            .map(|row| {
-                let pairs = self.columns.iter().cloned().zip(row.iter().cloned());
-                Value::Object(pairs.collect::<Map<String, Value>>())
-            })
-            .collect();
-        format!("{:#}\n", Value::Array(rows))
+        format!("{:#}\n", self.objects())
+    }
+
+    /// A JSON array with one object a row.
+    pub(super) fn objects(&self) -> Value {
+        let object = |row: &Vec<Value>| {
+            let pairs = self.columns.iter().cloned().zip(row.iter().cloned());
+            Value::Object(pairs.collect::<Map<String, Value>>())
+        };
+        Value::Array(self.rows.iter().map(object).collect())
     }
 }
 

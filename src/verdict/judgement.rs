@@ -82,3 +82,15 @@ pub struct Judgement {
     #[serde(default)]
     pub held_before: Option<bool>,
 }
+
+impl Judgement {
+    /// Whether another says the same in every part. (A margin that is no number is the same as another such.)
+    pub fn says_the_same(&self, other: &Self) -> bool {
+        let margin =
+            |of: &Self| of.margin.map(|value| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() });
+        let texts = |of: &Self| [of.property.clone(), of.witness.clone(), of.rule_digest.clone()];
+        (self.outcome, self.held_before) == (other.outcome, other.held_before)
+            && margin(self) == margin(other)
+            && texts(self) == texts(other)
+    }
+}

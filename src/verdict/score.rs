@@ -36,6 +36,13 @@ impl Counts {
         *self.slot(outcome) += 1;
     }
 
+    /// Counts as often again as another counted.
+    pub fn add_all(&mut self, other: Self) {
+        for outcome in Outcome::ALL {
+            *self.slot(outcome) += other.get(outcome);
+        }
+    }
+
     /// How often one outcome occurred.
     pub fn get(mut self, outcome: Outcome) -> u64 {
         *self.slot(outcome)

@@ -1,0 +1,113 @@
+//! What judging the past costs: one new property over 2,000 stored pick runs, beside simulating them.
+//!
+//! A few dozen runs are simulated and kept many times under new ids, so that the traces are real. Demanded: at least 1,000
+//! runs/s on two cores, everything that a user waits for included (finding the runs, traces, facts, rules, writing).
+
+use std::num::NonZero;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use actcheck::base::{Choices, Files};
+use actcheck::campaign::{Clock, Ending, Env, Manner, RecheckOptions, RuleSet, recheck, run_line};
+use actcheck::config::Overrides;
+use actcheck::history::{History, RunFilter};
+
+const SIMULATED: u64 = 40;
+const STORED: u64 = 2_000;
+
+const RULE: &str = "
+@prefix act: <http://actions#> .
+@prefix w: <https://w3id.org/actcheck/world#> .
+success(?o) :- parameter(act:pickObject, ?o), during(?o, w:maxTilt, ?tilt), ?tilt < 0.5 .
+margin(?m)  :- parameter(act:pickObject, ?o), during(?o, w:maxTilt, ?tilt), ?m = 0.5 - ?tilt .
+";
+const ENTRY: &str = "
+act:StaysUpright a act:Property ; rdfs:label \"stays upright\" ; act:unit \"rad\" ;
+    act:needsParameter act:pickObject ; act:verifiedBy <../rules/stays_upright.rls> .
+act:Pick act:successProperty act:StaysUpright .
+";
+
+fn main() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let simulated_per_sec = fill(&folder.path().join("history"));
+    let history = History::open_existing(&folder.path().join("history")).expect("it was just written");
+    let ontology = with_new_property(folder.path());
+    let jobs = std::thread::available_parallelism().map_or(1, NonZero::get);
+    println!("{STORED} stored pick runs, {jobs} cores; simulating makes {simulated_per_sec:.1} runs/s on one");
+    println!("{:44} {:>8} {:>8} {:>22}", "", "runs/s", "written", "times as fast as simulating");
+    let judge = |what: &str, jobs: usize, properties: &[String]| {
+        let start = Instant::now();
+        let rules = RuleSet::prepare(&Files::Disk, &ontology).and_then(|rules| rules.only(properties));
+        let rules = rules.expect("the shipped rules are sound");
+        let written = judge_all(&history, &rules, jobs);
+        let rate = STORED as f64 / start.elapsed().as_secs_f64();
+        println!("{what:44} {rate:8.0} {written:8} {:22.0}", rate / simulated_per_sec / jobs as f64);
+    };
+    let new = ["StaysUpright".to_owned()];
+    judge("one new property (at least 1,000)", jobs, &new);
+    judge("the same again: nothing is news", jobs, &new);
+    judge("all six properties: nothing is news", jobs, &[]);
+    judge("all six properties, one core", 1, &[]);
+}
+
+/// Simulates some runs and keeps them many times. Returns how many a second are simulated on one core.
+fn fill(dir: &Path) -> f64 {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/pick.toml");
+    let overrides = Overrides { history: Some(dir.to_owned()), runs: Some(2_000), ..Overrides::default() };
+    let env = Env::prepare(&config, &overrides).expect("the shipped configuration is sound");
+    let manner = Manner { clock: Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 }, disturb: None };
+    let start = Instant::now();
+    let records: Vec<_> = (0..SIMULATED)
+        .filter_map(|index| run_line(&env, "bench", index, Choices::random(env.campaign.seed, index), &manner).ok())
+        .collect();
+    let per_sec = records.len() as f64 / start.elapsed().as_secs_f64();
+    let history = History::open(dir).expect("a fresh history");
+    history
+        .begin_campaign(&env.record("bench".into(), "bench".into(), (manner.clock.now)()))
+        .expect("room on the disk");
+    for (index, record) in (0..STORED).zip(records.iter().cycle()) {
+        let mut record = record.clone();
+        record.id = format!("bench-{}", index + 1);
+        record.index = index;
+        history.commit(&record).expect("room on the disk");
+    }
+    history.flush().expect("room on the disk");
+    per_sec
+}
+
+/// A copy of the shipped ontology and rules with one property more.
+fn with_new_property(folder: &Path) -> std::path::PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (from, to) in [("ontology", "ontology"), ("rules", "rules"), ("rules/lib", "rules/lib")] {
+        std::fs::create_dir_all(folder.join(to)).expect("room on the disk");
+        for path in Files::Disk.list(&root.join(from)) {
+            let name = path.file_name().expect("a file has a name");
+            std::fs::copy(&path, folder.join(to).join(name)).expect("room on the disk");
+        }
+    }
+    let ontology = folder.join("ontology/actions.ttl");
+    let text = std::fs::read_to_string(&ontology).expect("it was just copied");
+    std::fs::write(&ontology, text + ENTRY).expect("room on the disk");
+    std::fs::write(folder.join("rules/stays_upright.rls"), RULE).expect("room on the disk");
+    ontology
+}
+
+/// Judges everything. Returns how many judgements were news.
+fn judge_all(history: &History, rules: &RuleSet, jobs: usize) -> usize {
+    let runs = history.runs(&RunFilter::default()).expect("a whole history");
+    let options = RecheckOptions { jobs, batch: RecheckOptions::BATCH, at: "2026-01-02T00:00:00Z".to_owned() };
+    let mut written = 0;
+    let end = recheck(
+        history,
+        &runs,
+        |_| rules,
+        &options,
+        &AtomicBool::new(false),
+        |_, batch| {
+            written += batch.iter().filter(|recheck| recheck.is_news()).count();
+        },
+    );
+    assert!(matches!(end.ending, Ending::Finished) && end.judged == STORED, "{end:?}");
+    written
+}

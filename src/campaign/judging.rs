@@ -1,0 +1,56 @@
+//! One performed action judged, in a new run or in a stored one.
+
+use std::collections::BTreeMap;
+
+use crate::actions::ActionEnd;
+use crate::facts::ActionFacts;
+use crate::ontology::{Action, Ontology};
+use crate::rules::{Budget, RuleBook};
+use crate::verdict::{Fate, Judgement, Outcome, judge};
+
+/// Outcomes of an action's success properties. The rules are asked only of an action that came to its own end.
+pub(super) fn judge_action(
+    ontology: &Ontology,
+    rules: &RuleBook,
+    action: &Action,
+    end: &ActionEnd,
+    facts: Option<ActionFacts<'_>>,
+) -> Vec<Judgement> {
+    let fate = match end {
+        ActionEnd::Completed => Fate::Completed,
+        ActionEnd::Broken(reason) => Fate::Broken(reason.clone()),
+        ActionEnd::Timeout(reason) => Fate::Timeout(reason.clone()),
+        ActionEnd::NotReached => Fate::NotReached,
+    };
+    let findings = match (&fate, facts) {
+        (Fate::Completed, Some(facts)) => {
+            let asked: Vec<String> = action.success_properties.iter().chain(&action.preconditions).cloned().collect();
+            rules.judge(&facts, &asked, &Budget::default())
+        }
+        _ => BTreeMap::new(),
+    };
+    let mut judgements = judge(ontology, action, &findings, &fate, |property| rules.digest(property).to_owned());
+    if let Some(facts) = facts {
+        note_held_before(rules, &facts, &mut judgements);
+    }
+    judgements
+}
+
+/// Notes, of what passed and states success, whether it had held before the action already.
+fn note_held_before(rules: &RuleBook, facts: &ActionFacts<'_>, judgements: &mut [Judgement]) {
+    let asked: Vec<String> = judgements
+        .iter()
+        .filter(|judgement| judgement.outcome == Outcome::Passed && rules.states_success(&judgement.property))
+        .map(|judgement| judgement.property.clone())
+        .collect();
+    if asked.is_empty() {
+        return;
+    }
+    let before = rules.held_before(facts, &asked, &Budget::default());
+    for judgement in judgements {
+        // What could not be judged then says nothing either way.
+        if let Some(Ok(found)) = before.get(&judgement.property) {
+            judgement.held_before = Some(found.applicable && found.holds);
+        }
+    }
+}

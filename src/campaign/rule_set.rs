@@ -1,0 +1,55 @@
+//! The rules that stored runs are judged by.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
+use crate::ontology::{self, Action, Ontology};
+use crate::rules::RuleBook;
+
+/// An ontology with its rules, prepared once, and which of its success properties are judged.
+pub struct RuleSet {
+    pub(super) ontology: Ontology,
+    pub(super) rules: RuleBook,
+    /// Actions by local name, with the properties that are judged only.
+    pub(super) actions: BTreeMap<String, Action>,
+}
+
+impl RuleSet {
+    /// Reads, checks and plans everything that an ontology links. All success properties are judged.
+    ///
+    /// # Errors
+    /// All faults of the ontology, or all of its rules, each with its place.
+    pub fn prepare(files: &Files, path: &Path) -> Result<Self, Diagnostics> {
+        let ontology = ontology::load(files, path)?;
+        let rules = RuleBook::prepare(&ontology)?;
+        let actions = ontology.actions.clone();
+        Ok(Self { ontology, rules, actions })
+    }
+
+    /// The same for some properties only, by local name or IRI; none means all.
+    ///
+    /// # Errors
+    /// `X030` no action has such a success property: every such name.
+    pub fn only(mut self, properties: &[String]) -> Result<Self, Diagnostics> {
+        if properties.is_empty() {
+            return Ok(self);
+        }
+        let named = |iri: &str| properties.iter().any(|name| name == iri || name == names::local(iri));
+        let all: BTreeSet<String> =
+            self.actions.values().flat_map(|action| &action.success_properties).cloned().collect();
+        let mut faults = Diagnostics::new();
+        for name in properties {
+            if !all.iter().any(|iri| name == iri || name == names::local(iri)) {
+                faults.push(
+                    Diagnostic::error("X030", format!("no action has a success property `{name}`"))
+                        .help(did_you_mean(name, all.iter().map(|iri| names::local(iri)))),
+                );
+            }
+        }
+        for action in self.actions.values_mut() {
+            action.success_properties.retain(|iri| named(iri));
+        }
+        faults.or(self)
+    }
+}

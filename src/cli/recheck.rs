@@ -1,0 +1,135 @@
+//! `actcheck recheck`
+
+use std::num::NonZero;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean};
+use crate::campaign::{Ending, RecheckOptions, RuleSet, recheck as judge_anew};
+use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::progress::Progress;
+use crate::cli::why::ontology_file;
+use crate::cli::{clock, history_dir, output, stop};
+use crate::history::{History, RunFilter, RunRow};
+use crate::report::{RecheckSummary, recheck_json, recheck_table, recheck_text};
+
+/// Faults that are told; the rest are counted.
+const TOLD: usize = 5;
+
+/// `actcheck recheck`
+#[derive(Debug, Args)]
+pub struct RecheckArgs {
+    /// Only these properties, by their names in the ontology [default: all success properties]
+    #[arg(value_name = "PROPERTY")]
+    pub properties: Vec<String>,
+    /// Only the runs of this campaign; may be given several times [default: all]
+    #[arg(long = "campaign", value_name = "ID")]
+    pub campaigns: Vec<String>,
+    /// Judge by the rules of another time: a folder with `ontology/actions.ttl` (or `actions.ttl`) and what it links
+    #[arg(long, value_name = "DIR", conflicts_with = "ontology")]
+    pub as_of_rules: Option<PathBuf>,
+    /// The ontology whose rules judge [default: ontology/actions.ttl here, or the one that the program carries]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
+    /// Workers; results don't depend on it [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How it is printed (csv: one line for each outcome that changed or is new)
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Judges stored runs by today's rules, keeps what is news, and prints it. Returns the exit code.
+pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
+    let (files, path) = ontology(args)?;
+    let rules = RuleSet::prepare(&files, &path)?.only(&args.properties)?;
+    let history = history_dir::open(&args.history)?;
+    let runs = runs(&history, &args.campaigns)?;
+    let progress = Progress::new(runs.len() as u64);
+    let bar = progress.bar();
+    let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; what was judged is kept"));
+    let options = RecheckOptions {
+        jobs: args.jobs.map_or_else(all_cores, usize::from),
+        batch: RecheckOptions::BATCH,
+        at: (clock::system().now)(),
+    };
+    let mut summary = RecheckSummary::default();
+    let end = judge_anew(
+        &history,
+        &runs,
+        |_| &rules,
+        &options,
+        &stop,
+        |judged, rechecks| {
+            summary.runs += judged;
+            rechecks.iter().for_each(|recheck| summary.add(recheck));
+            progress.judged(judged, summary.now().failed);
+        },
+    );
+    progress.finish();
+    output::print(&match args.format {
+        Format::Table => recheck_text(&summary),
+        Format::Csv => recheck_table(&summary).render(args.format.into()),
+        Format::Json => format!("{:#}\n", recheck_json(&summary)),
+    });
+    match end.ending {
+        Ending::Stopped(faults) => Err(faults),
+        Ending::Interrupted => Ok(stop::INTERRUPTED),
+        Ending::Finished if !end.faults.is_empty() => Err(first_of(end.faults)),
+        Ending::Finished => Ok(summary.exit_code()),
+    }
+}
+
+/// The ontology that was named, one of another time, or the usual one.
+fn ontology(args: &RecheckArgs) -> Result<(Files, PathBuf), Diagnostics> {
+    let Some(folder) = &args.as_of_rules else { return Ok(ontology_file(args.ontology.as_deref())) };
+    let places = ["ontology/actions.ttl", "actions.ttl"];
+    match places.map(|place| folder.join(place)).into_iter().find(|path| path.is_file()) {
+        Some(path) => Ok((Files::Disk, path)),
+        None => Err(no_rules(folder).into()),
+    }
+}
+
+fn no_rules(folder: &Path) -> Diagnostic {
+    Diagnostic::error("X032", format!("{} has neither `ontology/actions.ttl` nor `actions.ttl`", folder.display()))
+        .help("name a folder such as an older checkout of the project, with its ontology and rules")
+}
+
+/// The runs that are meant, all of them where no campaign is named.
+fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnostics> {
+    let known: Vec<String> = history.campaigns()?.into_iter().map(|row| row.id).collect();
+    let mut faults = Diagnostics::new();
+    for id in campaigns.iter().filter(|id| !known.contains(id)) {
+        let fault = format!("the history `{}` has no campaign `{id}`", history.dir().display());
+        faults.push(Diagnostic::error("X033", fault).help(did_you_mean(id, known.iter().map(String::as_str))));
+    }
+    let mut runs = faults.or(history.runs(&RunFilter::default())?)?;
+    runs.retain(|run| campaigns.is_empty() || campaigns.contains(&run.campaign));
+    if runs.is_empty() {
+        return Err(Diagnostic::error(
+            "X034",
+            format!("the history `{}` has no runs to judge", history.dir().display()),
+        )
+        .help("`actcheck run CONFIG` makes some")
+        .into());
+    }
+    Ok(runs)
+}
+
+fn all_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZero::get)
+}
+
+fn first_of(faults: Diagnostics) -> Diagnostics {
+    let left_out = faults.len().saturating_sub(TOLD);
+    let mut told = Diagnostics::new();
+    faults.into_iter().take(TOLD).for_each(|fault| told.push(fault));
+    if left_out > 0 {
+        told.push(Diagnostic::error("X035", format!("{left_out} more runs could not be judged")));
+    }
+    told
+}

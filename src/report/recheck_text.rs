@@ -1,0 +1,152 @@
+//! What a recheck changed, for people and for programs.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+
+use crate::base::names;
+use crate::report::recheck_summary::{Change, Why};
+use crate::report::table::ruled;
+use crate::report::{RecheckSummary, Table};
+use crate::verdict::{Counts, Outcome};
+
+/// Changes that are told at a terminal; `--format csv` has all.
+const TOLD: usize = 20;
+
+/// Counts of each property before and now, and the outcomes that changed.
+pub fn recheck_text(summary: &RecheckSummary) -> String {
+    let mut out = String::new();
+    let mut table = ruled();
+    table.force_no_tty().set_header(["property", "before", "now", "changed", "new"]);
+    for (iri, line) in &summary.properties {
+        table.add_row([
+            names::local(iri).to_owned(),
+            counted(line.before),
+            counted(line.now),
+            line.changed.to_string(),
+            line.new.to_string(),
+        ]);
+    }
+    let restated: u64 = summary.properties.values().map(|line| line.restated).sum();
+    let _ = writeln!(out, "{table}\n\n{}", told(summary, restated));
+    changes(&mut out, summary);
+    out
+}
+
+fn told(summary: &RecheckSummary, restated: u64) -> String {
+    let changed: u64 = summary.properties.values().map(|line| line.changed).sum();
+    let new: u64 = summary.properties.values().map(|line| line.new).sum();
+    let mut text = format!("{} judged anew: {changed} outcomes changed, {new} new", runs(summary.runs));
+    if restated > 0 {
+        let _ = write!(text, ", {restated} the same by another rule, margin or witness");
+    }
+    text
+}
+
+fn runs(count: u64) -> String {
+    if count == 1 { "1 run".to_owned() } else { format!("{count} runs") }
+}
+
+/// Changed outcomes first; of the new ones those that failed, which are the ones to look at.
+fn changes(out: &mut String, summary: &RecheckSummary) {
+    let (changed, new): (Vec<&Change>, Vec<&Change>) =
+        summary.changes.iter().partition(|change| change.before.is_some());
+    let failed: Vec<&Change> = new.into_iter().filter(|change| change.now.outcome == Outcome::Failed).collect();
+    for change in changed.iter().chain(&failed).take(TOLD) {
+        let before = change.before.map_or("new", |(outcome, _)| outcome.word());
+        let _ = writeln!(
+            out,
+            "  {} {}, {}: {before} → {} ({}{}); {}",
+            change.run,
+            names::local(&change.action),
+            names::local(&change.now.property),
+            change.now.outcome,
+            why_text(&change.why, 8),
+            margins(change),
+            change.now.witness
+        );
+    }
+    let left_out = (changed.len() + failed.len()).saturating_sub(TOLD);
+    if left_out > 0 {
+        let _ = writeln!(out, "  {left_out} more: --format csv lists every one");
+    }
+}
+
+fn margins(change: &Change) -> String {
+    let number = |margin: Option<f64>| margin.map_or("none".to_owned(), |margin| format!("{margin:.4}"));
+    match (change.before, change.now.margin) {
+        (Some((_, None)) | None, None) => String::new(),
+        (Some((_, before)), now) => format!(", margin {} → {}", number(before), number(now)),
+        (None, now) => format!(", margin {}", number(now)),
+    }
+}
+
+/// The reason in words, with so many letters of the digests.
+fn why_text(why: &Why, letters: usize) -> String {
+    let short = |digest: &str| digest.get(..letters).unwrap_or(digest).to_owned();
+    match why {
+        Why::NewProperty => "property is new".to_owned(),
+        Why::RuleChanged(before, now) => format!("rule changed {} → {}", short(before), short(now)),
+        Why::SameRule => "same rule, other ontology or program".to_owned(),
+    }
+}
+
+/// The outcomes that occurred, with their numbers.
+fn counted(counts: Counts) -> String {
+    let words: Vec<String> = Outcome::ALL
+        .into_iter()
+        .filter(|outcome| counts.get(*outcome) > 0)
+        .map(|outcome| format!("{} {outcome}", counts.get(outcome)))
+        .collect();
+    if words.is_empty() { "none".to_owned() } else { words.join(", ") }
+}
+
+/// One line for each outcome that changed or is new.
+pub fn recheck_table(summary: &RecheckSummary) -> Table {
+    let mut table = Table::new([
+        "run",
+        "step",
+        "action",
+        "property",
+        "before",
+        "now",
+        "margin_before",
+        "margin_now",
+        "why",
+        "witness",
+    ]);
+    for change in &summary.changes {
+        table.rows.push(vec![
+            change.run.clone().into(),
+            change.step.into(),
+            change.action.clone().into(),
+            change.now.property.clone().into(),
+            change.before.map(|(outcome, _)| outcome.word()).into(),
+            change.now.outcome.word().into(),
+            change.before.and_then(|(_, margin)| margin).into(),
+            change.now.margin.into(),
+            why_text(&change.why, usize::MAX).into(),
+            change.now.witness.clone().into(),
+        ]);
+    }
+    table
+}
+
+/// The same with the counts of each property.
+pub fn recheck_json(summary: &RecheckSummary) -> Value {
+    let properties: Vec<Value> = summary
+        .properties
+        .iter()
+        .map(|(iri, line)| {
+            json!({
+                "property": iri,
+                "before": line.before,
+                "now": line.now,
+                "changed": line.changed,
+                "new": line.new,
+                "restated": line.restated,
+            })
+        })
+        .collect();
+    json!({ "runs": summary.runs, "properties": properties, "changes": recheck_table(summary).objects() })
+}

@@ -1,0 +1,274 @@
+//! Judging the past anew: equal to simulating it again, nothing twice, nothing half, nothing lost.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use actcheck::actions::ActionEnd;
+use actcheck::base::{Files, Term, names};
+use actcheck::campaign::{Ending, RecheckEnd, RecheckOptions, RuleSet, recheck};
+use actcheck::facts::extract;
+use actcheck::history::{History, QueryAnswer, Recheck, RunFilter, RunStatus};
+use actcheck::verdict::Outcome;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::history::{sample_campaign, sample_run};
+use crate::support::{actcheck, copy, edit, project, root, stderr, stdout};
+
+const NEW_RULE: &str = "
+@prefix act: <http://actions#> .
+@prefix w: <https://w3id.org/actcheck/world#> .
+success(?o) :- parameter(act:pickObject, ?o), during(?o, w:maxTilt, ?tilt), ?tilt < 0.05 .
+margin(?m)  :- parameter(act:pickObject, ?o), during(?o, w:maxTilt, ?tilt), ?m = 0.05 - ?tilt .
+";
+
+const NEW_ENTRY: &str = "
+act:StaysUpright a act:Property ; rdfs:label \"stays upright\" ; act:unit \"rad\" ;
+    act:needsParameter act:pickObject ; act:verifiedBy <../rules/stays_upright.rls> .
+act:Pick act:successProperty act:StaysUpright .
+";
+
+/// As `ontology/history.ttl` gives it, with what else is compared.
+const NEWEST: &str = "SELECT ?index ?property ?outcome ?margin ?witness WHERE {
+    { ?a earl:subject ?e ; earl:test ?property ; earl:result ?r . ?r act:outcome ?outcome ; act:witness ?witness .
+      OPTIONAL { ?r act:margin ?margin } }
+    UNION
+    { GRAPH act:rechecked { ?a earl:subject ?e ; earl:test ?property ; earl:result ?r . ?r act:outcome ?outcome ;
+        act:witness ?witness . OPTIONAL { ?r act:margin ?margin } } }
+    FILTER NOT EXISTS { GRAPH act:rechecked { ?later act:supersedes ?a } }
+    ?e act:ofRun/act:index ?index } ORDER BY ?index ?property";
+const OWN: &str = "SELECT ?index ?property ?outcome ?margin ?witness WHERE {
+    ?a earl:subject ?e ; earl:test ?property ; earl:result ?r . ?r act:outcome ?outcome ; act:witness ?witness .
+    OPTIONAL { ?r act:margin ?margin } ?e act:ofRun/act:index ?index } ORDER BY ?index ?property";
+const RECHECKED: &str = "SELECT (COUNT(*) AS ?n) WHERE { GRAPH act:rechecked { ?a a earl:Assertion } }";
+
+fn add_property(folder: &Path) {
+    std::fs::write(folder.join("rules/stays_upright.rls"), NEW_RULE).unwrap();
+    let ontology = folder.join("ontology/actions.ttl");
+    std::fs::write(&ontology, std::fs::read_to_string(&ontology).unwrap() + NEW_ENTRY).unwrap();
+}
+
+/// The object has to move by more than any pick moves it.
+fn change_rule(folder: &Path) {
+    edit(&folder.join("rules/moved_object.rls"), "?d > 0.02", "?d > 0.45");
+    edit(&folder.join("rules/moved_object.rls"), "?d - 0.02", "?d - 0.45");
+}
+
+fn ask(folder: &Path, history: &str, query: &str) -> String {
+    let output = actcheck(folder, &["query", "--history", history, "--format", "csv", query]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    stdout(&output)
+}
+
+fn recheck_json(folder: &Path, arguments: &[&str]) -> (i32, Value) {
+    let output = actcheck(folder, &[&["recheck", "--history", "h", "--format", "json"], arguments].concat());
+    let text = stdout(&output);
+    let json = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}\n{}", stderr(&output)));
+    (output.status.code().unwrap(), json)
+}
+
+#[test]
+fn the_past_judged_anew_is_what_simulating_it_again_gives() {
+    let project = project();
+    let folder = project.path();
+    actcheck(folder, &["run", "configs/pick.toml", "--runs", "6", "--history", "h"]);
+    let own = ask(folder, "h", OWN);
+    let listed = stdout(&actcheck(folder, &["list", "--history", "h"]));
+    add_property(folder);
+    change_rule(folder);
+    let (code, json) = recheck_json(folder, &[]);
+    assert_eq!((code, &json["runs"]), (1, &Value::from(6)));
+    let line = |name: &str| {
+        let lines = json["properties"].as_array().unwrap();
+        lines.iter().find(|line| line["property"] == names::act(name)).unwrap().clone()
+    };
+    assert_eq!(line("StaysUpright")["new"], 6);
+    assert_eq!(line("CloseObject")["before"], line("CloseObject")["now"]);
+    let changed = line("MovedObject")["changed"].as_u64().unwrap();
+    assert!(changed > 0, "{json:#}");
+    let changes = json["changes"].as_array().unwrap();
+    assert_eq!(changes.len() as u64, 6 + changed);
+    let moved = changes.iter().find(|change| change["before"] == "passed").unwrap();
+    assert_eq!((&moved["now"], &moved["property"]), (&Value::from("failed"), &Value::from(names::act("MovedObject"))));
+    assert!(moved["why"].as_str().unwrap().starts_with("rule changed "), "{moved}");
+
+    actcheck(folder, &["run", "configs/pick.toml", "--runs", "6", "--history", "again"]);
+    let newest = ask(folder, "h", NEWEST);
+    assert_eq!(newest.lines().count(), 1 + 6 * 6);
+    assert_eq!(newest, ask(folder, "again", OWN));
+    assert_eq!(ask(folder, "h", OWN), own, "the campaign's own outcomes changed");
+    assert_eq!(stdout(&actcheck(folder, &["list", "--history", "h"])), listed);
+}
+
+#[test]
+fn rules_of_another_time_judge_too_and_nothing_is_written_twice() {
+    let project = project();
+    let folder = project.path();
+    actcheck(folder, &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
+    let own = ask(folder, "h", OWN);
+    let (_, json) = recheck_json(folder, &[]);
+    assert_eq!((json["changes"].as_array().unwrap().len(), ask(folder, "h", RECHECKED)), (0, "n\n0\n".to_owned()));
+    for name in ["ontology", "rules"] {
+        copy(&folder.join(name), &folder.join("old").join(name));
+    }
+    change_rule(folder);
+    let (_, json) = recheck_json(folder, &["MovedObject"]);
+    assert_eq!(json["properties"].as_array().unwrap().len(), 1);
+    let count = ask(folder, "h", RECHECKED);
+    assert_eq!(count, "n\n4\n");
+    let (_, json) = recheck_json(folder, &["MovedObject"]);
+    assert_eq!((json["changes"].as_array().unwrap().len(), ask(folder, "h", RECHECKED)), (0, count));
+    assert_ne!(ask(folder, "h", NEWEST), own);
+    for _ in 0..2 {
+        recheck_json(folder, &["--as-of-rules", "old"]);
+        assert_eq!(ask(folder, "h", NEWEST), own);
+        assert_eq!(ask(folder, "h", RECHECKED), "n\n8\n");
+    }
+    // All of it within a second or two: no two judgements may fall together.
+    recheck_json(folder, &[]);
+    assert_ne!(ask(folder, "h", NEWEST), own);
+    assert_eq!(ask(folder, "h", RECHECKED), "n\n12\n");
+}
+
+#[test]
+fn what_cannot_be_judged_is_said_and_writes_nothing() {
+    let project = project();
+    let folder = project.path();
+    let history = History::open(&folder.join("h")).unwrap();
+    history.begin_campaign(&sample_campaign("k", 0)).unwrap();
+    history.commit(&sample_run("k", 0)).unwrap();
+    drop(history);
+    let fails = |arguments: &[&str], wanted: &[&str]| {
+        let output = actcheck(folder, &[&["recheck"], arguments].concat());
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?} {text}");
+        wanted.iter().for_each(|wanted| assert!(text.contains(wanted), "no `{wanted}` in {text}"));
+    };
+    fails(&["MovedObjekt", "Banana", "--history", "h"], &["X030", "did you mean `MovedObject`?", "`Banana`"]);
+    fails(&["--campaign", "kk", "--history", "h"], &["X033", "did you mean `k`?"]);
+    fails(&["--as-of-rules", "models", "--history", "h"], &["X032", "models"]);
+    edit(&folder.join("rules/close_object.rls"), "success(", "success((");
+    fails(&["MovedObject", "--history", "h"], &["close_object.rls"]);
+    assert_eq!(ask(folder, "h", RECHECKED), "n\n0\n");
+    drop(History::open(&folder.join("empty")).unwrap());
+    std::fs::remove_dir_all(folder.join("rules")).unwrap();
+    copy(&root().join("rules"), &folder.join("rules"));
+    fails(&["--history", "empty"], &["X034", "no runs"]);
+}
+
+/// A history of sample runs, every one of which a new property can be judged in.
+fn filled(runs: u64) -> (TempDir, History, RuleSet) {
+    let project = project();
+    add_property(project.path());
+    let history = History::open(&project.path().join("h")).unwrap();
+    history.begin_campaign(&sample_campaign("k", 0)).unwrap();
+    (0..runs).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
+    let rules = RuleSet::prepare(&Files::Disk, &project.path().join("ontology/actions.ttl")).unwrap();
+    (project, history, rules)
+}
+
+/// Judges everything in batches of four; stops after so many of them.
+fn judge(history: &History, rules: &RuleSet, jobs: usize, batches: usize) -> (RecheckEnd, Vec<Recheck>) {
+    let stop = AtomicBool::new(false);
+    let runs = history.runs(&RunFilter::default()).unwrap();
+    let options = RecheckOptions { jobs, batch: 4, at: "2026-08-02T12:00:00Z".to_owned() };
+    let (mut told, mut seen) = (Vec::new(), 0);
+    let end = recheck(
+        history,
+        &runs,
+        |_| rules,
+        &options,
+        &stop,
+        |_, batch| {
+            told.extend(batch.to_vec());
+            seen += 1;
+            stop.store(seen >= batches, Ordering::Relaxed);
+        },
+    );
+    (end, told)
+}
+
+fn kept(history: &History) -> u64 {
+    match history.query("SELECT ?a WHERE { GRAPH act:rechecked { ?a a earl:Assertion } }") {
+        Ok(QueryAnswer::Table { rows, .. }) => rows.len() as u64,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_recheck_that_was_stopped_keeps_whole_batches_and_goes_on_later() {
+    let (_folder, history, rules) = filled(14);
+    let rules = rules.only(&["StaysUpright".to_owned()]).unwrap();
+    let (end, told) = judge(&history, &rules, 2, 1);
+    assert!(matches!(end.ending, Ending::Interrupted), "{end:?}");
+    assert!(end.judged >= 4 && end.judged < 14, "{end:?}");
+    assert_eq!((told.len() as u64, kept(&history)), (end.judged, end.judged));
+    let (end, again) = judge(&history, &rules, 1, usize::MAX);
+    assert!(matches!(end.ending, Ending::Finished) && end.judged == 14, "{end:?}");
+    assert_eq!(kept(&history), 14);
+    assert_eq!(again.iter().filter(|recheck| recheck.is_news()).count() as u64, 14 - told.len() as u64);
+    let order: Vec<&str> = again.iter().map(|recheck| recheck.run.as_str()).collect();
+    assert_eq!(order, (1..=14).map(|number| format!("k-{number}")).collect::<Vec<_>>());
+}
+
+#[test]
+fn any_number_of_workers_gives_the_same() {
+    let (_folder, history, rules) = filled(9);
+    let (_other_folder, other, _) = filled(9);
+    let told = |history, jobs| judge(history, &rules, jobs, usize::MAX).1;
+    assert_eq!(told(&history, 1), told(&other, 3));
+    assert_eq!(kept(&history), kept(&other));
+}
+
+#[test]
+fn what_did_not_come_to_its_own_end_keeps_its_fate() {
+    let (_folder, history, rules) = filled(1);
+    let mut record = sample_run("k", 7);
+    record.trace.snapshots.clear();
+    record.trace.actions[0].end = ActionEnd::Broken("a pose is no number".to_owned());
+    record.facts = extract(&record.trace);
+    record.status = RunStatus::Broken;
+    record.judgements[0].iter_mut().for_each(|judgement| judgement.outcome = Outcome::Broken);
+    history.commit(&record).unwrap();
+    let (_, told) = judge(&history, &rules, 1, usize::MAX);
+    let broken: Vec<&Recheck> = told.iter().filter(|recheck| recheck.run == "k-8").collect();
+    assert_eq!(broken.len(), 6);
+    assert!(broken.iter().all(|recheck| recheck.now.outcome == Outcome::Broken));
+    let news: Vec<&&Recheck> = broken.iter().filter(|recheck| recheck.is_news()).collect();
+    assert_eq!(news.len(), 1, "{news:?}");
+    assert_eq!(news[0].now.property, names::act("StaysUpright"));
+    assert_eq!(news[0].now.witness, "a pose is no number");
+}
+
+#[test]
+fn a_run_that_cannot_be_read_does_not_stop_the_others() {
+    let (folder, history, rules) = filled(6);
+    std::fs::remove_file(folder.path().join("h/traces/k-3.trace")).unwrap();
+    std::fs::write(folder.path().join("h/traces/k-5.trace"), "no trace").unwrap();
+    let (end, told) = judge(&history, &rules, 2, usize::MAX);
+    assert!(matches!(end.ending, Ending::Finished) && end.judged == 4, "{end:?}");
+    let codes: Vec<&str> = end.faults.iter().map(|fault| fault.code).collect();
+    assert_eq!(codes, ["H009", "H007"]);
+    assert!(told.iter().all(|recheck| !["k-3", "k-5"].contains(&recheck.run.as_str())));
+    drop(history);
+    let output = actcheck(folder.path(), &["recheck", "--history", "h", "--format", "csv"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("k-3") && stderr(&output).contains("k-5"), "{}", stderr(&output));
+}
+
+#[test]
+fn each_judgement_says_by_which_rules_and_when() {
+    let (_folder, history, rules) = filled(1);
+    judge(&history, &rules, 1, usize::MAX);
+    let query = "SELECT ?property ?at ?digest ?old WHERE { GRAPH act:rechecked { ?a earl:test ?property ;
+        act:recheckedAt ?at ; earl:result/act:ruleDigest ?digest }
+        OPTIONAL { GRAPH act:rechecked { ?a act:supersedes ?b } ?b earl:result/act:ruleDigest ?old } } ORDER BY ?property";
+    let Ok(QueryAnswer::Table { rows, .. }) = history.query(query) else { panic!("no table") };
+    assert_eq!(rows.len(), 6);
+    for row in &rows {
+        let property = row[0].as_ref().and_then(Term::as_iri).unwrap().to_owned();
+        assert!(row[1].as_ref().is_some_and(|at| at.to_string().contains("2026-08-02T12:00:00Z")), "{row:?}");
+        assert_eq!(row[3].is_some(), property != names::act("StaysUpright"), "{row:?}");
+        assert_ne!(row[2], row[3]);
+    }
+}
