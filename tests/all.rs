@@ -1,5 +1,7 @@
 //! All integration tests in one program: the large libraries are linked once.
 
+mod replay;
+
 mod broken;
 mod campaign;
 mod commands;

@@ -3,6 +3,10 @@
 //!
 //! Never: prints, reads the command line or a clock of its own, or knows how any stage does its work.
 
+mod replay;
+
+mod changes;
+mod difference;
 mod environment;
 mod judging;
 mod line;
@@ -11,6 +15,10 @@ mod recheck;
 mod rule_set;
 mod run_all;
 
+pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Recalled, Replay, replay_all};
+
+pub use changes::{Change, ChangeKind, changes};
+pub use difference::{Difference, first_difference};
 pub use environment::Env;
 pub use line::{Clock, Disturbance, Failure, Manner, run_line};
 pub use outcome::{CampaignEnd, Ending};

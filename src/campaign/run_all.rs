@@ -145,7 +145,8 @@ fn make_run(env: &Env, campaign: &str, index: u64, options: &Options) -> Vec<Mes
     messages
 }
 
-fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+/// What a panic said.
+pub(super) fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     panic
         .downcast_ref::<&str>()
         .map(|text| (*text).to_owned())

@@ -26,6 +26,16 @@ pub enum Command {
     /// 130 stopped by Ctrl-C (what was done is kept).
     #[command(after_help = "Example:\n  actcheck run configs/pick.toml --runs 5 --history /tmp/try")]
     Run(RunArgs),
+    /// Run stored runs again from their recorded choices, and say whether they go the same way
+    ///
+    /// If not: the first moment, body and quantity that differ, and which model, configuration, rule or program changed
+    /// since. Outcomes are those of today's rules; they don't count for the exit code.
+    ///
+    /// Exit code: 0 every bit of every state is the same, 1 a run differs, 2 one could not be run again.
+    #[command(
+        after_help = "Example:\n  actcheck replay k7f3-3    (an id that `actcheck list` prints; its beginning is enough)"
+    )]
+    Replay(crate::cli::replay::ReplayArgs),
     /// Check configuration, ontology, rules and models without simulating; every mistake at once
     #[command(after_help = "Example:\n  actcheck check configs/pick.toml")]
     Check(CheckArgs),

@@ -15,6 +15,7 @@ pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let done = match arguments.command {
         Command::Run(args) => crate::cli::run::run(&args),
+        Command::Replay(args) => crate::cli::replay::replay(&args),
         Command::Check(args) => check::check(&args).map(|()| 0),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),

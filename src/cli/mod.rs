@@ -2,6 +2,9 @@
 //!
 //! Never: does a stage's work.
 
+mod replay;
+mod replay_text;
+
 mod args;
 mod check;
 mod clock;

@@ -1,0 +1,294 @@
+//! Runs a stored run again from its recorded choices, and says whether it went the same way.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use rayon::prelude::*;
+
+use crate::base::{Choice, Choices, Diagnostic, Diagnostics};
+use crate::campaign::line::crashed;
+use crate::campaign::run_all::panic_text;
+use crate::campaign::{Change, Difference, Env, Failure, Manner, changes, first_difference, run_line};
+use crate::history::{CampaignRecord, History, RunDetail, RunRecord};
+
+/// Names of choices in one message; more would not be read.
+const MOST_NAMED: usize = 8;
+
+/// A run's campaign as it is today, and as it was.
+pub type Recalled = (Env, CampaignRecord);
+
+/// How well the recorded choices must fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fit {
+    /// Every choice must be there, of the same kind, and none be left over.
+    Exact,
+    /// Values are brought into their bounds, and what is missing is nominal.
+    Nearest,
+}
+
+/// What came of running a run again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replay {
+    /// Id of the stored run.
+    pub run: String,
+    /// Names of its actions.
+    pub test: String,
+    /// Whether every bit of every state is the same.
+    pub same: bool,
+    /// Digest over all states, then and now.
+    pub hashes: [String; 2],
+    /// Why it did not complete, then and now.
+    pub reasons: [Option<String>; 2],
+    /// Where the traces part first. Nothing where they are the same, or part by less than the stored states show.
+    pub difference: Option<Difference>,
+    /// Choices that did not fit.
+    pub misfits: Vec<Misfit>,
+    /// Outcomes that are others by the rules of today.
+    pub outcomes: Vec<OutcomeChange>,
+    /// What changed since.
+    pub changes: Vec<Change>,
+}
+
+/// A recorded choice that did not fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Misfit {
+    /// Name of the choice; the second and later ones of a name have their number.
+    pub name: String,
+    /// What is wrong with it.
+    pub kind: MisfitKind,
+}
+
+/// How a recorded choice can fail to fit.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MisfitKind {
+    /// It was asked for and is not recorded; the nominal value was taken.
+    Missing,
+    /// It is recorded and was not asked for.
+    LeftOver,
+    /// It is made from something else now: other bounds, another number of things, another spread.
+    OtherKind,
+    /// Its value had to be changed.
+    Moved {
+        /// The recorded value.
+        was: f64,
+        /// The value that was taken.
+        is: f64,
+    },
+}
+
+/// A property's outcome that is another one now; nothing where it was not judged.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutcomeChange {
+    /// Position of the action in the test, from 1.
+    pub step: usize,
+    /// IRI of the property.
+    pub property: String,
+    /// The outcome then.
+    pub was: Option<String>,
+    /// The outcome now.
+    pub is: Option<String>,
+}
+
+/// Runs stored runs again on several workers, and tells each as it comes. `runs` are ids; `campaigns` has theirs, by id.
+///
+/// The answers are in the order of `runs` and depend neither on the number of workers nor on the clock.
+pub fn replay_all(
+    history: &History,
+    campaigns: &BTreeMap<String, Recalled>,
+    runs: &[RunDetail],
+    (fit, jobs): (Fit, usize),
+    manner: &Manner,
+    on_done: impl Fn() + Sync,
+) -> Result<Vec<Result<Replay, Diagnostics>>, Diagnostics> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs.max(1))
+        .build()
+        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
+    let one = |detail: &RunDetail| {
+        let replayed = match campaigns.get(&detail.row.campaign) {
+            Some(recalled) => replay(history, recalled, detail, fit, manner),
+            None => Err(refused(detail, "its campaign is not known").into()),
+        };
+        on_done();
+        replayed
+    };
+    Ok(pool.install(|| runs.par_iter().map(one).collect()))
+}
+
+/// Runs one stored run again.
+///
+/// # Errors
+/// `S040` the configuration has no such test, `S041` the scene can't be built any more, `S042` the choices don't fit
+/// exactly and have to; or the stored trace can't be read.
+fn replay(
+    history: &History,
+    (env, record): &Recalled,
+    detail: &RunDetail,
+    fit: Fit,
+    manner: &Manner,
+) -> Result<Replay, Diagnostics> {
+    let run = &detail.row.run;
+    let (choices, was) = (history.choices(run)?, history.trace(run)?);
+    let index = index_of(env, detail)?;
+    let is = again(env, &record.id, index, &choices, manner).map_err(|why| {
+        refused(detail, &why).help("a model, the configuration or the program changed: see the digests in the history")
+    })?;
+    let misfits = misfits(&choices, &is.choices);
+    if fit == Fit::Exact && !misfits.is_empty() {
+        return Err(unfit(detail, &misfits).into());
+    }
+    let (now, difference) =
+        (env.record(String::new(), record.name.clone(), String::new()), first_difference(&was, &is.trace));
+    Ok(Replay {
+        run: run.clone(),
+        test: detail.row.test.clone(),
+        same: was.hash == is.trace.hash && detail.row.status == is.status && difference.is_none(),
+        hashes: [was.hash, is.trace.hash.clone()],
+        reasons: [detail.reason.clone(), is.reason.clone()],
+        difference,
+        misfits,
+        outcomes: outcome_changes(detail, &is),
+        changes: changes(record, &now),
+    })
+}
+
+fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
+    Diagnostic::error("S041", format!("run {} can't be run again: {why}", detail.row.run))
+}
+
+/// An index in today's campaign whose run performs the run's test.
+fn index_of(env: &Env, detail: &RunDetail) -> Result<u64, Diagnostics> {
+    let tests: Vec<String> = env.campaign.tests.iter().map(|test| test.join(" ")).collect();
+    match tests.iter().position(|test| *test == detail.row.test) {
+        Some(test) => Ok(test as u64 * u64::from(env.campaign.test_count)),
+        None => Err(Diagnostic::error(
+            "S040",
+            format!("the configuration {} has no test `{}`", env.campaign.source.name, detail.row.test),
+        )
+        .help(format!("its tests: {}", tests.join("; ")))
+        .into()),
+    }
+}
+
+/// The run, once more. A crash of simulation is a run too.
+fn again(env: &Env, campaign: &str, index: u64, choices: &[Choice], manner: &Manner) -> Result<RunRecord, String> {
+    let recorded = || Choices::recorded(choices);
+    match catch_unwind(AssertUnwindSafe(|| run_line(env, campaign, index, recorded(), manner))) {
+        Ok(Ok(record)) => Ok(record),
+        Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can't be built any more: {reason}")),
+        Err(panic) => {
+            let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
+            let redone = catch_unwind(AssertUnwindSafe(|| crashed(env, campaign, index, recorded(), &reason)));
+            redone.ok().flatten().ok_or(reason)
+        }
+    }
+}
+
+/// What does not fit between recorded choices and those that were made from them.
+fn misfits(recorded: &[Choice], made: &[Choice]) -> Vec<Misfit> {
+    let (recorded, made) = (by_name(recorded), by_name(made));
+    let mut names: Vec<&str> = recorded.keys().chain(made.keys()).copied().collect();
+    names.sort_unstable();
+    names.dedup();
+    let mut found = Vec::new();
+    for name in names {
+        let none = Vec::new();
+        let (was, is) = (recorded.get(name).unwrap_or(&none), made.get(name).unwrap_or(&none));
+        for number in 0..was.len().max(is.len()) {
+            let kind = match (was.get(number), is.get(number)) {
+                (None, _) => MisfitKind::Missing,
+                (_, None) => MisfitKind::LeftOver,
+                (Some(was), Some(is)) if was.value.to_bits() != is.value.to_bits() => {
+                    MisfitKind::Moved { was: was.value, is: is.value }
+                }
+                (Some(was), Some(is)) if was.kind != is.kind => MisfitKind::OtherKind,
+                _ => continue,
+            };
+            let name = if number == 0 { name.to_owned() } else { format!("{name} ({})", number + 1) };
+            found.push(Misfit { name, kind });
+        }
+    }
+    found
+}
+
+fn by_name(choices: &[Choice]) -> BTreeMap<&str, Vec<&Choice>> {
+    let mut names: BTreeMap<&str, Vec<&Choice>> = BTreeMap::new();
+    for choice in choices {
+        names.entry(choice.name.as_str()).or_default().push(choice);
+    }
+    names
+}
+
+fn unfit(detail: &RunDetail, misfits: &[Misfit]) -> Diagnostic {
+    let named: Vec<String> = misfits.iter().take(MOST_NAMED).map(Misfit::to_string).collect();
+    let more = misfits.len().saturating_sub(MOST_NAMED);
+    let rest = if more > 0 { format!(", and {more} more") } else { String::new() };
+    Diagnostic::error(
+        "S042",
+        format!("the choices of run {} don't fit exactly: {}{rest}", detail.row.run, named.join(", ")),
+    )
+    .help("`--nearest` brings values into their bounds and takes nominal ones for what is missing")
+}
+
+impl std::fmt::Display for Misfit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let name = &self.name;
+        match self.kind {
+            MisfitKind::Missing => write!(f, "`{name}` is missing"),
+            MisfitKind::LeftOver => write!(f, "`{name}` is not asked for any more"),
+            MisfitKind::OtherKind => write!(f, "`{name}` is made from something else now"),
+            MisfitKind::Moved { was, is } => write!(f, "`{name}` was {was}, is {is}"),
+        }
+    }
+}
+
+/// Outcomes then and now, by action and property; only those that are others.
+fn outcome_changes(was: &RunDetail, is: &RunRecord) -> Vec<OutcomeChange> {
+    let mut both: BTreeMap<(usize, &str), [Option<&'static str>; 2]> = BTreeMap::new();
+    for (idx, action) in was.actions.iter().enumerate() {
+        for judgement in &action.judgements {
+            both.entry((idx + 1, &judgement.property)).or_default()[0] = Some(judgement.outcome.word());
+        }
+    }
+    for (idx, judgements) in is.judgements.iter().enumerate() {
+        for judgement in judgements {
+            both.entry((idx + 1, &judgement.property)).or_default()[1] = Some(judgement.outcome.word());
+        }
+    }
+    both.into_iter()
+        .filter(|(_, [was, is])| was != is)
+        .map(|((step, property), [was, is])| OutcomeChange {
+            step,
+            property: property.to_owned(),
+            was: was.map(str::to_owned),
+            is: is.map(str::to_owned),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::ChoiceKind;
+
+    fn real(name: &str, high: f64, value: f64) -> Choice {
+        Choice { name: name.into(), kind: ChoiceKind::Real { low: 0.0, high, nominal: 0.0 }, value }
+    }
+
+    #[test]
+    fn every_way_not_to_fit_is_named() {
+        let recorded = [real("a", 1.0, 0.5), real("b", 1.0, 0.9), real("b", 1.0, 0.1), real("c", 1.0, 0.2)];
+        let made = [real("a", 2.0, 0.5), real("b", 0.8, 0.8), real("d", 1.0, 0.0), real("c", 1.0, 0.2)];
+        let told: Vec<String> = misfits(&recorded, &made).iter().map(Misfit::to_string).collect();
+        assert_eq!(
+            told,
+            [
+                "`a` is made from something else now",
+                "`b` was 0.9, is 0.8",
+                "`b (2)` is not asked for any more",
+                "`d` is missing",
+            ]
+        );
+        assert!(misfits(&recorded, &recorded).is_empty());
+    }
+}

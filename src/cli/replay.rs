@@ -1,0 +1,108 @@
+//! `actcheck replay`
+
+use std::collections::BTreeMap;
+use std::num::NonZero;
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget};
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::campaign::{Env, Fit, Manner, Recalled, Replay, replay_all};
+use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::replay_text::{replay_json, replay_table, replay_text};
+use crate::cli::{clock, history_dir, output};
+use crate::history::{History, RunDetail, RunFilter};
+
+/// `actcheck replay`
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// Ids of runs, or their beginnings
+    #[arg(value_name = "RUN", required_unless_present = "campaign")]
+    pub runs: Vec<String>,
+    /// All runs of this campaign
+    #[arg(long, value_name = "ID")]
+    pub campaign: Option<String>,
+    /// Refuse, naming them, choices that are missing, left over or made from something else now
+    #[arg(long, conflicts_with = "nearest")]
+    pub exact: bool,
+    /// Bring values into their bounds and take nominal ones for what is missing (the default)
+    #[arg(long)]
+    pub nearest: bool,
+    /// Run with this configuration instead of the one that the history keeps
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Workers, one simulation each; results don't depend on it [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How the answer is printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Runs stored runs again and prints whether they went the same way. Returns the exit code.
+pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
+    let history = history_dir::open(&args.history)?;
+    let runs = runs(&history, args)?;
+    let campaigns = recall(&history, &runs, args)?;
+    let bar = ProgressBar::with_draw_target(Some(runs.len() as u64), ProgressDrawTarget::stderr());
+    let fit = if args.exact { Fit::Exact } else { Fit::Nearest };
+    let all_cores = || std::thread::available_parallelism().map_or(1, NonZero::get);
+    let jobs = args.jobs.map_or_else(all_cores, usize::from);
+    let manner = Manner { clock: clock::system(), disturb: None };
+    let replayed = replay_all(&history, &campaigns, &runs, (fit, jobs), &manner, || bar.inc(1));
+    bar.finish_and_clear();
+    let (mut done, mut faults) = (Vec::new(), Diagnostics::new());
+    for one in replayed? {
+        match one {
+            Ok(replay) => done.push(replay),
+            Err(found) => faults.extend(found),
+        }
+    }
+    output::print(&match args.format {
+        Format::Table => replay_text(&done, faults.len()),
+        Format::Json => format!("{:#}\n", replay_json(&done)),
+        Format::Csv => replay_table(&done).render(Format::Csv.into()),
+    });
+    if faults.has_errors() { Err(faults) } else { Ok(u8::from(done.iter().any(|replay: &Replay| !replay.same))) }
+}
+
+/// The runs that are meant, each once, in the order in which they are named.
+fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnostics> {
+    let mut ids: Vec<String> = Vec::new();
+    for name in &args.runs {
+        ids.push(history.resolve(name)?);
+    }
+    if let Some(campaign) = &args.campaign {
+        history.campaign(campaign)?;
+        let filter = RunFilter { campaign: Some(campaign.clone()), ..RunFilter::default() };
+        ids.extend(history.runs(&filter)?.into_iter().map(|row| row.run));
+    }
+    let mut runs: Vec<RunDetail> = Vec::new();
+    for id in ids {
+        if !runs.iter().any(|known| known.row.run == id) {
+            runs.push(history.run(&id)?);
+        }
+    }
+    if runs.is_empty() {
+        return Err(Diagnostic::error("X030", "there is no run to replay")
+            .help("the campaign has no runs; `actcheck list` shows those of all campaigns")
+            .into());
+    }
+    Ok(runs)
+}
+
+/// The campaigns of the runs, as they are today and as they were.
+fn recall(history: &History, runs: &[RunDetail], args: &ReplayArgs) -> Result<BTreeMap<String, Recalled>, Diagnostics> {
+    let mut campaigns = BTreeMap::new();
+    for run in runs {
+        let id = &run.row.campaign;
+        if !campaigns.contains_key(id) {
+            campaigns.insert(id.clone(), Env::recall(history, id, args.config.as_deref())?);
+        }
+    }
+    Ok(campaigns)
+}

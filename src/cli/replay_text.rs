@@ -1,0 +1,126 @@
+//! What came of replays, for people and for programs.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+
+use crate::base::names;
+use crate::campaign::{Difference, Replay};
+use crate::report::Table;
+
+/// Lines of one kind below a run; the rest is counted.
+const MOST_LINES: usize = 12;
+
+/// Every run in words, and how many of all were the same.
+pub fn replay_text(replays: &[Replay], refused: usize) -> String {
+    let mut out = String::new();
+    for replay in replays {
+        one_text(&mut out, replay);
+    }
+    let same = replays.iter().filter(|replay| replay.same).count();
+    if replays.len() + refused > 1 {
+        let differ = replays.len() - same;
+        let _ = writeln!(out, "{same} of {} runs are the same, {differ} differ", replays.len() + refused);
+    }
+    out
+}
+
+fn one_text(out: &mut String, replay: &Replay) {
+    let [was, is] = &replay.hashes;
+    let told = match replay.same {
+        true => format!("the same, every bit of every state (trace {was})"),
+        false => format!("differs (trace {was}, now {is})"),
+    };
+    let _ = writeln!(out, "{} ({}): {told}", replay.run, replay.test);
+    if !replay.same {
+        let _ = writeln!(out, "  {}", difference_text(replay));
+    }
+    lines(out, "choice", replay.misfits.iter().map(ToString::to_string));
+    let or_none = |word: &Option<String>| word.clone().unwrap_or_else(|| "not judged".to_owned());
+    let outcomes = replay.outcomes.iter().map(|change| {
+        let property = names::local(&change.property);
+        format!("{property} of action {} was {}, is {}", change.step, or_none(&change.was), or_none(&change.is))
+    });
+    lines(out, "outcome", outcomes);
+    let or_gone = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "not there".to_owned());
+    let changes = replay.changes.iter().map(|change| {
+        format!("{} `{}` was {}, is {}", change.kind.word(), change.name, or_gone(&change.was), or_gone(&change.is))
+    });
+    lines(out, "changed since", changes);
+}
+
+fn lines(out: &mut String, what: &str, lines: impl ExactSizeIterator<Item = String>) {
+    let more = lines.len().saturating_sub(MOST_LINES);
+    for line in lines.take(MOST_LINES) {
+        let _ = writeln!(out, "  {what}: {line}");
+    }
+    if more > 0 {
+        let _ = writeln!(out, "  {what}: and {more} more");
+    }
+}
+
+fn difference_text(replay: &Replay) -> String {
+    let Some(found) = &replay.difference else {
+        let [was, is] = replay.reasons.each_ref().map(|reason| reason.as_deref().unwrap_or("completed"));
+        return match was == is {
+            true => {
+                "by less than the states show that were kept: 0.1 mm between the beginnings and ends of actions".into()
+            }
+            false => format!("it ended otherwise: was {was}, is {is}"),
+        };
+    };
+    let Difference { time_secs, step, body, quantity, unit, was, is, by, others } = found;
+    let place = if *step == 0 { "before the first action".to_owned() } else { format!("in action {step}") };
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let by = by.map_or_else(String::new, |by| format!(", by {by:.3e}{unit}"));
+    let rest = if *others > 0 { format!("; {others} more quantities differ then") } else { String::new() };
+    format!("first at {time_secs:.3} s, {place}: {quantity} of {body} was {was}{unit}, is {is}{unit}{by}{rest}")
+}
+
+/// One row for each run.
+pub fn replay_table(replays: &[Replay]) -> Table {
+    let columns = ["run", "same", "time_secs", "step", "body", "quantity", "unit", "was", "is", "by", "changed"];
+    let mut table = Table::new(columns);
+    for replay in replays {
+        let of = |value: fn(&Difference) -> Value| replay.difference.as_ref().map_or(Value::Null, value);
+        let changed: Vec<String> =
+            replay.changes.iter().map(|change| format!("{} {}", change.kind.word(), change.name)).collect();
+        table.rows.push(vec![
+            replay.run.clone().into(),
+            replay.same.into(),
+            of(|found| found.time_secs.into()),
+            of(|found| found.step.into()),
+            of(|found| found.body.clone().into()),
+            of(|found| found.quantity.clone().into()),
+            of(|found| found.unit.into()),
+            of(|found| found.was.clone().into()),
+            of(|found| found.is.clone().into()),
+            of(|found| found.by.into()),
+            changed.join("; ").into(),
+        ]);
+    }
+    table
+}
+
+/// Everything, for programs.
+pub fn replay_json(replays: &[Replay]) -> Value {
+    let one = |replay: &Replay| {
+        json!({
+            "run": replay.run, "test": replay.test, "same": replay.same,
+            "hash": { "was": replay.hashes[0], "is": replay.hashes[1] },
+            "reason": { "was": replay.reasons[0], "is": replay.reasons[1] },
+            "difference": replay.difference.as_ref().map(|found| json!({
+                "time_secs": found.time_secs, "step": found.step, "body": found.body, "quantity": found.quantity,
+                "unit": found.unit, "was": found.was, "is": found.is, "by": found.by, "others": found.others,
+            })),
+            "choices": replay.misfits.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            "outcomes": replay.outcomes.iter().map(|change| json!({
+                "step": change.step, "property": change.property, "was": change.was, "is": change.is,
+            })).collect::<Vec<_>>(),
+            "changes": replay.changes.iter().map(|change| json!({
+                "kind": change.kind.word(), "name": change.name, "was": change.was, "is": change.is,
+            })).collect::<Vec<_>>(),
+        })
+    };
+    Value::Array(replays.iter().map(one).collect())
+}
