@@ -18,5 +18,6 @@ mod readme;
 mod recheck;
 mod rules;
 mod scenario;
+mod stops;
 mod support;
 mod trust;

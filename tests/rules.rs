@@ -149,7 +149,7 @@ fn shown(findings: &Findings) -> String {
 }
 
 fn judged(book: &RuleBook, facts: &ActionFacts<'_>) -> Result<Findings, RuleFault> {
-    let budget = Budget { tuples: 100_000, secs: 2.0 };
+    let budget = Budget { tuples: 100_000, secs: 2.0, ..Budget::default() };
     book.judge(facts, &[TESTED.to_owned()], &budget).remove(TESTED).unwrap()
 }
 

@@ -7,7 +7,7 @@ use crate::base::{Diagnostic, Diagnostics, Source};
 use crate::config::{self, Campaign, Launcher, Overrides};
 use crate::history::{CampaignRecord, History};
 use crate::ontology::{self, Ontology};
-use crate::rules::RuleBook;
+use crate::rules::{Budget, RuleBook};
 use crate::scenario::Space;
 use crate::world;
 
@@ -21,6 +21,8 @@ pub struct Env {
     pub space: Space,
     /// The rules of all properties, ready to judge.
     pub rules: RuleBook,
+    /// What judging one property may cost.
+    pub rule_budget: Budget,
 }
 
 impl Env {
@@ -30,7 +32,15 @@ impl Env {
     /// All faults that can be found at once: first those of the configuration, then those of the ontology, then
     /// those of scene space, rules, robot and skills together.
     pub fn prepare(config: &Path, overrides: &Overrides) -> Result<Self, Diagnostics> {
-        Self::of(config::load(config, overrides)?)
+        Self::prepare_within(config, overrides, Budget::default())
+    }
+
+    /// Prepares a campaign as [`Env::prepare`] does, with a budget for every evaluation of rules, now and in its runs.
+    ///
+    /// # Errors
+    /// All faults that can be found at once, and a budget that was spent.
+    pub fn prepare_within(config: &Path, overrides: &Overrides, rule_budget: Budget) -> Result<Self, Diagnostics> {
+        Self::of(config::load(config, overrides)?, rule_budget)
     }
 
     /// What a campaign of the history ran with: its configuration's text as it was then, with the ontology, rules and
@@ -63,10 +73,10 @@ impl Env {
         let mut loaded = loaded?;
         let tests = loaded.tests.len().max(1) as u64;
         loaded.test_count = u32::try_from(record.planned_runs / tests).unwrap_or(loaded.test_count).max(1);
-        Ok((Self::of(loaded)?, record))
+        Ok((Self::of(loaded, Budget::default())?, record))
     }
 
-    fn of(campaign: Campaign) -> Result<Self, Diagnostics> {
+    fn of(campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let (files, path) = &campaign.ontology;
         let ontology = ontology::load(files, path)?;
         let mut faults = Diagnostics::new();
@@ -76,9 +86,11 @@ impl Env {
             faults.push(error.diagnostic());
         }
         let space = Space::new(&campaign, &ontology).map_err(|found| faults.extend(found)).ok();
-        let rules = RuleBook::prepare(&ontology).map_err(|found| faults.extend(found)).ok();
+        let rules = RuleBook::prepare_within(&ontology, &rule_budget).map_err(|found| faults.extend(found)).ok();
         match (space, rules) {
-            (Some(space), Some(rules)) if !faults.has_errors() => Ok(Self { campaign, ontology, space, rules }),
+            (Some(space), Some(rules)) if !faults.has_errors() => {
+                Ok(Self { campaign, ontology, space, rules, rule_budget })
+            }
             _ => Err(faults),
         }
     }

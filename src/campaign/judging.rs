@@ -3,19 +3,24 @@
 use std::collections::BTreeMap;
 
 use crate::actions::ActionEnd;
+use crate::campaign::Failure;
 use crate::facts::ActionFacts;
 use crate::ontology::{Action, Ontology};
-use crate::rules::{Budget, RuleBook};
+use crate::rules::{Budget, Findings, RuleBook, RuleFault};
 use crate::verdict::{Fate, Judgement, Outcome, judge};
 
 /// Outcomes of an action's success properties. The rules are asked only of an action that came to its own end.
+///
+/// # Errors
+/// The budget's `stop` was set and a rule took long.
 pub(super) fn judge_action(
     ontology: &Ontology,
     rules: &RuleBook,
     action: &Action,
     end: &ActionEnd,
     facts: Option<ActionFacts<'_>>,
-) -> Vec<Judgement> {
+    budget: &Budget,
+) -> Result<Vec<Judgement>, Failure> {
     let fate = match end {
         ActionEnd::Completed => Fate::Completed,
         ActionEnd::Broken(reason) => Fate::Broken(reason.clone()),
@@ -25,32 +30,46 @@ pub(super) fn judge_action(
     let findings = match (&fate, facts) {
         (Fate::Completed, Some(facts)) => {
             let asked: Vec<String> = action.success_properties.iter().chain(&action.preconditions).cloned().collect();
-            rules.judge(&facts, &asked, &Budget::default())
+            whole(rules.judge(&facts, &asked, budget))?
         }
         _ => BTreeMap::new(),
     };
     let mut judgements = judge(ontology, action, &findings, &fate, |property| rules.digest(property).to_owned());
     if let Some(facts) = facts {
-        note_held_before(rules, &facts, &mut judgements);
+        note_held_before(rules, &facts, &mut judgements, budget)?;
     }
-    judgements
+    Ok(judgements)
+}
+
+type Found = BTreeMap<String, Result<Findings, RuleFault>>;
+
+/// What was found, unless somebody interrupted it.
+fn whole(found: Found) -> Result<Found, Failure> {
+    let interrupted = found.values().any(|found| *found == Err(RuleFault::Interrupted));
+    if interrupted { Err(Failure::Interrupted) } else { Ok(found) }
 }
 
 /// Notes, of what passed and states success, whether it had held before the action already.
-fn note_held_before(rules: &RuleBook, facts: &ActionFacts<'_>, judgements: &mut [Judgement]) {
+fn note_held_before(
+    rules: &RuleBook,
+    facts: &ActionFacts<'_>,
+    judgements: &mut [Judgement],
+    budget: &Budget,
+) -> Result<(), Failure> {
     let asked: Vec<String> = judgements
         .iter()
         .filter(|judgement| judgement.outcome == Outcome::Passed && rules.states_success(&judgement.property))
         .map(|judgement| judgement.property.clone())
         .collect();
     if asked.is_empty() {
-        return;
+        return Ok(());
     }
-    let before = rules.held_before(facts, &asked, &Budget::default());
+    let before = whole(rules.held_before(facts, &asked, budget))?;
     for judgement in judgements {
         // What could not be judged then says nothing either way.
         if let Some(Ok(found)) = before.get(&judgement.property) {
             judgement.held_before = Some(found.applicable && found.holds);
         }
     }
+    Ok(())
 }

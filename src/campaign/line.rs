@@ -37,6 +37,9 @@ pub enum Failure {
     /// The scene could not be generated, or does not stand still by itself; another one may.
     #[error("{0}")]
     Discard(String),
+    /// Somebody asked for the end while its rules were judged.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 /// Takes one run down the line.
@@ -44,7 +47,7 @@ pub enum Failure {
 /// The same `choices` give the same record but for times. `campaign` is the campaign's id.
 ///
 /// # Errors
-/// A scene that could not be generated or did not settle. Faults of simulation are no error: they end the run as
+/// A scene that could not be generated or did not settle; [`Env::rule_budget`] was stopped in the middle of a long rule. Faults of simulation are no error: they end the run as
 /// broken, as data.
 pub fn run_line(
     env: &Env,
@@ -63,7 +66,7 @@ pub fn run_line(
         }
     };
     let trace = perform(env, &env.campaign.tests[test], &scene, &mut choices, disturb)?;
-    let mut record = record(env, campaign, index, scene, trace);
+    let mut record = record(env, campaign, index, scene, trace)?;
     record.choices = choices.into_made();
     record.started = started;
     record.wall_secs = (manner.clock.secs)() - start_secs;
@@ -77,18 +80,18 @@ pub(super) fn crashed(env: &Env, campaign: &str, index: u64, mut choices: Choice
     let test = env.test_of(index);
     let scene = scenario::draw(&env.space, test, &mut choices).ok()?;
     let trace = never_performed(&env.campaign.tests[test], &scene, reason);
-    let mut record = record(env, campaign, index, scene, trace);
+    let mut record = record(env, campaign, index, scene, trace).ok()?;
     record.choices = choices.into_made();
     Some(record)
 }
 
 /// From a trace to the record: facts, findings, verdicts, scores. Choices and times are left to the caller.
-fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> RunRecord {
+fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> Result<RunRecord, Failure> {
     let facts = facts::extract(&trace);
-    let judgements = judge_all(env, &trace, &facts);
+    let judgements = judge_all(env, &trace, &facts)?;
     let action_scores: Vec<f64> = judgements.iter().map(|list| action_score(list.iter().map(|j| j.outcome))).collect();
     let (status, reason) = status_of(&trace);
-    RunRecord {
+    Ok(RunRecord {
         id: format!("{campaign}-{}", index + 1),
         campaign: campaign.to_owned(),
         index,
@@ -106,7 +109,7 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
         judgements,
         started: String::new(),
         wall_secs: 0.0,
-    }
+    })
 }
 
 /// Builds the scene, lets it settle and performs the test in it.
@@ -156,14 +159,15 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
 }
 
 /// Outcomes of every action of a trace: one list for each.
-fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Vec<Vec<Judgement>> {
+fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Result<Vec<Vec<Judgement>>, Failure> {
     trace
         .actions
         .iter()
         .enumerate()
         .map(|(step, performed)| {
             let action = &env.ontology.actions[&performed.action];
-            judge_action(&env.ontology, &env.rules, action, &performed.end, facts.action(step))
+            let facts = facts.action(step);
+            judge_action(&env.ontology, &env.rules, action, &performed.end, facts, &env.rule_budget)
         })
         .collect()
 }

@@ -10,6 +10,7 @@ use crate::campaign::judging::judge_action;
 use crate::campaign::{Ending, RuleSet};
 use crate::facts::{self, RunFacts};
 use crate::history::{History, Recheck, RunRow, StoredJudgement};
+use crate::rules::Budget;
 
 /// How runs are judged anew. The number of workers changes nothing of what comes out.
 #[derive(Debug, Clone)]
@@ -150,7 +151,9 @@ fn judge_step(
     // A test has as many actions as somebody typed.
     let number = u32::try_from(step + 1).unwrap_or(u32::MAX);
     let mut stored = history.newest(&run.run, number, &action.success_properties)?;
-    let judged = judge_action(&rules.ontology, &rules.rules, action, &performed.end, facts.action(step));
+    let (facts, budget) = (facts.action(step), Budget::default());
+    let judged = judge_action(&rules.ontology, &rules.rules, action, &performed.end, facts, &budget)
+        .map_err(|failure| Diagnostic::error("R091", failure.to_string()))?;
     let rechecks = judged.into_iter().map(|judgement| {
         let before = take(&mut stored, &judgement.property);
         let now = match &before {

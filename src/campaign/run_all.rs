@@ -35,7 +35,8 @@ enum Message {
 
 /// Makes every planned run, commits each in a transaction of its own, and then tells `on_run` of it.
 ///
-/// `stop` ends the campaign after the runs in flight. A run is told only when it is in the history.
+/// `stop` ends the campaign after the runs in flight; where it is the stop of the environment's budget too, a run whose
+/// rules take long is given up. A run is told only when it is in the history.
 pub fn run_all(
     env: &Env,
     history: &History,
@@ -116,6 +117,7 @@ fn make_run(env: &Env, campaign: &str, index: u64, options: &Options) -> Vec<Mes
                 return messages;
             }
             Ok(Err(Failure::Discard(reason))) => messages.push(Message::Discard(index, reason)),
+            Ok(Err(Failure::Interrupted)) => return messages,
             Err(panic) => {
                 let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
                 let redone = catch_unwind(AssertUnwindSafe(|| crashed(env, campaign, index, choices(), &reason)));

@@ -1,14 +1,19 @@
 //! `actcheck check`
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use crate::base::Diagnostics;
 use crate::campaign::Env;
 use crate::cli::args::CheckArgs;
 use crate::cli::output;
 use crate::config::Overrides;
+use crate::rules::Budget;
 
-/// Says what a campaign would use, or everything that is wrong with it.
-pub fn check(args: &CheckArgs) -> Result<(), Diagnostics> {
-    let env = Env::prepare(&args.config, &Overrides::default())?;
+/// Says what a campaign would use, or everything that is wrong with it, unless somebody stops it.
+pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
+    let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
+    let env = Env::prepare_within(&args.config, &Overrides::default(), budget)?;
     output::print_diagnostics(env.rules.warnings());
     output::print(&format!(
         "{}: {} tests, {} runs; {} actions and {} properties in {}; {} models; robot {}\n",

@@ -1,6 +1,8 @@
 //! `actcheck datalog`
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use crate::base::{Diagnostic, Diagnostics, Files};
 use crate::cli::args::{DatalogArgs, ProofFormat};
@@ -11,14 +13,14 @@ use crate::rules::explain::Explanation;
 use crate::rules::standalone::{self, Program};
 
 /// Runs a program of its own, or says why one statement of it holds or does not.
-pub fn datalog(args: &DatalogArgs) -> Result<(), Diagnostics> {
-    let budget = Budget { tuples: args.max_tuples, secs: args.max_secs };
+pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
+    let budget = Budget { tuples: args.max_tuples, secs: args.max_secs, stop: Arc::clone(stop) };
     if let Some(statement) = &args.trace {
         let source = Files::Disk.read(&args.file).map_err(|why| {
             Diagnostic::error("X005", format!("{}: {why}", args.file.display())).help("name a file with rules (.rls)")
         })?;
         let folder = args.file.parent().unwrap_or(Path::new("."));
-        let program = Program::load(&source, folder)?;
+        let program = Program::load_until(&source, folder, stop)?;
         let explained = program.explain(statement, &budget);
         let explained = explained.map_err(|fault| Diagnostic::error("X008", fault.to_string()).in_source(&source))?;
         output::print(&rendered(&explained, args.format));

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::cli::args::{Arguments, Command};
-use crate::cli::{check, datalog, list, new, output, query, recheck, rules, show, why};
+use crate::cli::{check, datalog, list, new, output, query, recheck, rules, show, stop, why};
 
 /// Parses the process's arguments and does what they ask.
 ///
@@ -16,15 +16,15 @@ pub fn run() -> ExitCode {
     let done = match arguments.command {
         Command::Run(args) => crate::cli::run::run(&args),
         Command::Replay(args) => crate::cli::replay::replay(&args),
-        Command::Check(args) => check::check(&args).map(|()| 0),
+        Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Query(args) => query::query(&args).map(|()| 0),
         Command::Rules(args) => rules::rules(&args).map(|()| 0),
         Command::Recheck(args) => recheck::recheck(&args),
-        Command::Why(args) => why::why(&args).map(|()| 0),
+        Command::Why(args) => stop::interruptible(|stop| why::why(&args, stop)),
         Command::New(args) => new::new(&args).map(|()| 0),
-        Command::Datalog(args) => datalog::datalog(&args).map(|()| 0),
+        Command::Datalog(args) => stop::interruptible(|stop| datalog::datalog(&args, stop)),
     };
     match done {
         Ok(code) => ExitCode::from(code),

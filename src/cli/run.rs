@@ -2,6 +2,10 @@
 
 use std::num::NonZero;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+
+use indicatif::ProgressBar;
 
 use crate::analysis;
 use crate::base::{Diagnostic, Diagnostics};
@@ -12,21 +16,24 @@ use crate::cli::{clock, output, stop};
 use crate::config::Overrides;
 use crate::history::{self, History, RunFilter};
 use crate::report::{CampaignSummary, RunSummary, campaign_json, campaign_table, campaign_text};
+use crate::rules::Budget;
 use crate::verdict::{Counts, Outcome, mean};
 
 /// Runs a campaign and prints what came of it. Returns the exit code.
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let overrides = Overrides { runs: args.runs, seed: args.seed, history: args.history.clone() };
-    let env = Env::prepare(&args.config, &overrides)?;
+    let (stop, shown) = interrupt();
+    let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
+    let env = Env::prepare_within(&args.config, &overrides, budget)?;
     let history = History::open(&env.campaign.history)?;
     let clock = clock::system();
     let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     let name = args.config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let mut progress = Progress::new(env.planned_runs());
+    // From here on there is a campaign to end.
+    shown.get_or_init(|| progress.bar());
     history.begin_campaign(&env.record(id.clone(), name, (clock.now)()))?;
 
-    let mut progress = Progress::new(env.planned_runs());
-    let bar = progress.bar();
-    let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; Ctrl-C again stops at once"));
     let options =
         Options { jobs: args.jobs.map_or_else(all_cores, usize::from), manner: Manner { clock, disturb: None } };
     let mut runs = Vec::new();
@@ -54,6 +61,17 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         Ending::Finished => finished.map(|()| summary.exit_code()),
         Ending::Interrupted => finished.map(|()| stop::INTERRUPTED),
     }
+}
+
+/// The flag that Ctrl-C sets, and a place for the bar that then tells of it; before there is one, Ctrl-C ends the process.
+fn interrupt() -> (Arc<AtomicBool>, Arc<OnceLock<ProgressBar>>) {
+    let shown = Arc::new(OnceLock::<ProgressBar>::new());
+    let bar = Arc::clone(&shown);
+    let stop = stop::on_interrupt(move || match bar.get() {
+        Some(bar) => bar.println("stopping after the runs in flight; Ctrl-C again stops at once"),
+        None => stop::end_now(),
+    });
+    (stop, shown)
 }
 
 fn all_cores() -> usize {

@@ -1,6 +1,8 @@
 //! `actcheck why`
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
 use crate::cli::args::WhyArgs;
@@ -11,18 +13,19 @@ use crate::ontology;
 use crate::rules::{Budget, RuleBook};
 
 /// Prints, for each outcome of a run that is asked for, the proof that a property holds or how near it came.
-pub fn why(args: &WhyArgs) -> Result<(), Diagnostics> {
+pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
+    let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
     let history = history_dir::open(&args.history)?;
     let run = history.run(&args.run)?;
     let facts = history.facts(&run.row.run)?;
     let (files, path) = ontology_file(args.ontology.as_deref());
-    let rules = RuleBook::prepare(&ontology::load(&files, &path)?)?;
+    let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget)?;
     let mut told = 0;
     for (step, action) in run.actions.iter().enumerate() {
         let Some(seen) = facts.action(step) else { continue };
         for property in asked(action, args.property.as_deref()) {
             let title = format!("{} {}, {}", run.row.run, names::local(&action.action), names::local(&property));
-            let explained = rules.explain(&seen, &property, &Budget::default());
+            let explained = rules.explain(&seen, &property, &budget);
             let explained = explained.map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
             if args.format == crate::cli::args::ProofFormat::Text {
                 output::print(&format!("{title}\n"));

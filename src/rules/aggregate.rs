@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::{Term, TermId};
 use crate::rules::builtins;
+use crate::rules::meter::{Meter, Stop};
 use crate::rules::plan::operand_value;
 use crate::rules::program::{AggregateKind, Aggregation, Operand, Rule, Variable};
 use crate::rules::universe::Universe;
@@ -21,22 +22,25 @@ pub(crate) fn aggregate(
     aggregation: &Aggregation,
     matches: &[TermId],
     universe: &mut Universe<'_>,
-) -> Vec<TermId> {
+    meter: &mut Meter,
+) -> Result<Vec<TermId>, Stop> {
     let width = projection(aggregation).len();
     let keys = aggregation.group.len();
     let mut groups: BTreeMap<&[TermId], Vec<&[TermId]>> = BTreeMap::new();
     for row in matches.chunks_exact(width.max(1)) {
+        meter.step()?;
         groups.entry(&row[..keys]).or_default().push(&row[keys..]);
     }
     let mut out = Vec::new();
     let mut binding = vec![0; rule.variables.len()];
     for (key, rows) in groups {
+        meter.step()?;
         bind(&mut binding, &aggregation.group, key);
         if fill(aggregation, &rows, &mut binding, universe).is_some() {
             out.extend(rule.head.args.iter().map(|arg| operand_value(*arg, &binding)));
         }
     }
-    out
+    Ok(out)
 }
 
 fn bind(binding: &mut [TermId], variables: &[Variable], values: &[TermId]) {

@@ -59,7 +59,15 @@ impl RuleBook {
     /// # Errors
     /// All faults of all files, each with its place.
     pub fn prepare(ontology: &Ontology) -> Result<Self, Diagnostics> {
-        Preparing::default().run(ontology)
+        Self::prepare_within(ontology, &Budget::default())
+    }
+
+    /// Prepares a book as [`RuleBook::prepare`] does; each evaluation over the ontology alone stays within the budget.
+    ///
+    /// # Errors
+    /// All faults of all files, each with its place; a budget that was spent.
+    pub fn prepare_within(ontology: &Ontology, budget: &Budget) -> Result<Self, Diagnostics> {
+        Preparing::within(budget).run(ontology)
     }
 
     /// Judges an action by some properties, named by IRI: the libraries once, then each property.

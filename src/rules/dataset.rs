@@ -1,12 +1,13 @@
 //! One action's facts as a SPARQL dataset: sorted numbers, looked up in place, nothing copied from the ontology.
 
-use std::cell::Cell;
-use std::time::{Duration, Instant};
+use std::convert::Infallible;
+use std::hash::{Hash, Hasher};
 
 use oxigraph::model::{BlankNode, Literal, NamedNode, Term as RdfTerm};
 use spareval::{InternalQuad, QueryableDataset};
 
 use crate::base::{Term, TermId, Terms, names};
+use crate::rules::ledger::{Entry, Ledger};
 use crate::rules::universe::Universe;
 use crate::rules::values;
 
@@ -80,57 +81,50 @@ impl Statements {
     }
 }
 
-/// A view of both, with a time after which it gives nothing more.
+/// A view of both, with the ledger of all terms that it hands out.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
     pub(crate) snapshot: &'a Snapshot,
     pub(crate) statements: &'a Statements,
     pub(crate) universe: &'a Universe<'a>,
-    pub(crate) clock: &'a Clock,
+    pub(crate) ledger: &'a Ledger,
 }
 
-/// The time that a query may take, looked at while it reads.
-#[derive(Debug)]
-pub(crate) struct Clock {
-    deadline: Option<Instant>,
-    spent: Cell<bool>,
+/// A term in the evaluator's hands. Copying it may end the evaluation.
+#[derive(Debug, Clone)]
+pub(crate) struct ViewTerm<'a> {
+    value: Value,
+    _entry: Entry<'a>,
 }
-
-impl Clock {
-    /// A clock that runs out after some seconds; one too long for the system never does.
-    pub(crate) fn new(secs: f64) -> Self {
-        let time = Duration::try_from_secs_f64(secs.max(0.0)).ok();
-        let deadline = time.and_then(|time| Instant::now().checked_add(time));
-        Self { deadline, spent: Cell::new(false) }
-    }
-
-    /// Whether time is over. Once it is, it stays so.
-    pub(crate) fn spent(&self) -> bool {
-        let late = || self.deadline.is_some_and(|deadline| Instant::now() > deadline);
-        self.spent.set(self.spent.get() || late());
-        self.spent.get()
-    }
-}
-
-/// The query took too long.
-#[derive(Debug, thiserror::Error)]
-#[error("the query took too long")]
-pub(crate) struct TimeSpent;
 
 /// A term of the dataset by its number, or one that the query made.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) enum ViewTerm {
+enum Value {
     Known(TermId),
     Made(Box<RdfTerm>),
 }
 
-impl ViewTerm {
+impl ViewTerm<'_> {
     /// The number, where a pattern can match at all.
     fn id(&self) -> Option<TermId> {
-        match self {
-            Self::Known(id) => Some(*id),
-            Self::Made(_) => None,
+        match self.value {
+            Value::Known(id) => Some(id),
+            Value::Made(_) => None,
         }
+    }
+}
+
+impl PartialEq for ViewTerm<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.value == other.value
+    }
+}
+
+impl Eq for ViewTerm<'_> {}
+
+impl Hash for ViewTerm<'_> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.value.hash(state);
     }
 }
 
@@ -139,19 +133,25 @@ impl<'a> View<'a> {
         let statements = self.statements;
         self.snapshot.graphs.iter().map(|(name, graph)| (*name, graph)).chain([(statements.name, &statements.graph)])
     }
+
+    fn handed_out(&self, value: Value) -> ViewTerm<'a> {
+        ViewTerm { value, _entry: Entry::new(self.ledger) }
+    }
 }
 
 impl<'a> QueryableDataset<'a> for View<'a> {
-    type InternalTerm = ViewTerm;
-    type Error = TimeSpent;
+    type InternalTerm = ViewTerm<'a>;
+    type Error = Infallible;
 
     fn internal_quads_for_pattern(
         &self,
-        subject: Option<&ViewTerm>,
-        predicate: Option<&ViewTerm>,
-        object: Option<&ViewTerm>,
-        graph_name: Option<Option<&ViewTerm>>,
-    ) -> impl Iterator<Item = Result<InternalQuad<ViewTerm>, TimeSpent>> + use<'a> {
+        subject: Option<&ViewTerm<'a>>,
+        predicate: Option<&ViewTerm<'a>>,
+        object: Option<&ViewTerm<'a>>,
+        graph_name: Option<Option<&ViewTerm<'a>>>,
+    ) -> impl Iterator<Item = Result<InternalQuad<ViewTerm<'a>>, Infallible>> + use<'a> {
+        // A pattern that finds nothing hands nothing out, and yet takes its time.
+        self.ledger.look();
         let mut found = Vec::new();
         let parts = [subject, predicate, object];
         if parts.iter().flatten().all(|term| term.id().is_some()) {
@@ -166,41 +166,32 @@ impl<'a> QueryableDataset<'a> for View<'a> {
                 found.extend(graph.find(s, p, o).into_iter().map(|triple| (triple, named.then_some(name))));
             }
         }
-        // When time is over, each pattern ends with a fault, so that the whole query soon does.
-        let (clock, mut over) = (self.clock, false);
-        let mut found = found.into_iter();
-        std::iter::from_fn(move || {
-            if over {
-                return None;
-            }
-            // Looked at for each statement: behind one, a product of patterns may have a second of work.
-            over = clock.spent();
-            if over {
-                return Some(Err(TimeSpent));
-            }
-            found.next().map(|(triple, graph)| {
-                let [subject, predicate, object] = triple.map(ViewTerm::Known);
-                Ok(InternalQuad { subject, predicate, object, graph_name: graph.map(ViewTerm::Known) })
-            })
+        let view = *self;
+        found.into_iter().map(move |(triple, graph)| {
+            let known = |id| view.handed_out(Value::Known(id));
+            let [subject, predicate, object] = triple.map(known);
+            Ok(InternalQuad { subject, predicate, object, graph_name: graph.map(known) })
         })
     }
 
-    fn internal_named_graphs(&self) -> impl Iterator<Item = Result<ViewTerm, TimeSpent>> + use<'a> {
-        self.graphs().map(|(name, _)| Ok(ViewTerm::Known(name)))
+    fn internal_named_graphs(&self) -> impl Iterator<Item = Result<ViewTerm<'a>, Infallible>> + use<'a> {
+        let view = *self;
+        view.graphs().map(move |(name, _)| Ok(view.handed_out(Value::Known(name))))
     }
 
-    fn contains_internal_graph_name(&self, graph_name: &ViewTerm) -> Result<bool, TimeSpent> {
+    fn contains_internal_graph_name(&self, graph_name: &ViewTerm<'a>) -> Result<bool, Infallible> {
         Ok(self.graphs().any(|(name, _)| graph_name.id() == Some(name)))
     }
 
-    fn internalize_term(&self, term: RdfTerm) -> Result<ViewTerm, TimeSpent> {
-        Ok(self.universe.id(&from_rdf(&term)).map_or_else(|| ViewTerm::Made(Box::new(term)), ViewTerm::Known))
+    fn internalize_term(&self, term: RdfTerm) -> Result<ViewTerm<'a>, Infallible> {
+        let known = self.universe.id(&from_rdf(&term));
+        Ok(self.handed_out(known.map_or_else(|| Value::Made(Box::new(term)), Value::Known)))
     }
 
-    fn externalize_term(&self, term: ViewTerm) -> Result<RdfTerm, TimeSpent> {
-        Ok(match term {
-            ViewTerm::Known(id) => to_rdf(self.universe.term(id)),
-            ViewTerm::Made(term) => *term,
+    fn externalize_term(&self, term: ViewTerm<'a>) -> Result<RdfTerm, Infallible> {
+        Ok(match term.value {
+            Value::Known(id) => to_rdf(self.universe.term(id)),
+            Value::Made(term) => *term,
         })
     }
 }

@@ -358,7 +358,7 @@ impl Run<'_, '_, '_> {
         }
         .run(0)?;
         Ok(match &rule.aggregation {
-            Some(aggregation) => aggregate(rule, aggregation, &sink.rows, self.universe),
+            Some(aggregation) => aggregate(rule, aggregation, &sink.rows, self.universe, self.meter)?,
             None => sink.rows,
         })
     }

@@ -1,6 +1,9 @@
 //! What the rules found out about one property in one action.
 
-use crate::base::Term;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::base::{Diagnostic, Term};
 
 /// Result of one property's rule file over the facts of one action.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,20 +45,30 @@ pub enum RuleFault {
     /// A value that a rule can't work with, such as a margin that is no number.
     #[error("{0}")]
     Value(String),
+    /// Somebody asked for its end ([`Budget::stop`]).
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// The fault of something that was ended because somebody asked for it.
+pub(crate) fn interrupted() -> Diagnostic {
+    Diagnostic::error("R091", RuleFault::Interrupted.to_string())
 }
 
 /// Limits on one evaluation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Budget {
     /// Derived tuples.
     pub tuples: usize,
     /// Wall time. Unit: seconds.
     pub secs: f64,
+    /// Set from outside, it ends the evaluation: at once, or when it has lasted as long as an ordinary one (0.2 s).
+    pub stop: Arc<AtomicBool>,
 }
 
 impl Default for Budget {
     fn default() -> Self {
         // A pick run derives some hundred tuples in under a millisecond: both are far out of a sound rule's way.
-        Self { tuples: 5_000_000, secs: 10.0 }
+        Self { tuples: 5_000_000, secs: 10.0, stop: Arc::default() }
     }
 }

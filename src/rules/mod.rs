@@ -18,6 +18,7 @@ mod expressions;
 mod findings;
 mod given;
 mod join;
+mod ledger;
 mod lex;
 mod lex_text;
 mod load;

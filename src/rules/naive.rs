@@ -67,7 +67,7 @@ fn derive(rule: &Rule, sets: &Sets, universe: &mut Universe<'_>, meter: &mut Met
                     operands.iter().map(|arg| operand_value(*arg, &binding)).collect::<Vec<_>>()
                 })
                 .collect();
-            aggregate(rule, aggregation, &rows, universe).chunks(width).map(<[TermId]>::to_vec).collect()
+            aggregate(rule, aggregation, &rows, universe, meter)?.chunks(width).map(<[TermId]>::to_vec).collect()
         }
     })
 }
@@ -90,6 +90,7 @@ fn matches(
     match first {
         Literal::Positive(atom) => {
             for row in sets.get(&atom.predicate).into_iter().flatten() {
+                meter.step()?;
                 let before = binding.clone();
                 if unify(atom, row, binding) {
                     matches(rest, sets, universe, binding, found, meter)?;
@@ -99,10 +100,11 @@ fn matches(
             return Ok(());
         }
         Literal::Negative(atom) => {
-            let blocked =
-                sets.get(&atom.predicate).into_iter().flatten().any(|row| unify(atom, row, &mut binding.clone()));
-            if blocked {
-                return Ok(());
+            for row in sets.get(&atom.predicate).into_iter().flatten() {
+                meter.step()?;
+                if unify(atom, row, &mut binding.clone()) {
+                    return Ok(());
+                }
             }
         }
         Literal::Assign { variable, value, .. } => {

@@ -18,11 +18,16 @@ const TOLD: usize = 5;
 /// # Errors
 /// `R080` for each contradiction, with the rule of the W3C profile that finds it and its proof.
 pub fn owl_closure(triples: &[[Term; 3]]) -> Result<Vec<[Term; 3]>, Diagnostics> {
+    owl_closure_within(triples, &Budget::default())
+}
+
+/// The closure as [`owl_closure`] gives it, as far as the budget goes.
+pub(crate) fn owl_closure_within(triples: &[[Term; 3]], budget: &Budget) -> Result<Vec<[Term; 3]>, Diagnostics> {
     let unusable = |reason: String| Diagnostics::from(Diagnostic::error("R090", reason));
     let source = Files::Shipped.read(Path::new(RULES)).map_err(|reason| unusable(format!("{RULES}: {reason}")))?;
     let mut program = Program::load(&source, Path::new(""))?;
     program.add_facts("triple", triples.iter().map(|triple| triple.as_slice())).map_err(unusable)?;
-    let closure = program.close(Engine::Fast, &Budget::default()).map_err(|fault| unusable(fault.to_string()))?;
+    let closure = program.close(Engine::Fast, budget).map_err(|fault| unusable(fault.to_string()))?;
     let contradictions = closure.tuples("contradiction");
     if !contradictions.is_empty() {
         return Err(told(&program, &contradictions));

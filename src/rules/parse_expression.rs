@@ -227,7 +227,7 @@ impl Parser<'_> {
         };
         let plain = text.trim_end_matches(['f', 'd']);
         let term = match radix {
-            Some(radix) => i128::from_str_radix(&format!("{sign}{}", &text[2..]), radix).ok().map(integer),
+            Some(radix) => i128::from_str_radix(&format!("{sign}{}", &text[2..]), radix).ok().map(encoded_integer),
             None if plain.len() == text.len() && text.bytes().all(|b| b.is_ascii_digit()) => {
                 format!("{sign}{text}").parse::<i128>().ok().map(integer)
             }
@@ -282,6 +282,15 @@ impl Parser<'_> {
 }
 
 /// An integer; one that does not fit 64 bits is kept as a literal, exact but nothing to compute with.
+/// An integer in binary, octal or hexadecimal. Over 64 bits its datatype is the text `xsd:integer` and no IRI, as in Nemo,
+/// whose published tables want it so.
+fn encoded_integer(value: i128) -> Term {
+    match i64::try_from(value) {
+        Ok(value) => Term::Integer(value),
+        Err(_) => Term::Literal(value.to_string().into(), "xsd:integer".into()),
+    }
+}
+
 fn integer(value: i128) -> Term {
     match i64::try_from(value) {
         Ok(value) => Term::Integer(value),

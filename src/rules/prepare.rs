@@ -12,7 +12,7 @@ use crate::rules::findings::Budget;
 use crate::rules::given::{Phases, add_given};
 use crate::rules::load::Given;
 use crate::rules::meter::Meter;
-use crate::rules::owl::owl_closure;
+use crate::rules::owl::owl_closure_within;
 use crate::rules::parse::parse;
 use crate::rules::plan::Indexes;
 use crate::rules::program::{Atom, Literal, Operand, Origin, Predicates, Program, Rule};
@@ -31,9 +31,15 @@ pub(crate) struct Preparing {
     diagnostics: Diagnostics,
     /// Properties that libraries add to the snapshots.
     derived: BTreeSet<String>,
+    /// Of each evaluation over the ontology alone.
+    budget: Budget,
 }
 
 impl Preparing {
+    pub(crate) fn within(budget: &Budget) -> Self {
+        Self { budget: budget.clone(), ..Self::default() }
+    }
+
     pub(crate) fn run(mut self, ontology: &Ontology) -> Result<RuleBook, Diagnostics> {
         let phases = Phases::intern(&mut self.terms);
         let (libraries, properties) = self.parse(ontology);
@@ -168,7 +174,7 @@ impl Preparing {
 
     /// The ontology's statements with all that follows from them.
     fn closed(&mut self, ontology: &Ontology) -> Vec<[TermId; 3]> {
-        let closed = owl_closure(&ontology.triples).unwrap_or_else(|found| {
+        let closed = owl_closure_within(&ontology.triples, &self.budget).unwrap_or_else(|found| {
             self.diagnostics.extend(found);
             Vec::new()
         });
@@ -223,7 +229,7 @@ impl Preparing {
         let book = self.terms.clone();
         let mut universe = Universe::new(&book, None);
         let mut layers = Layers { own, below: Vec::new() };
-        let mut meter = Meter::new(&Budget::default());
+        let mut meter = Meter::new(&self.budget);
         if let Err(stopped) = evaluate(fixed, predicates, indexes, &mut layers, &mut universe, &mut meter) {
             let message = fault(&meter, stopped, fixed).to_string();
             let help = "the rules over the ontology alone must come to an end";

@@ -10,9 +10,11 @@ use crate::facts::ActionFacts;
 use crate::ontology::{Ontology, Vocabulary};
 use crate::rules::book::RuleBook;
 use crate::rules::builtins;
-use crate::rules::dataset::{Clock, Graph, Snapshot, TimeSpent, View, from_rdf, to_rdf};
+use crate::rules::dataset::{Graph, Snapshot, View, from_rdf, to_rdf};
 use crate::rules::evaluate::Tables;
 use crate::rules::findings::{Budget, Findings, RuleFault, WitnessRow};
+use crate::rules::ledger::Ledger;
+use crate::rules::meter::Stop;
 use crate::rules::query_text::{first_group, groups, scan, variables};
 use crate::rules::universe::Universe;
 use crate::rules::values::{Number, lexical};
@@ -22,6 +24,8 @@ pub(crate) struct Query {
     prepared: PreparedSparqlQuery,
     /// Whether it is an `ASK`, which holds when true.
     pub(crate) asks: bool,
+    /// Name of its file.
+    file: String,
 }
 
 impl Query {
@@ -48,13 +52,10 @@ impl Query {
             diagnostics
                 .push(Diagnostic::error("R061", "the query is neither ASK nor SELECT").in_source(source).help(help));
         }
-        diagnostics.or(Self { prepared, asks: form == Some(Form::Ask) })
+        diagnostics.or(Self { prepared, asks: form == Some(Form::Ask), file: source.name.to_string() })
     }
 
     /// Judges an action: `ASK` holds when true, `SELECT` when it has no row.
-    ///
-    /// Time is looked at for each statement that the query reads and for each row. A product of patterns that share no variable
-    /// is formed inside the evaluator, where nothing can stop it.
     pub(crate) fn judge(
         &self,
         book: &RuleBook,
@@ -62,11 +63,13 @@ impl Query {
         universe: &Universe<'_>,
         budget: &Budget,
     ) -> Result<Findings, RuleFault> {
-        let clock = Clock::new(budget.secs);
-        let view = View { snapshot, statements: &book.statements, universe, clock: &clock };
-        let results =
-            self.prepared.clone().on_queryable_dataset(view).execute().map_err(|error| fault(&error, budget))?;
-        let findings = match results {
+        let ledger = Ledger::new(budget);
+        let view = View { snapshot, statements: &book.statements, universe, ledger: &ledger };
+        ledger.hold(|| self.evaluate(view, budget)).unwrap_or_else(|stop| Err(self.stopped(stop, budget)))
+    }
+
+    fn evaluate(&self, view: View<'_>, budget: &Budget) -> Result<Findings, RuleFault> {
+        match self.prepared.clone().on_queryable_dataset(view).execute().map_err(|error| fault(&error))? {
             QueryResults::Boolean(holds) => Ok(Findings {
                 applicable: true,
                 holds,
@@ -75,48 +78,56 @@ impl Query {
                 margin: None,
                 because: Vec::new(),
             }),
-            QueryResults::Solutions(rows) => rows_found(rows, &clock, budget),
+            QueryResults::Solutions(rows) => self.rows_found(rows, budget),
             QueryResults::Graph(_) => Err(RuleFault::Value("the query is neither ASK nor SELECT".into())),
-        };
-        // A query may swallow the fault of a pattern, as in OPTIONAL; what it then says means nothing.
-        if clock.spent() { Err(time_spent(budget)) } else { findings }
+        }
     }
-}
 
-/// Every row is a violation.
-fn rows_found(rows: QuerySolutionIter<'_>, clock: &Clock, budget: &Budget) -> Result<Findings, RuleFault> {
-    let mut witness = Vec::new();
-    let (mut margin, mut because) = (None::<f64>, BTreeSet::new());
-    for row in rows {
-        let row = row.map_err(|error| fault(&error, budget))?;
-        if witness.len() >= budget.tuples {
-            return Err(RuleFault::BudgetSpent(format!("more than {} rows", budget.tuples)));
-        }
-        if clock.spent() {
-            return Err(time_spent(budget));
-        }
-        let mut values = Vec::new();
-        for (variable, term) in row.iter() {
-            let term = from_rdf(term);
-            match variable.as_str() {
-                "margin" => {
-                    let value = Number::of(&term).map(Number::double).filter(|value| !value.is_nan());
-                    let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is no number")))?;
-                    margin = Some(margin.map_or(value, |least| least.min(value)));
-                }
-                "because" => {
-                    because.insert(lexical(&term));
-                }
-                name => values.push((name.to_owned(), term)),
+    /// Every row is a violation.
+    fn rows_found(&self, rows: QuerySolutionIter<'_>, budget: &Budget) -> Result<Findings, RuleFault> {
+        let mut witness = Vec::new();
+        let (mut margin, mut because) = (None::<f64>, BTreeSet::new());
+        for row in rows {
+            let row = row.map_err(|error| fault(&error))?;
+            if witness.len() >= budget.tuples {
+                return Err(self.budget_spent(&format!("found more than {} rows", budget.tuples)));
             }
+            let mut values = Vec::new();
+            for (variable, term) in row.iter() {
+                let term = from_rdf(term);
+                match variable.as_str() {
+                    "margin" => {
+                        let value = Number::of(&term).map(Number::double).filter(|value| !value.is_nan());
+                        let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is no number")))?;
+                        margin = Some(margin.map_or(value, |least| least.min(value)));
+                    }
+                    "because" => {
+                        because.insert(lexical(&term));
+                    }
+                    name => values.push((name.to_owned(), term)),
+                }
+            }
+            witness.push(WitnessRow { predicate: "row".into(), values });
         }
-        witness.push(WitnessRow { predicate: "row".into(), values });
+        let witness_count = witness.len();
+        witness.sort_by(|a, b| a.values.cmp(&b.values));
+        witness.truncate(Findings::WITNESS_LIMIT);
+        let because = because.into_iter().collect();
+        Ok(Findings { applicable: true, holds: witness_count == 0, witness, witness_count, margin, because })
     }
-    let witness_count = witness.len();
-    witness.sort_by(|a, b| a.values.cmp(&b.values));
-    witness.truncate(Findings::WITNESS_LIMIT);
-    let because = because.into_iter().collect();
-    Ok(Findings { applicable: true, holds: witness_count == 0, witness, witness_count, margin, because })
+
+    fn stopped(&self, stop: Stop, budget: &Budget) -> RuleFault {
+        match stop {
+            Stop::Time => self.budget_spent(&format!("took more than {} s", budget.secs)),
+            Stop::Tuples => self.budget_spent(&format!("held more than {} terms at once", budget.tuples)),
+            Stop::Asked => RuleFault::Interrupted,
+        }
+    }
+
+    fn budget_spent(&self, how: &str) -> RuleFault {
+        let advice = "patterns that share no variable multiply: let each share one with those before it";
+        RuleFault::BudgetSpent(format!("the query in {} {how}; {advice}", self.file))
+    }
 }
 
 impl RuleBook {
@@ -184,15 +195,8 @@ fn evaluator() -> SparqlEvaluator {
     evaluator
 }
 
-fn time_spent(budget: &Budget) -> RuleFault {
-    RuleFault::BudgetSpent(format!("the query took more than {} s", budget.secs))
-}
-
-fn fault(error: &QueryEvaluationError, budget: &Budget) -> RuleFault {
-    match error {
-        QueryEvaluationError::Dataset(inner) if inner.is::<TimeSpent>() => time_spent(budget),
-        other => RuleFault::Value(other.to_string()),
-    }
+fn fault(error: &QueryEvaluationError) -> RuleFault {
+    RuleFault::Value(error.to_string())
 }
 
 /// Binds each designator that the query uses as a variable, at the start of every group that uses it:

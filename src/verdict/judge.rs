@@ -73,6 +73,7 @@ fn outcome_of(result: &Result<Findings, RuleFault>, property: Option<&Property>)
     match result {
         Err(RuleFault::BudgetSpent(reason)) => (Outcome::Timeout, None, reason.clone()),
         Err(RuleFault::Value(reason)) => (Outcome::Broken, None, reason.clone()),
+        Err(RuleFault::Interrupted) => (Outcome::Untested, None, RuleFault::Interrupted.to_string()),
         Ok(found) if !found.applicable => (Outcome::Inapplicable, None, words(found, property)),
         Ok(found) => {
             let outcome = if found.holds { Outcome::Passed } else { Outcome::Failed };

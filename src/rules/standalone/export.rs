@@ -1,11 +1,14 @@
 //! `@export`: tuples to delimited text or N-Triples-like rows.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::base::{Diagnostic, Diagnostics, did_you_mean};
+use crate::rules::findings::RuleFault;
 use crate::rules::options::{OptionValue, options};
 use crate::rules::standalone::program::{Closure, Program};
 use crate::rules::standalone::table::delimiter_of;
+use crate::rules::standalone::unfinished::Unfinished;
 use crate::rules::syntax::{Statement, Syntax, Transfer};
 use crate::rules::values;
 
@@ -75,27 +78,31 @@ fn file_name(syntax: &Syntax, predicate: &str) -> String {
     format!("{base}{predicate}").chars().map(|c| if fits(c) { c } else { '_' }).collect()
 }
 
-/// Writes the tuples of a predicate, sorted, and tells how many there are.
+/// Writes the tuples of a predicate, sorted, and tells how many there are. The file has its name only when it is whole.
 ///
 /// # Errors
-/// Why the file can't be written.
-pub(super) fn write(export: &Export, folder: &Path, closure: &Closure) -> Result<usize, String> {
+/// Why the file can't be written; `stop` was set.
+pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &AtomicBool) -> Result<usize, String> {
     let path = folder.join(&export.path);
     let lower = |error: &dyn std::fmt::Display| error.to_string().to_lowercase();
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(|error| lower(&error))?;
     }
-    let mut writer =
-        csv::WriterBuilder::new().delimiter(export.delimiter).from_path(&path).map_err(|error| lower(&error))?;
-    let mut count = 0;
     let mut tuples: Vec<Vec<&crate::base::Term>> = closure.tuples_unsorted(&export.predicate).collect();
     tuples.sort();
+    let (unfinished, file) = Unfinished::begin(path).map_err(|error| lower(&error))?;
+    let mut writer = csv::WriterBuilder::new().delimiter(export.delimiter).from_writer(file);
+    let mut count = 0;
     for tuple in tuples {
+        if stop.load(Ordering::Relaxed) {
+            return Err(RuleFault::Interrupted.to_string());
+        }
         if !tuple.is_empty() {
             writer.write_record(tuple.into_iter().map(values::full)).map_err(|error| lower(&error))?;
         }
         count += 1;
     }
     writer.flush().map_err(|error| lower(&error))?;
+    unfinished.keep().map_err(|error| lower(&error))?;
     Ok(count)
 }

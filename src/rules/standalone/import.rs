@@ -2,6 +2,7 @@
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use oxigraph::io::{RdfFormat, RdfParseError, RdfParser};
 use oxigraph::model::GraphName;
@@ -11,6 +12,7 @@ use crate::rules::check::{Checking, Role, counted};
 use crate::rules::dataset::from_rdf;
 use crate::rules::options::{OptionValue, options};
 use crate::rules::program::{Predicates, Program};
+use crate::rules::standalone::stoppable::Stoppable;
 use crate::rules::standalone::table::{ColumnKind, LeftOut, delimiter_of, read_table};
 use crate::rules::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
 use crate::rules::values::lexical;
@@ -225,6 +227,7 @@ pub(super) fn import(
     terms: &mut Terms,
     program: &mut Program,
     diagnostics: &mut Diagnostics,
+    stop: &AtomicBool,
 ) {
     let Some(id) = predicates.find(0, &import.predicate, None) else { return };
     let arity = predicates.get(id).arity;
@@ -237,7 +240,8 @@ pub(super) fn import(
         return;
     }
     let rows = program.facts.entry(id).or_default();
-    let read = open(&import.path).and_then(|reader| match &import.content {
+    let reader = open(&import.path).map(|inner| Stoppable { inner, stop });
+    let read = reader.and_then(|reader| match &import.content {
         Content::Table { delimiter, quoting, headers, columns } => {
             read_table(reader, *delimiter, *quoting, *headers, columns, import.limit, terms, rows)
         }
@@ -259,7 +263,7 @@ pub(super) fn import(
 }
 
 fn read_rdf(
-    reader: Box<dyn Read>,
+    reader: impl Read,
     format: RdfFormat,
     base: Option<&str>,
     limit: usize,

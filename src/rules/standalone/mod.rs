@@ -6,7 +6,9 @@ mod export;
 mod import;
 mod program;
 mod run;
+mod stoppable;
 mod table;
+mod unfinished;
 
 pub use program::{Closure, Engine, Program};
 pub use run::{Summary, run};

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use crate::base::{Diagnostics, Source, Term, TermId, Terms};
 use crate::rules::book::fault;
@@ -85,6 +86,14 @@ impl Program {
     /// # Errors
     /// All faults, each with its place: of the text, of the rules, and of files that can't be read.
     pub fn load(source: &Source, folder: &Path) -> Result<Self, Diagnostics> {
+        Self::load_until(source, folder, &AtomicBool::new(false))
+    }
+
+    /// Loads a program as [`Program::load`] does, until `stop` is set: then its imports end with a fault.
+    ///
+    /// # Errors
+    /// All faults, each with its place.
+    pub fn load_until(source: &Source, folder: &Path, stop: &AtomicBool) -> Result<Self, Diagnostics> {
         let (syntax, mut diagnostics) = parse(source);
         let mut terms = Terms::new();
         let mut checking = Checking::new(&mut terms, None);
@@ -99,7 +108,7 @@ impl Program {
             return Err(diagnostics);
         }
         for table in imports {
-            import(table, &predicates, &mut terms, &mut program, &mut diagnostics);
+            import(table, &predicates, &mut terms, &mut program, &mut diagnostics, stop);
         }
         let strata = stratify(&program.rules, &predicates, &Universe::new(&terms, None)).unwrap_or_else(|found| {
             diagnostics.extend(found);
