@@ -115,7 +115,7 @@ fn judged(file: &str, text: &str, facts: &RunFacts, budget: &Budget) -> Result<F
     let (book, iri) = book(file, text);
     let started = std::time::Instant::now();
     let found = book.judge(&facts.action(0).unwrap(), std::slice::from_ref(&iri), budget).remove(&iri).unwrap();
-    println!("{file}: {:.2} s with a budget of {} s", started.elapsed().as_secs_f64(), budget.secs);
+    println!("{file}: {:.2} s with a budget of {:.1e} s", started.elapsed().as_secs_f64(), budget.secs);
     found
 }
 
