@@ -175,6 +175,7 @@ fn again(env: &Env, campaign: &str, index: u64, choices: &[Choice], manner: &Man
     let recorded = || Choices::recorded(choices);
     match catch_unwind(AssertUnwindSafe(|| run_line(env, campaign, index, recorded(), manner))) {
         Ok(Ok(record)) => Ok(record),
+        Ok(Err(Failure::Interrupted)) => Err(Failure::Interrupted.to_string()),
         Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can't be built any more: {reason}")),
         Err(panic) => {
             let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
