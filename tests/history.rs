@@ -107,6 +107,7 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
     };
     let score = if failed { 0.8 } else { 1.0 };
     RunRecord {
+        shrunk_from: None,
         id: format!("{campaign}-{}", index + 1),
         campaign: campaign.to_owned(),
         index,

@@ -73,6 +73,16 @@ enum Rest {
     Random(Box<ChaCha8Rng>),
 }
 
+impl ChoiceKind {
+    /// The value that stands for "nothing special".
+    pub fn nominal(&self) -> f64 {
+        match self {
+            Self::Index { .. } | Self::Normal { .. } => 0.0,
+            Self::Real { nominal, .. } => *nominal,
+        }
+    }
+}
+
 impl Choices {
     /// Fresh decisions: the same seed and index give the same ones, on every machine.
     pub fn random(seed: u64, index: u64) -> Self {
@@ -128,6 +138,21 @@ impl Choices {
             (radius * libm::cos(angle)).clamp(-FARTHEST, FARTHEST) * sigma
         });
         self.record(name, ChoiceKind::Normal { sigma }, value);
+        value
+    }
+
+    /// A decision that chance never makes: one of `of` things, 0 unless a record says otherwise, and recorded only then.
+    ///
+    /// It lets a record ask for less than its configuration does.
+    pub fn exception(&mut self, name: &str, of: usize) -> usize {
+        let asked = match &mut self.origin {
+            Origin::Recorded { values, .. } => values.get_mut(name).and_then(VecDeque::pop_front).unwrap_or(0.0),
+            Origin::Random(_) | Origin::Steered { .. } => 0.0,
+        };
+        let value = (asked.max(0.0) as usize).min(of.saturating_sub(1));
+        if value > 0 {
+            self.record(name, ChoiceKind::Index { of }, value as f64);
+        }
         value
     }
 
@@ -221,6 +246,16 @@ mod tests {
     #[test]
     fn what_a_record_lacks_is_nominal() {
         assert_eq!(draw(&mut Choices::recorded(&[])), (0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn only_a_record_makes_an_exception() {
+        assert_eq!(Choices::random(7, 3).exception("left_out", 2), 0);
+        assert_eq!(Choices::recorded(&[]).exception("left_out", 2), 0);
+        let said = Choice { name: "left_out".into(), kind: ChoiceKind::Index { of: 2 }, value: 1.0 };
+        let mut again = Choices::recorded(std::slice::from_ref(&said));
+        assert_eq!(again.exception("left_out", 2), 1);
+        assert_eq!(again.made(), [said]);
     }
 
     #[test]

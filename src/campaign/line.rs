@@ -57,15 +57,15 @@ pub fn run_line(
     manner: &Manner,
 ) -> Result<RunRecord, Failure> {
     let (started, start_secs) = ((manner.clock.now)(), (manner.clock.secs)());
-    let test = env.test_of(index);
-    let scene =
-        scenario::draw(&env.space, test, &mut choices).map_err(|discard| Failure::Discard(discard.to_string()))?;
+    let scene = scenario::draw(&env.space, env.test_of(index), &mut choices)
+        .map_err(|discard| Failure::Discard(discard.to_string()))?;
+    let test = test_to_perform(env, index, &mut choices);
     let disturb = |world: &mut World| {
         if let Some(disturb) = manner.disturb {
             disturb(index, world);
         }
     };
-    let trace = perform(env, &env.campaign.tests[test], &scene, &mut choices, disturb)?;
+    let trace = perform(env, test, &scene, &mut choices, disturb)?;
     let mut record = record(env, campaign, index, scene, trace)?;
     record.choices = choices.into_made();
     record.started = started;
@@ -73,13 +73,19 @@ pub fn run_line(
     Ok(record)
 }
 
+/// The actions of a run. Only a shrunk record leaves the last ones out.
+fn test_to_perform<'a>(env: &'a Env, index: u64, choices: &mut Choices) -> &'a [String] {
+    let test = &env.campaign.tests[env.test_of(index)];
+    let left_out = choices.exception("test.left_out", test.len());
+    &test[..test.len() - left_out]
+}
+
 /// The record of a run whose simulation crashed: every property is broken, for the reason given.
 ///
 /// Nothing where the scene can't be drawn a second time.
 pub(super) fn crashed(env: &Env, campaign: &str, index: u64, mut choices: Choices, reason: &str) -> Option<RunRecord> {
-    let test = env.test_of(index);
-    let scene = scenario::draw(&env.space, test, &mut choices).ok()?;
-    let trace = never_performed(&env.campaign.tests[test], &scene, reason);
+    let scene = scenario::draw(&env.space, env.test_of(index), &mut choices).ok()?;
+    let trace = never_performed(test_to_perform(env, index, &mut choices), &scene, reason);
     let mut record = record(env, campaign, index, scene, trace).ok()?;
     record.choices = choices.into_made();
     Some(record)
@@ -94,8 +100,9 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
     Ok(RunRecord {
         id: format!("{campaign}-{}", index + 1),
         campaign: campaign.to_owned(),
+        shrunk_from: None,
         index,
-        test: env.campaign.tests[env.test_of(index)].join(" "),
+        test: trace.actions.iter().map(|action| action.action.as_str()).collect::<Vec<_>>().join(" "),
         seed: env.campaign.seed,
         status,
         reason,

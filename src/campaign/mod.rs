@@ -14,6 +14,7 @@ mod outcome;
 mod recheck;
 mod rule_set;
 mod run_all;
+pub mod shrink;
 
 pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Recalled, Replay, replay_all};
 

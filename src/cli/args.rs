@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::recheck::RecheckArgs;
+use crate::cli::shrink::ShrinkArgs;
 use crate::report::TableFormat;
 
 /// QuickCheck for robot actions: generated scenes, physics simulation, verdicts by rules that you edit.
@@ -47,6 +48,15 @@ pub enum Command {
         after_help = "Example:\n  actcheck show k7f3-3    (an id that `actcheck list` prints; its beginning is enough)"
     )]
     Show(ShowArgs),
+    /// Find the smallest scene that still fails as a run did, and say what of it matters
+    ///
+    /// Takes away objects and last actions, and brings noise, physics and poses back to nominal, as long as the same
+    /// properties fail. The small run is kept in the history. Exit code: 0 done, 130 stopped by Ctrl-C (the smallest so
+    /// far is kept and printed), 2 the run does not fail or can't be made again.
+    #[command(
+        after_help = "Example:\n  actcheck shrink k7f3-3 --picture small.svg    (an id that `actcheck list` prints; its beginning is enough)"
+    )]
+    Shrink(ShrinkArgs),
     /// Ask a history in SPARQL 1.1
     ///
     /// The prefixes act, w, obj, run, campaign, rdf, rdfs, owl, xsd, earl and prov are known. Facts about the world
@@ -93,6 +103,9 @@ pub struct RunArgs {
     /// Workers, one simulation each; results don't depend on it [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
+    /// Shrink one run of each failure mode afterwards, as `actcheck shrink` does
+    #[arg(long)]
+    pub shrink: bool,
     /// Folder of the history [default: `.actcheck` beside the configuration]
     #[arg(long, value_name = "DIR")]
     pub history: Option<PathBuf>,

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::cli::args::{Arguments, Command};
-use crate::cli::{check, datalog, list, new, output, query, recheck, rules, show, stop, why};
+use crate::cli::{check, datalog, list, new, output, query, recheck, rules, show, shrink, stop, why};
 
 /// Parses the process's arguments and does what they ask.
 ///
@@ -19,6 +19,7 @@ pub fn run() -> ExitCode {
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),
+        Command::Shrink(args) => shrink::shrink(&args),
         Command::Query(args) => query::query(&args).map(|()| 0),
         Command::Rules(args) => rules::rules(&args).map(|()| 0),
         Command::Recheck(args) => recheck::recheck(&args),

@@ -20,6 +20,7 @@ mod recheck;
 mod rules;
 mod run;
 mod show;
+mod shrink;
 mod stop;
 mod why;
 

@@ -12,7 +12,7 @@ use crate::base::{Diagnostic, Diagnostics};
 use crate::campaign::{CampaignEnd, Ending, Env, Manner, Options, run_all};
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
-use crate::cli::{clock, output, stop};
+use crate::cli::{clock, output, shrink, stop};
 use crate::config::Overrides;
 use crate::history::{self, History, RunFilter};
 use crate::report::{CampaignSummary, RunSummary, campaign_json, campaign_table, campaign_text};
@@ -50,12 +50,12 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     if finished.is_ok() {
         summary.failure_modes = failure_modes(&history, id)?;
     }
-    output::print(&match args.format {
-        Format::Table => campaign_text(&summary, output::colour()),
-        Format::Csv => campaign_table(&summary).render(args.format.into()),
-        Format::Json => format!("{:#}\n", campaign_json(&summary)),
-    });
+    print(&summary, args.format);
     warn_of_discards(&end);
+    if args.shrink && finished.is_ok() && matches!(end.ending, Ending::Finished) {
+        let shrunk = shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, &stop)?;
+        output::print(&shrink::printed(&shrunk, args.format));
+    }
     match end.ending {
         Ending::Stopped(faults) => Err(faults),
         Ending::Finished => finished.map(|()| summary.exit_code()),
@@ -74,12 +74,31 @@ fn interrupt() -> (Arc<AtomicBool>, Arc<OnceLock<ProgressBar>>) {
     (stop, shown)
 }
 
-fn all_cores() -> usize {
+fn print(summary: &CampaignSummary, format: Format) {
+    output::print(&match format {
+        Format::Table => campaign_text(summary, output::colour()),
+        Format::Csv => campaign_table(summary).render(format.into()),
+        Format::Json => format!("{:#}\n", campaign_json(summary)),
+    });
+}
+
+/// The first run of each failure mode, with its place in the campaign.
+fn examples(summary: &CampaignSummary) -> Vec<(String, u64)> {
+    let failing = summary.failure_modes.iter().filter(|mode| !mode.failed.is_empty());
+    let first = failing.filter_map(|mode| mode.runs.first());
+    first
+        .filter_map(|id| summary.runs.iter().find(|run| run.id == *id))
+        .map(|run| (run.id.clone(), run.index))
+        .collect()
+}
+
+/// As many workers as there are cores.
+pub(super) fn all_cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZero::get)
 }
 
 /// A crash of simulation is kept with its run; the panic's own message must not tear the progress bar.
-fn quietly<T>(work: impl FnOnce() -> T) -> T {
+pub(super) fn quietly<T>(work: impl FnOnce() -> T) -> T {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
     let result = work();

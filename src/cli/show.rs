@@ -41,7 +41,7 @@ fn outcomes(run: &RunDetail) -> Table {
     table
 }
 
-fn draw(history: &History, run: &RunDetail, file: &Path) -> Result<(), Diagnostics> {
+pub(super) fn draw(history: &History, run: &RunDetail, file: &Path) -> Result<(), Diagnostics> {
     let trace = history.trace(&run.row.run)?;
     let target = run.objects.iter().find(|object| object.role == Role::Target).map(|object| object.id.as_str());
     let title = format!("{} ({}): {}, S = {:.2}", run.row.run, run.row.test, run.row.status.word(), run.row.score);

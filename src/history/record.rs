@@ -88,6 +88,8 @@ pub struct RunRecord {
     pub id: String,
     /// Id of its campaign.
     pub campaign: String,
+    /// Id of the run that it is a smaller form of.
+    pub shrunk_from: Option<String>,
     /// Position in the campaign, from 0.
     pub index: u64,
     /// Names of the actions, joined by a space.

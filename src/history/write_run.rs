@@ -46,6 +46,7 @@ fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
         .text("act:status", record.status.word())
         .text("act:traceHash", &record.trace.hash)
         .may("act:reason", record.reason.as_deref().map(Literal::new_simple_literal))
+        .may("act:shrunkFrom", record.shrunk_from.as_deref().map(run_node))
         .has("prov:startedAtTime", time(&record.started))
         .has("act:wallSeconds", Literal::from(record.wall_secs))
         .text("act:program", &program(env!("CARGO_PKG_VERSION")));

@@ -11,6 +11,7 @@ mod recheck_summary;
 mod recheck_text;
 mod remarks;
 mod run_text;
+mod shrunk_text;
 mod summary;
 mod table;
 
@@ -23,5 +24,6 @@ pub use recheck_summary::{Change, RecheckLine, RecheckSummary, Why};
 pub use recheck_text::{recheck_json, recheck_table, recheck_text};
 pub use remarks::{Oddity, Remark};
 pub use run_text::{run_json, run_text};
+pub use shrunk_text::{ShrunkChoice, ShrunkSummary, shrunk_json, shrunk_text};
 pub use summary::{ActionSummary, CampaignSummary, PropertyLine, RunSummary, Share};
 pub use table::{Table, TableFormat};

@@ -41,7 +41,14 @@ pub struct Discard {
 /// # Errors
 /// An object found no free place.
 pub fn draw(space: &Space, _test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
-    let mut hand = Hand { space, choices, objects: Vec::new(), solids: Vec::new(), designators: BTreeMap::new() };
+    let mut hand = Hand {
+        space,
+        choices,
+        objects: Vec::new(),
+        solids: Vec::new(),
+        left_out: Vec::new(),
+        designators: BTreeMap::new(),
+    };
     hand.choose_names();
     let surface = hand.set_platform();
     if let Some(surface) = surface {
@@ -69,6 +76,8 @@ struct Hand<'a> {
     objects: Vec<SceneObject>,
     /// Forms of the objects that stand on the surface.
     solids: Vec<Solid>,
+    /// Models of the objects that a record leaves out.
+    left_out: Vec<String>,
     designators: BTreeMap<String, Vec<String>>,
 }
 
@@ -123,6 +132,11 @@ impl Hand<'_> {
         for number in 1..=count {
             let name = format!("other.{number}");
             if let Some(model) = self.choose(&format!("{name}.model"), &self.space.others) {
+                // Only a shrunk record leaves one out; the ids of the others stay as they were.
+                if self.choices.exception(&format!("{name}.left_out"), 2) == 1 {
+                    self.left_out.push(model.name.clone());
+                    continue;
+                }
                 let angle = TAU * (number - 1) as f64 / count as f64;
                 let nominal = [radius * libm::cos(angle), radius * libm::sin(angle)];
                 ids.push(self.place(&name, model, Role::Other, surface, nominal)?);
@@ -209,7 +223,8 @@ impl Hand<'_> {
 
     /// The model's name and the first number that is free.
     fn free_id(&self, model: &ObjectModel) -> String {
-        let taken = self.objects.iter().filter(|object| object.model.name == model.name).count();
+        let standing = self.objects.iter().map(|object| &object.model.name);
+        let taken = standing.chain(&self.left_out).filter(|name| **name == model.name).count();
         format!("{}_{}", model.name, taken + 1)
     }
 }

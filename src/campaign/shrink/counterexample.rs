@@ -1,0 +1,317 @@
+//! Shrinks a failing run: the line is the test, and a scene's choices are the list.
+
+use std::collections::BTreeSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use crate::base::{Choice, ChoiceKind, Choices, Diagnostic, Diagnostics, did_you_mean, names};
+use crate::campaign::shrink::list::{accepted_places, has};
+use crate::campaign::shrink::{Explained, Limits, Plan, Search, Tried, explain, reduce};
+use crate::campaign::{Env, Manner, run_line};
+use crate::history::{History, RunRecord, RunStatus};
+use crate::scenario::Role;
+use crate::verdict::Outcome;
+
+/// Prefix of the choices that are what sensors get wrong.
+const NOISE: &str = "sense.";
+/// Fresh noise for the small scene, to say how often it fails.
+const FRESH: u32 = 5;
+/// Movements under this are settling and rounding. Unit: metres.
+const MOVED_M: f64 = 1e-3;
+
+/// How often a scene must fail with fresh noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Repeat {
+    /// At least so many times.
+    pub least: u32,
+    /// Of so many repetitions.
+    pub of: u32,
+}
+
+/// How a run is shrunk.
+pub struct ShrinkOptions<'a> {
+    /// This property must still fail; without one, exactly those that failed in the run.
+    pub property: Option<&'a str>,
+    /// Simulations, those of the explanation included.
+    pub trials: u64,
+    /// Workers; what is found does not depend on it.
+    pub jobs: usize,
+    /// With fresh noise; without, the noise is as recorded, and shrinks like everything else.
+    pub repeat: Option<Repeat>,
+    /// How runs are made.
+    pub manner: Manner,
+    /// Whether time is up or somebody asked to stop.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// The smallest scene that was found.
+#[derive(Debug, Clone)]
+pub struct Shrunk {
+    /// Its choices, those of noise among them.
+    pub choices: Vec<Choice>,
+    /// IRIs of the properties that failed in the run; all of them, or the one that was asked for, fail still.
+    pub failed: BTreeSet<String>,
+    /// Other objects in the run that was shrunk.
+    pub others_before: usize,
+    /// Choices that were not nominal in it.
+    pub special_before: usize,
+    /// Whether nothing more can be taken away; otherwise limits ended it.
+    pub minimal: bool,
+    /// Simulations that shrinking took.
+    pub simulations: u64,
+    /// Simulations that the explanation took.
+    pub explaining: u64,
+    /// What matters.
+    pub explained: Explained,
+    /// How often it fails with fresh noise, and of how many repetitions; nothing without noise or time.
+    pub fresh: Option<(u32, u32)>,
+    /// Whether noise had to stay as recorded, because with fresh noise the run does not fail often enough.
+    pub noise_kept: bool,
+}
+
+/// Finds the smallest scene that fails as a run did. `recorded` are the run's choices, `index` its place in its campaign.
+///
+/// The number of workers changes nothing of what is found; a limit on time may. `on_better` hears of each smaller scene.
+///
+/// # Errors
+/// `S050` nothing fails when the run is made again, or not the property that was asked for.
+pub fn shrink(
+    env: &Env,
+    index: u64,
+    recorded: &[Choice],
+    options: &ShrinkOptions<'_>,
+    on_better: &mut dyn FnMut(&[Choice]),
+) -> Result<Shrunk, Diagnostics> {
+    let recorded = accepted_places(recorded);
+    let first = remake(env, index, &recorded, options)?;
+    let subject = Subject { env, index, failed: signature(&first), options };
+    subject.check_property()?;
+    let removals = removals(&first, &recorded);
+    let others_before = removals.len();
+    let ends = ends(env, index);
+    let plan = Plan { removals, ends, group: &group };
+    let start = accepted_places(&first.choices);
+    let fresh_noise = |list: &[Choice]| subject.with_fresh_noise(list);
+    let as_recorded = |list: &[Choice]| subject.as_recorded(list);
+    let noisy = start.iter().any(|choice| is_noise(&choice.name) && choice.value != 0.0);
+    let repeated = options.repeat.is_some() && noisy && fresh_noise(&start).made.is_some();
+    let test: &(dyn Fn(&[Choice]) -> Tried + Sync) = if repeated { &fresh_noise } else { &as_recorded };
+    let limits = Limits { simulations: options.trials, jobs: options.jobs, stop: options.stop };
+    let mut search = Search::new(test, limits);
+    let special_before = special(&start);
+    let start = if repeated { start.into_iter().filter(|choice| !is_noise(&choice.name)).collect() } else { start };
+    let (choices, minimal) = reduce(&mut search, start, &plan, on_better);
+    let simulations = search.simulations();
+    let explained = explain(&mut search, &choices, &plan);
+    let explaining = search.simulations() - simulations;
+    Ok(Shrunk {
+        fresh: (noisy && !(options.stop)()).then(|| subject.fresh_failures(&choices)),
+        choices: if repeated { subject.with_failing_noise(&choices) } else { choices },
+        failed: subject.failed,
+        others_before,
+        special_before,
+        minimal,
+        simulations,
+        explaining,
+        explained,
+        noise_kept: options.repeat.is_some() && noisy && !repeated,
+    })
+}
+
+/// Runs the small scene once more and keeps it in the history: a campaign of its own, whose run says what it was shrunk
+/// from. Returns the run.
+///
+/// # Errors
+/// Writing failed; or the scene can't be made any more, which a changed program explains.
+pub fn keep(
+    env: &Env,
+    history: &History,
+    (original, index): (&str, u64),
+    shrunk: &Shrunk,
+    manner: &Manner,
+) -> Result<RunRecord, Diagnostics> {
+    let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
+    let mut campaign = env.record(id.clone(), format!("shrunk {original}"), (manner.clock.now)());
+    campaign.planned_runs = 1;
+    let mut record = run_line(env, &id, index, Choices::recorded(&shrunk.choices), manner)
+        .map_err(|failure| Diagnostic::error("S051", format!("the shrunk scene can't be made again: {failure}")))?;
+    record.shrunk_from = Some(original.to_owned());
+    history.begin_campaign(&campaign)?;
+    history.commit(&record)?;
+    let outcomes = record.judgements.iter().flatten().map(|judgement| judgement.outcome);
+    let counts = crate::verdict::Counts::of(outcomes);
+    let end = crate::history::CampaignEnd {
+        ended: (manner.clock.now)(),
+        score: Some(record.score),
+        score_without_broken: (record.status != RunStatus::Broken).then_some(record.score),
+        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
+        discards: 0,
+        interrupted: false,
+    };
+    history.finish_campaign(&id, &end)?;
+    Ok(record)
+}
+
+/// The run to shrink and what must stay of it.
+struct Subject<'a> {
+    env: &'a Env,
+    index: u64,
+    failed: BTreeSet<String>,
+    options: &'a ShrinkOptions<'a>,
+}
+
+impl Subject<'_> {
+    fn check_property(&self) -> Result<(), Diagnostics> {
+        let failed = || self.failed.iter().map(|iri| names::local(iri));
+        match self.options.property {
+            _ if self.failed.is_empty() => Err(Diagnostic::error("S050", "no property fails in this run: there is nothing to shrink")
+                .help("rules or models may have changed since it was made; `actcheck list` shows runs that failed by their score")
+                .into()),
+            Some(property) if !self.failed.iter().any(|iri| is_named(iri, property)) => {
+                let message = format!("the property `{property}` does not fail in this run");
+                let help = format!("{}; those that fail: {}", did_you_mean(property, failed()), failed().collect::<Vec<_>>().join(", "));
+                Err(Diagnostic::error("S050", message).help(help).into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// One run. What can't be drawn, does not settle, breaks or runs out of time does not fail as it should.
+    fn run(&self, choices: Choices) -> Option<RunRecord> {
+        let run = || run_line(self.env, "shrink", self.index, choices, &self.options.manner).ok();
+        let record = catch_unwind(AssertUnwindSafe(run)).ok().flatten()?;
+        let failed = signature(&record);
+        let same = match self.options.property {
+            Some(property) => failed.iter().any(|iri| is_named(iri, property)),
+            None => failed == self.failed,
+        };
+        (record.status == RunStatus::Completed && same).then_some(record)
+    }
+
+    fn as_recorded(&self, list: &[Choice]) -> Tried {
+        let made = self.run(Choices::recorded(list)).map(|record| accepted_places(&record.choices));
+        Tried { made, simulations: 1 }
+    }
+
+    /// The scene of a list with the noise of a repetition. The noise does not depend on the scene.
+    fn repetition(&self, list: &[Choice], number: u32) -> Option<RunRecord> {
+        let scene: Vec<Choice> = list.iter().filter(|choice| !is_noise(&choice.name)).cloned().collect();
+        // Streams from the end: those from the beginning are the campaign's own.
+        self.run(Choices::partly_recorded(&scene, self.env.campaign.seed, u64::MAX - u64::from(number)))
+    }
+
+    fn with_fresh_noise(&self, list: &[Choice]) -> Tried {
+        let Some(Repeat { least, of }) = self.options.repeat else { return self.as_recorded(list) };
+        let mut made = None;
+        let (mut failures, mut simulations) = (0, 0);
+        for number in 0..of {
+            simulations += 1;
+            if let Some(record) = self.repetition(list, number) {
+                failures += 1;
+                made.get_or_insert(record.choices);
+            }
+            let left = of - number - 1;
+            if failures >= least || failures + left < least {
+                break;
+            }
+        }
+        let scene = |made: Vec<Choice>| {
+            accepted_places(&made).into_iter().filter(|choice| !is_noise(&choice.name)).collect::<Vec<_>>()
+        };
+        Tried { made: made.filter(|_| failures >= least).map(scene), simulations }
+    }
+
+    fn fresh_failures(&self, list: &[Choice]) -> (u32, u32) {
+        let of = self.options.repeat.map_or(FRESH, |repeat| repeat.of);
+        let failures = (0..of).filter(|number| self.repetition(list, *number).is_some()).count();
+        (u32::try_from(failures).unwrap_or(of), of)
+    }
+
+    /// The first noise with which a scene fails, written into its choices, so that one run shows it.
+    fn with_failing_noise(&self, list: &[Choice]) -> Vec<Choice> {
+        let of = self.options.repeat.map_or(1, |repeat| repeat.of);
+        let failing = (0..of).find_map(|number| self.repetition(list, number));
+        failing.map_or_else(|| list.to_vec(), |record| accepted_places(&record.choices))
+    }
+}
+
+/// The run made again.
+fn remake(env: &Env, index: u64, recorded: &[Choice], options: &ShrinkOptions<'_>) -> Result<RunRecord, Diagnostics> {
+    run_line(env, "shrink", index, Choices::recorded(recorded), &options.manner).map_err(|failure| {
+        Diagnostic::error("S051", format!("the run's scene can't be made any more: {failure}"))
+            .help("models, robot or program have changed since it was made")
+            .into()
+    })
+}
+
+fn signature(record: &RunRecord) -> BTreeSet<String> {
+    let failed = record.judgements.iter().flatten().filter(|judgement| judgement.outcome == Outcome::Failed);
+    failed.map(|judgement| judgement.property.clone()).collect()
+}
+
+fn is_named(iri: &str, name: &str) -> bool {
+    iri == name || names::local(iri) == name
+}
+
+fn is_noise(name: &str) -> bool {
+    name.starts_with(NOISE)
+}
+
+/// Choices of a list that are not nominal, those that only say how many objects there are left out.
+fn special(list: &[Choice]) -> usize {
+    list.iter().filter(|choice| choice.value != choice.kind.nominal() && group(list, &choice.name).is_some()).count()
+}
+
+fn left_out(number: &str) -> Choice {
+    Choice { name: format!("other.{number}.left_out"), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
+}
+
+/// One for each other object: first those that moved, the farthest first, then those that stand nearest to the target.
+fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
+    let numbers = recorded.iter().filter_map(|choice| choice.name.strip_prefix("other.")?.strip_suffix(".model"));
+    let left = numbers.map(left_out).filter(|removal| !has(recorded, removal));
+    let objects = &record.scene.objects;
+    let target = objects.iter().find(|object| object.role == Role::Target).map(|object| object.pose.position);
+    let others = objects.iter().filter(|object| object.role == Role::Other);
+    let mut ranked: Vec<(f64, f64, Choice)> = left
+        .zip(others)
+        .map(|(removal, object)| {
+            let courses = record.trace.actions.iter().flat_map(|action| &action.extremes);
+            let moved = courses.filter(|course| course.id == object.id).map(|course| course.max_displacement_m);
+            let moved = Some(moved.fold(0.0, f64::max)).filter(|moved| *moved > MOVED_M).unwrap_or(0.0);
+            let [x, y, _] = object.pose.position;
+            let away = target.map_or(0.0, |target| libm::hypot(x - target[0], y - target[1]));
+            (moved, away, removal)
+        })
+        .collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.total_cmp(&b.1)));
+    ranked.into_iter().map(|(.., removal)| removal).collect()
+}
+
+/// Leaves out as many of the last actions as possible.
+fn ends(env: &Env, index: u64) -> Vec<Choice> {
+    let of = env.campaign.tests[env.test_of(index)].len();
+    let end = |left_out: usize| Choice {
+        name: "test.left_out".to_owned(),
+        kind: ChoiceKind::Index { of },
+        value: left_out as f64,
+    };
+    (1..of).rev().map(end).collect()
+}
+
+/// What becomes nominal together: noise, physics, the robot's start, where others stand, where the target does, and what
+/// things are. How many things there are is not for this.
+fn group(list: &[Choice], name: &str) -> Option<u8> {
+    let behind = name.rsplit('.').next().unwrap_or(name);
+    let number = name.strip_prefix("other.").and_then(|rest| rest.split('.').next());
+    let gone = number.is_some_and(|number| has(list, &left_out(number)));
+    match (name, behind) {
+        ("other.count", _) | (_, "left_out") => None,
+        _ if gone => None,
+        _ if is_noise(name) => Some(0),
+        (_, "mass_scale" | "friction_scale" | "restitution") => Some(1),
+        _ if name.starts_with("robot.") => Some(2),
+        (_, "x" | "y" | "yaw") if number.is_some() => Some(3),
+        (_, "x" | "y" | "yaw") => Some(4),
+        _ => Some(5),
+    }
+}

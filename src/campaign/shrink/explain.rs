@@ -1,0 +1,172 @@
+//! Which choices of a failing list matter, how far each can go, and the nearest list that passes.
+
+use crate::base::{Choice, ChoiceKind};
+use crate::campaign::shrink::list::{ids, is_nominal, spread, with_value};
+use crate::campaign::shrink::{Id, Plan, Search};
+
+/// Halvings of the gap between a failing and a passing value: it shrinks to an eighth.
+const HALVINGS: usize = 3;
+/// Noise is drawn at most so many standard deviations from 0.
+const FARTHEST_SIGMAS: f64 = 4.0;
+
+/// What one choice does, all others as they are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Influence {
+    /// Which choice.
+    pub id: Id,
+    /// Its kind and its value in the failing list.
+    pub choice: Choice,
+    /// Whether it passes with the nominal value; nothing where limits ended the search before.
+    pub matters: Option<bool>,
+    /// It fails at both of these and at every value that was tried between. In the unit of the choice.
+    pub fails: (f64, f64),
+    /// The nearest values at which it passes, below and above; nothing where none was found.
+    pub passes: (Option<f64>, Option<f64>),
+}
+
+/// The list that passes and differs least: in one choice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Neighbour {
+    /// Which choice.
+    pub id: Id,
+    /// The value with which it passes.
+    pub value: f64,
+    /// How far that is from the failing value, as a share of the choice's spread.
+    pub distance: f64,
+}
+
+/// What is known of a failing list.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Explained {
+    /// Choices that are not nominal, in order.
+    pub influences: Vec<Influence>,
+    /// The nearest list that passes.
+    pub neighbour: Option<Neighbour>,
+}
+
+/// Values between a failing one and one that passes, or the end of what can be drawn.
+struct Bracket {
+    /// Which influence.
+    of: usize,
+    fails: f64,
+    /// Nothing until the end was tried.
+    passes: Option<f64>,
+    end: f64,
+    /// Whether there are values between.
+    continuous: bool,
+    open: bool,
+}
+
+/// Explains a failing list by changing one choice at a time.
+pub fn explain(search: &mut Search<'_>, list: &[Choice], plan: &Plan<'_>) -> Explained {
+    let special =
+        ids(list).into_iter().filter(|(id, choice)| !is_nominal(choice) && (plan.group)(list, &id.name).is_some());
+    let mut influences: Vec<Influence> = special
+        .map(|(id, choice)| Influence {
+            id,
+            choice: choice.clone(),
+            matters: None,
+            fails: (choice.value, choice.value),
+            passes: (None, None),
+        })
+        .collect();
+    let mut brackets = brackets(&influences);
+    for round in 0..=HALVINGS {
+        let open: Vec<usize> = (0..brackets.len()).filter(|at| brackets[*at].open).collect();
+        let points: Vec<f64> = open.iter().map(|at| brackets[*at].next()).collect();
+        let lists: Vec<Vec<Choice>> = open
+            .iter()
+            .zip(&points)
+            .map(|(at, point)| with_value(list.to_vec(), &influences[brackets[*at].of].id, *point))
+            .collect();
+        for ((at, point), fails) in open.into_iter().zip(points).zip(search.each(&lists)) {
+            let bracket = &mut brackets[at];
+            let influence = &mut influences[bracket.of];
+            if round == 0 && point == influence.choice.kind.nominal() {
+                influence.matters = fails.map(|fails| !fails);
+            }
+            bracket.learn(point, fails);
+        }
+    }
+    brackets.iter().for_each(|bracket| bracket.tell(&mut influences[bracket.of]));
+    let neighbour = neighbour(&influences);
+    Explained { influences, neighbour }
+}
+
+/// Towards nominal first, so that whether a choice matters is known before limits end it; then away from it.
+fn brackets(influences: &[Influence]) -> Vec<Bracket> {
+    let towards = influences.iter().enumerate().map(|(of, influence)| (of, influence.choice.kind.nominal()));
+    let away = influences.iter().enumerate().filter_map(|(of, influence)| {
+        let value = influence.choice.value;
+        let up = value > influence.choice.kind.nominal();
+        let end = match influence.choice.kind {
+            ChoiceKind::Real { low, high, .. } => {
+                if up {
+                    high
+                } else {
+                    low
+                }
+            }
+            ChoiceKind::Normal { sigma } => {
+                if up {
+                    FARTHEST_SIGMAS * sigma
+                } else {
+                    -FARTHEST_SIGMAS * sigma
+                }
+            }
+            ChoiceKind::Index { .. } => return None,
+        };
+        (end != value).then_some((of, end))
+    });
+    let bracket = |(of, end): (usize, f64)| {
+        let choice = &influences[of].choice;
+        let continuous = !matches!(choice.kind, ChoiceKind::Index { .. });
+        Bracket { of, fails: choice.value, passes: None, end, continuous, open: true }
+    };
+    towards.chain(away).map(bracket).collect()
+}
+
+impl Bracket {
+    fn next(&self) -> f64 {
+        self.passes.map_or(self.end, |passes| (self.fails + passes) / 2.0)
+    }
+
+    fn learn(&mut self, point: f64, fails: Option<bool>) {
+        match fails {
+            Some(true) => {
+                self.fails = point;
+                // Failing at the very end leaves nothing to look for.
+                self.open = self.continuous && self.passes.is_some();
+            }
+            Some(false) => {
+                self.passes = Some(point);
+                self.open = self.continuous;
+            }
+            None => self.open = false,
+        }
+    }
+
+    fn tell(&self, influence: &mut Influence) {
+        let (low, high) = influence.fails;
+        influence.fails = (low.min(self.fails), high.max(self.fails));
+        if let Some(passes) = self.passes {
+            if passes < influence.choice.value {
+                influence.passes.0 = Some(passes)
+            } else {
+                influence.passes.1 = Some(passes)
+            }
+        }
+    }
+}
+
+fn neighbour(influences: &[Influence]) -> Option<Neighbour> {
+    let passing = influences.iter().flat_map(|influence| {
+        let spread = spread(&influence.choice.kind);
+        [influence.passes.0, influence.passes.1].into_iter().flatten().map(move |value| Neighbour {
+            id: influence.id.clone(),
+            value,
+            distance: (value - influence.choice.value).abs() / spread,
+        })
+    });
+    passing.min_by(|a, b| a.distance.total_cmp(&b.distance))
+}

@@ -1,0 +1,202 @@
+//! `actcheck shrink`, and shrinking at the end of `actcheck run`
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::{Args, ValueEnum};
+
+use crate::base::{Choice, Diagnostic, Diagnostics};
+use crate::campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk, unit_of};
+use crate::campaign::{Env, Manner};
+use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::run::{all_cores, quietly};
+use crate::cli::{clock, history_dir, output, show, stop};
+use crate::history::{History, RunRecord};
+use crate::report::{ShrunkChoice, ShrunkSummary, shrunk_json, shrunk_text};
+use crate::rules::Budget;
+
+/// `actcheck shrink`
+#[derive(Debug, Args)]
+pub struct ShrinkArgs {
+    /// Id of the run, or its beginning
+    pub run: String,
+    /// Keep this property failing, by its name in the ontology [default: just those that failed]
+    #[arg(long, value_name = "PROPERTY")]
+    pub property: Option<String>,
+    /// Simulations at most, those of the explanation included
+    #[arg(long, value_name = "N", default_value_t = TRIALS, value_parser = clap::value_parser!(u64).range(1..))]
+    pub trials: u64,
+    /// Seconds at most [default: no limit]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub time: Option<f64>,
+    /// A scene must fail in K of N repetitions with fresh noise [default: once, with the noise as it was]
+    #[arg(long, value_name = "K/N", value_parser = repeat)]
+    pub repeat: Option<Repeat>,
+    /// Workers, one simulation each; results don't depend on it [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// The configuration to run by [default: the campaign's own, as the history keeps it]
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// Draw the small scene before and after into this file (SVG)
+    #[arg(long, value_name = "FILE.svg")]
+    pub picture: Option<PathBuf>,
+    /// How it is printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: ShrinkFormat,
+}
+
+/// Simulations that one run may take where nothing else is said: three times what most need.
+pub const TRIALS: u64 = 200;
+
+/// Formats of a shrunk run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum ShrinkFormat {
+    /// For people
+    #[default]
+    Text,
+    /// For programs
+    Json,
+}
+
+/// Finds the smallest scene that fails as a run did, keeps it and prints it. Returns the exit code.
+pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
+    let history = history_dir::open(&args.history)?;
+    let run = history.run(&args.run)?;
+    let (env, _) = Env::recall(&history, &run.row.campaign, args.config.as_deref())?;
+    let manner = Manner { clock: clock::system(), disturb: None };
+    let until = args.time.map(|secs| (manner.clock.secs)() + secs);
+    let asked = stop::on_interrupt(|| eprintln!("stopping; the smallest scene so far follows"));
+    let stop = || asked.load(Ordering::Relaxed) || until.is_some_and(|until| (manner.clock.secs)() >= until);
+    let options = ShrinkOptions {
+        property: args.property.as_deref(),
+        trials: args.trials,
+        jobs: args.jobs.map_or_else(all_cores, usize::from),
+        repeat: args.repeat,
+        manner,
+        stop: &stop,
+    };
+    let shrunk = shrink_one(&env, &history, (&run.row.run, run.row.index), &options)?;
+    output::print(&match args.format {
+        ShrinkFormat::Text => shrunk_text(&shrunk),
+        ShrinkFormat::Json => format!("{:#}\n", shrunk_json(&shrunk)),
+    });
+    if let Some(file) = &args.picture {
+        show::draw(&history, &shrunk.run, file)?;
+    }
+    Ok(if asked.load(Ordering::Relaxed) { stop::INTERRUPTED } else { 0 })
+}
+
+/// Shrinks one run of each failure mode of a campaign that has just ended.
+pub fn shrink_modes(
+    env: &Env,
+    history: &History,
+    examples: &[(String, u64)],
+    jobs: usize,
+    asked: &AtomicBool,
+) -> Result<Vec<ShrunkSummary>, Diagnostics> {
+    let manner = Manner { clock: clock::system(), disturb: None };
+    let stop = || asked.load(Ordering::Relaxed);
+    let options = ShrinkOptions { property: None, trials: TRIALS, jobs, repeat: None, manner, stop: &stop };
+    let wanted = examples.iter().take_while(|_| !stop());
+    wanted.map(|(run, index)| shrink_one(env, history, (run, *index), &options)).collect()
+}
+
+/// Shrunk runs behind a campaign's own results: texts, lines of JSON, or for CSV nothing, because its table has ended.
+pub fn printed(shrunk: &[ShrunkSummary], format: Format) -> String {
+    match format {
+        Format::Table => shrunk.iter().map(|one| format!("\n{}", shrunk_text(one))).collect(),
+        Format::Json => shrunk.iter().map(|one| format!("{:#}\n", shrunk_json(one))).collect(),
+        Format::Csv => String::new(),
+    }
+}
+
+fn shrink_one(
+    env: &Env,
+    history: &History,
+    (run, index): (&str, u64),
+    options: &ShrinkOptions<'_>,
+) -> Result<ShrunkSummary, Diagnostics> {
+    let recorded = history.choices(run)?;
+    let shrunk = quietly(|| shrink::shrink(env, index, &recorded, options, &mut |_| {}))?;
+    let record = shrink::keep(env, history, (run, index), &shrunk, &options.manner)?;
+    summary(env, history, run, shrunk, &record)
+}
+
+fn summary(
+    env: &Env,
+    history: &History,
+    original: &str,
+    shrunk: Shrunk,
+    record: &RunRecord,
+) -> Result<ShrunkSummary, Diagnostics> {
+    let influences = shrunk.explained.influences.iter();
+    let shown = |id: &Id| match influences.clone().filter(|other| other.id.name == id.name).count() {
+        0 | 1 => id.name.clone(),
+        _ => format!("{} ({})", id.name, id.nth + 1),
+    };
+    let choices = influences.clone().map(|influence| shrunk_choice(shown(&influence.id), influence));
+    Ok(ShrunkSummary {
+        original: original.to_owned(),
+        run: history.run(&record.id)?,
+        choices: choices.collect(),
+        neighbour: shrunk.explained.neighbour.as_ref().map(|near| (shown(&near.id), near.value)),
+        why: why(env, record, &shrunk)?,
+        failed: shrunk.failed.into_iter().collect(),
+        others_before: shrunk.others_before,
+        special_before: shrunk.special_before,
+        minimal: shrunk.minimal,
+        simulations: shrunk.simulations,
+        explaining: shrunk.explaining,
+        fresh: shrunk.fresh,
+        noise_kept: shrunk.noise_kept,
+    })
+}
+
+fn shrunk_choice(name: String, influence: &shrink::Influence) -> ShrunkChoice {
+    let Choice { name: full, kind, value } = &influence.choice;
+    ShrunkChoice {
+        name,
+        value: *value,
+        nominal: kind.nominal(),
+        unit: unit_of(full),
+        matters: influence.matters,
+        fails: influence.fails,
+        passes: influence.passes,
+    }
+}
+
+/// The explanation of each property that fails.
+fn why(env: &Env, record: &RunRecord, shrunk: &Shrunk) -> Result<Vec<String>, Diagnostics> {
+    let mut texts = Vec::new();
+    for (step, judgements) in record.judgements.iter().enumerate() {
+        let Some(facts) = record.facts.action(step) else { continue };
+        for judgement in judgements {
+            if judgement.outcome == crate::verdict::Outcome::Failed && shrunk.failed.contains(&judgement.property) {
+                let explained = env.rules.explain(&facts, &judgement.property, &Budget::default());
+                let explained =
+                    explained.map_err(|fault| Diagnostic::error("X008", format!("{}: {fault}", judgement.property)))?;
+                texts.push(explained.to_text());
+            }
+        }
+    }
+    Ok(texts)
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(secs) if secs > 0.0 && secs.is_finite() => Ok(secs),
+        _ => Err("must be a number of seconds above 0".to_owned()),
+    }
+}
+
+fn repeat(text: &str) -> Result<Repeat, String> {
+    let parts = text.split_once('/').and_then(|(least, of)| Some((least.parse().ok()?, of.parse().ok()?)));
+    match parts {
+        Some((least, of)) if 1 <= least && least <= of && of <= 1000 => Ok(Repeat { least, of }),
+        _ => Err("must be like 3/5: at least 3 failures in 5 repetitions".to_owned()),
+    }
+}
