@@ -18,6 +18,7 @@ mod readme;
 mod recheck;
 mod rules;
 mod scenario;
+mod shrink;
 mod stops;
 mod support;
 mod trust;
