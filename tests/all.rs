@@ -1,7 +1,6 @@
 //! All integration tests in one program: the large libraries are linked once.
 
-mod replay;
-
+mod bounds;
 mod broken;
 mod campaign;
 mod commands;
@@ -9,6 +8,7 @@ mod config;
 mod diagnostics;
 mod facts;
 mod floors;
+mod fuzz_corpus;
 mod history;
 mod no_panic;
 mod ontology;
@@ -16,6 +16,7 @@ mod oracle;
 mod physics;
 mod readme;
 mod recheck;
+mod replay;
 mod rules;
 mod scenario;
 mod shrink;

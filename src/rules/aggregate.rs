@@ -8,7 +8,7 @@ use crate::rules::meter::{Meter, Stop};
 use crate::rules::plan::operand_value;
 use crate::rules::program::{AggregateKind, Aggregation, Operand, Rule, Variable};
 use crate::rules::universe::Universe;
-use crate::rules::values::{Number, double_term};
+use crate::rules::values::{Number, double_term, is_beyond_64_bits};
 
 /// What of a match an aggregation looks at: the group, then each aggregate's input and distinct variables.
 pub(crate) fn projection(aggregation: &Aggregation) -> Vec<Operand> {
@@ -61,6 +61,10 @@ fn fill(
         let end = start + 1 + part.distinct.len();
         let distinct: BTreeSet<&[TermId]> = rows.iter().map(|row| &row[start..end]).collect();
         let inputs = distinct.iter().map(|row| universe.term(row[0]));
+        // What can't be computed with must not be passed over as if it were no number.
+        if part.kind != AggregateKind::Count && inputs.clone().any(is_beyond_64_bits) {
+            return None;
+        }
         let value = combine(part.kind, inputs)?;
         binding[part.output] = universe.intern(value);
         start = end;

@@ -6,6 +6,7 @@ use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, Terms, did_you_me
 use crate::ontology::Vocabulary;
 use crate::rules::builtins;
 use crate::rules::given::{GIVEN, VERDICT};
+use crate::rules::limits::{FAULT_LIMIT, LITERAL_LIMIT, RULE_LIMIT, WARNING_LIMIT};
 use crate::rules::program::{MAX_ARITY, Predicate, Predicates, Program, Scope};
 use crate::rules::syntax::{AtomSyntax, LiteralSyntax, Statement, Syntax};
 use crate::rules::translate::translate;
@@ -43,18 +44,25 @@ pub(crate) struct Checking<'a> {
     /// Where each predicate was first defined, and whether by a head (otherwise by an import or a use).
     pub(crate) defined: BTreeMap<(Scope, String), Definition>,
     pub(crate) diagnostics: Diagnostics,
+    /// How many errors were noted so far.
+    pub(crate) errors: usize,
 }
 
 /// First definition of a predicate.
 #[derive(Debug, Clone)]
 pub(crate) struct Definition {
     pub(crate) arity: usize,
-    pub(crate) place: String,
+    source: Source,
+    /// Unit: bytes of the source.
+    start: usize,
 }
 
-/// The most that one file or one rule may hold: everything behind the parser stays fast and shallow.
-const RULE_LIMIT: usize = 20_000;
-const LITERAL_LIMIT: usize = 256;
+impl Definition {
+    /// File and line. Only looked up for a fault, because counting lines takes time.
+    pub(crate) fn place(&self) -> String {
+        format!("{}:{}", self.source.name, self.source.line_and_column(self.start).0)
+    }
+}
 
 impl<'a> Checking<'a> {
     pub(crate) fn new(terms: &'a mut Terms, vocabulary: Option<&'a Vocabulary>) -> Self {
@@ -66,6 +74,7 @@ impl<'a> Checking<'a> {
             derived_terms: BTreeSet::new(),
             defined: BTreeMap::new(),
             diagnostics: Diagnostics::new(),
+            errors: 0,
         }
     }
 
@@ -77,6 +86,7 @@ impl<'a> Checking<'a> {
         message: impl Into<String>,
         help: impl Into<String>,
     ) {
+        self.errors += 1;
         self.diagnostics.push(Diagnostic::error(code, message).at(source, span.clone()).help(help));
     }
 
@@ -88,14 +98,19 @@ impl<'a> Checking<'a> {
         message: impl Into<String>,
         help: impl Into<String>,
     ) {
-        self.diagnostics.push(Diagnostic::warning(code, message).at(source, span.clone()).help(help));
+        if self.diagnostics.len() - self.errors.min(self.diagnostics.len()) < WARNING_LIMIT {
+            self.diagnostics.push(Diagnostic::warning(code, message).at(source, span.clone()).help(help));
+        }
     }
 
     /// First pass: which predicates the heads of a file define.
     pub(crate) fn define(&mut self, syntax: &Syntax, role: Role) {
         let source = &syntax.source;
-        let mut rules = 0;
+        let (mut rules, before) = (0, self.errors);
         for statement in &syntax.statements {
+            if self.errors - before >= FAULT_LIMIT {
+                return;
+            }
             match statement {
                 Statement::Rule(rule) => {
                     rules += 1;
@@ -143,7 +158,7 @@ impl<'a> Checking<'a> {
         }
         let elsewhere = self.defined.get(&(0, name.to_owned())).filter(|_| role.scope() != 0);
         if let Some(definition) = elsewhere {
-            let message = format!("`{name}` is defined by a library already ({})", definition.place);
+            let message = format!("`{name}` is defined by a library already ({})", definition.place());
             return self.error("R038", source, &head.name_span, message, "choose another name, or use the library's");
         }
         self.define_predicate(source, name, head.args.len(), &head.span, role);
@@ -154,7 +169,7 @@ impl<'a> Checking<'a> {
         let key = (role.scope(), name.to_owned());
         if let Some(known) = self.defined.get(&key) {
             if known.arity != arity {
-                let message = format!("`{name}` has {} here and {} in {}", counted(arity), known.arity, known.place);
+                let message = format!("`{name}` has {} here and {} in {}", counted(arity), known.arity, known.place());
                 self.error("R022", source, span, message, "give it the same number everywhere, or another name");
             }
             return;
@@ -163,8 +178,7 @@ impl<'a> Checking<'a> {
             let help = "split the tuple over several predicates that share a key";
             return self.error("R024", source, span, format!("`{name}` has more than {MAX_ARITY} arguments"), help);
         }
-        let (line, _) = source.line_and_column(span.start);
-        self.defined.insert(key, Definition { arity, place: format!("{}:{line}", source.name) });
+        self.defined.insert(key, Definition { arity, source: source.clone(), start: span.start });
         self.predicates.add(Predicate {
             name: name.to_owned(),
             scope: role.scope(),

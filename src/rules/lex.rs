@@ -1,6 +1,7 @@
 //! Rule text to tokens with their places.
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span};
+use crate::rules::limits::FAULT_LIMIT;
 
 /// What a token is. Texts are decoded already: no quotes, no indicators.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,7 +118,9 @@ impl Lexer<'_> {
     }
 
     pub(crate) fn error(&mut self, code: &'static str, span: Span, message: String, help: &str) {
-        self.diagnostics.push(Diagnostic::error(code, message).at(self.source, span).help(help));
+        if self.diagnostics.len() < FAULT_LIMIT {
+            self.diagnostics.push(Diagnostic::error(code, message).at(self.source, span).help(help));
+        }
     }
 
     /// White space and comments of every form.

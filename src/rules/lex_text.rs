@@ -116,7 +116,8 @@ impl Lexer<'_> {
         self.depth += 1;
         let mut tokens: Vec<Spanned> = Vec::new();
         let mut open = 0usize;
-        loop {
+        // The closing brace, or nothing where it is missing: a place must not cut a character.
+        let close = loop {
             self.skip_blank();
             let at = self.at;
             if self.at >= self.end || self.peek() == Some('\n') {
@@ -126,11 +127,11 @@ impl Lexer<'_> {
                     "`{` has no end".into(),
                     "close it with `}`, or write `{{` for a brace",
                 );
-                break;
+                break at..at;
             }
             if self.peek() == Some('}') && open == 0 {
                 self.at += 1;
-                break;
+                break at..self.at;
             }
             if let Some(token) = self.next(tokens.last()) {
                 match token {
@@ -140,9 +141,9 @@ impl Lexer<'_> {
                 }
                 tokens.push(Spanned { token, span: at..self.at });
             }
-        }
+        };
         self.depth -= 1;
-        tokens.push(Spanned { token: Token::End, span: self.at.saturating_sub(1)..self.at });
+        tokens.push(Spanned { token: Token::End, span: close });
         Some(tokens)
     }
 }

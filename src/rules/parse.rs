@@ -2,16 +2,13 @@
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 use crate::rules::lex::{Spanned, Token, lex};
+use crate::rules::limits::{FAULT_LIMIT, PREFIX_LIMIT, SIZE_LIMIT};
 use crate::rules::syntax::{
     AtomSyntax, Comparison, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer,
 };
 
 /// Directives of the language.
 const DIRECTIVES: [&str; 7] = ["base", "declare", "export", "import", "output", "parameter", "prefix"];
-/// Faults noted per file; more help nobody.
-const FAULT_LIMIT: usize = 50;
-/// Larger texts are refused. Unit: bytes. (The largest rule file we know of is a hundredth of it.)
-const SIZE_LIMIT: usize = 32 << 20;
 
 /// A fault was noted; the statement is given up.
 pub(crate) struct Lost;
@@ -280,12 +277,17 @@ impl Parser<'_> {
     }
 
     fn namespace(&mut self, prefix: String) -> Result<Option<Statement>, Lost> {
+        let span = self.span();
         let Token::Iri(iri) = self.token().clone() else {
             return Err(self.unexpected("a namespace such as `<https://example.org/>`"));
         };
         self.advance();
         let namespace = self.resolve(&iri);
         self.prefixes.retain(|(known, _)| *known != prefix);
+        if self.prefixes.len() == PREFIX_LIMIT {
+            let help = "write the other names as IRIs in `<…>`";
+            return Err(self.fault("R006", span, format!("more than {PREFIX_LIMIT} prefixes"), help));
+        }
         self.prefixes.push((prefix, namespace));
         Ok(None)
     }

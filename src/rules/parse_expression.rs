@@ -3,9 +3,10 @@
 use crate::base::{Span, Term, did_you_mean, names};
 use crate::rules::builtins;
 use crate::rules::lex::{FormatPiece, Token};
+use crate::rules::limits::ARGUMENT_LIMIT;
 use crate::rules::parse::{Lost, Parser};
 use crate::rules::syntax::{Expression, ExpressionKind};
-use crate::rules::values::{double_term, literal};
+use crate::rules::values::{double_term, integer, literal};
 
 /// Expressions nested deeper are refused; recursion over them is then safe everywhere.
 const DEPTH_LIMIT: usize = 64;
@@ -149,6 +150,11 @@ impl Parser<'_> {
         let mut found = Vec::new();
         while !self.take(close) {
             found.push(self.expression()?);
+            if found.len() > ARGUMENT_LIMIT {
+                let span = self.span();
+                let help = "split the values over several facts or assignments";
+                return Err(self.fault("R006", span, format!("more than {ARGUMENT_LIMIT} arguments"), help));
+            }
             if !self.is(close) {
                 self.expect(",", &format!("or `{close}`"))?;
             }
@@ -229,14 +235,14 @@ impl Parser<'_> {
         let term = match radix {
             Some(radix) => i128::from_str_radix(&format!("{sign}{}", &text[2..]), radix).ok().map(encoded_integer),
             None if plain.len() == text.len() && text.bytes().all(|b| b.is_ascii_digit()) => {
-                format!("{sign}{text}").parse::<i128>().ok().map(integer)
+                integer(&format!("{sign}{text}"))
             }
             None => format!("{sign}{plain}").parse::<f64>().ok().filter(|v| v.is_finite()).map(double_term),
         };
         match term {
             Some(term) => Expression { kind: ExpressionKind::Constant(term), span },
             None => {
-                let help = "integers have up to 38 digits, doubles reach up to about 1.8e308";
+                let help = "doubles reach up to about 1.8e308; integers in other bases than ten have up to 127 bits";
                 self.fault("R013", span.clone(), format!("number `{text}` is out of range"), help);
                 Expression { kind: ExpressionKind::Broken, span }
             }
@@ -281,19 +287,11 @@ impl Parser<'_> {
     }
 }
 
-/// An integer; one that does not fit 64 bits is kept as a literal, exact but nothing to compute with.
 /// An integer in binary, octal or hexadecimal. Over 64 bits its datatype is the text `xsd:integer` and no IRI, as in Nemo,
 /// whose published tables want it so.
 fn encoded_integer(value: i128) -> Term {
     match i64::try_from(value) {
         Ok(value) => Term::Integer(value),
         Err(_) => Term::Literal(value.to_string().into(), "xsd:integer".into()),
-    }
-}
-
-fn integer(value: i128) -> Term {
-    match i64::try_from(value) {
-        Ok(value) => Term::Integer(value),
-        Err(_) => Term::Literal(value.to_string().into(), format!("{}integer", names::XSD).into()),
     }
 }

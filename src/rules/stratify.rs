@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::base::{Diagnostic, Diagnostics, names};
+use crate::rules::limits::{CYCLE_SHOWN, FAULT_LIMIT};
 use crate::rules::program::{Literal, PredicateId, Predicates, Rule};
 use crate::rules::universe::Universe;
 
@@ -40,6 +41,9 @@ pub(crate) fn stratify(
     let mut diagnostics = Diagnostics::new();
     for (from, edges) in graph.iter().enumerate() {
         for edge in edges.iter().filter(|e| e.strict && component[e.to] == component[from]) {
+            if diagnostics.len() == FAULT_LIMIT {
+                return Err(diagnostics);
+            }
             diagnostics.push(cycle_fault(from, edge, &graph, &component, rules, predicates, terms));
         }
     }
@@ -145,10 +149,15 @@ fn cycle_fault(
         .iter()
         .find(|literal| literal.atom().is_some_and(|atom| atom.predicate == edge.to))
         .map_or(rule.origin.span.clone(), |literal| literal.span().clone());
-    let way: Vec<String> = way_back(edge.to, from, graph, component)
-        .into_iter()
-        .map(|predicate| shown(predicates, predicate, terms))
-        .collect();
+    let back = way_back(edge.to, from, graph, component);
+    let mut way: Vec<String> =
+        back.iter().take(CYCLE_SHOWN).map(|predicate| shown(predicates, *predicate, terms)).collect();
+    if let Some(left_out) = back.len().checked_sub(CYCLE_SHOWN + 1).filter(|count| *count > 0) {
+        way.push(format!("({left_out} more)"));
+    }
+    if back.len() > CYCLE_SHOWN {
+        way.push(shown(predicates, from, terms));
+    }
     let name = shown(predicates, from, terms);
     let word = if rule.aggregation.is_some() { "aggregates over" } else { "negates" };
     let target = shown(predicates, edge.to, terms);

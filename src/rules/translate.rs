@@ -8,6 +8,7 @@ use crate::rules::check::{Checking, Role, counted};
 use crate::rules::expression::Expr;
 use crate::rules::expressions::{contains_aggregate, push_new};
 use crate::rules::given::{GIVEN, add_given, phase_of, property_place};
+use crate::rules::limits::{FAULT_LIMIT, LITERAL_LIMIT, VARIABLE_LIMIT};
 use crate::rules::options::globals;
 use crate::rules::program::{Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule, Variable};
 use crate::rules::safety;
@@ -20,8 +21,14 @@ use crate::rules::universe::Universe;
 pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> Program {
     let mut program = Program::default();
     let globals = globals(checking, syntax, role);
+    let before = checking.errors;
     for statement in &syntax.statements {
+        if checking.errors - before >= FAULT_LIMIT {
+            break;
+        }
         match statement {
+            // Said when its heads were defined.
+            Statement::Rule(rule) if rule.body.len() > LITERAL_LIMIT => {}
             Statement::Rule(rule) if rule.body.is_empty() => {
                 for head in &rule.heads {
                     let fact = Translation::new(checking, &syntax.source, role, &globals).fact(head);
@@ -54,6 +61,8 @@ pub(crate) struct Translation<'c, 'a> {
     /// Rules for what a body atom can't say by itself.
     extra: Vec<Rule>,
     pub(crate) faulty: bool,
+    /// Whether too many variables were told.
+    overfull: bool,
 }
 
 impl<'c, 'a> Translation<'c, 'a> {
@@ -72,6 +81,7 @@ impl<'c, 'a> Translation<'c, 'a> {
             body: Vec::new(),
             extra: Vec::new(),
             faulty: false,
+            overfull: false,
         }
     }
 
@@ -165,15 +175,25 @@ impl<'c, 'a> Translation<'c, 'a> {
     pub(crate) fn variable(&mut self, name: &str, span: &Span) -> Variable {
         match self.variables.iter().position(|(known, _)| known == name) {
             Some(variable) => variable,
-            None => {
-                self.variables.push((name.to_owned(), span.clone()));
-                self.variables.len() - 1
-            }
+            None => self.add_variable(name, span),
         }
     }
 
     pub(crate) fn made_variable(&mut self, span: &Span) -> Variable {
-        self.variables.push((String::new(), span.clone()));
+        self.add_variable("", span)
+    }
+
+    /// A rule with too many of them is faulty; its variables then mean nothing.
+    fn add_variable(&mut self, name: &str, span: &Span) -> Variable {
+        if self.variables.len() == VARIABLE_LIMIT {
+            if !self.overfull {
+                self.overfull = true;
+                let message = format!("rule with more than {VARIABLE_LIMIT} variables");
+                self.error("R006", span, message, "split it into several rules");
+            }
+            return 0;
+        }
+        self.variables.push((name.to_owned(), span.clone()));
         self.variables.len() - 1
     }
 
@@ -239,7 +259,7 @@ impl<'c, 'a> Translation<'c, 'a> {
                         "`{name}` has {} here and {} in {}",
                         counted(args.len()),
                         definition.arity,
-                        definition.place
+                        definition.place()
                     );
                     self.error("R022", &atom.span, message, "give it the same number everywhere, or another name");
                 }

@@ -86,13 +86,36 @@ pub(crate) fn literal(text: &str, datatype: &str) -> Term {
             Some(value) if value.is_finite() => Term::Literal((value as f32).to_string().into(), datatype.into()),
             _ => other(),
         },
-        "decimal" => decimal(text).map_or_else(other, |canonical| match canonical.parse() {
-            Ok(value) => Term::Integer(value),
-            Err(_) => Term::Decimal(canonical.into()),
+        "decimal" => decimal(text).map_or_else(other, |canonical| match whole(&canonical) {
+            Some(term) => term,
+            None => Term::Decimal(canonical.into()),
         }),
-        _ if INTEGER_TYPES.contains(&local) => text.parse().map_or_else(|_| other(), Term::Integer),
+        _ if INTEGER_TYPES.contains(&local) => integer(text).unwrap_or_else(other),
         _ => other(),
     }
+}
+
+/// The term of an integer of any length, in decimal digits with or without a sign; nothing for another text.
+///
+/// One that 64 bits don't hold is, as in Nemo, an `xsd:integer` literal in canonical form: equal to itself alone, exact, and
+/// no number to compute with, because a double in its place would be rounded.
+pub(crate) fn integer(text: &str) -> Option<Term> {
+    if text.contains('.') { None } else { whole(&decimal(text)?) }
+}
+
+/// The same for a canonical decimal; nothing where it has a fraction.
+fn whole(canonical: &str) -> Option<Term> {
+    match canonical.parse() {
+        Ok(value) => Some(Term::Integer(value)),
+        Err(_) if canonical.contains('.') => None,
+        Err(_) => Some(Term::Literal(canonical.into(), format!("{}integer", names::XSD).into())),
+    }
+}
+
+/// Whether a term is an integer that 64 bits don't hold.
+pub(crate) fn is_beyond_64_bits(term: &Term) -> bool {
+    matches!(term, Term::Literal(text, datatype)
+        if (datatype.strip_prefix(names::XSD) == Some("integer") || datatype.as_ref() == "xsd:integer") && integer(text).is_some())
 }
 
 fn xsd_float(text: &str) -> Option<f64> {

@@ -3,7 +3,7 @@
 use std::io::Read;
 
 use crate::base::{Term, TermId, Terms, names};
-use crate::rules::values::{Number, double_term, literal};
+use crate::rules::values::{Number, double_term, integer, is_beyond_64_bits, literal};
 
 /// How the fields of a column are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,10 +35,7 @@ impl ColumnKind {
         match self {
             Self::Any => Some(any(field)),
             Self::String | Self::Skip => Some(Term::string(field)),
-            Self::Int => match literal(field, &format!("{}integer", names::XSD)) {
-                term @ Term::Integer(_) => Some(term),
-                _ => None,
-            },
+            Self::Int => integer(field),
             Self::Double => field.parse().ok().filter(|value: &f64| value.is_finite()).map(double_term),
         }
     }
@@ -127,7 +124,7 @@ fn any(field: &str) -> Term {
     }
     if field.starts_with(|c: char| c.is_ascii_digit() || c == '+' || c == '-') {
         let number = literal(field, &format!("{}decimal", names::XSD));
-        if Number::of(&number).is_some() {
+        if Number::of(&number).is_some() || is_beyond_64_bits(&number) {
             return number;
         }
     }

@@ -1,0 +1,157 @@
+//! What the fuzz targets feed: each entrance takes any text, and must come back soon without a panic.
+//!
+//! The targets below `fuzz_targets/` hand libFuzzer's inputs to these functions; `tests/fuzz_corpus.rs` of the program
+//! includes this file and hands them the corpus, so that what was found once stays found.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use actcheck::base::{Diagnostics, Files, Source, Term, Terms, digest_of, names};
+use actcheck::facts::RunFacts;
+use actcheck::ontology::{self, Ontology, Property, RuleFile, RuleLanguage};
+use actcheck::rules::standalone::{Engine, Program};
+use actcheck::rules::{Budget, RuleBook, RuleFault, parse as parse_rules};
+
+/// Small enough for many inputs a second; a sound engine comes back from any input within it.
+const BUDGET: Budget = Budget { tuples: 500, secs: 0.2 };
+const TESTED: &str = "http://actions#Tested";
+
+/// The rule parser.
+pub fn parse(text: &str) {
+    let (syntax, diagnostics) = parse_rules(&Source::new("fuzz.rls", text));
+    assert_eq!(syntax.whole, !diagnostics.has_errors());
+    places_are_in(text, &diagnostics);
+}
+
+/// The checker: the text as a program of its own, and as the rules of a property of the shipped ontology.
+pub fn check(text: &str) {
+    drop(program(text));
+    // Preparing a book takes some milliseconds; most inputs are torn, and the program has said so.
+    if !parse_rules(&Source::new("fuzz.rls", text)).0.whole {
+        return;
+    }
+    match RuleBook::prepare(&with_property(text, RuleLanguage::Datalog)) {
+        Ok(book) => places_are_in(text, book.warnings()),
+        Err(found) => {
+            assert!(found.has_errors());
+            places_are_in(text, &found);
+        }
+    }
+}
+
+/// Both evaluators over a program of its own, which must derive the same, and why it derives that.
+pub fn evaluate(text: &str) {
+    let Some(program) = program(text) else { return };
+    let (fast, naive) = (program.close(Engine::Fast, &BUDGET), program.close(Engine::Naive, &BUDGET));
+    let (Ok(fast), Ok(naive)) = (fast, naive) else { return };
+    for predicate in fast.predicates() {
+        let tuples = fast.tuples(predicate);
+        assert_eq!(tuples, naive.tuples(predicate), "{predicate}");
+        if let Some(tuple) = tuples.first() {
+            let args: Vec<String> = tuple.iter().map(Term::to_string).collect();
+            // A term that the language can't spell is refused in words.
+            let _ = program.explain(&format!("{predicate}({})", args.join(", ")), &BUDGET).map(|why| why.to_text());
+        }
+    }
+}
+
+/// A property in SPARQL: prepared and judged over the facts of one action.
+pub fn sparql_property(text: &str) {
+    let book = match RuleBook::prepare(&with_property(text, RuleLanguage::Sparql)) {
+        Ok(book) => book,
+        Err(found) => return places_are_in(text, &found),
+    };
+    let Some(action) = facts().action(0) else { unreachable!("the facts hold one action") };
+    for (_, result) in book.judge(&action, &[TESTED.to_owned()], &BUDGET) {
+        match result {
+            Ok(findings) => assert!(findings.witness.len() <= findings.witness_count),
+            Err(RuleFault::BudgetSpent(reason) | RuleFault::Value(reason)) => assert!(!reason.is_empty()),
+        }
+    }
+}
+
+/// A program of its own, where it has no fault. It never reads a file: an input that could name one is left out.
+fn program(text: &str) -> Option<Program> {
+    if text.contains("@import") && text.contains(['/', '\\']) {
+        return None;
+    }
+    match Program::load(&Source::new("fuzz.rls", text), Path::new("no such folder")) {
+        Ok(program) => {
+            places_are_in(text, &program.warnings);
+            Some(program)
+        }
+        Err(found) => {
+            assert!(found.has_errors());
+            places_are_in(text, &found);
+            None
+        }
+    }
+}
+
+/// Every diagnostic can be shown: its place lies in the text and cuts no character.
+fn places_are_in(text: &str, diagnostics: &Diagnostics) {
+    for found in diagnostics.iter() {
+        assert!(!found.message.is_empty());
+        if let (Some(span), Some(source)) = (&found.span, &found.source)
+            && source.text.as_ref() == text
+        {
+            assert!(text.get(span.clone()).is_some(), "{span:?} is no place: {found}");
+        }
+    }
+    let _ = diagnostics.to_string();
+}
+
+/// The shipped ontology with the text as its only property.
+fn with_property(text: &str, language: RuleLanguage) -> Ontology {
+    static SHIPPED: OnceLock<Ontology> = OnceLock::new();
+    let shipped = SHIPPED.get_or_init(|| {
+        let path = Path::new("ontology/actions.ttl");
+        let mut ontology = ontology::load(&Files::Shipped, path).unwrap_or_else(|found| panic!("{found}"));
+        // Closing them under OWL takes longer than all the rest, and is the same for every input.
+        ontology.triples.clear();
+        ontology
+    });
+    let rule = RuleFile {
+        source: Source::new("fuzz.rls", text),
+        language,
+        path: "fuzz.rls".into(),
+        digest: digest_of(text),
+        linked_at: None,
+    };
+    let property = Property {
+        iri: TESTED.into(),
+        name: "Tested".into(),
+        label: "the tested property".into(),
+        comment: None,
+        rule,
+        needs: Default::default(),
+        unit: Some("m".into()),
+    };
+    let mut ontology = shipped.clone();
+    ontology.properties = [(TESTED.to_owned(), property)].into();
+    ontology
+}
+
+/// A glass that is lifted by 0.1 m, beside a box.
+fn facts() -> &'static RunFacts {
+    static FACTS: OnceLock<RunFacts> = OnceLock::new();
+    FACTS.get_or_init(|| {
+        let mut terms = Terms::new();
+        let [glass, other] = ["glass", "box"].map(|name| terms.intern(Term::iri(format!("{}{name}", names::OBJ))));
+        let [x, y, z, touches] =
+            ["x", "y", "z", "touches"].map(|name| terms.intern(Term::iri(format!("{}{name}", names::W))));
+        let mut state = |height: f64| {
+            let mut triples = vec![[glass, touches, other]];
+            for (body, position) in [(glass, [0.4, 0.0, height]), (other, [0.5, 0.1, 0.05])] {
+                for (axis, value) in [x, y, z].into_iter().zip(position) {
+                    triples.push([body, axis, terms.intern(Term::Double(value))]);
+                }
+            }
+            triples.sort_unstable();
+            triples
+        };
+        let snapshots = vec![state(0.06), state(0.16)];
+        let designator = terms.intern(Term::iri(format!("{}pickObject", names::ACT)));
+        RunFacts { terms, snapshots, during: vec![Vec::new()], parameters: vec![vec![[designator, glass]]] }
+    })
+}
