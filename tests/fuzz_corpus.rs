@@ -1,7 +1,7 @@
 //! The inputs below `tests/fuzz_corpus/`, each given to its fuzz target: none panics, and all come back.
 //!
-//! They are the smallest set that reached what ten minutes of libFuzzer reached; those with a name in words are old
-//! crashers. `fuzz/README.md` tells how to search for more.
+//! They are a sample of what ten minutes of libFuzzer kept, short and long ones, because each reached code that no smaller
+//! one did. `fuzz/README.md` tells how to search for more.
 
 use std::path::{Path, PathBuf};
 
