@@ -14,6 +14,7 @@ mod no_panic;
 mod ontology;
 mod oracle;
 mod physics;
+mod proofs;
 mod readme;
 mod recheck;
 mod replay;

@@ -15,7 +15,7 @@ use actcheck::rules::explain::Support;
 use actcheck::rules::standalone::Program;
 use actcheck::rules::{Budget, Findings, RuleBook, RuleFault, owl_closure};
 
-const TESTED: &str = "http://actions#Tested";
+pub const TESTED: &str = "http://actions#Tested";
 
 fn root() -> PathBuf {
     // The package may stand elsewhere than the tests; the working directory of tests is the package's.
@@ -36,7 +36,7 @@ fn rule_file(path: &Path) -> RuleFile {
 }
 
 /// The shipped ontology with one property, the case's, in place of its own.
-fn ontology_of(case: &Path) -> Ontology {
+pub fn ontology_of(case: &Path) -> Ontology {
     let mut ontology = shipped_ontology();
     let shipped = root().join("../../rules");
     let mut libraries: Vec<PathBuf> = list(case).into_iter().filter(|path| is_library(path)).collect();
@@ -101,7 +101,7 @@ fn term(term: &oxigraph::model::Term) -> Term {
 }
 
 /// Facts of a case; none where it has no such file.
-fn facts_of(case: &Path) -> RunFacts {
+pub fn facts_of(case: &Path) -> RunFacts {
     let mut facts = RunFacts {
         snapshots: vec![vec![], vec![]],
         during: vec![vec![]],
@@ -177,7 +177,7 @@ fn differs(file: &Path, got: &str) -> Option<String> {
     (got != expected).then(|| format!("== {}\n-- expected\n{expected}-- got\n{got}", file.display()))
 }
 
-fn cases() -> Vec<PathBuf> {
+pub fn cases() -> Vec<PathBuf> {
     list(&root()).into_iter().filter(|path| path.is_dir()).collect()
 }
 

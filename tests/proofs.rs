@@ -1,0 +1,482 @@
+//! A small checker of proofs that shares nothing with the engine: it reads the rules' text itself, takes each step for an
+//! instance of its rule, wants facts at the leaves, and finds out for itself whether what is said to be absent is absent.
+//!
+//! It knows as much of the language as the shipped properties use; anything else is an error, so nothing slips through.
+
+use std::collections::BTreeMap;
+
+use actcheck::base::{Term, TermId, names};
+use actcheck::facts::RunFacts;
+use actcheck::rules::explain::{Premise, Proof, Support};
+use actcheck::rules::{Budget, RuleBook};
+
+use crate::rules::{TESTED, cases, facts_of, ontology_of};
+
+/// Numbers in statements are rounded to six digits.
+const ROUNDED: f64 = 2e-5;
+
+#[derive(Debug, Clone, PartialEq)]
+enum Value {
+    Number(f64),
+    Text(String),
+}
+
+type Binding = BTreeMap<String, Value>;
+
+/// A predicate with its arguments as they are written.
+#[derive(Debug, Clone)]
+struct Atom {
+    name: String,
+    args: Vec<String>,
+}
+
+/// A rule or a fact of a rule file.
+#[derive(Debug, Clone)]
+struct Rule {
+    heads: Vec<Atom>,
+    body: Vec<String>,
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDED * a.abs().max(b.abs()).max(1e-3)
+}
+
+fn same(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Number(a), Value::Number(b)) => near(*a, *b),
+        (a, b) => a == b,
+    }
+}
+
+fn constant(text: &str) -> Value {
+    text.parse().map_or_else(|_| Value::Text(text.to_owned()), Value::Number)
+}
+
+/// Parts between separators that stand in no parentheses and no string.
+fn split(text: &str, separator: char) -> Vec<String> {
+    let (mut parts, mut depth, mut quoted) = (vec![String::new()], 0, false);
+    for c in text.chars() {
+        quoted ^= c == '"';
+        depth += i32::from(!quoted && c == '(') - i32::from(!quoted && c == ')');
+        if c == separator && depth == 0 && !quoted {
+            parts.push(String::new());
+        } else {
+            parts.last_mut().unwrap().push(c);
+        }
+    }
+    parts.iter().map(|part| part.trim().to_owned()).filter(|part| !part.is_empty()).collect()
+}
+
+/// `before(…)`, `after(…)` and `during(…)` are short for `state(PHASE, …)`.
+fn atom(text: &str) -> Atom {
+    let (name, args) = text.trim().strip_suffix(')').and_then(|text| text.split_once('(')).expect("an atom");
+    let mut atom = Atom { name: name.trim().to_owned(), args: split(args, ',') };
+    if ["before", "after", "during"].contains(&atom.name.as_str()) {
+        atom.args.insert(0, format!("act:{}", atom.name));
+        atom.name = "state".to_owned();
+    }
+    atom
+}
+
+fn rule(text: &str) -> Rule {
+    let text = text.trim().trim_end_matches('.').trim();
+    let (heads, body) = text.split_once(":-").unwrap_or((text, ""));
+    Rule { heads: split(heads, ',').iter().map(|head| atom(head)).collect(), body: split(body, ',') }
+}
+
+/// The rules of a file, in which every rule ends with ` .`, as ours do.
+fn rules(text: &str) -> Vec<Rule> {
+    let code: Vec<&str> = text.lines().filter(|line| !line.starts_with(['%', '@', '#'])).collect();
+    let statements = code.join("\n") + "\n";
+    statements.split(" .\n").filter(|statement| !statement.trim().is_empty()).map(rule).collect()
+}
+
+fn shown(term: &Term) -> Value {
+    match term {
+        Term::Iri(iri) => Value::Text(names::shorten(iri)),
+        Term::Double(number) => Value::Number(*number),
+        Term::Integer(number) => Value::Number(*number as f64),
+        other => Value::Text(other.to_string()),
+    }
+}
+
+/// The given facts of a case's only action.
+fn given(facts: &RunFacts) -> Vec<(String, Vec<Value>)> {
+    let action = facts.action(0).unwrap();
+    let value = |id: &TermId| shown(facts.terms.term(*id));
+    let phases = [("act:before", action.before), ("act:after", action.after), ("act:during", action.during)];
+    let states = phases
+        .into_iter()
+        .flat_map(|(phase, triples)| triples.iter().map(move |triple| (phase, triple)).collect::<Vec<_>>());
+    let states = states.map(|(phase, triple)| {
+        let mut args = vec![Value::Text(phase.to_owned())];
+        args.extend(triple.iter().map(value));
+        ("state".to_owned(), args)
+    });
+    let parameters = action.parameters.iter().map(|pair| ("parameter".to_owned(), pair.iter().map(value).collect()));
+    states.chain(parameters).collect()
+}
+
+/// Extends a binding so that written arguments are the values, where that is possible.
+fn unify(written: &[String], values: &[Value], binding: &Binding) -> Option<Binding> {
+    if written.len() != values.len() {
+        return None;
+    }
+    let mut binding = binding.clone();
+    for (arg, value) in written.iter().zip(values) {
+        let fits = match arg.as_str() {
+            "_" => true,
+            name if name.starts_with('?') => match binding.get(name) {
+                Some(bound) => same(bound, value),
+                None => {
+                    binding.insert(name.to_owned(), value.clone());
+                    true
+                }
+            },
+            text => same(&constant(text), value),
+        };
+        if !fits {
+            return None;
+        }
+    }
+    Some(binding)
+}
+
+/// Evaluates an expression; nothing while a variable has no value.
+fn evaluate(text: &str, binding: &Binding) -> Option<Value> {
+    let text = text.trim();
+    for operators in [['+', '-'], ['*', '/']] {
+        // The last one of the weakest operators is applied last. A sign belongs to its number.
+        let (mut depth, mut quoted, mut at) = (0, false, None);
+        for (idx, c) in text.char_indices() {
+            quoted ^= c == '"';
+            depth += i32::from(c == '(') - i32::from(c == ')');
+            let between = text[..idx].ends_with(' ') && text[idx + c.len_utf8()..].starts_with(' ');
+            if !quoted && depth == 0 && between && operators.contains(&c) {
+                at = Some((idx, c));
+            }
+        }
+        if let Some((idx, c)) = at {
+            let (Value::Number(a), Value::Number(b)) =
+                (evaluate(&text[..idx], binding)?, evaluate(&text[idx + 1..], binding)?)
+            else {
+                panic!("{text} is no sum of numbers");
+            };
+            return Some(Value::Number(match c {
+                '+' => a + b,
+                '-' => a - b,
+                '*' => a * b,
+                _ => a / b,
+            }));
+        }
+    }
+    if text.starts_with('?') {
+        return binding.get(text).cloned();
+    }
+    if let Some((name, args)) = text.strip_suffix(')').and_then(|text| text.split_once('('))
+        && !text.starts_with('"')
+    {
+        let args: Option<Vec<Value>> = split(args, ',').iter().map(|arg| evaluate(arg, binding)).collect();
+        return Some(call(name, &args?));
+    }
+    Some(constant(text))
+}
+
+fn call(name: &str, args: &[Value]) -> Value {
+    let numbers: Vec<f64> =
+        args.iter().filter_map(|arg| if let Value::Number(n) = arg { Some(*n) } else { None }).collect();
+    let text = |idx: usize| match &args[idx] {
+        Value::Text(text) => text.trim_matches('"').to_owned(),
+        Value::Number(number) => number.to_string(),
+    };
+    match name {
+        "ABS" => Value::Number(numbers[0].abs()),
+        "SQRT" => Value::Number(numbers[0].sqrt()),
+        "MIN" => Value::Number(numbers.iter().copied().fold(f64::INFINITY, f64::min)),
+        "MAX" => Value::Number(numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+        "STR" => {
+            let short = text(0);
+            let long = names::PREFIXES
+                .iter()
+                .find_map(|(prefix, iri)| Some(format!("{iri}{}", short.strip_prefix(prefix)?.strip_prefix(':')?)));
+            Value::Text(long.unwrap_or_else(|| short.trim_matches(['<', '>']).to_owned()))
+        }
+        "STRSTARTS" => Value::Text(text(0).starts_with(&text(1)).to_string()),
+        other => panic!("{other} is not known to the checker"),
+    }
+}
+
+/// A condition that is no atom: the binding that it gives, `Some(None)` where it does not hold, nothing while it waits.
+fn condition(text: &str, binding: &Binding) -> Option<Option<Binding>> {
+    for operator in [" <= ", " >= ", " != ", " < ", " > ", " = "] {
+        let Some((left, right)) = text.split_once(operator) else { continue };
+        let right = evaluate(right, binding)?;
+        if operator == " = " && left.starts_with('?') && !binding.contains_key(left) {
+            let mut binding = binding.clone();
+            binding.insert(left.to_owned(), right);
+            return Some(Some(binding));
+        }
+        let left = evaluate(left, binding)?;
+        let holds = match (&left, &right, operator.trim()) {
+            (_, _, "=") => same(&left, &right),
+            (_, _, "!=") => !same(&left, &right),
+            (Value::Number(a), Value::Number(b), "<") => a < b,
+            (Value::Number(a), Value::Number(b), "<=") => a <= b,
+            (Value::Number(a), Value::Number(b), ">") => a > b,
+            (Value::Number(a), Value::Number(b), ">=") => a >= b,
+            _ => false,
+        };
+        return Some(holds.then(|| binding.clone()));
+    }
+    let holds = evaluate(text, binding)? == Value::Text("true".to_owned());
+    Some(holds.then(|| binding.clone()))
+}
+
+fn is_atom(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_lowercase()) && text.contains('(')
+}
+
+/// The rules and facts of one case.
+struct Case {
+    facts: Vec<(String, Vec<Value>)>,
+    rules: Vec<Rule>,
+}
+
+impl Case {
+    /// All tuples of a predicate, from facts and, backwards, from rules. The shipped rules are not recursive but through
+    /// the property in `state`, which the constant in its place keeps apart.
+    fn tuples(&self, name: &str, pattern: &[Option<Value>]) -> Vec<Vec<Value>> {
+        let fits = |values: &[Value]| {
+            values.len() == pattern.len()
+                && values
+                    .iter()
+                    .zip(pattern)
+                    .all(|(value, asked)| asked.as_ref().is_none_or(|asked| same(asked, value)))
+        };
+        let mut found: Vec<Vec<Value>> =
+            self.facts.iter().filter(|(known, values)| known == name && fits(values)).map(|(_, v)| v.clone()).collect();
+        for rule in &self.rules {
+            for head in rule.heads.iter().filter(|head| head.name == name && head.args.len() == pattern.len()) {
+                let possible = head.args.iter().zip(pattern).all(|(arg, asked)| {
+                    arg.starts_with(['?', '_']) || asked.as_ref().is_none_or(|asked| same(&constant(arg), asked))
+                });
+                // A property that is left open asks for given facts alone: no shipped rule asks for more.
+                if !possible || (name == "state" && pattern[2].is_none()) {
+                    continue;
+                }
+                let mut start = Binding::new();
+                for (arg, asked) in head.args.iter().zip(pattern) {
+                    if let (true, Some(asked)) = (arg.starts_with('?'), asked) {
+                        start.insert(arg.clone(), asked.clone());
+                    }
+                }
+                for binding in self.solve(&rule.body, &start) {
+                    let tuple: Vec<Value> = head.args.iter().filter_map(|arg| evaluate(arg, &binding)).collect();
+                    if fits(&tuple) {
+                        found.push(tuple);
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    fn matches(&self, atom: &Atom, binding: &Binding) -> Vec<Binding> {
+        let pattern: Vec<Option<Value>> = atom
+            .args
+            .iter()
+            .map(|arg| if arg.starts_with(['?', '_']) { binding.get(arg).cloned() } else { Some(constant(arg)) })
+            .collect();
+        self.tuples(&atom.name, &pattern).iter().filter_map(|tuple| unify(&atom.args, tuple, binding)).collect()
+    }
+
+    /// Bindings that satisfy a body: atoms first, then what can be computed, then what must be absent.
+    fn solve(&self, body: &[String], start: &Binding) -> Vec<Binding> {
+        let mut bindings = vec![start.clone()];
+        for literal in body.iter().filter(|literal| is_atom(literal)) {
+            let atom = atom(literal);
+            bindings = bindings.iter().flat_map(|binding| self.matches(&atom, binding)).collect();
+        }
+        bindings.into_iter().filter_map(|binding| self.settle(body, binding)).collect()
+    }
+
+    /// The conditions of a body whose atoms are bound.
+    fn settle(&self, body: &[String], mut binding: Binding) -> Option<Binding> {
+        let mut waiting: Vec<&String> =
+            body.iter().filter(|literal| !is_atom(literal) && !literal.starts_with('~')).collect();
+        while !waiting.is_empty() {
+            let before = waiting.len();
+            let mut still = Vec::new();
+            for literal in waiting {
+                match condition(literal, &binding) {
+                    Some(settled) => binding = settled?,
+                    None => still.push(literal),
+                }
+            }
+            assert!(still.len() < before, "{still:?} can't be computed");
+            waiting = still;
+        }
+        let absent = body.iter().filter_map(|literal| literal.strip_prefix('~'));
+        absent.map(atom).all(|atom| self.matches(&atom, &binding).is_empty()).then_some(binding)
+    }
+
+    /// Each step an instance of its rule, each leaf a fact. Gives the number of steps.
+    fn check(&self, proof: &Proof, proved: &mut Vec<String>) -> Result<usize, String> {
+        let statement = atom(&proof.statement);
+        let values: Vec<Value> = statement.args.iter().map(|arg| constant(arg)).collect();
+        let steps = match &proof.support {
+            Support::Fact => {
+                let given = |(name, known): &(String, Vec<Value>)| {
+                    *name == statement.name
+                        && known.len() == values.len()
+                        && known.iter().zip(&values).all(|(a, b)| same(a, b))
+                };
+                let stated = |rule: &Rule| {
+                    rule.body.is_empty()
+                        && rule.heads.iter().any(|head| {
+                            head.name == statement.name && unify(&head.args, &values, &Binding::new()).is_some()
+                        })
+                };
+                if !self.facts.iter().any(given) && !self.rules.iter().any(stated) {
+                    return Err(format!("{} is no fact", proof.statement));
+                }
+                1
+            }
+            Support::Cut if proved.contains(&proof.statement) => 1,
+            Support::Cut => return Err(format!("{} is proved nowhere", proof.statement)),
+            Support::Aggregate { .. } => return Err("no shipped property aggregates".to_owned()),
+            Support::Rule { rule: cited, premises } => {
+                1 + self.check_step(&statement, &values, &cited.text, premises, proved)?
+            }
+        };
+        proved.push(proof.statement.clone());
+        Ok(steps)
+    }
+
+    fn check_step(
+        &self,
+        statement: &Atom,
+        values: &[Value],
+        text: &str,
+        premises: &[Premise],
+        proved: &mut Vec<String>,
+    ) -> Result<usize, String> {
+        let cited = rule(text);
+        let known = |known: &Rule| known.body == cited.body && known.heads.len() == cited.heads.len();
+        if !self.rules.iter().any(known) {
+            return Err(format!("`{text}` stands in no rule file"));
+        }
+        if premises.len() != cited.body.len() {
+            return Err(format!("{} conditions for {} of `{text}`", premises.len(), cited.body.len()));
+        }
+        let (mut binding, mut steps) = (Binding::new(), 0);
+        for (literal, premise) in cited.body.iter().zip(premises) {
+            match premise {
+                Premise::Proof(inner) if is_atom(literal) => {
+                    steps += self.check(inner, proved)?;
+                    let (written, proved) = (atom(literal), atom(&inner.statement));
+                    let values: Vec<Value> = proved.args.iter().map(|arg| constant(arg)).collect();
+                    let fits = (written.name == proved.name).then(|| unify(&written.args, &values, &binding)).flatten();
+                    binding = fits.ok_or_else(|| format!("{} is no instance of {literal}", inner.statement))?;
+                }
+                Premise::Absent(_) if literal.starts_with('~') => {}
+                Premise::Computed(_) if !is_atom(literal) && !literal.starts_with('~') => {}
+                other => return Err(format!("{other:?} can't support {literal}")),
+            }
+        }
+        let binding =
+            self.settle(&cited.body, binding).ok_or_else(|| format!("a condition of `{text}` does not hold"))?;
+        let concludes = |head: &Atom| head.name == statement.name && unify(&head.args, values, &binding).is_some();
+        if cited.heads.iter().any(concludes) {
+            Ok(steps)
+        } else {
+            Err(format!("`{text}` does not conclude {statement:?}"))
+        }
+    }
+}
+
+/// The shipped properties in Datalog, with their facts, and what is said of them.
+fn shipped() -> Vec<(String, Case, actcheck::rules::explain::Explanation)> {
+    let mut found = Vec::new();
+    for folder in cases() {
+        let Ok(file) = std::fs::read_to_string(folder.join("shipped")) else { continue };
+        if !file.trim().ends_with(".rls") {
+            // A query has no proof; its rows are its witnesses.
+            continue;
+        }
+        let ontology = ontology_of(&folder);
+        let facts = facts_of(&folder);
+        let book = RuleBook::prepare(&ontology).unwrap();
+        let explanation = book.explain(&facts.action(0).unwrap(), TESTED, &Budget::default()).unwrap();
+        let texts = ontology.libraries.iter().chain(ontology.properties.values().map(|property| &property.rule));
+        let rules = texts.flat_map(|file| rules(&file.source.text)).collect();
+        found.push((folder.display().to_string(), Case { facts: given(&facts), rules }, explanation));
+    }
+    found
+}
+
+#[test]
+fn every_shipped_proof_is_made_of_instances_of_rules_and_of_facts() {
+    let (mut proofs, mut steps) = (0, 0);
+    for (name, case, explanation) in shipped() {
+        for proof in &explanation.proofs {
+            steps += case.check(proof, &mut Vec::new()).unwrap_or_else(|why| panic!("{name}: {why}"));
+            proofs += 1;
+        }
+        // What the explanation says of the whole, the checker finds by itself.
+        let derived = |predicate: &str| {
+            let arities = case.rules.iter().flat_map(|rule| &rule.heads).filter(|head| head.name == predicate);
+            arities.map(|head| head.args.len()).any(|arity| !case.tuples(predicate, &vec![None; arity]).is_empty())
+        };
+        let states_success = case.rules.iter().flat_map(|rule| &rule.heads).any(|head| head.name == "success");
+        let holds = if states_success { derived("success") } else { !derived("violation") };
+        assert_eq!(holds, explanation.findings.unwrap().holds, "{name}");
+    }
+    assert!(proofs >= 4 && steps >= 30, "{proofs} proofs of {steps} steps");
+}
+
+/// Every statement of a proof, one at a time, made a little wrong.
+fn spoiled(proof: &Proof) -> Vec<Proof> {
+    let mut all = Vec::new();
+    let (head, last) = proof.statement.rsplit_once(if proof.statement.contains(", ") { ", " } else { "(" }).unwrap();
+    let joint = if proof.statement.contains(", ") { ", " } else { "(" };
+    let wrong = match last.trim_end_matches(')').parse::<f64>() {
+        Ok(number) => format!("{head}{joint}{})", number + 0.5),
+        Err(_) => format!("{head}{joint}obj:nothing)"),
+    };
+    all.push(Proof { statement: wrong, support: proof.support.clone() });
+    if let Support::Rule { rule, premises } = &proof.support {
+        for (idx, premise) in premises.iter().enumerate() {
+            let Premise::Proof(inner) = premise else { continue };
+            for inner in spoiled(inner) {
+                let mut premises = premises.clone();
+                premises[idx] = Premise::Proof(inner);
+                all.push(Proof {
+                    statement: proof.statement.clone(),
+                    support: Support::Rule { rule: rule.clone(), premises },
+                });
+            }
+        }
+        for idx in 0..premises.len() {
+            let mut premises = premises.clone();
+            premises.remove(idx);
+            all.push(Proof {
+                statement: proof.statement.clone(),
+                support: Support::Rule { rule: rule.clone(), premises },
+            });
+        }
+    }
+    all
+}
+
+#[test]
+fn a_proof_with_one_wrong_statement_is_refused() {
+    let mut refused = 0;
+    for (name, case, explanation) in shipped() {
+        for wrong in explanation.proofs.iter().flat_map(spoiled) {
+            assert!(case.check(&wrong, &mut Vec::new()).is_err(), "{name}: {wrong:?}");
+            refused += 1;
+        }
+    }
+    assert!(refused >= 60, "{refused}");
+}
