@@ -211,3 +211,18 @@ fn integers_beyond_64_bits_are_exact_and_give_no_result() {
         assert_eq!(closure.tuples("long"), [[Term::Literal("7".repeat(400).into(), integer.into())]]);
     }
 }
+
+/// A fault in a line of ten megabytes is told with what stands around it: drawing such a line took minutes.
+#[test]
+fn a_fault_in_a_very_long_line_is_shown_with_its_surroundings() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in
+        [("quotes", "'".repeat(10_000_000)), ("dots", ". ".repeat(5_000_000)), ("umlauts", "ä".repeat(5_000_000))]
+    {
+        std::fs::write(folder.path().join(format!("{name}.rls")), text).unwrap();
+        let output = crate::support::actcheck(folder.path(), &["datalog", &format!("{name}.rls")]);
+        let told = crate::support::stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{name}: {told}");
+        assert!(told.contains(&format!("{name}.rls:1:")) && told.len() < 200_000, "{name}: {} bytes", told.len());
+    }
+}

@@ -37,7 +37,14 @@ pub struct Diagnostic {
 impl Diagnostic {
     /// An error without a place.
     pub fn error(code: &'static str, message: impl Into<String>) -> Self {
-        Self { code, severity: Severity::Error, message: message.into(), source: None, span: None, help: None }
+        Self {
+            code,
+            severity: Severity::Error,
+            message: readable(message.into()),
+            source: None,
+            span: None,
+            help: None,
+        }
     }
 
     /// A warning without a place.
@@ -88,6 +95,20 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
+/// A message may quote a name of megabytes: nobody reads beyond its beginning.
+fn readable(mut message: String) -> String {
+    if let Some((end, _)) = message.char_indices().nth(LONGEST_MESSAGE) {
+        message.truncate(end);
+        message.push('…');
+    }
+    message
+}
+
+/// Unit: characters. A contradiction's proof or a cycle of rules takes a few thousand.
+const LONGEST_MESSAGE: usize = 20_000;
+/// So much of a text is shown on each side of a place, and of the place itself. Unit: bytes.
+const MOST_SHOWN: usize = 300;
+
 impl miette::Diagnostic for Diagnostic {
     fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
         Some(Box::new(self.code))
@@ -111,9 +132,9 @@ impl miette::Diagnostic for Diagnostic {
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = miette::LabeledSpan> + '_>> {
-        let span = self.span.clone()?;
-        self.source.as_ref()?;
-        Some(Box::new(std::iter::once(miette::LabeledSpan::at(span, "here"))))
+        let (span, source) = (self.span.clone()?, self.source.as_ref()?);
+        let end = source.boundary(span.end.min(span.start.saturating_add(MOST_SHOWN)));
+        Some(Box::new(std::iter::once(miette::LabeledSpan::at(span.start..end.max(span.start), "here"))))
     }
 }
 
@@ -125,12 +146,22 @@ impl miette::SourceCode for Source {
         context_lines_after: usize,
     ) -> Result<Box<dyn miette::SpanContents<'a> + 'a>, miette::MietteError> {
         let contents = self.text.as_ref().read_span(span, context_lines_before, context_lines_after)?;
+        let whole = contents.span().offset()..contents.span().offset() + contents.data().len();
+        let (mut shown, mut line, mut column) = (whole.clone(), contents.line(), contents.column());
+        if whole.len() > 3 * MOST_SHOWN {
+            // A line of megabytes would take minutes to draw: only what is around the place is shown.
+            shown.start = self.boundary(span.offset().saturating_sub(MOST_SHOWN)).max(whole.start);
+            shown.end = self.boundary(span.offset() + span.len() + MOST_SHOWN).min(whole.end);
+            let cut = &self.text[whole.start..shown.start];
+            line += cut.matches('\n').count();
+            column = cut.rfind('\n').map_or(column + cut.len(), |idx| cut.len() - idx - 1);
+        }
         Ok(Box::new(miette::MietteSpanContents::new_named(
             self.name.to_string(),
-            contents.data(),
-            *contents.span(),
-            contents.line(),
-            contents.column(),
+            &self.text.as_bytes()[shown.clone()],
+            (shown.start, shown.len()).into(),
+            line,
+            column,
             contents.line_count(),
         )))
     }

@@ -25,13 +25,18 @@ impl Source {
 
     /// Line and column of a byte offset. Unit: both count from 1; a column counts characters.
     pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
+        let before = &self.text[..self.boundary(offset)];
+        let line = before.matches('\n').count() + 1;
+        let start_of_line = before.rfind('\n').map_or(0, |idx| idx + 1);
+        (line, before[start_of_line..].chars().count() + 1)
+    }
+
+    /// The last place up to a byte offset where a character begins.
+    pub(super) fn boundary(&self, offset: usize) -> usize {
         let mut end = offset.min(self.text.len());
         while !self.text.is_char_boundary(end) {
             end -= 1;
         }
-        let before = &self.text[..end];
-        let line = before.matches('\n').count() + 1;
-        let start_of_line = before.rfind('\n').map_or(0, |idx| idx + 1);
-        (line, before[start_of_line..].chars().count() + 1)
+        end
     }
 }
