@@ -117,6 +117,7 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
         reason: None,
         score,
         action_scores: vec![score],
+        discards: (0..index % 2).map(|_| "found no free place for `plate`".to_owned()).collect(),
         choices: vec![Choice { name: "target.yaw".to_owned(), kind: ChoiceKind::Normal { sigma: 0.1 }, value: 0.07 }],
         scene: scene(),
         facts: extract(&trace),
@@ -266,6 +267,7 @@ fn a_run_is_shown_with_all_that_was_kept() {
     assert_eq!(run.program_version, env!("CARGO_PKG_VERSION"));
     assert_eq!(run.robot_base, [-0.6, 0.0, 0.1]);
     assert_eq!(run.noise["yawNoise"], 0.05);
+    assert_eq!((&run.discards, run.discards.len()), (&record.discards, 1));
     assert_eq!(run.designators, record.scene.designators);
     let roles: Vec<Role> = run.objects.iter().map(|object| object.role).collect();
     assert_eq!(&roles[..3], [Role::Platform, Role::Target, Role::Other]);

@@ -108,6 +108,7 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
         reason,
         score: run_score(&action_scores),
         action_scores,
+        discards: Vec::new(),
         choices: Vec::new(),
         scene,
         actions: trace.actions.iter().map(|action| env.ontology.actions[&action.action].iri.clone()).collect(),

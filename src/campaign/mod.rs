@@ -10,10 +10,12 @@ mod difference;
 mod environment;
 mod judging;
 mod line;
+mod make_run;
 mod outcome;
 mod recheck;
 mod rule_set;
 mod run_all;
+mod schedule;
 pub mod shrink;
 
 pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Recalled, Replay, replay_all};
@@ -26,3 +28,4 @@ pub use outcome::{CampaignEnd, Ending};
 pub use recheck::{RecheckEnd, RecheckOptions, recheck};
 pub use rule_set::RuleSet;
 pub use run_all::{Options, run_all};
+pub use schedule::{Planned, Schedule, Told, ToldOutcome, schedule_of};

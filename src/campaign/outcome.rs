@@ -9,7 +9,7 @@ pub struct CampaignEnd {
     pub ending: Ending,
     /// Runs that are in the history.
     pub committed: u64,
-    /// Scenes that could not be built, with the reason, in the order of the runs that they were drawn for.
+    /// Scenes that could not be used for the runs that are in the history, with the reason, by index of the run.
     pub discards: Vec<(u64, String)>,
 }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::base::{Choice, Choices, Diagnostic, Diagnostics};
 use crate::campaign::line::crashed;
-use crate::campaign::run_all::panic_text;
+use crate::campaign::make_run::panic_text;
 use crate::campaign::{Change, Difference, Env, Failure, Manner, changes, first_difference, run_line};
 use crate::history::{CampaignRecord, History, RunDetail, RunRecord};
 

@@ -1,21 +1,21 @@
-//! Runs a campaign on several workers and commits each run as it comes.
+//! Runs a campaign on several workers and commits its runs in the order of the schedule.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::collections::{BTreeMap, VecDeque};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Mutex, PoisonError};
 
-use crate::base::{Choices, Diagnostic, Diagnostics};
-use crate::campaign::line::crashed;
-use crate::campaign::{CampaignEnd, Ending, Env, Failure, Manner, run_line};
+use crate::base::{Diagnostic, Diagnostics};
+use crate::campaign::make_run::{Making, make_run};
+use crate::campaign::{CampaignEnd, Ending, Env, Manner, Planned, Schedule, Told, schedule_of};
 use crate::history::{History, RunRecord};
-
-/// Scenes drawn for one run before the campaign is given up.
-///
-/// A space of which one scene in five can be built leaves a run without one once in 70,000 runs.
-const SCENES_PER_RUN: u64 = 50;
 
 /// The store is brought to the disk at least this often. Unit: seconds.
 const FLUSH_SECS: f64 = 1.0;
+
+/// Runs for each worker that may be ahead of the slowest one: made, and not yet kept because an earlier one is not.
+const AHEAD: usize = 4;
 
 /// How a campaign is run. The number of workers and the clock change nothing of what comes out.
 #[derive(Debug, Clone, Copy)]
@@ -26,15 +26,21 @@ pub struct Options {
     pub manner: Manner,
 }
 
-/// What a worker sends.
-enum Message {
-    Run(Box<RunRecord>),
-    Discard(u64, String),
-    Impossible(Diagnostics),
+/// A planned run and its place in the schedule, from 0.
+struct Order {
+    place: u64,
+    planned: Planned,
 }
 
-/// Makes every planned run, commits each in a transaction of its own, and then tells `on_run` of it.
+/// What a worker made of an order.
+struct Made {
+    place: u64,
+    making: Making,
+}
+
+/// Makes every run of the schedule, commits each in a transaction of its own, and then tells `on_run` of it.
 ///
+/// Runs are kept in the order of the schedule, whatever the number of workers: what is in the history is its beginning.
 /// `stop` ends the campaign after the runs in flight; where it is the stop of the environment's budget too, a run whose
 /// rules take long is given up. A run is told only when it is in the history.
 pub fn run_all(
@@ -46,160 +52,156 @@ pub fn run_all(
     mut on_run: impl FnMut(&RunRecord),
 ) -> CampaignEnd {
     let jobs = options.jobs.max(1);
-    let next = AtomicU64::new(0);
     let halt = AtomicBool::new(false);
+    let mut keeper = Keeper::new(history, options.manner, &mut on_run);
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
         Ok(pool) => pool,
-        Err(error) => return nothing_done(Diagnostic::error("X010", format!("workers can't be started: {error}"))),
+        Err(error) => {
+            keeper.stop(Diagnostic::error("X010", format!("workers can't be started: {error}")).into());
+            return keeper.end;
+        }
     };
-    let (sender, receiver) = sync_channel(jobs * 2);
+    let (orders, taken) = channel();
+    let (give, made) = channel();
+    let taken = Mutex::new(taken);
     pool.in_place_scope(|scope| {
         for _ in 0..jobs {
-            let sender = sender.clone();
-            let (next, halt) = (&next, &halt);
+            let (give, taken, halt) = (give.clone(), &taken, &halt);
             scope.spawn(move |_| {
-                work(
-                    env,
-                    campaign,
-                    options,
-                    next,
-                    &|| stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed),
-                    &sender,
-                );
+                work(env, campaign, &options.manner, taken, &give, &|| {
+                    stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed)
+                });
             });
         }
-        // The workers hold the only senders now: the receiver ends when they do.
-        drop(sender);
-        let mut end = collect(history, options, receiver, &halt, &mut on_run);
-        if matches!(end.ending, Ending::Finished) && end.committed < env.planned_runs() {
-            end.ending = Ending::Interrupted;
-        }
-        end
-    })
+        conduct(&mut *schedule_of(env), &mut keeper, &orders, &made, jobs * AHEAD);
+        // What is still being made is not wanted any more; without orders the workers end.
+        halt.store(true, Ordering::Relaxed);
+        drop(orders);
+    });
+    keeper.finish()
 }
 
-fn nothing_done(fault: Diagnostic) -> CampaignEnd {
-    CampaignEnd { ending: Ending::Stopped(fault.into()), committed: 0, discards: Vec::new() }
-}
-
-/// One worker: takes the next index until there is none.
+/// One worker: takes orders until there are none.
 fn work(
     env: &Env,
     campaign: &str,
-    options: &Options,
-    next: &AtomicU64,
+    manner: &Manner,
+    orders: &Mutex<Receiver<Order>>,
+    give: &Sender<Made>,
     stopped: &dyn Fn() -> bool,
-    sender: &SyncSender<Message>,
 ) {
-    while !stopped() {
-        let index = next.fetch_add(1, Ordering::Relaxed);
-        if index >= env.planned_runs() {
+    loop {
+        let order = orders.lock().unwrap_or_else(PoisonError::into_inner).recv();
+        let Ok(Order { place, planned }) = order else { return };
+        let making = if stopped() { Making::Interrupted } else { make_run(env, campaign, &planned, manner) };
+        if give.send(Made { place, making }).is_err() {
             return;
         }
-        for message in make_run(env, campaign, index, options) {
-            if sender.send(message).is_err() {
+    }
+}
+
+/// Hands out what the schedule plans and has kept what comes back, in order.
+fn conduct(
+    schedule: &mut dyn Schedule,
+    keeper: &mut Keeper<'_>,
+    orders: &Sender<Order>,
+    made: &Receiver<Made>,
+    ahead: usize,
+) {
+    let mut batch = VecDeque::new();
+    // Runs that came before one that the schedule has before them.
+    let mut early = BTreeMap::new();
+    let (mut ordered, mut kept) = (0, 0);
+    loop {
+        if batch.is_empty() && ordered == kept {
+            batch = schedule.next_batch(&std::mem::take(&mut keeper.told)).into();
+            if batch.is_empty() {
                 return;
             }
         }
+        while ordered - kept < ahead as u64
+            && let Some(planned) = batch.pop_front()
+        {
+            let order = Order { place: ordered, planned };
+            if orders.send(order).is_err() {
+                return;
+            }
+            ordered += 1;
+        }
+        let Ok(Made { place, making }) = made.recv() else { return };
+        early.insert(place, making);
+        while let Some(making) = early.remove(&kept) {
+            if keeper.keep(making).is_break() {
+                return;
+            }
+            kept += 1;
+        }
     }
 }
 
-/// The run of an index, after the scenes that had to be discarded for it.
-fn make_run(env: &Env, campaign: &str, index: u64, options: &Options) -> Vec<Message> {
-    let mut messages = Vec::new();
-    for attempt in 0..SCENES_PER_RUN {
-        // Attempts have streams of their own, so that a discard moves no other run's decisions.
-        let choices = || Choices::random(env.campaign.seed, index | (attempt << 48));
-        let made = catch_unwind(AssertUnwindSafe(|| run_line(env, campaign, index, choices(), &options.manner)));
-        match made {
-            Ok(Ok(record)) => {
-                messages.push(Message::Run(Box::new(record)));
-                return messages;
+/// The only place that writes runs.
+struct Keeper<'a> {
+    history: &'a History,
+    manner: Manner,
+    on_run: &'a mut dyn FnMut(&RunRecord),
+    end: CampaignEnd,
+    /// Runs of the batch, as the schedule is told of them.
+    told: Vec<Told>,
+    flushed_at: f64,
+}
+
+impl<'a> Keeper<'a> {
+    fn new(history: &'a History, manner: Manner, on_run: &'a mut dyn FnMut(&RunRecord)) -> Self {
+        let end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new() };
+        Self { history, manner, on_run, end, told: Vec::new(), flushed_at: (manner.clock.secs)() }
+    }
+
+    /// Keeps the schedule's next run, and says whether there may be another one.
+    fn keep(&mut self, making: Making) -> ControlFlow<()> {
+        match making {
+            Making::Run(record) => {
+                if let Err(faults) = self.commit(&record) {
+                    self.stop(faults);
+                    return ControlFlow::Break(());
+                }
+                self.end.committed += 1;
+                self.end.discards.extend(record.discards.iter().map(|reason| (record.index, reason.clone())));
+                self.told.push(Told::of(&record));
+                (self.on_run)(&record);
+                ControlFlow::Continue(())
             }
-            Ok(Err(Failure::Discard(reason))) => messages.push(Message::Discard(index, reason)),
-            Ok(Err(Failure::Interrupted)) => return messages,
-            Err(panic) => {
-                let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
-                let redone = catch_unwind(AssertUnwindSafe(|| crashed(env, campaign, index, choices(), &reason)));
-                messages.push(match redone {
-                    Ok(Some(record)) => Message::Run(Box::new(record)),
-                    _ => Message::Impossible(Diagnostic::error("S031", reason).into()),
-                });
-                return messages;
+            Making::Interrupted => {
+                self.end.ending = Ending::Interrupted;
+                ControlFlow::Break(())
+            }
+            Making::Impossible(faults) => {
+                self.stop(faults);
+                ControlFlow::Break(())
             }
         }
     }
-    let last = messages.iter().rev().find_map(|message| match message {
-        Message::Discard(_, reason) => Some(reason.clone()),
-        _ => None,
-    });
-    let fault = Diagnostic::error(
-        "S030",
-        format!(
-            "no scene could be built for run {} in {SCENES_PER_RUN} draws; the last one: {}",
-            index + 1,
-            last.unwrap_or_default()
-        ),
-    )
-    .at(&env.campaign.source, 0..0)
-    .help("put fewer objects on the surface (`[surfaceObjects] count`), smaller ones, or a larger surface");
-    messages.push(Message::Impossible(fault.into()));
-    messages
-}
 
-/// What a panic said.
-pub(super) fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
-    panic
-        .downcast_ref::<&str>()
-        .map(|text| (*text).to_owned())
-        .or_else(|| panic.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "no message".to_owned())
-}
-
-/// Commits what comes in; the only place that writes.
-fn collect(
-    history: &History,
-    options: &Options,
-    receiver: Receiver<Message>,
-    halt: &AtomicBool,
-    on_run: &mut dyn FnMut(&RunRecord),
-) -> CampaignEnd {
-    let mut end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new() };
-    let mut flushed_at = (options.manner.clock.secs)();
-    for message in receiver {
-        let result = match message {
-            Message::Discard(index, reason) => {
-                end.discards.push((index, reason));
-                Ok(())
-            }
-            Message::Impossible(faults) => Err(faults),
-            // After a fault the remaining messages are only drained, so that no worker waits for ever.
-            Message::Run(_) if halt.load(Ordering::Relaxed) => Ok(()),
-            Message::Run(record) => history.commit(&record).map(|()| {
-                end.committed += 1;
-                on_run(&record);
-            }),
-        };
-        let result = result.and_then(|()| {
-            let now = (options.manner.clock.secs)();
-            if now - flushed_at < FLUSH_SECS || halt.load(Ordering::Relaxed) {
-                return Ok(());
-            }
-            flushed_at = now;
-            history.flush()
-        });
-        if let Err(faults) = result {
-            halt.store(true, Ordering::Relaxed);
-            if !matches!(end.ending, Ending::Stopped(_)) {
-                end.ending = Ending::Stopped(faults);
-            }
+    fn commit(&mut self, record: &RunRecord) -> Result<(), Diagnostics> {
+        self.history.commit(record)?;
+        let now = (self.manner.clock.secs)();
+        if now - self.flushed_at >= FLUSH_SECS {
+            self.flushed_at = now;
+            self.history.flush()?;
         }
+        Ok(())
     }
-    if let Err(faults) = history.flush()
-        && !matches!(end.ending, Ending::Stopped(_))
-    {
-        end.ending = Ending::Stopped(faults);
+
+    fn stop(&mut self, faults: Diagnostics) {
+        self.end.ending = Ending::Stopped(faults);
     }
-    end.discards.sort();
-    end
+
+    fn finish(mut self) -> CampaignEnd {
+        if let Err(faults) = self.history.flush()
+            && !matches!(self.end.ending, Ending::Stopped(_))
+        {
+            self.stop(faults);
+        }
+        self.end.discards.sort();
+        self.end
+    }
 }

@@ -20,6 +20,7 @@ pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageE
         row: row(run, &node),
         seed: node.count("act:seed").unwrap_or_default(),
         reason: node.text("act:reason"),
+        discards: discards(store, run, &node)?,
         wall_secs: node.number("act:wallSeconds").unwrap_or_default(),
         world: node.text("act:worldName").unwrap_or_default(),
         program_version: version(&node),
@@ -42,6 +43,19 @@ fn row(run: &NamedNode, node: &Node) -> RunRow {
         trace_hash: node.text("act:traceHash").unwrap_or_default(),
         started: node.text("prov:startedAtTime").unwrap_or_default(),
     }
+}
+
+/// Reasons of the discards before a run, in order.
+fn discards(store: &Store, run: &NamedNode, node: &Node) -> Result<Vec<String>, StorageError> {
+    if node.count("act:discards").unwrap_or_default() == 0 {
+        return Ok(Vec::new());
+    }
+    let mut found: Vec<(u64, String)> = of_run(store, run, "act:Discard")?
+        .iter()
+        .map(|(_, node)| (node.count("act:attempt").unwrap_or_default(), node.text("act:reason").unwrap_or_default()))
+        .collect();
+    found.sort();
+    Ok(found.into_iter().map(|(_, reason)| reason).collect())
 }
 
 /// The status of a word; what is no status is nobody's success.

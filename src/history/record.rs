@@ -75,7 +75,7 @@ pub struct CampaignEnd {
     pub score_without_broken: Option<f64>,
     /// Counts of all outcomes.
     pub outcomes: BTreeMap<Outcome, u64>,
-    /// Scenes that were drawn and discarded.
+    /// Scenes that were drawn for its runs and discarded.
     pub discards: u64,
     /// Whether it ended before all its runs were done.
     pub interrupted: bool,
@@ -104,6 +104,8 @@ pub struct RunRecord {
     pub score: f64,
     /// One for each action (the paper's A).
     pub action_scores: Vec<f64>,
+    /// Why each scene that was drawn for it before could not be used, in order.
+    pub discards: Vec<String>,
     /// Every decision.
     pub choices: Vec<Choice>,
     /// The scene.

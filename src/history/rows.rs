@@ -103,6 +103,8 @@ pub struct RunDetail {
     pub seed: u64,
     /// Why it did not complete.
     pub reason: Option<String>,
+    /// Why each scene that was drawn for it before could not be used, in order.
+    pub discards: Vec<String>,
     /// Unit: seconds.
     pub wall_secs: f64,
     /// Name of the world.

@@ -24,6 +24,7 @@ pub(super) fn quads(record: &RunRecord) -> Vec<Quad> {
     let run = run_node(&record.id);
     let mut statements = Statements::default();
     write_run(record, &run, &mut statements);
+    write_discards(record, &run, &mut statements);
     write_scene::write(record, &run, &mut statements);
     for step in 0..record.trace.actions.len() {
         write_execution(record, step, &run, &mut statements);
@@ -45,12 +46,25 @@ fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
         .has("act:score", Literal::from(record.score))
         .text("act:status", record.status.word())
         .text("act:traceHash", &record.trace.hash)
+        .has("act:discards", count(record.discards.len() as u64))
         .may("act:reason", record.reason.as_deref().map(Literal::new_simple_literal))
         .may("act:shrunkFrom", record.shrunk_from.as_deref().map(run_node))
         .has("prov:startedAtTime", time(&record.started))
         .has("act:wallSeconds", Literal::from(record.wall_secs))
         .text("act:program", &program(env!("CARGO_PKG_VERSION")));
     write_designators(&record.scene.designators, record, &mut about);
+}
+
+/// The scenes that were drawn for a run before its own: they count, whoever stops and resumes the campaign.
+fn write_discards(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
+    for (number, reason) in record.discards.iter().enumerate() {
+        statements
+            .about(below(run, &format!("discard/{}", number + 1)))
+            .is_a("act:Discard")
+            .has("act:ofRun", run.clone())
+            .has("act:attempt", count(number as u64 + 1))
+            .text("act:reason", reason);
+    }
 }
 
 /// Designators: an object where the scene has one of that name, otherwise a text.

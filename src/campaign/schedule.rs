@@ -1,0 +1,128 @@
+//! Which runs a campaign makes, in which order, and from which decisions.
+//!
+//! A schedule depends on its configuration and on what came of earlier batches, and on nothing else: neither the number of
+//! workers nor the moment at which somebody stopped and resumed the campaign changes it.
+
+use crate::base::Choices;
+use crate::campaign::Env;
+use crate::history::RunRecord;
+use crate::verdict::Outcome;
+
+/// Runs of a plain campaign that are planned at a time. Workers wait for each other only between batches, so a large number
+/// costs nothing; it bounds the memory of a campaign of millions of runs.
+const BATCH: usize = 10_000;
+
+/// A run that is to be made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planned {
+    /// Position in the campaign, from 0: the run's number is the index + 1.
+    pub index: u64,
+}
+
+impl Planned {
+    /// The decisions of the run's `attempt`, from 0: the scenes of the attempts before had to be discarded.
+    ///
+    /// Attempts have streams of their own, so that a discard moves no other run's decisions.
+    pub fn choices(&self, seed: u64, attempt: u64) -> Choices {
+        Choices::random(seed, self.index | (attempt << 48))
+    }
+}
+
+/// What a schedule is told of a run that is in the history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    /// Position in the campaign, from 0.
+    pub index: u64,
+    /// Scenes that were discarded before the one of the run.
+    pub discards: u64,
+    /// What came of each property of each action.
+    pub outcomes: Vec<ToldOutcome>,
+}
+
+/// What came of a property in a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToldOutcome {
+    /// IRI.
+    pub property: String,
+    /// The outcome.
+    pub outcome: Outcome,
+    /// How far from flipping, in the property's unit; positive: passed.
+    pub margin: Option<f64>,
+}
+
+impl Told {
+    /// What there is to tell of a new run.
+    pub fn of(record: &RunRecord) -> Self {
+        let judgements = record.judgements.iter().flatten();
+        let outcomes = judgements.map(|judgement| ToldOutcome {
+            property: judgement.property.clone(),
+            outcome: judgement.outcome,
+            margin: judgement.margin,
+        });
+        Self { index: record.index, discards: record.discards.len() as u64, outcomes: outcomes.collect() }
+    }
+}
+
+/// Says which runs come next.
+pub trait Schedule {
+    /// The next runs, in the order in which they are kept; none when there are no more.
+    ///
+    /// It is asked when every run of the batch before is in the history; `told` are those, in the same order.
+    fn next_batch(&mut self, told: &[Told]) -> Vec<Planned>;
+}
+
+/// The schedule that a campaign's configuration asks for.
+pub fn schedule_of(env: &Env) -> Box<dyn Schedule> {
+    let tests = env.campaign.tests.len() as u64;
+    Box::new(InTurns { tests, runs: u64::from(env.campaign.test_count), made: 0 })
+}
+
+/// Every run of every test. Tests take turns, so that whatever ends a campaign early leaves as many runs of each.
+struct InTurns {
+    tests: u64,
+    /// Of each test.
+    runs: u64,
+    /// Planned so far.
+    made: u64,
+}
+
+impl Schedule for InTurns {
+    fn next_batch(&mut self, _told: &[Told]) -> Vec<Planned> {
+        let (tests, runs) = (self.tests, self.runs);
+        let batch: Vec<Planned> = (self.made..tests * runs)
+            .take(BATCH)
+            .map(|place| Planned { index: place % tests * runs + place / tests })
+            .collect();
+        self.made += batch.len() as u64;
+        batch
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tests_take_turns_and_every_run_is_planned_once() {
+        let mut schedule = InTurns { tests: 3, runs: 5_000, made: 0 };
+        let mut indices = Vec::new();
+        loop {
+            let batch = schedule.next_batch(&[]);
+            if batch.is_empty() {
+                break;
+            }
+            indices.extend(batch.iter().map(|planned| planned.index));
+        }
+        assert_eq!(indices[..5], [0, 5_000, 10_000, 1, 5_001]);
+        indices.sort_unstable();
+        assert_eq!(indices, (0..15_000).collect::<Vec<u64>>());
+    }
+
+    #[test]
+    fn attempts_and_runs_have_decisions_of_their_own() {
+        let first = |index, attempt| Planned { index }.choices(7, attempt).real("x", 0.0, 1.0, 0.0).to_bits();
+        assert_eq!(first(1, 0), first(1, 0));
+        assert_ne!(first(1, 0), first(2, 0));
+        assert_ne!(first(1, 0), first(1, 1));
+    }
+}
