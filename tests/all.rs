@@ -4,6 +4,7 @@ mod bounds;
 mod broken;
 mod campaign;
 mod commands;
+mod compare;
 mod config;
 mod diagnostics;
 mod facts;

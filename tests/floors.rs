@@ -31,7 +31,7 @@ const FLOORS: [(&str, &[&str]); 14] = [
 /// Libraries of the field and where they may be named.
 const FENCES: [(&str, &[&str]); 10] = [
     ("toml", &["config"]),
-    ("statrs", &["search"]),
+    ("statrs", &["search", "analysis"]),
     ("oxigraph", &["ontology", "rules", "history"]),
     ("rapier3d", &["world"]),
     ("parry3d", &["world", "scenario"]),

@@ -1,13 +1,19 @@
-//! History to tables and patterns: rates with intervals, and the ways in which runs fail.
+//! History to tables and patterns: rates with intervals, the ways in which runs fail, and campaigns side by side.
 //!
 //! Never: judges, writes to a history, or hands out a type of the table library.
 
+mod compare;
 mod failure_modes;
 mod frame;
+mod holm;
+mod paired;
 mod property_rates;
 mod wilson;
 
+pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use failure_modes::{FailureMode, failure_modes};
 pub use frame::AnalysisError;
+pub use holm::holm;
+pub use paired::{Difference, PairedTable, PairedTest};
 pub use property_rates::{PropertyRate, property_rates};
 pub use wilson::{Interval, wilson};

@@ -40,6 +40,21 @@ pub enum Command {
     /// Check configuration, ontology, rules and models without simulating; every mistake at once
     #[command(after_help = "Example:\n  actcheck check configs/pick.toml")]
     Check(CheckArgs),
+    /// Compare two campaigns on the same scenes: which properties hold less or more often, and where it flipped
+    ///
+    /// Runs with the same number and the same scene (test, world, what stands where) make a pair; other runs are counted and named.
+    /// For each property, and for whole runs (some property passed, none failed), both rates, their difference with a 95 %
+    /// interval (Tango's score interval for pairs), McNemar's exact test, and Holm's correction for the number of lines.
+    ///
+    /// Only passed and failed say something of the robot: a scene in which either side is inapplicable, broken, timed out or
+    /// untested is left out of that line and counted, so that `--fail-if-worse` does not see a robot that hangs; the table says
+    /// how many there are.
+    ///
+    /// Exit code: 0 done (B is not shown to be worse), 1 B is worse (only with --fail-if-worse), 2 it could not be done.
+    #[command(
+        after_help = "Examples:\n  actcheck compare k7f3 m2x9 --fail-if-worse 0.05    (ids of campaigns: the beginnings of those that `actcheck list` prints)\n  actcheck compare main/.actcheck branch/.actcheck   (the newest campaigns of two histories)\n  actcheck compare k7f3 k7f3@rechecked               (the same runs by the rules of `actcheck recheck`)"
+    )]
+    Compare(crate::cli::compare::CompareArgs),
     /// List the runs of a history
     #[command(after_help = "Example:\n  actcheck list --format csv")]
     List(ListArgs),

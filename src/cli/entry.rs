@@ -17,6 +17,7 @@ pub fn run() -> ExitCode {
         Command::Run(args) => crate::cli::run::run(&args),
         Command::Replay(args) => crate::cli::replay::replay(&args),
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),
+        Command::Compare(args) => crate::cli::compare::compare(&args),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Shrink(args) => shrink::shrink(&args),

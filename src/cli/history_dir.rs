@@ -14,11 +14,18 @@ const NONE_FOUND: &str = "X002";
 /// # Errors
 /// None is found, several are, or it can't be opened.
 pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
-    let folder = match &args.history {
-        Some(folder) => folder.clone(),
-        None => find(Path::new("."))?,
-    };
-    History::open_existing(&folder)
+    History::open_existing(&folder(args)?)
+}
+
+/// The folder of the history that was named, or of the one that is found.
+///
+/// # Errors
+/// None is found, or several are.
+pub fn folder(args: &HistoryArgs) -> Result<PathBuf, Diagnostics> {
+    match &args.history {
+        Some(folder) => Ok(folder.clone()),
+        None => find(Path::new(".")),
+    }
 }
 
 /// Opens the history that was named, or the one that is found; nothing where none was named and there is none.

@@ -8,6 +8,7 @@ mod replay_text;
 mod args;
 mod check;
 mod clock;
+mod compare;
 mod datalog;
 mod entry;
 mod history_dir;

@@ -83,7 +83,7 @@ fn noise(node: &Node) -> BTreeMap<String, f64> {
 }
 
 /// Values of the designators that a run or an execution names as such.
-fn designators(node: &Node) -> BTreeMap<String, Vec<String>> {
+pub(super) fn designators(node: &Node) -> BTreeMap<String, Vec<String>> {
     let mut found = BTreeMap::new();
     for designator in node.all("act:designator").iter().map(text_of) {
         let mut values: Vec<String> = node.all(&designator).iter().map(id_of).collect();
@@ -105,7 +105,8 @@ fn of_run(store: &Store, run: &NamedNode, class: &str) -> Result<Vec<(Term, Node
     Ok(found)
 }
 
-fn objects(store: &Store, run: &NamedNode) -> Result<Vec<ObjectDetail>, StorageError> {
+/// The objects of a run's scene: each kind by id.
+pub(super) fn objects(store: &Store, run: &NamedNode) -> Result<Vec<ObjectDetail>, StorageError> {
     let mut objects: Vec<ObjectDetail> =
         of_run(store, run, "act:SceneObject")?.iter().map(|(_, node)| object(node)).collect();
     objects.sort_by(|a, b| (a.role, &a.id).cmp(&(b.role, &b.id)));

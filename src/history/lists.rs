@@ -1,6 +1,6 @@
 //! Lists of campaigns, runs and outcomes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use oxigraph::model::{Literal, Term};
 use oxigraph::sparql::QueryEvaluationError;
@@ -35,6 +35,21 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
     ?result act:outcome ?outcome .
     OPTIONAL { ?result act:margin ?margin }
 }";
+
+/// Judgements that were made after the run, and that no later one supersedes.
+const RECHECKED: &str = "
+SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?margin ?rule WHERE {
+    GRAPH act:rechecked {
+        ?assertion earl:subject ?execution ; earl:test ?property ; earl:result ?result .
+        ?result act:outcome ?outcome ; act:ruleDigest ?rule .
+        OPTIONAL { ?result act:margin ?margin }
+    }
+    FILTER NOT EXISTS { GRAPH act:rechecked { ?later act:supersedes ?assertion } }
+    ?execution act:ofRun ?run ; act:step ?step ; act:action ?action .
+    ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status .
+}";
+
+const SHRUNK: &str = "SELECT DISTINCT ?campaign WHERE { ?run act:shrunkFrom ?original ; act:campaign ?campaign }";
 
 type Row = Vec<Option<Term>>;
 
@@ -85,6 +100,11 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
     }
 }
 
+/// Ids of the campaigns that hold the smaller form of a run.
+pub(super) fn shrunk_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
+    Ok(select(store, SHRUNK, Vec::new())?.iter().map(|row| id(row, 0)).collect())
+}
+
 /// Position of each campaign in the order of their starts.
 fn ranks(store: &Store) -> Result<BTreeMap<String, usize>, QueryEvaluationError> {
     Ok(select(store, STARTS, Vec::new())?.iter().enumerate().map(|(rank, row)| (id(row, 0), rank)).collect())
@@ -122,20 +142,7 @@ pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, Que
 /// Outcomes of the runs that a filter lets through, in the same order, then by step and property.
 pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
-    let mut rows: Vec<OutcomeRow> = select(store, OUTCOMES, given(filter))?
-        .iter()
-        .map(|row| OutcomeRow {
-            run: id(row, 0),
-            campaign: id(row, 1),
-            index: number(row, 2),
-            test: text(row, 3),
-            step: number(row, 5),
-            action: text(row, 6),
-            property: text(row, 7),
-            outcome: outcome(Some(&text(row, 8))),
-            margin: row.get(9).and_then(Option::as_ref).and_then(|margin| text_of(margin).parse().ok()),
-        })
-        .collect();
+    let mut rows: Vec<OutcomeRow> = select(store, OUTCOMES, given(filter))?.iter().map(outcome_row).collect();
     rows.sort_by(|a, b| {
         (ranks.get(&a.campaign), a.index, &a.run, a.step, &a.property).cmp(&(
             ranks.get(&b.campaign),
@@ -146,4 +153,24 @@ pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeR
         ))
     });
     Ok(rows)
+}
+
+/// The judgements made after the run that nothing supersedes, each with the digest of its rule, in no order.
+pub(super) fn rechecked(store: &Store, filter: &RunFilter) -> Result<Vec<(OutcomeRow, String)>, QueryEvaluationError> {
+    Ok(select(store, RECHECKED, given(filter))?.iter().map(|row| (outcome_row(row), text(row, 10))).collect())
+}
+
+/// A row of [`OUTCOMES`] or of [`RECHECKED`].
+fn outcome_row(row: &Row) -> OutcomeRow {
+    OutcomeRow {
+        run: id(row, 0),
+        campaign: id(row, 1),
+        index: number(row, 2),
+        test: text(row, 3),
+        step: number(row, 5),
+        action: text(row, 6),
+        property: text(row, 7),
+        outcome: outcome(Some(&text(row, 8))),
+        margin: row.get(9).and_then(Option::as_ref).and_then(|margin| text_of(margin).parse().ok()),
+    }
 }

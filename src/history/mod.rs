@@ -9,12 +9,14 @@ mod folder;
 mod frames;
 mod graphs;
 mod lists;
+mod newest;
 mod query;
 mod read;
 mod read_campaign;
 mod recheck;
 mod record;
 mod rows;
+mod scene_digest;
 mod statements;
 mod store;
 mod syntax_fault;
@@ -25,9 +27,11 @@ mod write_run;
 mod write_scene;
 
 pub use answer::{Cancel, QueryAnswer};
+pub use newest::NewestOutcomes;
 pub use recheck::{Recheck, StoredJudgement};
 pub use record::{CampaignEnd, CampaignRecord, RunRecord, RunStatus};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
+pub use scene_digest::SceneDigest;
 pub use store::History;
 
 // What the readers of a history meet in its products.

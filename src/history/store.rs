@@ -347,7 +347,7 @@ impl History {
         fault::store(self.dir(), doing, error)
     }
 
-    fn query_fault(&self, error: &QueryEvaluationError) -> Diagnostics {
+    pub(super) fn query_fault(&self, error: &QueryEvaluationError) -> Diagnostics {
         match error {
             QueryEvaluationError::Dataset(error) => fault::damaged(self.dir(), &error.to_string()),
             other => {

@@ -1,0 +1,292 @@
+//! Two campaigns on the same scenes: what holds more or less often, and in which scenes it went another way.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::analysis::{Difference, PairedTable, PairedTest, holm};
+use crate::history::{OutcomeRow, RunRow, RunStatus, SceneDigest};
+use crate::verdict::{Counts, Outcome};
+
+/// What is compared: whole runs, or one property of one action.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Compared {
+    /// A run passes when some property passed in it and none failed.
+    WholeRun,
+    /// Every execution of the action in the run.
+    Property {
+        /// IRI of the action.
+        action: String,
+        /// IRI of the property.
+        property: String,
+    },
+}
+
+/// One run of a campaign, as far as it is compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComparedRun {
+    /// Its id.
+    pub run: String,
+    /// Position in the campaign, from 0.
+    pub index: u64,
+    /// Its scene.
+    pub scene: SceneDigest,
+    outcomes: BTreeMap<Compared, Outcome>,
+}
+
+/// One line of a comparison.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComparedLine {
+    /// What is compared.
+    pub of: Compared,
+    /// The scenes in which both sides passed or failed.
+    pub table: PairedTable,
+    /// The difference of the rates; nothing where no scene was decided on both sides.
+    pub difference: Option<Difference>,
+    /// What chance alone would do.
+    pub test: PairedTest,
+    /// Two-sided probability, corrected for the number of lines.
+    pub two_sided_adjusted: f64,
+    /// One-sided probability that the second is worse, corrected for the number of lines.
+    pub second_worse_adjusted: f64,
+    /// Runs that passed in the first and failed in the second: ids of both.
+    pub worse: Vec<(String, String)>,
+    /// Runs that failed in the first and passed in the second: ids of both.
+    pub better: Vec<(String, String)>,
+    /// Outcomes of the scenes that were not decided on both sides: of the first, and of the second.
+    pub left_out: [Counts; 2],
+}
+
+/// Two campaigns, compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// Scenes that both have.
+    pub pairs: u64,
+    /// Of those, the ones whose objects have other masses, frictions or restitutions.
+    pub other_physics: u64,
+    /// Runs whose index the other side lacks, of the first and of the second.
+    pub alone: [Vec<String>; 2],
+    /// Runs with the same index and another scene.
+    pub other_scene: Vec<(String, String)>,
+    /// What only one side judged, of the first and of the second.
+    pub judged_alone: [Vec<Compared>; 2],
+    /// Whole runs first, then by action and property.
+    pub lines: Vec<ComparedLine>,
+}
+
+/// The runs of a campaign for a comparison, by index. What is unknown of a run leaves it out.
+pub fn compared_runs(
+    runs: &[RunRow],
+    scenes: &BTreeMap<String, SceneDigest>,
+    outcomes: &[OutcomeRow],
+) -> Vec<ComparedRun> {
+    let mut of_run: BTreeMap<&str, BTreeMap<Compared, Outcome>> = BTreeMap::new();
+    for row in outcomes {
+        let of = Compared::Property { action: row.action.clone(), property: row.property.clone() };
+        let known = of_run.entry(&row.run).or_default();
+        let both = known.get(&of).map_or(row.outcome, |before| together(*before, row.outcome));
+        known.insert(of, both);
+    }
+    let mut found: Vec<ComparedRun> = Vec::new();
+    for row in runs {
+        let Some(scene) = scenes.get(&row.run) else { continue };
+        let mut outcomes = of_run.remove(row.run.as_str()).unwrap_or_default();
+        // A run that broke says nothing of the robot, whatever came before.
+        let whole = match row.status {
+            RunStatus::Broken => Outcome::Broken,
+            RunStatus::Completed | RunStatus::Timeout => {
+                outcomes.values().copied().reduce(together).unwrap_or(Outcome::Untested)
+            }
+        };
+        outcomes.insert(Compared::WholeRun, whole);
+        found.push(ComparedRun { run: row.run.clone(), index: row.index, scene: scene.clone(), outcomes });
+    }
+    found.sort_by(|a, b| (a.index, &a.run).cmp(&(b.index, &b.run)));
+    found
+}
+
+/// Several outcomes as one: failed where one failed; decided only where none was left open.
+fn together(one: Outcome, other: Outcome) -> Outcome {
+    const STRONGEST_FIRST: [Outcome; 6] =
+        [Outcome::Failed, Outcome::Broken, Outcome::Timeout, Outcome::Untested, Outcome::Passed, Outcome::Inapplicable];
+    STRONGEST_FIRST.into_iter().find(|outcome| [one, other].contains(outcome)).unwrap_or(one)
+}
+
+/// Compares two campaigns run by run: those with the same index and the same scene.
+pub fn compare(first: &[ComparedRun], second: &[ComparedRun]) -> Comparison {
+    let by_index =
+        |runs: &'_ [ComparedRun]| runs.iter().enumerate().map(|(at, run)| (run.index, at)).collect::<BTreeMap<_, _>>();
+    let (firsts, seconds) = (by_index(first), by_index(second));
+    let alone = |runs: &[ComparedRun], other: &BTreeMap<u64, usize>| {
+        runs.iter().filter(|run| !other.contains_key(&run.index)).map(|run| run.run.clone()).collect::<Vec<_>>()
+    };
+    let met: Vec<(&ComparedRun, &ComparedRun)> =
+        firsts.iter().filter_map(|(index, at)| Some((&first[*at], &second[*seconds.get(index)?]))).collect();
+    let (pairs, others): (Vec<_>, Vec<_>) =
+        met.into_iter().partition(|(a, b)| a.scene.arrangement == b.scene.arrangement);
+    let judged = [judged(pairs.iter().map(|(a, _)| *a)), judged(pairs.iter().map(|(_, b)| *b))];
+    Comparison {
+        pairs: pairs.len() as u64,
+        other_physics: pairs.iter().filter(|(a, b)| a.scene.physics != b.scene.physics).count() as u64,
+        alone: [alone(first, &seconds), alone(second, &firsts)],
+        other_scene: others.into_iter().map(|(a, b)| (a.run.clone(), b.run.clone())).collect(),
+        judged_alone: [
+            judged[0].difference(&judged[1]).cloned().collect(),
+            judged[1].difference(&judged[0]).cloned().collect(),
+        ],
+        lines: lines(&pairs, judged[0].intersection(&judged[1])),
+    }
+}
+
+fn judged<'a>(runs: impl Iterator<Item = &'a ComparedRun>) -> BTreeSet<Compared> {
+    runs.flat_map(|run| run.outcomes.keys().cloned()).collect()
+}
+
+fn lines<'a>(
+    pairs: &[(&ComparedRun, &ComparedRun)],
+    compared: impl Iterator<Item = &'a Compared>,
+) -> Vec<ComparedLine> {
+    let mut lines: Vec<ComparedLine> = compared.map(|of| line(pairs, of)).collect();
+    let two_sided = holm(&lines.iter().map(|line| line.test.two_sided).collect::<Vec<f64>>());
+    let worse = holm(&lines.iter().map(|line| line.test.second_worse).collect::<Vec<f64>>());
+    for ((line, two_sided), worse) in lines.iter_mut().zip(two_sided).zip(worse) {
+        (line.two_sided_adjusted, line.second_worse_adjusted) = (two_sided, worse);
+    }
+    lines
+}
+
+fn line(pairs: &[(&ComparedRun, &ComparedRun)], of: &Compared) -> ComparedLine {
+    let mut table = PairedTable::default();
+    let (mut worse, mut better, mut left_out) = (Vec::new(), Vec::new(), [Counts::default(); 2]);
+    for (first, second) in pairs {
+        let outcomes = [first, second].map(|run| run.outcomes.get(of).copied().unwrap_or(Outcome::Untested));
+        let [Some(a), Some(b)] = outcomes.map(decided) else {
+            left_out.iter_mut().zip(outcomes).for_each(|(counts, outcome)| counts.add(outcome));
+            continue;
+        };
+        table.add(a, b);
+        let ids = || (first.run.clone(), second.run.clone());
+        match (a, b) {
+            (true, false) => worse.push(ids()),
+            (false, true) => better.push(ids()),
+            _ => {}
+        }
+    }
+    let test = table.test();
+    ComparedLine {
+        of: of.clone(),
+        table,
+        difference: table.difference(),
+        test,
+        two_sided_adjusted: test.two_sided,
+        second_worse_adjusted: test.second_worse,
+        worse,
+        better,
+        left_out,
+    }
+}
+
+/// Whether it passed, where that says something of the robot.
+fn decided(outcome: Outcome) -> Option<bool> {
+    match outcome {
+        Outcome::Passed => Some(true),
+        Outcome::Failed => Some(false),
+        Outcome::Inapplicable | Outcome::Broken | Outcome::Timeout | Outcome::Untested => None,
+    }
+}
+
+impl Comparison {
+    /// The lines in which the second is worse: one-sided, exact, and corrected so that the chance of any false one is at most
+    /// `level`.
+    pub fn worse_at(&self, level: f64) -> Vec<&ComparedLine> {
+        self.lines.iter().filter(|line| line.second_worse_adjusted <= level).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(index: u64, arrangement: &str, outcomes: &[(&str, Outcome)]) -> ComparedRun {
+        let scene = SceneDigest { arrangement: arrangement.to_owned(), physics: String::new() };
+        let row = RunRow {
+            run: format!("k-{}", index + 1),
+            campaign: "k".to_owned(),
+            index,
+            test: "Pick".to_owned(),
+            status: RunStatus::Completed,
+            score: 1.0,
+            trace_hash: String::new(),
+            started: String::new(),
+        };
+        let outcome = |(property, outcome): &(&str, Outcome)| OutcomeRow {
+            run: row.run.clone(),
+            campaign: "k".to_owned(),
+            index,
+            test: "Pick".to_owned(),
+            step: 1,
+            action: "Pick".to_owned(),
+            property: (*property).to_owned(),
+            outcome: *outcome,
+            margin: None,
+        };
+        let outcomes: Vec<OutcomeRow> = outcomes.iter().map(outcome).collect();
+        let scenes = BTreeMap::from([(row.run.clone(), scene)]);
+        compared_runs(&[row], &scenes, &outcomes).remove(0)
+    }
+
+    use Outcome::{Broken, Failed, Inapplicable, Passed, Timeout, Untested};
+
+    #[test]
+    fn only_runs_of_the_same_scene_are_pairs_and_none_is_lost() {
+        let a = [run(0, "x", &[("p", Passed)]), run(1, "y", &[("p", Passed)]), run(2, "z", &[("p", Failed)])];
+        let b = [run(1, "y", &[("p", Failed)]), run(2, "other", &[("p", Failed)]), run(3, "w", &[("p", Passed)])];
+        let found = compare(&a, &b);
+        assert_eq!(found.pairs, 1);
+        assert_eq!(found.alone, [vec!["k-1".to_owned()], vec!["k-4".to_owned()]]);
+        assert_eq!(found.other_scene, [("k-3".to_owned(), "k-3".to_owned())]);
+        assert_eq!(found.lines.len(), 2);
+        assert!(found.lines.iter().all(|line| line.worse.len() == 1 && line.table.only_first == 1));
+    }
+
+    #[test]
+    fn what_says_nothing_of_the_robot_is_left_out_on_both_sides_and_counted() {
+        let open = [Inapplicable, Broken, Timeout, Untested];
+        let runs = |outcomes: &[Outcome]| -> Vec<ComparedRun> {
+            (0u64..).zip(outcomes).map(|(index, outcome)| run(index, "s", &[("p", *outcome)])).collect()
+        };
+        let a = runs(&[&[Passed, Failed][..], &[Passed; 4]].concat());
+        let b = runs(&[&[Passed, Passed][..], &open].concat());
+        let found = compare(&a, &b);
+        for line in &found.lines {
+            assert_eq!(line.table, PairedTable { both: 1, only_second: 1, ..PairedTable::default() });
+            assert_eq!(line.left_out[0], Counts { passed: 4, ..Counts::default() });
+            assert_eq!(line.left_out[1], Counts::of(open));
+        }
+    }
+
+    #[test]
+    fn a_whole_run_fails_with_one_property_and_is_open_with_one_left_open() {
+        let whole = |outcomes: &[(&str, Outcome)]| run(0, "s", outcomes).outcomes[&Compared::WholeRun];
+        assert_eq!(whole(&[("p", Passed), ("q", Failed), ("r", Timeout)]), Failed);
+        assert_eq!(whole(&[("p", Passed), ("q", Timeout)]), Timeout);
+        assert_eq!(whole(&[("p", Passed), ("q", Inapplicable)]), Passed);
+        assert_eq!(whole(&[("p", Inapplicable)]), Inapplicable);
+        assert_eq!(whole(&[]), Untested);
+    }
+
+    #[test]
+    fn what_one_side_alone_judged_is_named() {
+        let a = [run(0, "s", &[("old", Passed), ("p", Passed)])];
+        let b = [run(0, "s", &[("new", Passed), ("p", Passed)])];
+        let found = compare(&a, &b);
+        let names = |list: &[Compared]| -> Vec<String> {
+            list.iter()
+                .map(|of| match of {
+                    Compared::WholeRun => String::new(),
+                    Compared::Property { property, .. } => property.clone(),
+                })
+                .collect()
+        };
+        assert_eq!(found.judged_alone.each_ref().map(|list| names(list)), [["old"], ["new"]]);
+        assert_eq!(found.lines.len(), 2);
+    }
+}

@@ -1,0 +1,223 @@
+//! `actcheck compare`
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::analysis::{Comparison, compare as compare_runs, compared_runs};
+use crate::base::{Diagnostic, Diagnostics};
+use crate::campaign::changes;
+use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::{history_dir, output};
+use crate::history::{CampaignRecord, History, RunFilter, RunRow, SceneDigest};
+use crate::report::{CompareSummary, ComparedSide, SideChange, compare_json, compare_table, compare_text};
+
+/// Behind a campaign: its outcomes as they were last judged.
+const RECHECKED: &str = "@rechecked";
+
+/// `actcheck compare`
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// The campaign to compare with: ID, DIR#ID for one of another history, or DIR for the newest there; with @rechecked behind
+    /// it by its newest judgements (see `actcheck recheck`)
+    #[arg(value_name = "A")]
+    pub first: String,
+    /// The campaign to judge, named the same way
+    #[arg(value_name = "B")]
+    pub second: String,
+    /// Exit with 1 where B is worse than A: where, in any line, as many scenes that only A passes would come up with at most this
+    /// probability if B were no worse. The chance of a false alarm is at most LEVEL (usually 0.05), for all lines together
+    #[arg(long, value_name = "LEVEL", value_parser = level)]
+    pub fail_if_worse: Option<f64>,
+    /// Where the history of an ID without DIR lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How it is printed (csv: one line for each property; json: everything)
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+fn level(text: &str) -> Result<f64, String> {
+    let wrong = || "a probability above 0 and below 1 is needed, such as 0.05".to_owned();
+    let level: f64 = text.parse().map_err(|_| wrong())?;
+    if level > 0.0 && level < 1.0 { Ok(level) } else { Err(wrong()) }
+}
+
+/// Compares two campaigns and prints what came of it. Returns the exit code.
+pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
+    let mut histories = Histories::default();
+    let first = Side::read(&args.first, &args.history, &mut histories)?;
+    let second = Side::read(&args.second, &args.history, &mut histories)?;
+    let comparison = compare_runs(&first.runs(), &second.runs());
+    if comparison.pairs == 0 {
+        return Err(nothing_shared(&first, &second, &comparison).into());
+    }
+    let changes = changes(&first.record, &second.record)
+        .into_iter()
+        .map(|change| SideChange {
+            kind: change.kind.word().to_owned(),
+            name: change.name,
+            first: change.was,
+            second: change.is,
+        })
+        .collect();
+    let sides = [first.summary(), second.summary()];
+    let summary = CompareSummary { sides, comparison, changes, level: args.fail_if_worse };
+    output::print(&match args.format {
+        Format::Table => compare_text(&summary),
+        Format::Csv => compare_table(&summary).render(args.format.into()),
+        Format::Json => format!("{:#}\n", compare_json(&summary)),
+    });
+    Ok(summary.exit_code())
+}
+
+/// The histories that were opened, each once: a second opening would find the first one's lock.
+#[derive(Default)]
+struct Histories {
+    open: BTreeMap<PathBuf, History>,
+}
+
+impl Histories {
+    fn get(&mut self, dir: Option<&Path>, default: &HistoryArgs) -> Result<&History, Diagnostics> {
+        let dir = match dir {
+            Some(dir) => dir.to_path_buf(),
+            None => history_dir::folder(default)?,
+        };
+        let key = std::fs::canonicalize(&dir).unwrap_or_else(|_| dir.clone());
+        if !self.open.contains_key(&key) {
+            self.open.insert(key.clone(), History::open_existing(&dir)?);
+        }
+        Ok(&self.open[&key])
+    }
+}
+
+/// What was typed for one side.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Name<'a> {
+    dir: Option<&'a Path>,
+    campaign: Option<&'a str>,
+    rechecked: bool,
+}
+
+impl<'a> Name<'a> {
+    fn read(text: &'a str) -> Self {
+        let (place, rechecked) = match text.strip_suffix(RECHECKED) {
+            Some(place) => (place, true),
+            None => (text, false),
+        };
+        let (dir, campaign) = match place.rsplit_once('#') {
+            Some((dir, "")) => (Some(Path::new(dir)), None),
+            Some((dir, campaign)) => (Some(Path::new(dir)), Some(campaign)),
+            None if Path::new(place).is_dir() => (Some(Path::new(place)), None),
+            None => (None, Some(place)),
+        };
+        Self { dir, campaign, rechecked }
+    }
+}
+
+/// One side, read from its history.
+struct Side {
+    name: String,
+    record: CampaignRecord,
+    rows: Vec<RunRow>,
+    scenes: BTreeMap<String, SceneDigest>,
+    outcomes: Vec<crate::history::OutcomeRow>,
+}
+
+impl Side {
+    fn read(text: &str, default: &HistoryArgs, histories: &mut Histories) -> Result<Self, Diagnostics> {
+        let name = Name::read(text);
+        let history = histories.get(name.dir, default)?;
+        let id = match name.campaign {
+            Some(id) => id.to_owned(),
+            None => newest(history)?,
+        };
+        let mut record = history.campaign(&id)?;
+        let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
+        let rows = history.runs(&filter)?;
+        let outcomes = if name.rechecked {
+            let newest = history.newest_outcomes(&filter)?;
+            judged_by(&mut record, &newest.rules);
+            newest.rows
+        } else {
+            history.outcomes(&filter)?
+        };
+        Ok(Self { name: text.to_owned(), record, scenes: history.scenes(&rows)?, rows, outcomes })
+    }
+
+    fn runs(&self) -> Vec<crate::analysis::ComparedRun> {
+        compared_runs(&self.rows, &self.scenes, &self.outcomes)
+    }
+
+    fn summary(&self) -> ComparedSide {
+        ComparedSide {
+            name: self.name.clone(),
+            campaign: self.record.id.clone(),
+            config: self.record.name.clone(),
+            runs: self.rows.len() as u64,
+            planned: self.record.planned_runs,
+            started: self.record.started.clone(),
+            config_text: self.record.config_text.clone(),
+        }
+    }
+}
+
+/// The newest campaign of a history that is no smaller form of a run.
+fn newest(history: &History) -> Result<String, Diagnostics> {
+    let shrunk = history.shrunk_campaigns()?;
+    let mut ids = history.campaigns()?.into_iter().map(|row| row.id).rev();
+    ids.find(|id| !shrunk.contains(id)).ok_or_else(|| {
+        Diagnostic::error("X070", format!("the history `{}` has no campaign", history.dir().display()))
+            .help("`actcheck run CONFIG` makes one")
+            .into()
+    })
+}
+
+/// Puts the rules of later judgements in the place of the campaign's own.
+fn judged_by(record: &mut CampaignRecord, rules: &BTreeMap<String, std::collections::BTreeSet<String>>) {
+    for (property, digests) in rules {
+        let digest = digests.iter().cloned().collect::<Vec<_>>().join(" and ");
+        match record.rules.iter_mut().find(|(known, ..)| known == property) {
+            Some((_, _, known)) => *known = digest,
+            None => record.rules.push((property.clone(), property.clone(), digest)),
+        }
+    }
+}
+
+fn nothing_shared(first: &Side, second: &Side, comparison: &Comparison) -> Diagnostic {
+    let message = format!("`{}` and `{}` have no scene in common", first.name, second.name);
+    let fault = Diagnostic::error("X071", message);
+    let [a, b] = [&first.record, &second.record];
+    fault.help(if first.rows.is_empty() || second.rows.is_empty() {
+        let empty = if first.rows.is_empty() { first } else { second };
+        format!("`{}` has no runs", empty.name)
+    } else if a.seed != b.seed {
+        format!("their seeds differ: {} and {}; run both with the same `--seed`", a.seed, b.seed)
+    } else if comparison.other_scene.is_empty() {
+        "they have no run numbers in common".to_owned()
+    } else {
+        "scenes are the same where seed, tests, objects and surfaces of the configurations are; sensing, skill, robot and rules may differ"
+            .to_owned()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_side_is_named_by_history_campaign_and_judgements() {
+        let name = |dir, campaign, rechecked| Name { dir, campaign, rechecked };
+        assert_eq!(Name::read("k7f3"), name(None, Some("k7f3"), false));
+        assert_eq!(Name::read("k7f3@rechecked"), name(None, Some("k7f3"), true));
+        assert_eq!(Name::read("old/.actcheck#k7f3"), name(Some(Path::new("old/.actcheck")), Some("k7f3"), false));
+        assert_eq!(Name::read("a#b#k7f3"), name(Some(Path::new("a#b")), Some("k7f3"), false));
+        assert_eq!(Name::read("src@rechecked"), name(Some(Path::new("src")), None, true));
+        assert_eq!(Name::read("nowhere#"), name(Some(Path::new("nowhere")), None, false));
+        for wrong in ["0", "1", "-0.1", "NaN", "5 %", ""] {
+            assert!(level(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(level("0.05"), Ok(0.05));
+    }
+}

@@ -1,0 +1,68 @@
+//! Whether two runs had the same scene.
+
+use std::collections::BTreeMap;
+
+use oxigraph::model::NamedNode;
+use oxigraph::store::{StorageError, Store};
+
+use crate::base::{Diagnostics, Digest};
+use crate::history::detail::{designators, objects};
+use crate::history::read::Node;
+use crate::history::write_run::run_node;
+use crate::history::write_scene::role_word;
+use crate::history::{History, ObjectDetail, RunRow};
+
+/// The scene of a run, in two digests.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneDigest {
+    /// The test, the world, which objects stand where, and where the robot stands.
+    pub arrangement: String,
+    /// Mass, friction and restitution of the objects.
+    pub physics: String,
+}
+
+impl History {
+    /// The scenes of some runs, by the ids of the runs.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
+        let store = self.store()?;
+        runs.iter()
+            .map(|row| Ok((row.run.clone(), read(&store, &run_node(&row.run))?)))
+            .collect::<Result<_, StorageError>>()
+            .map_err(|error| self.fault("reading scenes", &error))
+    }
+}
+
+fn read(store: &Store, run: &NamedNode) -> Result<SceneDigest, StorageError> {
+    let node = Node::read(store, run)?;
+    let objects = objects(store, run)?;
+    let mut arrangement = Digest::new();
+    for property in ["act:test", "act:worldName", "w:baseX", "w:baseY", "w:baseYaw"] {
+        arrangement.update(node.text(property).unwrap_or_default().as_bytes());
+    }
+    for (designator, values) in designators(&node) {
+        arrangement.update(designator.as_bytes());
+        arrangement.update(values.join("\n").as_bytes());
+    }
+    let mut physics = Digest::new();
+    for object in &objects {
+        add_place(object, &mut arrangement);
+        add_numbers([object.mass_kg, object.friction, object.restitution], &mut physics);
+    }
+    Ok(SceneDigest { arrangement: arrangement.finish(), physics: physics.finish() })
+}
+
+fn add_place(object: &ObjectDetail, digest: &mut Digest) {
+    for text in [&object.id, &object.model, &object.category, role_word(object.role)] {
+        digest.update(text.as_bytes());
+    }
+    add_numbers([object.x, object.y, object.z, object.yaw], digest);
+}
+
+fn add_numbers(values: impl IntoIterator<Item = f64>, digest: &mut Digest) {
+    for value in values {
+        digest.update(&value.to_bits().to_le_bytes());
+    }
+}
