@@ -3,7 +3,8 @@
 use serde::Serialize;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use crate::analysis::wilson::Z;
+/// Quantile of the normal distribution that leaves 2.5 % above: intervals are of 95 %.
+const Z: f64 = 1.959_963_984_540_054;
 
 /// The scenes that two campaigns share, by what came of them in each.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// Quantile of the normal distribution that leaves 2.5 % above: intervals are of 95 %.
-pub(super) const Z: f64 = 1.959_963_984_540_054;
+const Z: f64 = 1.959_963_984_540_054;
 
 /// A rate with its 95 % confidence interval. All three lie in [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
