@@ -18,6 +18,7 @@ mod physics;
 mod proofs;
 mod readme;
 mod recheck;
+mod repeat;
 mod replay;
 mod rules;
 mod scenario;

@@ -25,6 +25,8 @@ fn flipped(choices: &mut Choices, scenes: u64, rates: &[f64]) -> Vec<ComparedRun
             run: run.clone(),
             campaign: "k".to_owned(),
             index,
+            repetition: None,
+            weight: None,
             test: "Pick".to_owned(),
             status: RunStatus::Completed,
             score: 1.0,

@@ -111,6 +111,8 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
         id: format!("{campaign}-{}", index + 1),
         campaign: campaign.to_owned(),
         index,
+        repetition: None,
+        weight: None,
         test: "Pick".to_owned(),
         seed: u64::MAX,
         status: RunStatus::Completed,
@@ -142,6 +144,7 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         models: vec![("glass".to_owned(), digest_of("glass"))],
         seed: 7,
         planned_runs: 6,
+        repeat: 1,
         started: format!("2026-08-01T12:{minute:02}:00Z"),
         program_version: "0.1.0".to_owned(),
     }

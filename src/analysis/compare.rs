@@ -209,6 +209,8 @@ mod tests {
         let scene = SceneDigest { arrangement: arrangement.to_owned(), physics: String::new() };
         let row = RunRow {
             run: format!("k-{}", index + 1),
+            repetition: None,
+            weight: None,
             campaign: "k".to_owned(),
             index,
             test: "Pick".to_owned(),

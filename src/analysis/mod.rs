@@ -3,6 +3,7 @@
 //! Never: judges, writes to a history, or hands out a type of the table library.
 
 mod compare;
+mod consistency;
 mod failure_modes;
 mod frame;
 mod holm;
@@ -11,9 +12,10 @@ mod property_rates;
 mod wilson;
 
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
+pub use consistency::{Consistency, Flaky, PassPower, Repeated, Variance, consistency};
 pub use failure_modes::{FailureMode, failure_modes};
 pub use frame::AnalysisError;
 pub use holm::holm;
 pub use paired::{Difference, PairedTable, PairedTest};
 pub use property_rates::{PropertyRate, property_rates};
-pub use wilson::{Interval, wilson};
+pub use wilson::{Interval, wilson, wilson_share};

@@ -25,13 +25,22 @@ pub fn wilson(successes: u64, trials: u64) -> Option<Interval> {
     }
     #[expect(clippy::cast_precision_loss, reason = "counts of runs are far below 2^52")]
     let (successes, trials) = (successes.min(trials) as f64, trials as f64);
-    let rate = successes / trials;
+    wilson_share(successes / trials, trials)
+}
+
+/// The same for a share of trials that need not be a whole number; nothing where there was none.
+///
+/// Shape: the rate from 0 to 1.
+pub fn wilson_share(rate: f64, trials: f64) -> Option<Interval> {
+    if trials <= 0.0 || !(0.0..=1.0).contains(&rate) {
+        return None;
+    }
     let denominator = 1.0 + Z * Z / trials;
     let centre = (rate + Z * Z / (2.0 * trials)) / denominator;
     let half = Z / denominator * libm::sqrt(rate * (1.0 - rate) / trials + Z * Z / (4.0 * trials * trials));
     // At 0 and 1 the ends meet the rate exactly, but for rounding.
     let low = if rate == 0.0 { 0.0 } else { (centre - half).max(0.0) };
-    let high = if successes == trials { 1.0 } else { (centre + half).min(1.0) };
+    let high = if rate == 1.0 { 1.0 } else { (centre + half).min(1.0) };
     Some(Interval { rate, low, high })
 }
 

@@ -48,6 +48,8 @@ pub struct Choice {
 #[derive(Debug, Clone)]
 pub struct Choices {
     origin: Origin,
+    /// What noise is drawn from, once it begins; without one, everything is drawn from the same.
+    noise: Option<Box<ChaCha8Rng>>,
     made: Vec<Choice>,
 }
 
@@ -86,25 +88,45 @@ impl ChoiceKind {
 impl Choices {
     /// Fresh decisions: the same seed and index give the same ones, on every machine.
     pub fn random(seed: u64, index: u64) -> Self {
-        Self { origin: Origin::Random(generator(seed, index)), made: Vec::new() }
+        Self::of(Origin::Random(generator(seed, index)))
     }
 
     /// The decisions of a record, by name. What the record lacks gets its nominal value.
     pub fn recorded(record: &[Choice]) -> Self {
-        Self { origin: Origin::Recorded { values: by_name(record), rest: Rest::Nominal }, made: Vec::new() }
+        Self::of(Origin::Recorded { values: by_name(record), rest: Rest::Nominal })
     }
 
     /// The decisions of a record, by name; what it lacks is drawn, as [`Choices::random`] does.
     pub fn partly_recorded(record: &[Choice], seed: u64, index: u64) -> Self {
         let rest = Rest::Random(generator(seed, index));
-        Self { origin: Origin::Recorded { values: by_name(record), rest }, made: Vec::new() }
+        Self::of(Origin::Recorded { values: by_name(record), rest })
     }
 
     /// Fresh decisions, but for the names of `quantiles`: the first decision of such a name is the value below which
     /// this share of its distribution lies. Shape: each from 0 to 1; uniform ones give the nominal distribution.
     pub fn steered(quantiles: &BTreeMap<String, f64>, seed: u64, index: u64) -> Self {
-        let origin = Origin::Steered { quantiles: quantiles.clone(), generator: generator(seed, index) };
-        Self { origin, made: Vec::new() }
+        Self::of(Origin::Steered { quantiles: quantiles.clone(), generator: generator(seed, index) })
+    }
+
+    fn of(origin: Origin) -> Self {
+        Self { origin, noise: None, made: Vec::new() }
+    }
+
+    /// Lets what is drawn after [`Choices::begin_noise`] come from a stream of its own, so that the same scene can be
+    /// run with different noise.
+    pub fn with_noise(self, seed: u64, index: u64) -> Self {
+        Self { noise: Some(generator(seed, index)), ..self }
+    }
+
+    /// From here on decisions are noise: the scene is complete.
+    pub fn begin_noise(&mut self) {
+        let Some(noise) = self.noise.take() else { return };
+        match &mut self.origin {
+            Origin::Random(generator)
+            | Origin::Steered { generator, .. }
+            | Origin::Recorded { rest: Rest::Random(generator), .. } => *generator = noise,
+            Origin::Recorded { rest: Rest::Nominal, .. } => {}
+        }
     }
 
     /// One of `of` things, counted from 0. `of` must not be 0.
@@ -277,6 +299,23 @@ mod tests {
         assert_eq!((again.0, again.1), (drawn.0, drawn.1));
         assert_ne!(again.2, drawn.2);
         assert_eq!(draw(&mut Choices::partly_recorded(scene, 7, 9)), again);
+    }
+
+    #[test]
+    fn noise_can_come_from_a_stream_of_its_own() {
+        let drawn = |mut choices: Choices| {
+            let scene = choices.real("yaw", -1.0, 1.0, 0.0);
+            choices.begin_noise();
+            (scene, choices.normal("noise", 0.01))
+        };
+        let first = drawn(Choices::random(7, 3).with_noise(7, 100));
+        assert_eq!(drawn(Choices::random(7, 3).with_noise(7, 100)), first);
+        let again = drawn(Choices::random(7, 3).with_noise(7, 101));
+        assert_eq!(again.0, first.0);
+        assert_ne!(again.1, first.1);
+        // Noise depends on its own stream alone.
+        assert_eq!(drawn(Choices::random(7, 4).with_noise(7, 100)).1, first.1);
+        assert_eq!(drawn(Choices::random(7, 3)).0, first.0);
     }
 
     #[test]

@@ -54,7 +54,12 @@ impl Env {
         config: Option<&Path>,
     ) -> Result<(Self, CampaignRecord), Diagnostics> {
         let record = history.campaign(campaign)?;
-        let overrides = Overrides { runs: None, seed: Some(record.seed), history: Some(history.dir().to_path_buf()) };
+        let overrides = Overrides {
+            seed: Some(record.seed),
+            repeat: Some(record.repeat),
+            history: Some(history.dir().to_path_buf()),
+            ..Overrides::default()
+        };
         let loaded = match config {
             Some(config) => config::load(config, &overrides),
             None => {
@@ -71,8 +76,8 @@ impl Env {
             }
         };
         let mut loaded = loaded?;
-        let tests = loaded.tests.len().max(1) as u64;
-        loaded.test_count = u32::try_from(record.planned_runs / tests).unwrap_or(loaded.test_count).max(1);
+        let runs_of_a_scene = loaded.tests.len().max(1) as u64 * u64::from(record.repeat);
+        loaded.test_count = u32::try_from(record.planned_runs / runs_of_a_scene).unwrap_or(loaded.test_count).max(1);
         Ok((Self::of(loaded, Budget::default())?, record))
     }
 
@@ -118,6 +123,7 @@ impl Env {
             models,
             seed: self.campaign.seed,
             planned_runs: self.planned_runs(),
+            repeat: self.campaign.repeat,
             started,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
         }
@@ -125,13 +131,18 @@ impl Env {
 
     /// Runs of all tests together.
     pub fn planned_runs(&self) -> u64 {
-        self.campaign.tests.len() as u64 * u64::from(self.campaign.test_count)
+        self.campaign.tests.len() as u64 * self.runs_of_a_test()
     }
 
     /// Which test a run performs: all runs of the first one come first. An index past the end means the last one.
     pub fn test_of(&self, index: u64) -> usize {
         let last = self.campaign.tests.len().saturating_sub(1);
-        usize::try_from(index / u64::from(self.campaign.test_count.max(1))).map_or(last, |test| test.min(last))
+        usize::try_from(index / self.runs_of_a_test().max(1)).map_or(last, |test| test.min(last))
+    }
+
+    /// Every scene of a test, as often as it is run.
+    pub(super) fn runs_of_a_test(&self) -> u64 {
+        u64::from(self.campaign.test_count) * u64::from(self.campaign.repeat)
     }
 }
 

@@ -65,6 +65,7 @@ pub fn run_line(
             disturb(index, world);
         }
     };
+    choices.begin_noise();
     let trace = perform(env, test, &scene, &mut choices, disturb)?;
     let mut record = record(env, campaign, index, scene, trace)?;
     record.choices = choices.into_made();
@@ -102,6 +103,8 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
         campaign: campaign.to_owned(),
         shrunk_from: None,
         index,
+        repetition: None,
+        weight: None,
         test: trace.actions.iter().map(|action| action.action.as_str()).collect::<Vec<_>>().join(" "),
         seed: env.campaign.seed,
         status,

@@ -43,11 +43,17 @@ pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, manner: &Ma
             }
         };
         return match record {
-            Ok(record) => Making::Run(Box::new(RunRecord { discards, ..record })),
+            Ok(record) => Making::Run(Box::new(kept(planned, record, discards))),
             Err(reason) => Making::Impossible(Diagnostic::error("S031", reason).into()),
         };
     }
     Making::Impossible(no_scene(env, planned, discards.last()).into())
+}
+
+/// The record with what its plan says of it. Discards are of a scene: its first run has them.
+fn kept(planned: &Planned, record: RunRecord, discards: Vec<String>) -> RunRecord {
+    let first = planned.repetition.is_none_or(|number| number == 0);
+    RunRecord { discards: if first { discards } else { Vec::new() }, repetition: planned.repetition(), ..record }
 }
 
 fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {

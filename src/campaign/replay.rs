@@ -160,7 +160,7 @@ fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
 fn index_of(env: &Env, detail: &RunDetail) -> Result<u64, Diagnostics> {
     let tests: Vec<String> = env.campaign.tests.iter().map(|test| test.join(" ")).collect();
     match tests.iter().position(|test| *test == detail.row.test) {
-        Some(test) => Ok(test as u64 * u64::from(env.campaign.test_count)),
+        Some(test) => Ok(test as u64 * env.runs_of_a_test()),
         None => Err(Diagnostic::error(
             "S040",
             format!("the configuration {} has no test `{}`", env.campaign.source.name, detail.row.test),

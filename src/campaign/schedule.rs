@@ -5,26 +5,43 @@
 
 use crate::base::Choices;
 use crate::campaign::Env;
-use crate::history::RunRecord;
+use crate::history::{Repetition, RunRecord};
 use crate::verdict::Outcome;
 
 /// Runs of a plain campaign that are planned at a time. Workers wait for each other only between batches, so a large number
 /// costs nothing; it bounds the memory of a campaign of millions of runs.
 const BATCH: usize = 10_000;
 
+/// Sets streams of noise apart from those of scenes.
+const NOISE: u64 = 1 << 63;
+
 /// A run that is to be made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
     /// Position in the campaign, from 0: the run's number is the index + 1.
     pub index: u64,
+    /// Number of its scene in the campaign, from 0.
+    pub scene: u64,
+    /// Number of the run among those of its scene, from 0; nothing where every scene is run once.
+    pub repetition: Option<u64>,
 }
 
 impl Planned {
     /// The decisions of the run's `attempt`, from 0: the scenes of the attempts before had to be discarded.
     ///
-    /// Attempts have streams of their own, so that a discard moves no other run's decisions.
+    /// Attempts have streams of their own, so that a discard moves no other run's decisions; and so has the noise of each
+    /// repetition, whatever the number of repetitions.
     pub fn choices(&self, seed: u64, attempt: u64) -> Choices {
-        Choices::random(seed, self.index | (attempt << 48))
+        let scene = Choices::random(seed, self.scene | (attempt << 48));
+        match self.repetition {
+            None => scene,
+            Some(number) => scene.with_noise(seed, NOISE | (number << 40) | self.scene),
+        }
+    }
+
+    /// What the run's record says of it.
+    pub fn repetition(&self) -> Option<Repetition> {
+        self.repetition.map(|number| Repetition { scene: self.scene, number })
     }
 }
 
@@ -74,25 +91,35 @@ pub trait Schedule {
 /// The schedule that a campaign's configuration asks for.
 pub fn schedule_of(env: &Env) -> Box<dyn Schedule> {
     let tests = env.campaign.tests.len() as u64;
-    Box::new(InTurns { tests, runs: u64::from(env.campaign.test_count), made: 0 })
+    let repeat = u64::from(env.campaign.repeat);
+    Box::new(InTurns { tests, scenes: u64::from(env.campaign.test_count), repeat, made: 0 })
 }
 
-/// Every run of every test. Tests take turns, so that whatever ends a campaign early leaves as many runs of each.
+/// Every scene of every test, as often as it is run. Tests take turns, so that whatever ends a campaign early leaves as
+/// many scenes of each.
 struct InTurns {
     tests: u64,
     /// Of each test.
-    runs: u64,
-    /// Planned so far.
+    scenes: u64,
+    /// Runs of each scene.
+    repeat: u64,
+    /// Runs planned so far.
     made: u64,
+}
+
+impl InTurns {
+    /// The run at a place of the schedule, from 0.
+    fn planned(&self, place: u64) -> Planned {
+        let (turn, repetition) = (place / self.repeat, place % self.repeat);
+        let scene = turn % self.tests * self.scenes + turn / self.tests;
+        Planned { index: scene * self.repeat + repetition, scene, repetition: (self.repeat > 1).then_some(repetition) }
+    }
 }
 
 impl Schedule for InTurns {
     fn next_batch(&mut self, _told: &[Told]) -> Vec<Planned> {
-        let (tests, runs) = (self.tests, self.runs);
-        let batch: Vec<Planned> = (self.made..tests * runs)
-            .take(BATCH)
-            .map(|place| Planned { index: place % tests * runs + place / tests })
-            .collect();
+        let planned = self.tests * self.scenes * self.repeat;
+        let batch: Vec<Planned> = (self.made..planned).take(BATCH).map(|place| self.planned(place)).collect();
         self.made += batch.len() as u64;
         batch
     }
@@ -104,7 +131,7 @@ mod tests {
 
     #[test]
     fn tests_take_turns_and_every_run_is_planned_once() {
-        let mut schedule = InTurns { tests: 3, runs: 5_000, made: 0 };
+        let mut schedule = InTurns { tests: 3, scenes: 5_000, repeat: 1, made: 0 };
         let mut indices = Vec::new();
         loop {
             let batch = schedule.next_batch(&[]);
@@ -119,8 +146,33 @@ mod tests {
     }
 
     #[test]
+    fn the_runs_of_a_scene_come_one_after_another() {
+        let batch = InTurns { tests: 2, scenes: 2, repeat: 3, made: 0 }.next_batch(&[]);
+        let indices: Vec<u64> = batch.iter().map(|planned| planned.index).collect();
+        assert_eq!(indices, [0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11]);
+        assert_eq!(batch[5].repetition(), Some(Repetition { scene: 2, number: 2 }));
+    }
+
+    /// Repetitions share the scene, and keep their noise when there are more of them.
+    #[test]
+    fn repetitions_differ_in_noise_alone() {
+        let drawn = |scene, repetition| {
+            let mut choices = Planned { index: 0, scene, repetition }.choices(7, 0);
+            let yaw = choices.real("yaw", 0.0, 1.0, 0.0).to_bits();
+            choices.begin_noise();
+            (yaw, choices.normal("sense.x", 1.0).to_bits())
+        };
+        assert_eq!(drawn(1, Some(0)).0, drawn(1, Some(1)).0);
+        assert_eq!(drawn(1, Some(0)).0, drawn(1, None).0);
+        assert_ne!(drawn(1, Some(0)).1, drawn(1, Some(1)).1);
+        assert_ne!(drawn(1, Some(0)).1, drawn(2, Some(0)).1);
+    }
+
+    #[test]
     fn attempts_and_runs_have_decisions_of_their_own() {
-        let first = |index, attempt| Planned { index }.choices(7, attempt).real("x", 0.0, 1.0, 0.0).to_bits();
+        let first = |index, attempt| {
+            Planned { index, scene: index, repetition: None }.choices(7, attempt).real("x", 0.0, 1.0, 0.0).to_bits()
+        };
         assert_eq!(first(1, 0), first(1, 0));
         assert_ne!(first(1, 0), first(2, 0));
         assert_ne!(first(1, 0), first(1, 1));

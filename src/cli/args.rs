@@ -109,12 +109,15 @@ pub enum Command {
 pub struct RunArgs {
     /// The campaign's configuration (TOML)
     pub config: PathBuf,
-    /// Runs of each test, instead of the configuration's `test_count`
+    /// Scenes of each test, instead of the configuration's `test_count`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
     /// Seed of all randomness, instead of the configuration's `seed`
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
+    /// Runs of each scene, each with other noise, instead of the configuration's `repeat`
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeat: Option<u32>,
     /// Workers, one simulation each; results don't depend on it [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,

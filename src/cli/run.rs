@@ -21,7 +21,7 @@ use crate::verdict::{Counts, Outcome, mean};
 
 /// Runs a campaign and prints what came of it. Returns the exit code.
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
-    let overrides = Overrides { runs: args.runs, seed: args.seed, history: args.history.clone() };
+    let overrides = Overrides { runs: args.runs, seed: args.seed, repeat: args.repeat, history: args.history.clone() };
     let (stop, shown) = interrupt();
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let env = Env::prepare_within(&args.config, &overrides, budget)?;

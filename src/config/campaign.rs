@@ -7,15 +7,17 @@ use std::sync::Arc;
 use crate::base::{Diagnostic, Files, Source, Span};
 use crate::config::{ObjectModel, RobotProfile};
 
-/// One campaign: every test, `test_count` times, each time in another scene.
+/// One campaign: every test in `test_count` scenes, in each `repeat` times.
 #[derive(Debug, Clone)]
 pub struct Campaign {
     /// The text that it was read from.
     pub source: Source,
     /// Lists of action names, performed in order (`tests`).
     pub tests: Vec<Vec<String>>,
-    /// Runs of each test (`test_count`).
+    /// Scenes of each test (`test_count`).
     pub test_count: u32,
+    /// Runs of each scene, each with other noise (`repeat`); without it, 1.
+    pub repeat: u32,
     /// What performs the actions (`test_launcher`).
     pub launcher: Launcher,
     /// Seed of all randomness (`seed`); without one, 0.
@@ -67,6 +69,8 @@ pub struct Overrides {
     pub runs: Option<u32>,
     /// Instead of `seed`.
     pub seed: Option<u64>,
+    /// Instead of `repeat`; at least 1.
+    pub repeat: Option<u32>,
     /// Instead of `[history] dir`; relative to where the program runs.
     pub history: Option<PathBuf>,
 }

@@ -13,6 +13,8 @@ const SHIPPED_ONTOLOGY: &str = "ontology/actions.ttl";
 const HISTORY_DIR: &str = ".actcheck";
 /// More runs of one test than anybody waits for; a larger number is a slip of the finger.
 const MOST_RUNS: i64 = 10_000_000;
+/// A thousand runs of one scene tell its pass rate to three hundredths.
+const MOST_REPETITIONS: i64 = 1000;
 
 /// Reads a configuration with the models and the robot that it names. Paths in it are relative to it.
 ///
@@ -38,6 +40,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     table.require(&["tests", "test_count"]);
     let (tests, mut places) = read_tests(&mut table);
     let test_count = table.integer("test_count", 1..=MOST_RUNS).and_then(|count| u32::try_from(count).ok());
+    let repeat = table.integer("repeat", 1..=MOST_REPETITIONS).and_then(|count| u32::try_from(count).ok());
     let launcher = read_launcher(&mut table);
     let seed = table.integer("seed", 0..=i64::MAX).map_or(0, i64::unsigned_abs);
     let ontology = read_ontology_path(&mut table, folder);
@@ -59,6 +62,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         source,
         tests,
         test_count: overrides.runs.or(test_count).unwrap_or(1).max(1),
+        repeat: overrides.repeat.or(repeat).unwrap_or(1).max(1),
         launcher,
         seed: overrides.seed.unwrap_or(seed),
         ontology,

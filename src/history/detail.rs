@@ -9,7 +9,7 @@ use crate::base::names;
 use crate::history::read::{Node, id_of, subjects, text_of};
 use crate::history::statements::iri;
 use crate::history::write_scene::role_of;
-use crate::history::{ActionDetail, ObjectDetail, RunDetail, RunRow, RunStatus};
+use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail, RunRow, RunStatus};
 use crate::scenario::Role;
 use crate::verdict::{Judgement, Outcome};
 
@@ -37,6 +37,11 @@ fn row(run: &NamedNode, node: &Node) -> RunRow {
         run: id_of(&run.clone().into()),
         campaign: node.all("act:campaign").first().map(id_of).unwrap_or_default(),
         index: node.count("act:index").unwrap_or_default(),
+        repetition: node
+            .count("act:sceneNumber")
+            .zip(node.count("act:repetition"))
+            .map(|(scene, number)| Repetition { scene, number }),
+        weight: node.number("act:weight"),
         test: node.text("act:test").unwrap_or_default(),
         status: status(node.text("act:status").as_deref()),
         score: node.number("act:score").unwrap_or_default(),

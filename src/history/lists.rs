@@ -9,7 +9,7 @@ use oxigraph::store::Store;
 use crate::history::detail::{outcome, status, version};
 use crate::history::read::{Node, id_of, select, text_of};
 use crate::history::write_campaign::campaign_node;
-use crate::history::{CampaignRow, OutcomeRow, RunFilter, RunRow};
+use crate::history::{CampaignRow, OutcomeRow, Repetition, RunFilter, RunRow};
 use crate::verdict::Outcome;
 
 const CAMPAIGNS: &str = "
@@ -22,9 +22,11 @@ const STARTS: &str = "
 SELECT ?campaign WHERE { ?campaign a act:Campaign ; prov:startedAtTime ?started } ORDER BY ?started ?campaign";
 
 const RUNS: &str = "
-SELECT ?run ?campaign ?index ?test ?status ?score ?hash ?started WHERE {
+SELECT ?run ?campaign ?index ?test ?status ?score ?hash ?started ?scene ?repetition ?weight WHERE {
     ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status ; act:score ?score ;
         act:traceHash ?hash ; prov:startedAtTime ?started .
+    OPTIONAL { ?run act:sceneNumber ?scene ; act:repetition ?repetition }
+    OPTIONAL { ?run act:weight ?weight }
 }";
 
 const OUTCOMES: &str = "
@@ -61,8 +63,12 @@ fn id(row: &Row, column: usize) -> String {
     row.get(column).and_then(Option::as_ref).map(id_of).unwrap_or_default()
 }
 
+fn may<T: std::str::FromStr>(row: &Row, column: usize) -> Option<T> {
+    row.get(column).and_then(Option::as_ref).and_then(|term| text_of(term).parse().ok())
+}
+
 fn number<T: std::str::FromStr + Default>(row: &Row, column: usize) -> T {
-    text(row, column).parse().unwrap_or_default()
+    may(row, column).unwrap_or_default()
 }
 
 /// All campaigns, by their start.
@@ -128,6 +134,8 @@ pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, Que
             run: id(row, 0),
             campaign: id(row, 1),
             index: number(row, 2),
+            repetition: may(row, 8).zip(may(row, 9)).map(|(scene, number)| Repetition { scene, number }),
+            weight: may(row, 10),
             test: text(row, 3),
             status: status(Some(&text(row, 4))),
             score: number(row, 5),
@@ -171,6 +179,6 @@ fn outcome_row(row: &Row) -> OutcomeRow {
         action: text(row, 6),
         property: text(row, 7),
         outcome: outcome(Some(&text(row, 8))),
-        margin: row.get(9).and_then(Option::as_ref).and_then(|margin| text_of(margin).parse().ok()),
+        margin: may(row, 9),
     }
 }

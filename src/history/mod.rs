@@ -29,7 +29,7 @@ mod write_scene;
 pub use answer::{Cancel, QueryAnswer};
 pub use newest::NewestOutcomes;
 pub use recheck::{Recheck, StoredJudgement};
-pub use record::{CampaignEnd, CampaignRecord, RunRecord, RunStatus};
+pub use record::{CampaignEnd, CampaignRecord, Repetition, RunRecord, RunStatus};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;
 pub use store::History;

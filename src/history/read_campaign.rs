@@ -36,6 +36,8 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         models,
         seed: node.count("act:seed").unwrap_or_default(),
         planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
+        // Histories of before there were repetitions lack it.
+        repeat: node.count("act:repeat").and_then(|repeat| u32::try_from(repeat).ok()).unwrap_or(1).max(1),
         started: text(&node, "prov:startedAtTime"),
         program_version: version(&node),
     }))

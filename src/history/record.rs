@@ -31,6 +31,8 @@ pub struct CampaignRecord {
     pub seed: u64,
     /// How many runs were asked for.
     pub planned_runs: u64,
+    /// Runs of each scene.
+    pub repeat: u32,
     /// RFC 3339.
     pub started: String,
     /// Version of this program.
@@ -81,6 +83,15 @@ pub struct CampaignEnd {
     pub interrupted: bool,
 }
 
+/// One of several runs of a scene, each with other noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Repetition {
+    /// Number of the scene in its campaign, from 0.
+    pub scene: u64,
+    /// Number of the run among those of the scene, from 0.
+    pub number: u64,
+}
+
 /// One run, complete: written in one transaction.
 #[derive(Debug, Clone)]
 pub struct RunRecord {
@@ -92,6 +103,11 @@ pub struct RunRecord {
     pub shrunk_from: Option<String>,
     /// Position in the campaign, from 0.
     pub index: u64,
+    /// Which run of which scene it is, where scenes are run more than once.
+    pub repetition: Option<Repetition>,
+    /// Importance weight of its scene, where scenes are not drawn as the configuration's ranges say: the nominal
+    /// density by the one that it was drawn from.
+    pub weight: Option<f64>,
     /// Names of the actions, joined by a space.
     pub test: String,
     /// Seed of the campaign.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::history::RunStatus;
+use crate::history::{Repetition, RunStatus};
 use crate::scenario::Role;
 use crate::verdict::{Judgement, Outcome};
 
@@ -26,6 +26,10 @@ pub struct RunRow {
     pub campaign: String,
     /// Position in the campaign, from 0.
     pub index: u64,
+    /// Which run of which scene it is, where scenes are run more than once.
+    pub repetition: Option<Repetition>,
+    /// Importance weight of its scene, where scenes were not drawn as the configuration's ranges say.
+    pub weight: Option<f64>,
     /// Names of the actions, joined by a space.
     pub test: String,
     /// How it ended.

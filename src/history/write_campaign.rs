@@ -26,6 +26,7 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .text("act:ontologyDigest", &record.ontology_digest)
         .has("act:seed", count(record.seed))
         .has("act:plannedRuns", count(record.planned_runs))
+        .has("act:repeat", count(u64::from(record.repeat)))
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version));
     for (number, (property, path, digest)) in record.rules.iter().enumerate() {

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::analysis::FailureMode;
+use crate::report::repeated_text::repeated_json;
 use crate::report::{CampaignSummary, RunSummary, Share};
 use crate::verdict::Judgement;
 
@@ -34,6 +35,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         "runs_passed": summary.pass_rate().as_ref().map(share),
         "exit_code": summary.exit_code(),
         "properties": properties,
+        "repetitions": repeated_json(summary),
         "failure_modes": summary.failure_modes.iter().map(failure_mode).collect::<Vec<_>>(),
         "remarks": summary.remarks_json(),
         "runs": summary.runs.iter().map(run).collect::<Vec<_>>(),

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use comfy_table::{Attribute, Cell, Color};
 
 use crate::base::names;
+use crate::report::repeated_text::repeated_text;
 use crate::report::table::ruled;
 use crate::report::{CampaignSummary, RunSummary, Share};
 use crate::verdict::Outcome;
@@ -20,6 +21,7 @@ pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
     out.push('\n');
     properties_table(&mut out, summary);
     out.push('\n');
+    repeated_text(&mut out, summary);
     scores(&mut out, summary);
     failure_modes(&mut out, summary);
     remarks(&mut out, summary);

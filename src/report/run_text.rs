@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use crate::base::names;
-use crate::history::{ActionDetail, ObjectDetail, RunDetail};
+use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 use crate::report::table::ruled;
 
 /// Everything about a run: its scene, what the actions reported, every outcome with margin and witness.
@@ -26,6 +26,12 @@ pub fn run_text(run: &RunDetail) -> String {
         run.wall_secs,
         run.program_version
     );
+    if let Some(Repetition { scene, number }) = row.repetition {
+        let _ = writeln!(out, "run {} of scene {}", number + 1, scene + 1);
+    }
+    if let Some(weight) = row.weight {
+        let _ = writeln!(out, "importance weight {weight:.3}: a search chose the scene");
+    }
     let _ = writeln!(out, "trace {}", row.trace_hash);
     for (designator, values) in &run.designators {
         let _ = writeln!(out, "{designator} = {}", values.join(", "));
@@ -143,6 +149,8 @@ pub fn run_json(run: &RunDetail) -> Value {
         .collect();
     json!({
         "run": row.run, "campaign": row.campaign, "index": row.index, "test": row.test, "status": row.status.word(),
+        "scene": row.repetition.map(|repetition| repetition.scene),
+        "repetition": row.repetition.map(|repetition| repetition.number), "weight": row.weight,
         "reason": run.reason, "score": row.score, "trace_hash": row.trace_hash, "seed": run.seed,
         "started": row.started, "wall_secs": run.wall_secs, "program_version": run.program_version,
         "world": run.world, "robot_base": run.robot_base, "noise": run.noise, "designators": run.designators,

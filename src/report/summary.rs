@@ -1,7 +1,7 @@
 //! What is said about a campaign when it is over, as plain data.
 
 use crate::analysis::{FailureMode, Interval, wilson};
-use crate::history::{RunRecord, RunStatus};
+use crate::history::{Repetition, RunRecord, RunStatus};
 use crate::verdict::{Counts, Judgement, Outcome, mean};
 
 /// A campaign in short.
@@ -36,6 +36,8 @@ pub struct RunSummary {
     pub id: String,
     /// Position in the campaign, from 0.
     pub index: u64,
+    /// Which run of which scene it is, where scenes are run more than once.
+    pub repetition: Option<Repetition>,
     /// Names of its actions.
     pub test: String,
     /// How it ended.
@@ -71,6 +73,11 @@ pub struct Share {
 }
 
 impl Share {
+    /// The same with another interval, where there is one.
+    fn knowing(self, interval: Option<Interval>) -> Self {
+        Self { interval: interval.unwrap_or(self.interval), ..self }
+    }
+
     /// The share of `count` in `of`; nothing where `of` is 0.
     pub fn new(count: u64, of: u64) -> Option<Self> {
         Some(Self { count, of, interval: wilson(count, of)? })
@@ -119,6 +126,7 @@ impl RunSummary {
         Self {
             id: record.id.clone(),
             index: record.index,
+            repetition: record.repetition,
             test: record.test.clone(),
             status: record.status,
             reason: record.reason.clone(),
@@ -159,7 +167,7 @@ impl CampaignSummary {
     pub fn pass_rate(&self) -> Option<Share> {
         let judged = self.runs.iter().filter(|run| run.status != RunStatus::Broken).count() as u64;
         let passed = self.runs.iter().filter(|run| run.passed()).count() as u64;
-        Share::new(passed, judged)
+        Share::new(passed, judged).map(|rate| rate.knowing(self.interval_of_repeated(None)))
     }
 
     /// All outcomes of all properties.
@@ -176,6 +184,7 @@ impl CampaignSummary {
                 let own: Vec<&Judgement> = judgements.filter(|judgement| judgement.property == *iri).collect();
                 let counts = Counts::of(own.iter().map(|judgement| judgement.outcome));
                 let rate = Share::new(counts.passed, counts.decided());
+                let rate = rate.map(|rate| rate.knowing(self.interval_of_repeated(Some(iri))));
                 let held_before = own.iter().filter(|judgement| judgement.held_before == Some(true)).count() as u64;
                 PropertyLine { property: iri.clone(), label: label.clone(), counts, rate, held_before }
             })
@@ -216,6 +225,7 @@ pub(super) mod tests {
         RunSummary {
             id: format!("k7f3-{}", index + 1),
             index,
+            repetition: None,
             test: "Pick".into(),
             status,
             reason: (status != RunStatus::Completed).then(|| "body left the world".into()),

@@ -1,0 +1,269 @@
+//! How alike the runs of one scene are: what of a property's outcome the scene decides, and what the noise.
+
+use std::collections::BTreeMap;
+
+use crate::analysis::{Interval, wilson_share};
+
+/// One decided run of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Repeated {
+    /// Number of the scene.
+    pub scene: u64,
+    /// Whether it passed.
+    pub passed: bool,
+    /// How far from flipping, where that is known.
+    pub margin: Option<f64>,
+}
+
+/// What several runs of each of several scenes say of one property.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Consistency {
+    /// Scenes with at least two decided runs that all passed.
+    pub always_passed: u64,
+    /// Scenes with at least two decided runs that all failed.
+    pub always_failed: u64,
+    /// The others with at least two decided runs, by number.
+    pub flaky: Vec<Flaky>,
+    /// pass^k for k from 1 to the most decided runs of a scene.
+    pub pass_powers: Vec<PassPower>,
+    /// Of passing, 1 for passed and 0 for failed.
+    pub outcome: Option<Variance>,
+    /// Of the margin, where all decided runs have one. Unit: the margin's, squared.
+    pub margin: Option<Variance>,
+    /// Share of passed runs. Its interval knows that runs of one scene are alike.
+    pub rate: Option<Interval>,
+}
+
+/// A scene that sometimes passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Flaky {
+    /// Its number.
+    pub scene: u64,
+    /// So many of its runs passed.
+    pub passed: u64,
+    /// Of so many.
+    pub of: u64,
+}
+
+/// The probability that `k` independent runs of a scene all pass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PassPower {
+    /// How many runs.
+    pub k: u64,
+    /// Scenes with at least so many decided runs: those that it is the mean of.
+    pub scenes: u64,
+    /// The mean with an interval; that is a wide one, because a number in [0, 1] spreads at most as much as one that is 0
+    /// or 1 as often.
+    pub probability: Interval,
+}
+
+/// Where the spread of a number comes from. Unit: the number's, squared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Variance {
+    /// Of runs about the mean of their scene.
+    pub noise: f64,
+    /// Of the scenes' means themselves. The estimate is unbiased, so it may be negative where there is little of it.
+    pub scene: f64,
+}
+
+impl Variance {
+    /// Share of the noise in both together, in [0, 1]; nothing where there is no spread.
+    pub fn noise_share(&self) -> Option<f64> {
+        let both = self.noise + self.scene.max(0.0);
+        (both > 0.0).then(|| self.noise / both)
+    }
+}
+
+/// What decided runs say about how alike the runs of a scene are.
+pub fn consistency(runs: &[Repeated]) -> Consistency {
+    let mut scenes: BTreeMap<u64, Vec<&Repeated>> = BTreeMap::new();
+    for run in runs {
+        scenes.entry(run.scene).or_default().push(run);
+    }
+    let counts: Vec<Flaky> = scenes.iter().map(|(scene, runs)| count(*scene, runs)).collect();
+    let several = || counts.iter().filter(|scene| scene.of >= 2);
+    let numbers = |number: &dyn Fn(&Repeated) -> f64| -> Vec<Vec<f64>> {
+        scenes.values().map(|runs| runs.iter().map(|run| number(run)).collect()).collect()
+    };
+    let outcome = variance(&numbers(&|run| f64::from(u8::from(run.passed))));
+    let told = runs.iter().all(|run| run.margin.is_some_and(f64::is_finite));
+    Consistency {
+        always_passed: several().filter(|scene| scene.passed == scene.of).count() as u64,
+        always_failed: several().filter(|scene| scene.passed == 0).count() as u64,
+        flaky: several().filter(|scene| scene.passed > 0 && scene.passed < scene.of).copied().collect(),
+        pass_powers: (1..=counts.iter().map(|scene| scene.of).max().unwrap_or(0))
+            .filter_map(|k| pass_power(&counts, k))
+            .collect(),
+        outcome,
+        margin: told.then(|| variance(&numbers(&|run| run.margin.unwrap_or_default()))).flatten(),
+        rate: clustered_rate(&counts, outcome),
+    }
+}
+
+fn count(scene: u64, runs: &[&Repeated]) -> Flaky {
+    Flaky { scene, passed: runs.iter().filter(|run| run.passed).count() as u64, of: runs.len() as u64 }
+}
+
+/// The mean over scenes of C(passed, k) / C(runs, k), which is unbiased whatever each scene's own probability is.
+fn pass_power(counts: &[Flaky], k: u64) -> Option<PassPower> {
+    let enough: Vec<f64> = counts
+        .iter()
+        .filter(|scene| scene.of >= k)
+        // The first of k draws without replacement passes, then the second of what is left, and so on.
+        .map(|scene| {
+            (0..k).map(|drawn| scene.passed.saturating_sub(drawn) as f64 / (scene.of - drawn) as f64).product()
+        })
+        .collect();
+    let scenes = enough.len() as f64;
+    let probability = wilson_share(enough.iter().sum::<f64>() / scenes, scenes)?;
+    Some(PassPower { k, scenes: enough.len() as u64, probability })
+}
+
+/// Components of the variance between and within groups; nothing without two groups and one group of two.
+///
+/// Source: the one-way model with random effects, by the method of moments of the analysis of variance (Searle, 1971,
+/// for groups of unequal size): both are unbiased.
+fn variance(groups: &[Vec<f64>]) -> Option<Variance> {
+    let (count, total) = (groups.len() as f64, groups.iter().map(Vec::len).sum::<usize>() as f64);
+    if groups.len() < 2 || total <= count {
+        return None;
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let grand = groups.iter().flatten().sum::<f64>() / total;
+    let (mut within, mut between, mut squares) = (0.0, 0.0, 0.0);
+    for group in groups {
+        let (own, size) = (mean(group), group.len() as f64);
+        within += group.iter().map(|value| (value - own) * (value - own)).sum::<f64>();
+        between += size * (own - grand) * (own - grand);
+        squares += size * size;
+    }
+    let noise = within / (total - count);
+    let size = (total - squares / total) / (count - 1.0);
+    Some(Variance { noise, scene: (between / (count - 1.0) - noise) / size })
+}
+
+/// Wilson's interval with as many runs as are worth their number: so many runs of one scene less, as they are alike.
+///
+/// Source: the design effect of Kish (1965), 1 + (m - 1) ρ, with ρ from the components of the variance.
+fn clustered_rate(counts: &[Flaky], outcome: Option<Variance>) -> Option<Interval> {
+    let runs = counts.iter().map(|scene| scene.of as f64).sum::<f64>();
+    let passed = counts.iter().map(|scene| scene.passed as f64).sum::<f64>();
+    let squares = counts.iter().map(|scene| (scene.of * scene.of) as f64).sum::<f64>();
+    // Where all runs went alike nothing tells noise from scenes: then each scene counts once.
+    let alike = outcome.and_then(|variance| variance.noise_share()).map_or(1.0, |noise| 1.0 - noise);
+    let worth = runs / (1.0 + (squares / runs - 1.0) * alike);
+    wilson_share(passed / runs, worth)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn runs(scenes: &[&[u8]]) -> Vec<Repeated> {
+        let of = |(scene, runs): (usize, &&[u8])| {
+            let repeated = |passed: &u8| Repeated { scene: scene as u64, passed: *passed == 1, margin: None };
+            runs.iter().map(repeated).collect::<Vec<_>>()
+        };
+        scenes.iter().enumerate().flat_map(of).collect()
+    }
+
+    #[test]
+    fn scenes_are_told_apart_by_how_their_runs_went() {
+        let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1], &[0, 1]]));
+        assert_eq!((found.always_passed, found.always_failed), (1, 1));
+        assert_eq!(
+            found.flaky,
+            [Flaky { scene: 2, passed: 2, of: 3 }, Flaky { scene: 4, passed: 1, of: 2 }],
+            "a scene of one run is neither"
+        );
+        assert_eq!(consistency(&[]), Consistency::default());
+    }
+
+    /// Of three runs two passed: of the three pairs one passed whole. So by hand for all scenes.
+    #[test]
+    fn pass_powers_are_shares_of_all_choices_of_runs() {
+        let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1, 1]]));
+        let told: Vec<(u64, u64, f64)> =
+            found.pass_powers.iter().map(|power| (power.k, power.scenes, power.probability.rate)).collect();
+        let expected =
+            [(1, 4, (1.0 + 0.0 + 2.0 / 3.0 + 1.0) / 4.0), (2, 4, (1.0 + 1.0 / 3.0 + 1.0) / 4.0), (3, 3, 1.0 / 3.0)];
+        for (told, expected) in told.iter().zip(expected) {
+            assert_eq!((told.0, told.1), (expected.0, expected.1));
+            assert!((told.2 - expected.2).abs() < 1e-12, "{told:?}");
+        }
+        assert_eq!(told.len(), 3);
+    }
+
+    /// Kutner, Nachtsheim, Neter and Li, "Applied Linear Statistical Models", table 25.1: ratings by five officers of four
+    /// candidates each; the mean squares are 394.925 and 73.2833, and the officers' variance 80.41.
+    #[test]
+    fn published_components_come_out() {
+        let ratings = [
+            vec![76.0, 65.0, 85.0, 74.0],
+            vec![59.0, 75.0, 81.0, 67.0],
+            vec![49.0, 63.0, 61.0, 46.0],
+            vec![74.0, 71.0, 85.0, 89.0],
+            vec![66.0, 84.0, 80.0, 79.0],
+        ];
+        let found = variance(&ratings).expect("five groups of four");
+        assert!((found.noise - 73.283_3).abs() < 1e-3, "{found:?}");
+        assert!((found.scene - 80.410_4).abs() < 1e-3, "{found:?}");
+        assert_eq!(variance(&ratings[..1]), None);
+        assert_eq!(variance(&[vec![1.0], vec![2.0]]), None);
+    }
+
+    /// Scenes pass with probability 0.2 or 0.8, equally often: the variance of scenes is 0.09, that of noise 0.16, and two
+    /// runs both pass with probability 0.34. Estimates of unequal numbers of runs are right in the mean.
+    #[test]
+    fn estimates_are_unbiased_for_a_known_mixture() {
+        const CAMPAIGNS: usize = 4000;
+        let mut state = 1_u64;
+        let mut uniform = || {
+            // Knuth's linear congruential generator: any will do here.
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let (mut noise, mut scene, mut both, mut held) = (0.0, 0.0, 0.0, 0);
+        for _ in 0..CAMPAIGNS {
+            let mut drawn = Vec::new();
+            for number in 0..12 {
+                let probability = if uniform() < 0.5 { 0.2 } else { 0.8 };
+                let repetitions = 2 + number % 4;
+                drawn.extend((0..repetitions).map(|_| Repeated {
+                    scene: number,
+                    passed: uniform() < probability,
+                    margin: None,
+                }));
+            }
+            let found = consistency(&drawn);
+            let outcome = found.outcome.expect("twelve scenes");
+            noise += outcome.noise / CAMPAIGNS as f64;
+            scene += outcome.scene / CAMPAIGNS as f64;
+            both += found.pass_powers[1].probability.rate / CAMPAIGNS as f64;
+            let rate = found.rate.expect("there are runs");
+            held += usize::from((rate.low..=rate.high).contains(&0.5));
+        }
+        assert!((noise - 0.16).abs() < 0.002, "{noise}");
+        assert!((scene - 0.09).abs() < 0.003, "{scene}");
+        assert!((both - 0.34).abs() < 0.005, "{both}");
+        // The plain interval, which takes all runs for independent, holds in 84 %.
+        assert!(held * 100 >= CAMPAIGNS * 93, "{held}");
+    }
+
+    #[test]
+    fn where_all_runs_went_alike_each_scene_counts_once() {
+        let found = consistency(&runs(&[&[1, 1, 1], &[1, 1, 1]]));
+        assert_eq!(found.rate, wilson_share(1.0, 2.0));
+        assert_eq!(found.outcome.and_then(|variance| variance.noise_share()), None);
+    }
+
+    #[test]
+    fn margins_count_where_every_run_has_one() {
+        let run = |scene, margin| Repeated { scene, passed: true, margin };
+        let mut told = vec![run(0, Some(1.0)), run(0, Some(3.0)), run(1, Some(5.0)), run(1, Some(7.0))];
+        // Within: 2 each. Between the means 2 and 6: 2 · (4 + 4) / 1 = 16, less 2, by 2.
+        assert_eq!(consistency(&told).margin, Some(Variance { noise: 2.0, scene: 7.0 }));
+        told.push(run(1, None));
+        assert_eq!(consistency(&told).margin, None);
+    }
+}

@@ -1,0 +1,71 @@
+//! What repetitions of scenes say: each property, and the runs as a whole.
+
+use crate::analysis::{Consistency, Interval, Repeated, consistency};
+use crate::report::{CampaignSummary, RunSummary};
+use crate::verdict::{Counts, Judgement, Outcome};
+
+/// How alike the runs of a scene are in one property, or as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RepeatedProperty {
+    /// IRI of the property; nothing for whole runs, which pass where everything does.
+    pub property: Option<String>,
+    /// Its label.
+    pub label: String,
+    /// What the repetitions say.
+    pub found: Consistency,
+}
+
+impl CampaignSummary {
+    /// Each property, then the runs as a whole; nothing where every scene was run once.
+    pub fn repeated(&self) -> Vec<RepeatedProperty> {
+        if !self.is_repeated() {
+            return Vec::new();
+        }
+        let properties = self.properties.iter().map(|(iri, label, _)| (Some(iri), label.as_str()));
+        properties
+            .chain([(None, "everything")])
+            .map(|(iri, label)| RepeatedProperty {
+                property: iri.cloned(),
+                label: label.to_owned(),
+                found: consistency(&self.decided(iri.map(String::as_str))),
+            })
+            .collect()
+    }
+
+    /// Runs of a scene, in order of their repetition.
+    pub fn runs_of_scene(&self, scene: u64) -> impl Iterator<Item = &RunSummary> {
+        self.runs.iter().filter(move |run| run.repetition.is_some_and(|repetition| repetition.scene == scene))
+    }
+
+    /// The interval of a pass rate that knows which runs are of one scene; nothing where every scene was run once.
+    pub(super) fn interval_of_repeated(&self, property: Option<&str>) -> Option<Interval> {
+        if self.is_repeated() { consistency(&self.decided(property)).rate } else { None }
+    }
+
+    fn is_repeated(&self) -> bool {
+        self.runs.iter().any(|run| run.repetition.is_some())
+    }
+
+    /// The runs in which a property was decided, or, without one, those that were not broken.
+    fn decided(&self, property: Option<&str>) -> Vec<Repeated> {
+        let of = |run: &RunSummary| {
+            let scene = run.repetition?.scene;
+            let Some(property) = property else {
+                let judged = run.status != crate::history::RunStatus::Broken;
+                return judged.then(|| Repeated { scene, passed: run.passed(), margin: None });
+            };
+            let judgements = run.actions.iter().flat_map(|action| &action.judgements);
+            let own: Vec<&Judgement> = judgements.filter(|judgement| judgement.property == property).collect();
+            let counts = Counts::of(own.iter().map(|judgement| judgement.outcome));
+            let margins: Option<Vec<f64>> =
+                own.iter().filter(|judgement| is_decided(judgement)).map(|judgement| judgement.margin).collect();
+            let margin = margins.and_then(|margins| margins.into_iter().reduce(f64::min));
+            (counts.decided() > 0).then_some(Repeated { scene, passed: counts.failed == 0, margin })
+        };
+        self.runs.iter().filter_map(of).collect()
+    }
+}
+
+fn is_decided(judgement: &Judgement) -> bool {
+    matches!(judgement.outcome, Outcome::Passed | Outcome::Failed)
+}

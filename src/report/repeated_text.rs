@@ -1,0 +1,110 @@
+//! Repetitions for people and for programs.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+
+use crate::analysis::{Flaky, PassPower, Variance};
+use crate::report::table::ruled;
+use crate::report::{CampaignSummary, RepeatedProperty};
+
+/// Columns of pass^k; the rest are in the JSON.
+const POWERS_SHOWN: usize = 5;
+/// Flaky scenes named for each property; the rest are in the JSON.
+const SCENES_NAMED: usize = 6;
+
+/// What the repetitions of each scene say; nothing where every scene was run once.
+pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
+    let repeated = summary.repeated();
+    let most = repeated.iter().map(|property| property.found.pass_powers.len()).max().unwrap_or(0);
+    if most == 0 {
+        return;
+    }
+    let powers = shown_powers(most);
+    let mut table = ruled();
+    table.force_no_tty();
+    let header = ["property", "always passed", "always failed", "flaky"].map(str::to_owned);
+    let of_powers = powers.iter().map(|k| format!("pass^{k} [95 % interval]"));
+    table.set_header(header.into_iter().chain(of_powers).chain(["spread by noise".to_owned()]));
+    for RepeatedProperty { label, found, .. } in &repeated {
+        let scenes = found.always_passed + found.always_failed + found.flaky.len() as u64;
+        let of = |count: u64| format!("{count} of {scenes}");
+        let head = [label.clone(), of(found.always_passed), of(found.always_failed), of(found.flaky.len() as u64)];
+        let power = |k: &u64| found.pass_powers.iter().find(|power| power.k == *k).map_or_else(String::new, told);
+        table.add_row(head.into_iter().chain(powers.iter().map(power)).chain([noise_share(found.outcome)]));
+    }
+    let _ = writeln!(out, "{table}");
+    let _ = writeln!(
+        out,
+        "pass^k: the probability that k runs of a scene, each with other noise, all pass\n\
+         spread by noise: share of the outcomes' variance within scenes; the rest is between them"
+    );
+    repeated.iter().for_each(|property| flaky(out, summary, property));
+    out.push('\n');
+}
+
+/// The first ones and the last.
+fn shown_powers(most: usize) -> Vec<u64> {
+    (1..=most as u64).filter(|k| *k < POWERS_SHOWN as u64 || *k == most as u64).collect()
+}
+
+fn told(power: &PassPower) -> String {
+    let interval = &power.probability;
+    format!("{:.0} % [{:.0}–{:.0}]", interval.rate * 100.0, interval.low * 100.0, interval.high * 100.0)
+}
+
+fn noise_share(variance: Option<Variance>) -> String {
+    let share = variance.and_then(|variance| variance.noise_share());
+    share.map_or_else(|| "no spread".to_owned(), |share| format!("{:.0} %", share * 100.0))
+}
+
+/// The scenes in which a property sometimes passes, with their first run.
+fn flaky(out: &mut String, summary: &CampaignSummary, property: &RepeatedProperty) {
+    let scenes = &property.found.flaky;
+    if scenes.is_empty() {
+        return;
+    }
+    let named = scenes.iter().take(SCENES_NAMED).map(|Flaky { scene, passed, of }| {
+        let run = summary.runs_of_scene(*scene).next().map_or("", |run| run.id.as_str());
+        format!("{} ({passed} of {of} passed, from {run})", scene + 1)
+    });
+    let named: Vec<String> = named.collect();
+    let rest = scenes.len().saturating_sub(SCENES_NAMED);
+    let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
+    let _ = writeln!(out, "  {}: flaky in scene {}{more}", property.label, named.join(", "));
+}
+
+/// The same as JSON: `null` where every scene was run once.
+pub(super) fn repeated_json(summary: &CampaignSummary) -> Value {
+    let repeated = summary.repeated();
+    if repeated.is_empty() {
+        return Value::Null;
+    }
+    let property = |RepeatedProperty { property, label, found }: &RepeatedProperty| {
+        let flaky = |Flaky { scene, passed, of }: &Flaky| {
+            let runs: Vec<&str> = summary.runs_of_scene(*scene).map(|run| run.id.as_str()).collect();
+            json!({ "scene": scene, "passed": passed, "of": of, "runs": runs })
+        };
+        let power = |power: &PassPower| {
+            json!({
+                "k": power.k, "scenes": power.scenes, "probability": power.probability.rate,
+                "low": power.probability.low, "high": power.probability.high,
+            })
+        };
+        json!({
+            "property": property, "label": label,
+            "always_passed": found.always_passed, "always_failed": found.always_failed,
+            "flaky": found.flaky.iter().map(flaky).collect::<Vec<_>>(),
+            "pass_powers": found.pass_powers.iter().map(power).collect::<Vec<_>>(),
+            "outcome_variance": variance_json(found.outcome), "margin_variance": variance_json(found.margin),
+        })
+    };
+    Value::Array(repeated.iter().map(property).collect())
+}
+
+fn variance_json(variance: Option<Variance>) -> Value {
+    variance.map_or(
+        Value::Null,
+        |variance| json!({ "noise": variance.noise, "scene": variance.scene, "noise_share": variance.noise_share() }),
+    )
+}
