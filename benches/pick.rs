@@ -75,6 +75,7 @@ fn main() {
         costs.time("history", || history.commit(&record)).expect("room on the disk");
     }
     let end = CampaignEnd {
+        ended_by: None,
         ended: (clock.now)(),
         score: None,
         score_without_broken: None,

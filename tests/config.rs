@@ -115,7 +115,7 @@ fn paths_are_relative_to_the_configuration_and_the_command_line_wins() {
     assert_eq!(campaign.ontology, (Files::Disk, PathBuf::from("ontology/actions.ttl")));
     assert_eq!(campaign.history, Path::new("configs/.actcheck"));
     let history = Some(PathBuf::from("elsewhere"));
-    let overrides = Overrides { runs: Some(2), seed: Some(99), repeat: Some(3), history };
+    let overrides = Overrides { runs: Some(2), seed: Some(99), repeat: Some(3), history, ..Overrides::default() };
     let campaign = config::load(Path::new("configs/pick.toml"), &overrides).unwrap();
     assert_eq!((campaign.test_count, campaign.seed, campaign.repeat), (2, 99, 3));
     assert_eq!(campaign.history, PathBuf::from("elsewhere"));

@@ -145,6 +145,9 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         seed: 7,
         planned_runs: 6,
         repeat: 1,
+        time_secs: Some(90.0),
+        until_width: Some(0.05),
+        max_failures: Some(3),
         started: format!("2026-08-01T12:{minute:02}:00Z"),
         program_version: "0.1.0".to_owned(),
     }
@@ -329,6 +332,7 @@ fn a_campaign_is_listed_with_its_end() {
         score_without_broken: None,
         outcomes: BTreeMap::from([(Outcome::Passed, 28), (Outcome::Failed, 2)]),
         discards: 3,
+        ended_by: Some("failures".to_owned()),
         interrupted: false,
     };
     history.finish_campaign("z2", &end).unwrap();
@@ -336,6 +340,7 @@ fn a_campaign_is_listed_with_its_end() {
     let [z2, a1] = campaigns.as_slice() else { panic!("{campaigns:?}") };
     assert_eq!((z2.id.as_str(), z2.name.as_str(), z2.runs, z2.planned_runs, z2.seed), ("z2", "pick", 6, 6, 7));
     assert_eq!((z2.score, z2.score_without_broken, z2.interrupted), (Some(0.9), None, false));
+    assert_eq!(z2.ended_by.as_deref(), Some("failures"));
     assert_eq!((&z2.ended, &z2.outcomes), (&Some(end.ended), &end.outcomes));
     assert_eq!((a1.id.as_str(), a1.runs, a1.interrupted, &a1.ended), ("a1", 2, true, &None));
 }
@@ -416,6 +421,7 @@ fn every_term_of_a_history_is_described() {
         score_without_broken: Some(1.0),
         outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, 1)).collect(),
         ended: "2026-08-01T12:09:00Z".to_owned(),
+        ended_by: Some("time".to_owned()),
         ..CampaignEnd::default()
     };
     history.finish_campaign("z2", &end).unwrap();

@@ -3,6 +3,7 @@
 //! Never: reads the simulation's truth inside a skill, judges an action, or knows a property.
 
 mod call;
+mod cut;
 mod grasp;
 mod operator;
 mod perform;
@@ -12,7 +13,8 @@ mod route;
 mod trace;
 
 pub use call::{ActionCall, UnknownSkill, known_skill, reference_skills};
-pub use perform::perform;
+pub use cut::Cut;
+pub use perform::{perform, perform_until};
 pub use trace::{ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace};
 
 // States are part of a trace: its readers meet them here.

@@ -1,6 +1,6 @@
 //! What a skill has in hand: joint commands, measurements and noisy sight. The world's truth stays behind it.
 
-use crate::actions::{Percept, Phase};
+use crate::actions::{Cut, Percept, Phase};
 use crate::base::Choices;
 use crate::scenario::RobotProfile;
 use crate::world::{Command, Kinematics, Layout, Observation, Sighting, World};
@@ -12,6 +12,8 @@ pub enum Interrupt {
     Fault,
     /// The action's time is up.
     Budget,
+    /// The run is cut off from outside.
+    Cut,
 }
 
 /// Share of a joint's velocity limit that skills use: room for the controller to catch up.
@@ -26,6 +28,7 @@ pub struct Operator<'a> {
     command: Command,
     start_secs: f64,
     budget_secs: f64,
+    cut: Cut,
     /// Phases begun so far.
     pub phases: Vec<Phase>,
     /// What was seen so far.
@@ -33,10 +36,10 @@ pub struct Operator<'a> {
 }
 
 impl<'a> Operator<'a> {
-    /// The robot at the beginning of an action that may take `budget_secs` of simulated time.
-    pub fn new(world: &'a mut World, choices: &'a mut Choices, budget_secs: f64) -> Self {
+    /// The robot at the beginning of an action that may take `budget_secs` of simulated time, in a run that ends at `cut`.
+    pub fn new(world: &'a mut World, choices: &'a mut Choices, budget_secs: f64, cut: Cut) -> Self {
         let (command, start_secs) = (world.hold(), world.time_secs());
-        Self { world, choices, command, start_secs, budget_secs, phases: Vec::new(), percepts: Vec::new() }
+        Self { world, choices, command, start_secs, budget_secs, cut, phases: Vec::new(), percepts: Vec::new() }
     }
 
     /// Names what follows.
@@ -138,6 +141,9 @@ impl<'a> Operator<'a> {
         }
         if self.elapsed_secs() > self.budget_secs {
             return Err(Interrupt::Budget);
+        }
+        if self.cut.is_due(self.world.time_secs()) {
+            return Err(Interrupt::Cut);
         }
         Ok(())
     }

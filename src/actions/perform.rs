@@ -1,5 +1,6 @@
 //! Performs a list of actions and keeps what happened.
 
+use crate::actions::cut::{self, Cut};
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::{
     ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Trace, known_skill, pick,
@@ -13,6 +14,17 @@ use crate::world::World;
 /// Faults and spent budgets end the run as data: later actions are there as not reached. An action whose own report is
 /// "failed" does not end the run, as with a real robot.
 pub fn perform(calls: &[ActionCall], world: &mut World, choices: &mut Choices, budget: &Budget) -> Trace {
+    perform_until(calls, world, choices, budget, Cut::Never)
+}
+
+/// The same, but that the run ends where it is cut off.
+pub fn perform_until(
+    calls: &[ActionCall],
+    world: &mut World,
+    choices: &mut Choices,
+    budget: &Budget,
+    cut: Cut,
+) -> Trace {
     world.localise(choices);
     let mut snapshots = vec![world.snapshot()];
     let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
@@ -22,7 +34,7 @@ pub fn perform(calls: &[ActionCall], world: &mut World, choices: &mut Choices, b
             actions.push(unreached(call));
             continue;
         }
-        actions.push(perform_one(call, world, choices, budget));
+        actions.push(perform_one(call, world, choices, (budget, cut)));
         snapshots.push(world.snapshot());
     }
     let tracks = world.tracks();
@@ -30,10 +42,15 @@ pub fn perform(calls: &[ActionCall], world: &mut World, choices: &mut Choices, b
     Trace { snapshots, actions, frames, hash: world.state_digest() }
 }
 
-fn perform_one(call: &ActionCall, world: &mut World, choices: &mut Choices, budget: &Budget) -> ActionTrace {
+fn perform_one(
+    call: &ActionCall,
+    world: &mut World,
+    choices: &mut Choices,
+    (budget, cut): (&Budget, Cut),
+) -> ActionTrace {
     let began = world.time_secs();
     world.begin_record();
-    let mut operator = Operator::new(world, choices, budget.action_secs);
+    let mut operator = Operator::new(world, choices, budget.action_secs, cut);
     let outcome = match known_skill(&call.action) {
         Ok(()) => pick::pick(call, &mut operator),
         Err(unknown) => {
@@ -77,6 +94,7 @@ fn ended(
     match (outcome, world.fault()) {
         (_, Some(fault)) => (ActionEnd::Broken(fault.to_string()), None),
         (Ok(report), None) => (ActionEnd::Completed, Some(report)),
+        (Err(Interrupt::Cut), None) => (ActionEnd::Cut(cut::REASON.to_owned()), None),
         (Err(_), None) => {
             let reason = format!("the action took longer than its budget of {} s", budget.action_secs);
             (ActionEnd::Timeout(reason), None)

@@ -57,6 +57,8 @@ pub enum ActionEnd {
     Timeout(String),
     /// An earlier action ended the run.
     NotReached,
+    /// By the clock on the wall, which cut the run off: a timeout that says nothing of the robot.
+    Cut(String),
 }
 
 /// What an action says of itself. It can be wrong.

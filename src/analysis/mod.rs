@@ -9,7 +9,6 @@ mod frame;
 mod holm;
 mod paired;
 mod property_rates;
-mod wilson;
 
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, Flaky, PassPower, Repeated, Variance, consistency};
@@ -18,4 +17,6 @@ pub use frame::AnalysisError;
 pub use holm::holm;
 pub use paired::{Difference, PairedTable, PairedTest};
 pub use property_rates::{PropertyRate, property_rates};
-pub use wilson::{Interval, wilson, wilson_share};
+
+// Rates of outcomes and their intervals are part of a verdict; readers of tables meet them here.
+pub use crate::verdict::{Interval, wilson, wilson_share};

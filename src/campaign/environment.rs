@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::actions;
 use crate::base::{Diagnostic, Diagnostics, Source};
+use crate::campaign::budget::ceiling;
 use crate::config::{self, Campaign, Launcher, Overrides};
 use crate::history::{CampaignRecord, History};
 use crate::ontology::{self, Ontology};
@@ -40,7 +41,9 @@ impl Env {
     /// # Errors
     /// All faults that can be found at once, and a budget that was spent.
     pub fn prepare_within(config: &Path, overrides: &Overrides, rule_budget: Budget) -> Result<Self, Diagnostics> {
-        Self::of(config::load(config, overrides)?, rule_budget)
+        let mut campaign = config::load(config, overrides)?;
+        campaign.test_count = ceiling(overrides).unwrap_or(campaign.test_count);
+        Self::of(campaign, rule_budget)
     }
 
     /// What a campaign of the history ran with: its configuration's text as it was then, with the ontology, rules and
@@ -124,6 +127,9 @@ impl Env {
             seed: self.campaign.seed,
             planned_runs: self.planned_runs(),
             repeat: self.campaign.repeat,
+            time_secs: self.campaign.limits.time_secs,
+            until_width: self.campaign.limits.until_width,
+            max_failures: self.campaign.limits.max_failures,
             started,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
         }

@@ -24,7 +24,7 @@ pub(super) fn judge_action(
     let fate = match end {
         ActionEnd::Completed => Fate::Completed,
         ActionEnd::Broken(reason) => Fate::Broken(reason.clone()),
-        ActionEnd::Timeout(reason) => Fate::Timeout(reason.clone()),
+        ActionEnd::Timeout(reason) | ActionEnd::Cut(reason) => Fate::Timeout(reason.clone()),
         ActionEnd::NotReached => Fate::NotReached,
     };
     let findings = match (&fate, facts) {

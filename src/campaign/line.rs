@@ -1,6 +1,6 @@
 //! The line, once, top to bottom: choices → scene → world → trace → facts → findings → verdict.
 
-use crate::actions::{self, ActionCall, ActionEnd, Trace};
+use crate::actions::{self, ActionCall, ActionEnd, Cut, Trace};
 use crate::base::Choices;
 use crate::campaign::Env;
 use crate::campaign::judging::judge_action;
@@ -53,8 +53,22 @@ pub fn run_line(
     env: &Env,
     campaign: &str,
     index: u64,
-    mut choices: Choices,
+    choices: Choices,
     manner: &Manner,
+) -> Result<RunRecord, Failure> {
+    run_line_until(env, campaign, (index, choices), manner, Cut::Never)
+}
+
+/// The same, but that the run ends where it is cut off.
+///
+/// # Errors
+/// As [`run_line`].
+pub(super) fn run_line_until(
+    env: &Env,
+    campaign: &str,
+    (index, mut choices): (u64, Choices),
+    manner: &Manner,
+    cut: Cut,
 ) -> Result<RunRecord, Failure> {
     let (started, start_secs) = ((manner.clock.now)(), (manner.clock.secs)());
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices)
@@ -66,7 +80,7 @@ pub fn run_line(
         }
     };
     choices.begin_noise();
-    let trace = perform(env, test, &scene, &mut choices, disturb)?;
+    let trace = perform((env, cut), test, &scene, &mut choices, disturb)?;
     let mut record = record(env, campaign, index, scene, trace)?;
     record.choices = choices.into_made();
     record.started = started;
@@ -125,7 +139,7 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
 
 /// Builds the scene, lets it settle and performs the test in it.
 fn perform(
-    env: &Env,
+    (env, cut): (&Env, Cut),
     test: &[String],
     scene: &Scene,
     choices: &mut Choices,
@@ -143,7 +157,7 @@ fn perform(
         return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
     }
     disturb(&mut world);
-    Ok(actions::perform(&calls(test, scene), &mut world, choices, &env.campaign.budget))
+    Ok(actions::perform_until(&calls(test, scene), &mut world, choices, &env.campaign.budget, cut))
 }
 
 fn calls(test: &[String], scene: &Scene) -> Vec<ActionCall> {
@@ -188,7 +202,9 @@ fn status_of(trace: &Trace) -> (RunStatus, Option<String>) {
     for action in &trace.actions {
         match &action.end {
             ActionEnd::Broken(reason) => return (RunStatus::Broken, Some(reason.clone())),
-            ActionEnd::Timeout(reason) => return (RunStatus::Timeout, Some(reason.clone())),
+            ActionEnd::Timeout(reason) | ActionEnd::Cut(reason) => {
+                return (RunStatus::Timeout, Some(reason.clone()));
+            }
             ActionEnd::Completed | ActionEnd::NotReached => {}
         }
     }

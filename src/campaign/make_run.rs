@@ -2,9 +2,10 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use crate::actions::Cut;
 use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::line::crashed;
-use crate::campaign::{Env, Failure, Manner, Planned, run_line};
+use crate::campaign::line::{crashed, run_line_until};
+use crate::campaign::{Env, Failure, Manner, Planned};
 use crate::history::RunRecord;
 
 /// Scenes drawn for one run before the campaign is given up.
@@ -28,7 +29,8 @@ pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, manner: &Ma
     for attempt in 0..SCENES_PER_RUN {
         let index = planned.index;
         let choices = || planned.choices(env.campaign.seed, attempt);
-        let made = catch_unwind(AssertUnwindSafe(|| run_line(env, campaign, index, choices(), manner)));
+        let cut = cut_of(env, manner);
+        let made = catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, choices()), manner, cut)));
         let record = match made {
             Ok(Ok(record)) => Ok(record),
             Ok(Err(Failure::Interrupted)) => return Making::Interrupted,
@@ -54,6 +56,12 @@ pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, manner: &Ma
 fn kept(planned: &Planned, record: RunRecord, discards: Vec<String>) -> RunRecord {
     let first = planned.repetition.is_none_or(|number| number == 0);
     RunRecord { discards: if first { discards } else { Vec::new() }, repetition: planned.repetition(), ..record }
+}
+
+/// When a run that begins now is cut off.
+fn cut_of(env: &Env, manner: &Manner) -> Cut {
+    let secs = manner.clock.secs;
+    env.campaign.limits.run_secs.map_or(Cut::Never, |limit| Cut::Clock { secs, at_secs: secs() + limit })
 }
 
 fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {

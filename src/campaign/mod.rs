@@ -5,6 +5,7 @@
 
 mod replay;
 
+mod budget;
 mod changes;
 mod difference;
 mod environment;
@@ -20,6 +21,7 @@ pub mod shrink;
 
 pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Recalled, Replay, replay_all};
 
+pub use budget::Spent;
 pub use changes::{Change, ChangeKind, changes};
 pub use difference::{Difference, first_difference};
 pub use environment::Env;

@@ -1,6 +1,7 @@
 //! How a campaign ended.
 
 use crate::base::Diagnostics;
+use crate::campaign::Spent;
 
 /// What there is to say when no more runs come.
 #[derive(Debug)]
@@ -18,6 +19,8 @@ pub struct CampaignEnd {
 pub enum Ending {
     /// Every planned run was made.
     Finished,
+    /// A budget was spent; its runs up to there are in the history.
+    Budget(Spent),
     /// Somebody asked it to stop.
     Interrupted,
     /// The history could not be written, or no scene could be built.

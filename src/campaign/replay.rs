@@ -5,10 +5,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
 
+use crate::actions::{ActionEnd, Cut, Trace};
 use crate::base::{Choice, Choices, Diagnostic, Diagnostics};
-use crate::campaign::line::crashed;
+use crate::campaign::line::{crashed, run_line_until};
 use crate::campaign::make_run::panic_text;
-use crate::campaign::{Change, Difference, Env, Failure, Manner, changes, first_difference, run_line};
+use crate::campaign::{Change, Difference, Env, Failure, Manner, changes, first_difference};
 use crate::history::{CampaignRecord, History, RunDetail, RunRecord};
 
 /// Names of choices in one message; more would not be read.
@@ -35,6 +36,8 @@ pub struct Replay {
     pub test: String,
     /// Whether every bit of every state is the same.
     pub same: bool,
+    /// Simulated time at which the clock on the wall had cut the run off; it is compared up to there. Unit: seconds.
+    pub cut_secs: Option<f64>,
     /// Digest over all states, then and now.
     pub hashes: [String; 2],
     /// Why it did not complete, then and now.
@@ -130,7 +133,10 @@ fn replay(
     let run = &detail.row.run;
     let (choices, was) = (history.choices(run)?, history.trace(run)?);
     let index = index_of(env, detail)?;
-    let is = again(env, &record.id, index, &choices, manner).map_err(|why| {
+    // What the clock on the wall did is no part of a run's decisions: it is cut off at the same moment of simulated time.
+    let cut_secs = cut_secs(&was);
+    let cut = cut_secs.map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
+    let is = again(env, &record.id, (index, &choices), manner, cut).map_err(|why| {
         refused(detail, &why).help("a model, the configuration or the program changed: see the digests in the history")
     })?;
     let misfits = misfits(&choices, &is.choices);
@@ -143,6 +149,7 @@ fn replay(
         run: run.clone(),
         test: detail.row.test.clone(),
         same: was.hash == is.trace.hash && detail.row.status == is.status && difference.is_none(),
+        cut_secs,
         hashes: [was.hash, is.trace.hash.clone()],
         reasons: [detail.reason.clone(), is.reason.clone()],
         difference,
@@ -150,6 +157,12 @@ fn replay(
         outcomes: outcome_changes(detail, &is),
         changes: changes(record, &now),
     })
+}
+
+/// Simulated time at which the clock had cut a run off.
+fn cut_secs(trace: &Trace) -> Option<f64> {
+    let cut = trace.actions.iter().any(|action| matches!(action.end, ActionEnd::Cut(_)));
+    trace.snapshots.last().filter(|_| cut).map(|last| last.time_secs)
 }
 
 fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
@@ -171,9 +184,15 @@ fn index_of(env: &Env, detail: &RunDetail) -> Result<u64, Diagnostics> {
 }
 
 /// The run, once more. A crash of simulation is a run too.
-fn again(env: &Env, campaign: &str, index: u64, choices: &[Choice], manner: &Manner) -> Result<RunRecord, String> {
+fn again(
+    env: &Env,
+    campaign: &str,
+    (index, choices): (u64, &[Choice]),
+    manner: &Manner,
+    cut: Cut,
+) -> Result<RunRecord, String> {
     let recorded = || Choices::recorded(choices);
-    match catch_unwind(AssertUnwindSafe(|| run_line(env, campaign, index, recorded(), manner))) {
+    match catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, recorded()), manner, cut))) {
         Ok(Ok(record)) => Ok(record),
         Ok(Err(Failure::Interrupted)) => Err(Failure::Interrupted.to_string()),
         Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can't be built any more: {reason}")),

@@ -7,8 +7,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 
 use crate::base::{Diagnostic, Diagnostics};
+use crate::campaign::budget::Tally;
 use crate::campaign::make_run::{Making, make_run};
-use crate::campaign::{CampaignEnd, Ending, Env, Manner, Planned, Schedule, Told, schedule_of};
+use crate::campaign::{CampaignEnd, Ending, Env, Manner, Planned, Schedule, Spent, Told, schedule_of};
 use crate::history::{History, RunRecord};
 
 /// The store is brought to the disk at least this often. Unit: seconds.
@@ -41,7 +42,8 @@ struct Made {
 /// Makes every run of the schedule, commits each in a transaction of its own, and then tells `on_run` of it.
 ///
 /// Runs are kept in the order of the schedule, whatever the number of workers: what is in the history is its beginning.
-/// `stop` ends the campaign after the runs in flight; where it is the stop of the environment's budget too, a run whose
+/// Budgets that count runs are decided on them in the same order: what was made beyond is not kept.
+/// `stop`, and a campaign's time, end it after the runs in flight; where it is the stop of the environment's budget too, a run whose
 /// rules take long is given up. A run is told only when it is in the history.
 pub fn run_all(
     env: &Env,
@@ -53,7 +55,9 @@ pub fn run_all(
 ) -> CampaignEnd {
     let jobs = options.jobs.max(1);
     let halt = AtomicBool::new(false);
-    let mut keeper = Keeper::new(history, options.manner, &mut on_run);
+    let mut keeper = Keeper::new(env, history, options.manner, &mut on_run);
+    let secs = options.manner.clock.secs;
+    let time_up_at = env.campaign.limits.time_secs.map_or(f64::INFINITY, |limit| secs() + limit);
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
         Ok(pool) => pool,
         Err(error) => {
@@ -69,11 +73,16 @@ pub fn run_all(
             let (give, taken, halt) = (give.clone(), &taken, &halt);
             scope.spawn(move |_| {
                 work(env, campaign, &options.manner, taken, &give, &|| {
-                    stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed)
+                    stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed) || secs() >= time_up_at
                 });
             });
         }
         conduct(&mut *schedule_of(env), &mut keeper, &orders, &made, jobs * AHEAD);
+        if let (Ending::Interrupted, Some(limit), false) =
+            (&keeper.end.ending, env.campaign.limits.time_secs, stop.load(Ordering::Relaxed))
+        {
+            keeper.end.ending = Ending::Budget(Spent::Time(limit));
+        }
         // What is still being made is not wanted any more; without orders the workers end.
         halt.store(true, Ordering::Relaxed);
         drop(orders);
@@ -145,15 +154,17 @@ struct Keeper<'a> {
     manner: Manner,
     on_run: &'a mut dyn FnMut(&RunRecord),
     end: CampaignEnd,
+    tally: Tally,
     /// Runs of the batch, as the schedule is told of them.
     told: Vec<Told>,
     flushed_at: f64,
 }
 
 impl<'a> Keeper<'a> {
-    fn new(history: &'a History, manner: Manner, on_run: &'a mut dyn FnMut(&RunRecord)) -> Self {
+    fn new(env: &Env, history: &'a History, manner: Manner, on_run: &'a mut dyn FnMut(&RunRecord)) -> Self {
         let end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new() };
-        Self { history, manner, on_run, end, told: Vec::new(), flushed_at: (manner.clock.secs)() }
+        let flushed_at = (manner.clock.secs)();
+        Self { history, manner, on_run, end, tally: Tally::new(env), told: Vec::new(), flushed_at }
     }
 
     /// Keeps the schedule's next run, and says whether there may be another one.
@@ -166,9 +177,17 @@ impl<'a> Keeper<'a> {
                 }
                 self.end.committed += 1;
                 self.end.discards.extend(record.discards.iter().map(|reason| (record.index, reason.clone())));
-                self.told.push(Told::of(&record));
                 (self.on_run)(&record);
-                ControlFlow::Continue(())
+                let told = Told::of(&record);
+                let spent = self.tally.count(&told);
+                self.told.push(told);
+                match spent {
+                    Some(spent) => {
+                        self.end.ending = Ending::Budget(spent);
+                        ControlFlow::Break(())
+                    }
+                    None => ControlFlow::Continue(()),
+                }
             }
             Making::Interrupted => {
                 self.end.ending = Ending::Interrupted;

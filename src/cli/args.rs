@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::recheck::RecheckArgs;
 use crate::cli::shrink::ShrinkArgs;
+use crate::config::duration_secs;
 use crate::report::TableFormat;
 
 /// QuickCheck for robot actions: generated scenes, physics simulation, verdicts by rules that you edit.
@@ -22,6 +23,9 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a campaign: generate scenes, perform the actions, judge them, keep every run
+    ///
+    /// It ends with the last planned run, or when a budget is spent: of time, of failures, or because every rate is
+    /// known well enough. A limit on the clock for each run is `run_secs` in the configuration's `[budget]`.
     ///
     /// Exit code: 0 everything passed, 1 a property failed, 2 it could not run or nothing could be judged,
     /// 130 stopped by Ctrl-C (what was done is kept).
@@ -109,9 +113,19 @@ pub enum Command {
 pub struct RunArgs {
     /// The campaign's configuration (TOML)
     pub config: PathBuf,
-    /// Scenes of each test, instead of the configuration's `test_count`
+    /// Scenes of each test, instead of the configuration's `test_count`; where a budget ends the campaign, at most so many
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
+    /// End after this time, such as 90s, 10m or 2h; runs in flight are kept. Without `--runs`, as many runs as fit
+    #[arg(long, value_name = "DURATION", value_parser = duration_secs)]
+    pub time: Option<f64>,
+    /// End when the 95 % interval of every property's pass rate is at most so wide, such as 0.05. Without `--runs`, at
+    /// most four times the runs that suffice whatever the rate: 6132 of each test for 0.05
+    #[arg(long, value_name = "WIDTH", value_parser = width)]
+    pub until_width: Option<f64>,
+    /// End at the run with which so many have failed, the same one at any number of workers
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub max_failures: Option<u64>,
     /// Seed of all randomness, instead of the configuration's `seed`
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
@@ -130,6 +144,13 @@ pub struct RunArgs {
     /// How results are printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
+}
+
+fn width(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(width) if width > 0.0 && width < 1.0 => Ok(width),
+        _ => Err(format!("`{text}` is no number between 0 and 1")),
+    }
 }
 
 /// `actcheck check`

@@ -12,11 +12,14 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A bar for so many runs.
-    pub fn new(runs: u64) -> Self {
+    /// A bar for so many runs. Where time ends them too, it shows the time instead of what is left of the runs.
+    pub fn new(runs: u64, time_secs: Option<f64>) -> Self {
         let bar = ProgressBar::with_draw_target(Some(runs), ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template("{bar:32} {pos}/{len} runs  {per_sec}  {eta} left  {msg}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let template = match time_secs {
+            None => "{bar:32} {pos}/{len} runs  {per_sec}  {eta} left  {msg}".to_owned(),
+            Some(secs) => format!("{{pos}} runs  {{per_sec}}  {{elapsed}} of {secs:.0}s  {{msg}}"),
+        };
+        let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
         bar.set_style(style);
         bar.set_message("0 failed");
         bar.enable_steady_tick(std::time::Duration::from_millis(200));

@@ -49,7 +49,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     let rules = RuleSet::prepare(&files, &path)?.only(&args.properties)?;
     let history = history_dir::open(&args.history)?;
     let runs = runs(&history, &args.campaigns)?;
-    let progress = Progress::new(runs.len() as u64);
+    let progress = Progress::new(runs.len() as u64, None);
     let bar = progress.bar();
     let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; what was judged is kept"));
     let options = RecheckOptions {
@@ -80,7 +80,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
         Ending::Stopped(faults) => Err(faults),
         Ending::Interrupted => Ok(stop::INTERRUPTED),
         Ending::Finished if !end.faults.is_empty() => Err(first_of(end.faults)),
-        Ending::Finished => Ok(summary.exit_code()),
+        Ending::Finished | Ending::Budget(_) => Ok(summary.exit_code()),
     }
 }
 

@@ -35,6 +35,10 @@ fn one_text(out: &mut String, replay: &Replay) {
     if !replay.same {
         let _ = writeln!(out, "  {}", difference_text(replay));
     }
+    if let Some(secs) = replay.cut_secs {
+        let _ =
+            writeln!(out, "  only up to {secs:.3} s, where the clock on the wall had cut it off (`[budget] run_secs`)");
+    }
     lines(out, "choice", replay.misfits.iter().map(ToString::to_string));
     let or_none = |word: &Option<String>| word.clone().unwrap_or_else(|| "not judged".to_owned());
     let outcomes = replay.outcomes.iter().map(|change| {
@@ -106,7 +110,7 @@ pub fn replay_table(replays: &[Replay]) -> Table {
 pub fn replay_json(replays: &[Replay]) -> Value {
     let one = |replay: &Replay| {
         json!({
-            "run": replay.run, "test": replay.test, "same": replay.same,
+            "run": replay.run, "test": replay.test, "same": replay.same, "cut_secs": replay.cut_secs,
             "hash": { "was": replay.hashes[0], "is": replay.hashes[1] },
             "reason": { "was": replay.reasons[0], "is": replay.reasons[1] },
             "difference": replay.difference.as_ref().map(|found| json!({

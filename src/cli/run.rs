@@ -9,19 +9,19 @@ use indicatif::ProgressBar;
 
 use crate::analysis;
 use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::{CampaignEnd, Ending, Env, Manner, Options, run_all};
+use crate::campaign::{CampaignEnd, Ending, Env, Manner, Options, Spent, run_all};
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
 use crate::cli::{clock, output, shrink, stop};
 use crate::config::Overrides;
 use crate::history::{self, History, RunFilter};
-use crate::report::{CampaignSummary, RunSummary, campaign_json, campaign_table, campaign_text};
+use crate::report::{CampaignSummary, EndedBy, RunSummary, campaign_json, campaign_table, campaign_text};
 use crate::rules::Budget;
 use crate::verdict::{Counts, Outcome, mean};
 
 /// Runs a campaign and prints what came of it. Returns the exit code.
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
-    let overrides = Overrides { runs: args.runs, seed: args.seed, repeat: args.repeat, history: args.history.clone() };
+    let overrides = overrides(args);
     let (stop, shown) = interrupt();
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let env = Env::prepare_within(&args.config, &overrides, budget)?;
@@ -29,7 +29,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let clock = clock::system();
     let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     let name = args.config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let mut progress = Progress::new(env.planned_runs());
+    let mut progress = Progress::new(env.planned_runs(), env.campaign.limits.time_secs);
     // From here on there is a campaign to end.
     shown.get_or_init(|| progress.bar());
     history.begin_campaign(&env.record(id.clone(), name, (clock.now)()))?;
@@ -52,14 +52,26 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     }
     print(&summary, args.format);
     warn_of_discards(&end);
-    if args.shrink && finished.is_ok() && matches!(end.ending, Ending::Finished) {
+    if args.shrink && finished.is_ok() && is_whole(&end) {
         let shrunk = shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, &stop)?;
         output::print(&shrink::printed(&shrunk, args.format));
     }
     match end.ending {
         Ending::Stopped(faults) => Err(faults),
-        Ending::Finished => finished.map(|()| summary.exit_code()),
+        Ending::Finished | Ending::Budget(_) => finished.map(|()| summary.exit_code()),
         Ending::Interrupted => finished.map(|()| stop::INTERRUPTED),
+    }
+}
+
+fn overrides(args: &RunArgs) -> Overrides {
+    Overrides {
+        runs: args.runs,
+        seed: args.seed,
+        repeat: args.repeat,
+        time_secs: args.time,
+        until_width: args.until_width,
+        max_failures: args.max_failures,
+        history: args.history.clone(),
     }
 }
 
@@ -106,6 +118,19 @@ pub(super) fn quietly<T>(work: impl FnOnce() -> T) -> T {
     result
 }
 
+/// The budget that ended a campaign.
+fn spent(end: &CampaignEnd) -> Option<Spent> {
+    match end.ending {
+        Ending::Budget(spent) => Some(spent),
+        _ => None,
+    }
+}
+
+/// Whether a campaign came to its own end.
+fn is_whole(end: &CampaignEnd) -> bool {
+    matches!(end.ending, Ending::Finished | Ending::Budget(_))
+}
+
 /// Writes the campaign's end into the history. The runs are there already.
 fn finish(
     history: &History,
@@ -122,7 +147,8 @@ fn finish(
         score_without_broken: mean(whole.map(|run| run.score)),
         outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
         discards: end.discards.len() as u64,
-        interrupted: !matches!(end.ending, Ending::Finished),
+        ended_by: spent(end).map(|spent| spent.word().to_owned()),
+        interrupted: !is_whole(end),
     };
     history.finish_campaign(id, &record)
 }
@@ -161,7 +187,8 @@ fn summarise(
         runs,
         planned: env.planned_runs(),
         discards: end.discards.len() as u64,
-        interrupted: matches!(end.ending, Ending::Interrupted | Ending::Stopped(_)),
+        ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), told: spent.to_string() }),
+        interrupted: !is_whole(end),
     }
 }
 

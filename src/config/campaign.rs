@@ -44,6 +44,8 @@ pub struct Campaign {
     pub sensing: Sensing,
     /// Budgets of one action (`[budget]`).
     pub budget: Budget,
+    /// Budgets of a run and of the whole campaign (`[budget]`).
+    pub limits: Limits,
     /// History folder (`[history] dir`), `.actcheck` beside the configuration by default.
     pub history: PathBuf,
     /// Where things are written, for faults that only a later stage can see: `tests.0.1` is the second action of
@@ -63,7 +65,7 @@ impl Campaign {
 }
 
 /// What the command line says instead of the file.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Overrides {
     /// Instead of `test_count`; at least 1.
     pub runs: Option<u32>,
@@ -71,6 +73,12 @@ pub struct Overrides {
     pub seed: Option<u64>,
     /// Instead of `repeat`; at least 1.
     pub repeat: Option<u32>,
+    /// Instead of `[budget] time`. Unit: seconds.
+    pub time_secs: Option<f64>,
+    /// Instead of `[budget] until_width`.
+    pub until_width: Option<f64>,
+    /// Instead of `[budget] max_failures`.
+    pub max_failures: Option<u64>,
     /// Instead of `[history] dir`; relative to where the program runs.
     pub history: Option<PathBuf>,
 }
@@ -126,4 +134,29 @@ pub struct Sensing {
 pub struct Budget {
     /// Simulated time of one action. Unit: seconds.
     pub action_secs: f64,
+}
+
+/// Limits on one run and on the whole campaign; nothing means none.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Limits {
+    /// Time of one run on the clock; beyond it the run ends as `timeout`. Unit: seconds.
+    pub run_secs: Option<f64>,
+    /// Time of the campaign on the clock. Unit: seconds.
+    pub time_secs: Option<f64>,
+    /// The campaign ends when the 95 % interval of every property is at most so wide. In (0, 1).
+    pub until_width: Option<f64>,
+    /// The campaign ends when in so many runs a property failed; at least 1.
+    pub max_failures: Option<u64>,
+}
+
+impl Limits {
+    /// The same with what the command line says instead.
+    pub(super) fn overridden(self, overrides: &Overrides) -> Self {
+        Self {
+            run_secs: self.run_secs,
+            time_secs: overrides.time_secs.or(self.time_secs),
+            until_width: overrides.until_width.or(self.until_width),
+            max_failures: overrides.max_failures.or(self.max_failures),
+        }
+    }
 }

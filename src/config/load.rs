@@ -48,7 +48,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let robot = shelf.read_robot(&mut table, folder, &mut found);
     let physics = ranges::read_physics(&mut table, &mut found);
     let sensing = ranges::read_sensing(&mut table, &mut found);
-    let budget = ranges::read_budget(&mut table, &mut found);
+    let (budget, limits) = ranges::read_budget(&mut table, &mut found);
     let history = read_history(&mut table, folder, &mut found);
     let Designators { candidates, other_count, nav_obstacles, nav_obstacle_count } =
         designators::read(&mut table, &shelf, &mut places, &mut found);
@@ -75,6 +75,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         physics,
         sensing,
         budget,
+        limits: limits.overridden(overrides),
         history: overrides.history.clone().unwrap_or(history),
         places,
     })

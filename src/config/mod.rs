@@ -4,6 +4,7 @@
 
 mod campaign;
 mod designators;
+mod duration;
 mod load;
 pub mod model;
 mod ranges;
@@ -13,7 +14,8 @@ mod table;
 mod value;
 mod words;
 
-pub use campaign::{Budget, Campaign, Launcher, Overrides, Physics, Range, Sensing};
+pub use campaign::{Budget, Campaign, Launcher, Limits, Overrides, Physics, Range, Sensing};
+pub use duration::duration_secs;
 pub(crate) use load::{beside, in_order_of_place};
 pub use load::{load, load_text};
 pub use model::{ObjectModel, Part, Shape, Surface};

@@ -3,7 +3,7 @@
 use std::ops::Bound;
 
 use crate::base::Diagnostics;
-use crate::config::{Budget, Physics, Sensing, Table};
+use crate::config::{Budget, Limits, Physics, Sensing, Table, duration_secs};
 
 const ABOVE_ZERO: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(100.0));
 
@@ -74,14 +74,30 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
     sensing
 }
 
-/// `[budget]`: limits on one action.
-pub(crate) fn read_budget(root: &mut Table, found: &mut Diagnostics) -> Budget {
+/// `[budget]`: limits on one action, on one run, and on the campaign.
+pub(crate) fn read_budget(root: &mut Table, found: &mut Diagnostics) -> (Budget, Limits) {
     // A pick takes some ten seconds; one that is not done in a minute is lost.
-    let mut budget = Budget { action_secs: 60.0 };
-    let Some(mut table) = root.table("budget") else { return budget };
+    let (mut budget, mut limits) = (Budget { action_secs: 60.0 }, Limits::default());
+    let Some(mut table) = root.table("budget") else { return (budget, limits) };
     set(&mut budget.action_secs, table.number("action_secs", (Bound::Excluded(0.0), Bound::Included(3600.0))));
+    limits.run_secs = table.number("run_secs", (Bound::Excluded(0.0), Bound::Included(86_400.0)));
+    limits.time_secs = read_duration(&mut table, "time");
+    limits.until_width = table.number("until_width", (Bound::Excluded(0.0), Bound::Excluded(1.0)));
+    limits.max_failures = table.integer("max_failures", 1..=i64::MAX).map(i64::unsigned_abs);
     table.finish(found);
-    budget
+    (budget, limits)
+}
+
+fn read_duration(table: &mut Table, key: &str) -> Option<f64> {
+    let written = table.string(key)?;
+    match duration_secs(&written.value) {
+        Ok(secs) => Some(secs),
+        Err(reason) => {
+            let message = format!("`budget.{key}`: {reason}");
+            table.fault("C006", written.span, message, format!("write it like `{key} = \"10m\"`"));
+            None
+        }
+    }
 }
 
 fn set<T>(place: &mut T, value: Option<T>) {

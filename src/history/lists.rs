@@ -90,6 +90,7 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
         name: text("rdfs:label"),
         started: text("prov:startedAtTime"),
         ended: node.text("prov:endedAtTime"),
+        ended_by: node.text("act:endedBy"),
         interrupted: node.truth("act:interrupted").unwrap_or(true),
         seed: node.count("act:seed").unwrap_or_default(),
         planned_runs: node.count("act:plannedRuns").unwrap_or_default(),

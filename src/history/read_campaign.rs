@@ -38,6 +38,9 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
         // Histories of before there were repetitions lack it.
         repeat: node.count("act:repeat").and_then(|repeat| u32::try_from(repeat).ok()).unwrap_or(1).max(1),
+        time_secs: node.number("act:timeBudget"),
+        until_width: node.number("act:untilWidth"),
+        max_failures: node.count("act:maxFailures"),
         started: text(&node, "prov:startedAtTime"),
         program_version: version(&node),
     }))

@@ -29,10 +29,16 @@ pub struct CampaignRecord {
     pub models: Vec<(String, String)>,
     /// Seed of all randomness.
     pub seed: u64,
-    /// How many runs were asked for.
+    /// How many runs were asked for; where budgets end the campaign, at most so many.
     pub planned_runs: u64,
     /// Runs of each scene.
     pub repeat: u32,
+    /// Budget of time on the clock. Unit: seconds.
+    pub time_secs: Option<f64>,
+    /// Width of intervals at which the campaign ends.
+    pub until_width: Option<f64>,
+    /// Number of failed runs at which the campaign ends.
+    pub max_failures: Option<u64>,
     /// RFC 3339.
     pub started: String,
     /// Version of this program.
@@ -79,7 +85,9 @@ pub struct CampaignEnd {
     pub outcomes: BTreeMap<Outcome, u64>,
     /// Scenes that were drawn for its runs and discarded.
     pub discards: u64,
-    /// Whether it ended before all its runs were done.
+    /// The budget that ended it: `time`, `width` or `failures`.
+    pub ended_by: Option<String>,
+    /// Whether it was stopped before all its runs were done or a budget was spent.
     pub interrupted: bool,
 }
 

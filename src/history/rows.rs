@@ -53,7 +53,9 @@ pub struct CampaignRow {
     pub started: String,
     /// RFC 3339; nothing where the program was ended from outside.
     pub ended: Option<String>,
-    /// Whether it ended before all its runs were done.
+    /// The budget that ended it: `time`, `width` or `failures`.
+    pub ended_by: Option<String>,
+    /// Whether it was stopped before all its runs were done or a budget was spent.
     pub interrupted: bool,
     /// Seed of all randomness.
     pub seed: u64,

@@ -27,6 +27,9 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .has("act:seed", count(record.seed))
         .has("act:plannedRuns", count(record.planned_runs))
         .has("act:repeat", count(u64::from(record.repeat)))
+        .may("act:timeBudget", record.time_secs.map(Literal::from))
+        .may("act:untilWidth", record.until_width.map(Literal::from))
+        .may("act:maxFailures", record.max_failures.map(count))
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version));
     for (number, (property, path, digest)) in record.rules.iter().enumerate() {
@@ -56,6 +59,7 @@ pub(super) fn end(id: &str, end: &CampaignEnd) -> Vec<Quad> {
         .may("act:score", end.score.map(Literal::from))
         .may("act:scoreWithoutBroken", end.score_without_broken.map(Literal::from))
         .has("act:discards", count(end.discards))
+        .may("act:endedBy", end.ended_by.as_deref().map(Literal::new_simple_literal))
         .has("act:interrupted", Literal::from(end.interrupted));
     for (outcome, times) in &end.outcomes {
         about.has(&format!("act:{outcome}Count"), count(*times));

@@ -119,7 +119,7 @@ fn end_word(end: &ActionEnd) -> &'static str {
     match end {
         ActionEnd::Completed => "completed",
         ActionEnd::Broken(_) => "broken",
-        ActionEnd::Timeout(_) => "timeout",
+        ActionEnd::Timeout(_) | ActionEnd::Cut(_) => "timeout",
         ActionEnd::NotReached => "untested",
     }
 }
@@ -127,7 +127,7 @@ fn end_word(end: &ActionEnd) -> &'static str {
 /// What there is to say of how an action ended: why it did not complete, or its own words.
 fn message(action: &ActionTrace) -> Option<&str> {
     match &action.end {
-        ActionEnd::Broken(reason) | ActionEnd::Timeout(reason) => Some(reason),
+        ActionEnd::Broken(reason) | ActionEnd::Timeout(reason) | ActionEnd::Cut(reason) => Some(reason),
         ActionEnd::Completed | ActionEnd::NotReached => action.report.as_ref().map(|report| report.message.as_str()),
     }
 }

@@ -28,6 +28,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         "planned_runs": summary.planned,
         "finished_runs": summary.runs.len(),
         "interrupted": summary.interrupted,
+        "ended_by": summary.ended_by.as_ref().map(|ended| ended.budget),
         "discarded_scenes": summary.discards,
         "counts": summary.counts(),
         "score": summary.total_score(),

@@ -114,6 +114,9 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
     if let Some(rate) = summary.pass_rate() {
         let _ = writeln!(out, "runs in which everything passed: {}", rate);
     }
+    if let Some(ended) = &summary.ended_by {
+        let _ = writeln!(out, "ended after {} of at most {} runs: {}", summary.runs.len(), summary.planned, ended.told);
+    }
     if summary.interrupted {
         let _ = writeln!(
             out,

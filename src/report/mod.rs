@@ -34,5 +34,5 @@ pub use remarks::{Oddity, Remark};
 pub use repeated::RepeatedProperty;
 pub use run_text::{run_json, run_text};
 pub use shrunk_text::{ShrunkChoice, ShrunkSummary, shrunk_json, shrunk_text};
-pub use summary::{ActionSummary, CampaignSummary, PropertyLine, RunSummary, Share};
+pub use summary::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, RunSummary, Share};
 pub use table::{Table, TableFormat};

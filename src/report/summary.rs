@@ -25,8 +25,19 @@ pub struct CampaignSummary {
     pub planned: u64,
     /// Scenes that could not be built and were drawn again.
     pub discards: u64,
+    /// The budget that ended it; nothing where it came to its planned runs or was interrupted.
+    pub ended_by: Option<EndedBy>,
     /// Whether it was stopped before its end.
     pub interrupted: bool,
+}
+
+/// The budget that ended a campaign.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct EndedBy {
+    /// `time`, `width` or `failures`.
+    pub budget: &'static str,
+    /// In words.
+    pub told: String,
 }
 
 /// A run in short.
@@ -247,6 +258,7 @@ pub(super) mod tests {
             planned: runs.len() as u64,
             runs,
             discards: 1,
+            ended_by: None,
             interrupted: false,
         }
     }

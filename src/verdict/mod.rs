@@ -1,11 +1,13 @@
-//! Turns what the rules found into outcomes with witness and margin, and outcomes into scores.
+//! Turns what the rules found into outcomes with witness and margin, and outcomes into scores and rates.
 //!
 //! Never: evaluates a rule, looks at a trace, or folds the six outcomes into two.
 
 mod judge;
 mod judgement;
 mod score;
+mod wilson;
 
 pub use judge::{Fate, judge};
 pub use judgement::{Judgement, Outcome};
 pub use score::{Counts, action_score, mean, run_score};
+pub use wilson::{Interval, trials_for_width, wilson, wilson_share};

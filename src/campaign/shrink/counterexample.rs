@@ -145,6 +145,7 @@ pub fn keep(
         score_without_broken: (record.status != RunStatus::Broken).then_some(record.score),
         outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
         discards: 0,
+        ended_by: None,
         interrupted: false,
     };
     history.finish_campaign(&id, &end)?;

@@ -44,6 +44,14 @@ pub fn wilson_share(rate: f64, trials: f64) -> Option<Interval> {
     Some(Interval { rate, low, high })
 }
 
+/// Trials after which the interval is at most so wide, whatever the rate.
+///
+/// Source: the interval is widest at a rate of one half, where its width is z / √(n + z²).
+pub fn trials_for_width(width: f64) -> u64 {
+    let trials = Z * Z * (1.0 / (width * width) - 1.0);
+    if trials.is_finite() && trials < 1e18 { trials.max(1.0).ceil() as u64 } else { u64::MAX }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -58,6 +66,16 @@ mod tests {
             assert!((interval.low - low).abs() < 5e-5, "{interval:?}");
             assert!((interval.high - high).abs() < 5e-5, "{interval:?}");
         }
+    }
+
+    #[test]
+    fn so_many_trials_make_an_interval_so_narrow() {
+        for width in [0.02, 0.05, 0.1, 0.3] {
+            let trials = trials_for_width(width).next_multiple_of(2);
+            let spread = |trials| wilson(trials / 2, trials).map_or(1.0, |interval| interval.high - interval.low);
+            assert!(spread(trials) <= width && spread(trials - 4) > width, "{width}: {trials}");
+        }
+        assert_eq!((trials_for_width(1.0), trials_for_width(0.0)), (1, u64::MAX));
     }
 
     #[test]

@@ -1,0 +1,34 @@
+//! What ends a run from outside, whatever its actions do.
+
+/// When a run is cut off. The action in progress then ends as [`crate::actions::ActionEnd::Cut`].
+#[derive(Debug, Clone, Copy)]
+pub enum Cut {
+    /// Never.
+    Never,
+    /// When the caller's clock shows this time: a run that takes too long by the clock on the wall.
+    Clock {
+        /// Seconds since any fixed moment.
+        secs: fn() -> f64,
+        /// The moment, by the same clock.
+        at_secs: f64,
+    },
+    /// At this simulated time, since the scene was built. So a run that the clock had cut off is made again, exactly.
+    Simulated {
+        /// Unit: seconds.
+        at_secs: f64,
+    },
+}
+
+/// What is said of a run that was cut off.
+pub(super) const REASON: &str = "the run took longer on the clock than `[budget] run_secs` allows";
+
+impl Cut {
+    /// Whether the run ends here. `time_secs` is simulated.
+    pub(super) fn is_due(&self, time_secs: f64) -> bool {
+        match *self {
+            Self::Never => false,
+            Self::Clock { secs, at_secs } => secs() >= at_secs,
+            Self::Simulated { at_secs } => time_secs >= at_secs,
+        }
+    }
+}

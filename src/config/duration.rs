@@ -1,0 +1,38 @@
+//! Durations as people write them.
+
+use jiff::SignedDuration;
+
+/// Longer than any campaign: a year. Unit: seconds.
+const LONGEST_SECS: f64 = 366.0 * 86_400.0;
+
+/// Seconds of a duration such as `90s`, `10m`, `2h` or `1h30m`.
+///
+/// # Errors
+/// A sentence: it is no duration, or none above zero and up to a year.
+pub fn duration_secs(text: &str) -> Result<f64, String> {
+    let duration: SignedDuration =
+        text.trim().parse().map_err(|_| format!("`{text}` is no duration such as 90s, 10m or 2h"))?;
+    let secs = duration.as_secs_f64();
+    if secs > 0.0 && secs <= LONGEST_SECS {
+        Ok(secs)
+    } else {
+        Err(format!("`{text}` is not above zero and at most a year"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_write_durations_in_several_ways() {
+        for (text, secs) in
+            [("90s", 90.0), ("10m", 600.0), ("2h", 7200.0), ("1h30m", 5400.0), ("1.5s", 1.5), (" 1 h ", 3600.0)]
+        {
+            assert_eq!(duration_secs(text), Ok(secs), "{text}");
+        }
+        for text in ["", "10", "0s", "-5s", "ten minutes", "1e9h", "500000h"] {
+            assert!(duration_secs(text).is_err(), "{text}");
+        }
+    }
+}
