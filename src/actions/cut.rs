@@ -1,9 +1,10 @@
 //! What ends a run from outside, whatever its actions do.
 
 /// When a run is cut off. The action in progress then ends as [`crate::actions::ActionEnd::Cut`].
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub enum Cut {
     /// Never.
+    #[default]
     Never,
     /// When the caller's clock shows this time: a run that takes too long by the clock on the wall.
     Clock {

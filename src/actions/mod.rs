@@ -10,11 +10,13 @@ mod perform;
 mod pick;
 mod plan;
 mod route;
+mod sabotage;
 mod trace;
 
 pub use call::{ActionCall, UnknownSkill, known_skill, reference_skills};
 pub use cut::Cut;
-pub use perform::{perform, perform_until};
+pub use perform::{Interference, perform, perform_with};
+pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
 pub use trace::{ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace};
 
 // States are part of a trace: its readers meet them here.

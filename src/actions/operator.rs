@@ -1,6 +1,7 @@
 //! What a skill has in hand: joint commands, measurements and noisy sight. The world's truth stays behind it.
 
-use crate::actions::{Cut, Percept, Phase};
+use crate::actions::sabotage::IDLE_SECS;
+use crate::actions::{ActionReport, Cut, Interference, Percept, Phase, Saboteur};
 use crate::base::Choices;
 use crate::scenario::RobotProfile;
 use crate::world::{Command, Kinematics, Layout, Observation, Sighting, World};
@@ -29,6 +30,8 @@ pub struct Operator<'a> {
     start_secs: f64,
     budget_secs: f64,
     cut: Cut,
+    /// Who makes things go wrong on purpose; nobody as a rule.
+    saboteur: Option<&'a mut Saboteur>,
     /// Phases begun so far.
     pub phases: Vec<Phase>,
     /// What was seen so far.
@@ -36,10 +39,37 @@ pub struct Operator<'a> {
 }
 
 impl<'a> Operator<'a> {
-    /// The robot at the beginning of an action that may take `budget_secs` of simulated time, in a run that ends at `cut`.
-    pub fn new(world: &'a mut World, choices: &'a mut Choices, budget_secs: f64, cut: Cut) -> Self {
+    /// The robot at the beginning of an action that may take `budget_secs` of simulated time, with what interferes from outside.
+    pub fn new(
+        world: &'a mut World,
+        choices: &'a mut Choices,
+        budget_secs: f64,
+        interference: Interference<'a>,
+    ) -> Self {
         let (command, start_secs) = (world.hold(), world.time_secs());
-        Self { world, choices, command, start_secs, budget_secs, cut, phases: Vec::new(), percepts: Vec::new() }
+        let Interference { cut, saboteur } = interference;
+        let (phases, percepts) = (Vec::new(), Vec::new());
+        Self { world, choices, command, start_secs, budget_secs, cut, saboteur, phases, percepts }
+    }
+
+    /// Lets a skill act, unless the robot is sabotaged into doing nothing. What is reported can be sabotaged too.
+    ///
+    /// # Errors
+    /// [`Interrupt`] if the action has to end.
+    pub fn act(
+        &mut self,
+        skill: impl FnOnce(&mut Self) -> Result<ActionReport, Interrupt>,
+    ) -> Result<ActionReport, Interrupt> {
+        let believed = if self.saboteur.as_deref().is_some_and(Saboteur::idles) {
+            self.wait(IDLE_SECS)?;
+            ActionReport { succeeded: false, message: "did nothing".to_owned() }
+        } else {
+            skill(self)?
+        };
+        Ok(match &mut self.saboteur {
+            None => believed,
+            Some(saboteur) => saboteur.report(believed),
+        })
     }
 
     /// Names what follows.
@@ -69,7 +99,11 @@ impl<'a> Operator<'a> {
 
     /// What the robot measures of itself.
     pub fn observe(&self) -> Observation {
-        self.world.observe()
+        let observed = self.world.observe();
+        match &self.saboteur {
+            None => observed,
+            Some(saboteur) => saboteur.observation(observed),
+        }
     }
 
     /// Joint positions that the controllers were last told.
@@ -79,7 +113,10 @@ impl<'a> Operator<'a> {
 
     /// Looks at one object.
     pub fn see(&mut self, id: &str) -> Option<Sighting> {
-        let seen = self.world.perceive(id, self.choices)?;
+        let mut seen = self.world.perceive(id, self.choices)?;
+        if let Some(saboteur) = &mut self.saboteur {
+            seen = saboteur.sighting(seen);
+        }
         self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
         Some(seen)
     }
@@ -92,7 +129,12 @@ impl<'a> Operator<'a> {
 
     /// Feels the gap between the fingers. Unit: metres.
     pub fn feel_opening(&mut self) -> f64 {
-        self.world.feel_opening(self.choices)
+        let felt = self.world.feel_opening(self.choices);
+        match &self.saboteur {
+            None => felt,
+            // The gap as it was sensed, with the error that the sensor makes.
+            Some(_) => felt + self.observe().gripper_opening_m - self.world.observe().gripper_opening_m,
+        }
     }
 
     /// Moves along joint positions, at rest at both ends, no faster than the joints allow and no shorter than `secs`.
@@ -135,7 +177,10 @@ impl<'a> Operator<'a> {
     }
 
     fn tick(&mut self) -> Result<(), Interrupt> {
-        self.world.step(&self.command);
+        match &mut self.saboteur {
+            None => self.world.step(&self.command),
+            Some(saboteur) => saboteur.step(self.world, &self.command),
+        }
         if self.world.fault().is_some() {
             return Err(Interrupt::Fault);
         }

@@ -3,7 +3,8 @@
 use crate::actions::cut::{self, Cut};
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::{
-    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Trace, known_skill, pick,
+    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Saboteur, Trace, known_skill,
+    pick,
 };
 use crate::base::Choices;
 use crate::scenario::Budget;
@@ -14,16 +15,34 @@ use crate::world::World;
 /// Faults and spent budgets end the run as data: later actions are there as not reached. An action whose own report is
 /// "failed" does not end the run, as with a real robot.
 pub fn perform(calls: &[ActionCall], world: &mut World, choices: &mut Choices, budget: &Budget) -> Trace {
-    perform_until(calls, world, choices, budget, Cut::Never)
+    perform_with(calls, world, choices, budget, Interference::default())
 }
 
-/// The same, but that the run ends where it is cut off.
-pub fn perform_until(
+/// What comes into a run from outside. The default is nothing, as it should be.
+#[derive(Debug, Default)]
+pub struct Interference<'a> {
+    /// Where the run is cut off.
+    pub cut: Cut,
+    /// Who makes things go wrong on purpose.
+    pub saboteur: Option<&'a mut Saboteur>,
+}
+
+impl Interference<'_> {
+    /// The same for a while.
+    fn lent(&mut self) -> Interference<'_> {
+        Interference { cut: self.cut, saboteur: self.saboteur.as_deref_mut() }
+    }
+}
+
+/// Performs the actions as [`perform`] does, with interference from outside.
+///
+/// The trace tells of the calls as they were meant.
+pub fn perform_with(
     calls: &[ActionCall],
     world: &mut World,
     choices: &mut Choices,
     budget: &Budget,
-    cut: Cut,
+    mut interference: Interference<'_>,
 ) -> Trace {
     world.localise(choices);
     let mut snapshots = vec![world.snapshot()];
@@ -34,7 +53,7 @@ pub fn perform_until(
             actions.push(unreached(call));
             continue;
         }
-        actions.push(perform_one(call, world, choices, (budget, cut)));
+        actions.push(perform_one(call, world, choices, budget, interference.lent()));
         snapshots.push(world.snapshot());
     }
     let tracks = world.tracks();
@@ -46,13 +65,16 @@ fn perform_one(
     call: &ActionCall,
     world: &mut World,
     choices: &mut Choices,
-    (budget, cut): (&Budget, Cut),
+    budget: &Budget,
+    mut interference: Interference<'_>,
 ) -> ActionTrace {
     let began = world.time_secs();
     world.begin_record();
-    let mut operator = Operator::new(world, choices, budget.action_secs, cut);
+    let misled = interference.saboteur.as_deref_mut().map(|saboteur| saboteur.begin(call, world));
+    let understood = misled.as_ref().unwrap_or(call);
+    let mut operator = Operator::new(world, choices, budget.action_secs, interference);
     let outcome = match known_skill(&call.action) {
-        Ok(()) => pick::pick(call, &mut operator),
+        Ok(()) => operator.act(|operator| pick::pick(understood, operator)),
         Err(unknown) => {
             return ActionTrace { end: ActionEnd::Broken(unknown.to_string()), ..unreached(call) };
         }

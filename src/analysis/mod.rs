@@ -7,6 +7,7 @@ mod consistency;
 mod failure_modes;
 mod frame;
 mod holm;
+mod oracles;
 mod paired;
 mod property_rates;
 
@@ -15,6 +16,7 @@ pub use consistency::{Consistency, Flaky, PassPower, Repeated, Variance, consist
 pub use failure_modes::{FailureMode, failure_modes};
 pub use frame::AnalysisError;
 pub use holm::holm;
+pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
 pub use paired::{Difference, PairedTable, PairedTest};
 pub use property_rates::{PropertyRate, property_rates};
 

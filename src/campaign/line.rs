@@ -1,6 +1,6 @@
 //! The line, once, top to bottom: choices → scene → world → trace → facts → findings → verdict.
 
-use crate::actions::{self, ActionCall, ActionEnd, Cut, Trace};
+use crate::actions::{self, ActionCall, ActionEnd, Cut, Interference, Saboteur, Trace};
 use crate::base::Choices;
 use crate::campaign::Env;
 use crate::campaign::judging::judge_action;
@@ -56,7 +56,7 @@ pub fn run_line(
     choices: Choices,
     manner: &Manner,
 ) -> Result<RunRecord, Failure> {
-    run_line_until(env, campaign, (index, choices), manner, Cut::Never)
+    run_line_with(env, campaign, (index, choices), manner, Interference::default())
 }
 
 /// The same, but that the run ends where it is cut off.
@@ -66,9 +66,35 @@ pub fn run_line(
 pub(super) fn run_line_until(
     env: &Env,
     campaign: &str,
-    (index, mut choices): (u64, Choices),
+    run: (u64, Choices),
     manner: &Manner,
     cut: Cut,
+) -> Result<RunRecord, Failure> {
+    run_line_with(env, campaign, run, manner, Interference { cut, saboteur: None })
+}
+
+/// The same, while somebody makes things go wrong on purpose.
+///
+/// What comes of it is no run of the robot's and must not be kept among them.
+///
+/// # Errors
+/// As [`run_line`].
+pub fn run_sabotaged(
+    env: &Env,
+    campaign: &str,
+    run: (u64, Choices),
+    manner: &Manner,
+    saboteur: &mut Saboteur,
+) -> Result<RunRecord, Failure> {
+    run_line_with(env, campaign, run, manner, Interference { cut: Cut::Never, saboteur: Some(saboteur) })
+}
+
+fn run_line_with(
+    env: &Env,
+    campaign: &str,
+    (index, mut choices): (u64, Choices),
+    manner: &Manner,
+    interference: Interference<'_>,
 ) -> Result<RunRecord, Failure> {
     let (started, start_secs) = ((manner.clock.now)(), (manner.clock.secs)());
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices)
@@ -80,7 +106,7 @@ pub(super) fn run_line_until(
         }
     };
     choices.begin_noise();
-    let trace = perform((env, cut), test, &scene, &mut choices, disturb)?;
+    let trace = perform((env, interference), test, &scene, &mut choices, disturb)?;
     let mut record = record(env, campaign, index, scene, trace)?;
     record.choices = choices.into_made();
     record.started = started;
@@ -139,7 +165,7 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
 
 /// Builds the scene, lets it settle and performs the test in it.
 fn perform(
-    (env, cut): (&Env, Cut),
+    (env, interference): (&Env, Interference<'_>),
     test: &[String],
     scene: &Scene,
     choices: &mut Choices,
@@ -157,7 +183,7 @@ fn perform(
         return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
     }
     disturb(&mut world);
-    Ok(actions::perform_until(&calls(test, scene), &mut world, choices, &env.campaign.budget, cut))
+    Ok(actions::perform_with(&calls(test, scene), &mut world, choices, &env.campaign.budget, interference))
 }
 
 fn calls(test: &[String], scene: &Scene) -> Vec<ActionCall> {

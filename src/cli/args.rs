@@ -59,6 +59,16 @@ pub enum Command {
         after_help = "Examples:\n  actcheck compare k7f3 m2x9 --fail-if-worse 0.05    (ids of campaigns: the beginnings of those that `actcheck list` prints)\n  actcheck compare main/.actcheck branch/.actcheck   (the newest campaigns of two histories)\n  actcheck compare k7f3 k7f3@rechecked               (the same runs by the rules of `actcheck recheck`)"
     )]
     Compare(crate::cli::compare::CompareArgs),
+    /// Test the properties themselves: put faults into the world and the robot, and see which property notices
+    ///
+    /// Runs every scene without a fault and with each of them (a robot that does nothing, a hand that opens in mid-air, a
+    /// report that lies, …) from the same choices. A property notices a fault when it fails beyond chance where it passed
+    /// without. Nothing is kept in a history.
+    ///
+    /// Exit code: 0 every fault is noticed and every property notices one, 1 there is a gap, 2 it could not be done,
+    /// 130 stopped by Ctrl-C.
+    #[command(after_help = "Example:\n  actcheck check-oracles configs/pick.toml")]
+    CheckOracles(crate::cli::check_oracles::CheckOraclesArgs),
     /// List the runs of a history
     #[command(after_help = "Example:\n  actcheck list --format csv")]
     List(ListArgs),

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::cli::args::{Arguments, Command};
-use crate::cli::{check, datalog, list, new, output, query, recheck, rules, show, shrink, stop, why};
+use crate::cli::{check, check_oracles, datalog, list, new, output, query, recheck, rules, show, shrink, stop, why};
 
 /// Parses the process's arguments and does what they ask.
 ///
@@ -18,6 +18,7 @@ pub fn run() -> ExitCode {
         Command::Replay(args) => crate::cli::replay::replay(&args),
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),
         Command::Compare(args) => crate::cli::compare::compare(&args),
+        Command::CheckOracles(args) => check_oracles::check_oracles(&args),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Shrink(args) => shrink::shrink(&args),

@@ -7,6 +7,7 @@ mod replay_text;
 
 mod args;
 mod check;
+mod check_oracles;
 mod clock;
 mod compare;
 mod datalog;

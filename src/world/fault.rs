@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::base::Pose;
+
 /// Horizontal distance from the world's origin beyond which a body has left it. Unit: metres. The floor ends a metre
 /// further out; scenes are a few metres wide.
 pub const WORLD_RADIUS_M: f64 = 14.0;
@@ -33,7 +35,18 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A disturbance to inject, for tests of physics, and of what notices it.
+/// Something that happens to an object by no doing of the robot's, for tests of what notices it. It can happen in reality.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mishap {
+    /// The object is somewhere else from one moment to the next, at rest.
+    Pose(Pose),
+    /// Its friction coefficient is another one.
+    Friction(f64),
+    /// It lies on its side where it stood, at rest.
+    Fall,
+}
+
+/// A disturbance that breaks simulation, for tests of physics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Poison {
     /// The body's velocity becomes NaN.

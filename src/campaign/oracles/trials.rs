@@ -1,0 +1,146 @@
+//! Every scene of a campaign without a fault and with each of them, from the same choices.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+use crate::actions::Saboteur;
+use crate::base::{Choice, Choices, Diagnostic, Diagnostics};
+use crate::campaign::oracles::Fault;
+use crate::campaign::{Env, Manner, Planned, run_line, run_sabotaged};
+use crate::history::{RunRecord, RunStatus};
+use crate::verdict::{Judgement, Outcome};
+
+/// Scenes drawn for one run before it is left out: as many as a campaign draws.
+const SCENES_PER_RUN: u64 = 50;
+/// Campaign of the records, which are never kept.
+const NO_CAMPAIGN: &str = "check-oracles";
+
+/// How faults are tried.
+#[derive(Debug, Clone, Copy)]
+pub struct TrialOptions {
+    /// Workers, one simulation each.
+    pub jobs: usize,
+    /// How each run is made.
+    pub manner: Manner,
+}
+
+/// One scene with one fault, or with none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// Position of the run in the campaign, from 0.
+    pub index: u64,
+    /// Name of the fault; none: the scene as it is.
+    pub fault: Option<&'static str>,
+    /// Whether the fault came about.
+    pub came_about: bool,
+    /// Outcome of each property, by IRI: that of the action which fared worst where several have it. Empty where there was
+    /// no judgement: no scene, a crash of simulation, or a spent budget.
+    pub outcomes: BTreeMap<String, Outcome>,
+}
+
+/// A scene that can be run again.
+struct Scene {
+    index: u64,
+    choices: Vec<Choice>,
+}
+
+/// Runs every planned scene without a fault, and then with each, on several workers. Tells `on_done` after each.
+///
+/// The answers are in the order of the indices, that of no fault before the others; they depend neither on the number of
+/// workers nor on the clock. `stop` leaves out what has not begun yet.
+///
+/// # Errors
+/// `X010` workers can't be started.
+pub fn try_faults(
+    env: &Env,
+    faults: &[Fault],
+    options: &TrialOptions,
+    stop: &AtomicBool,
+    on_done: impl Fn() + Sync,
+) -> Result<Vec<Trial>, Diagnostics> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.jobs.max(1))
+        .build()
+        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
+    let going = || !stop.load(Ordering::Relaxed);
+    let sound = |index: u64| {
+        let made = if going() { without_fault(env, index, &options.manner) } else { None };
+        on_done();
+        made
+    };
+    let with_fault = |(scene, fault): &(&Scene, &Fault)| {
+        let made = if going() { with_fault(env, scene, fault, &options.manner) } else { None };
+        on_done();
+        made
+    };
+    Ok(pool.install(|| {
+        let sound: Vec<(Scene, Trial)> = (0..env.planned_runs()).into_par_iter().filter_map(sound).collect();
+        let pairs: Vec<(&Scene, &Fault)> =
+            sound.iter().flat_map(|(scene, _)| faults.iter().map(move |fault| (scene, fault))).collect();
+        let spoilt: Vec<Trial> = pairs.par_iter().filter_map(with_fault).collect();
+        let mut trials: Vec<Trial> = sound.iter().map(|(_, trial)| trial.clone()).chain(spoilt).collect();
+        trials.sort_by_key(|trial| trial.index);
+        trials
+    }))
+}
+
+/// The scene of an index as a campaign would run it; nothing where there is none.
+fn without_fault(env: &Env, index: u64, manner: &Manner) -> Option<(Scene, Trial)> {
+    let repeat = u64::from(env.campaign.repeat);
+    let repetition = (repeat > 1).then_some(index % repeat);
+    let planned = Planned { index, scene: index / repeat, repetition };
+    (0..SCENES_PER_RUN).find_map(|attempt| {
+        let choices = planned.choices(env.campaign.seed, attempt);
+        let record = run(env, index, choices, manner, None)?;
+        let outcomes = outcomes(&record);
+        let trial = Trial { index, fault: None, came_about: true, outcomes };
+        Some((Scene { index, choices: record.choices }, trial))
+    })
+}
+
+/// The same scene with a fault. What the fault makes the robot decide anew is drawn anew.
+fn with_fault(env: &Env, scene: &Scene, fault: &Fault, manner: &Manner) -> Option<Trial> {
+    let index = scene.index;
+    let choices = Choices::partly_recorded(&scene.choices, env.campaign.seed, index);
+    let mut saboteur = Saboteur::new(fault.sabotage);
+    let record = run(env, index, choices, manner, Some(&mut saboteur));
+    let outcomes = record.as_ref().map(outcomes).unwrap_or_default();
+    Some(Trial { index, fault: Some(fault.name), came_about: saboteur.came_about(), outcomes })
+}
+
+/// One run; nothing where the scene was discarded or simulation crashed.
+fn run(env: &Env, index: u64, choices: Choices, manner: &Manner, saboteur: Option<&mut Saboteur>) -> Option<RunRecord> {
+    let line = || match saboteur {
+        None => run_line(env, NO_CAMPAIGN, index, choices, manner),
+        Some(saboteur) => run_sabotaged(env, NO_CAMPAIGN, (index, choices), manner, saboteur),
+    };
+    catch_unwind(AssertUnwindSafe(line)).ok()?.ok()
+}
+
+/// The worst outcome of each property over the actions of a completed run.
+fn outcomes(record: &RunRecord) -> BTreeMap<String, Outcome> {
+    let mut worst: BTreeMap<String, Outcome> = BTreeMap::new();
+    if record.status != RunStatus::Completed {
+        return worst;
+    }
+    for Judgement { property, outcome, .. } in record.judgements.iter().flatten() {
+        let known = worst.entry(property.clone()).or_insert(*outcome);
+        if severity(*outcome) > severity(*known) {
+            *known = *outcome;
+        }
+    }
+    worst
+}
+
+/// What counts most where a property is judged for several actions.
+fn severity(outcome: Outcome) -> u8 {
+    match outcome {
+        Outcome::Failed => 3,
+        Outcome::Broken | Outcome::Timeout | Outcome::Untested => 2,
+        Outcome::Passed => 1,
+        Outcome::Inapplicable => 0,
+    }
+}

@@ -1,0 +1,102 @@
+//! `actcheck check-oracles`
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget};
+
+use crate::analysis::{OracleTrial, oracle_matrix};
+use crate::base::{Diagnostic, Diagnostics};
+use crate::campaign::oracles::{FAULTS, Trial, TrialOptions, try_faults};
+use crate::campaign::{Env, Manner};
+use crate::cli::args::Format;
+use crate::cli::run::{all_cores, quietly};
+use crate::cli::{clock, output, stop};
+use crate::config::Overrides;
+use crate::report::{OracleSummary, oracles_json, oracles_table, oracles_text};
+use crate::rules::Budget;
+
+/// `actcheck check-oracles`
+#[derive(Debug, Args)]
+pub struct CheckOraclesArgs {
+    /// The campaign's configuration (TOML)
+    pub config: PathBuf,
+    /// Scenes of each test, instead of the configuration's `test_count`; each is run once without a fault and once with each
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub runs: Option<u32>,
+    /// Seed of all randomness, instead of the configuration's `seed`
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Workers, one simulation each; results don't depend on it [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// How the matrix is printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Runs every scene with every fault and prints which properties notice. Returns the exit code.
+pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
+    let overrides = Overrides { runs: args.runs, seed: args.seed, ..Overrides::default() };
+    // Nothing is kept, so that there is nothing to bring to an end.
+    let stop = stop::on_interrupt(|| {});
+    let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
+    let env = Env::prepare_within(&args.config, &overrides, budget)?;
+    let steps = env.planned_runs() * (FAULTS.len() as u64 + 1);
+    let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
+    let manner = Manner { clock: clock::system(), disturb: None };
+    let options = TrialOptions { jobs: args.jobs.map_or_else(all_cores, usize::from), manner };
+    let trials = quietly(|| try_faults(&env, &FAULTS, &options, &stop, || bar.inc(1)))?;
+    bar.finish_and_clear();
+    if stop.load(Ordering::Relaxed) {
+        return Ok(stop::INTERRUPTED);
+    }
+    if trials.iter().all(|trial| trial.outcomes.is_empty()) {
+        return Err(Diagnostic::error("V010", "no scene could be judged, so nothing is known of the properties")
+            .help("`actcheck run` with the same configuration says why")
+            .into());
+    }
+    let summary = summarise(args, &env, &trials);
+    output::print(&match args.format {
+        Format::Table => oracles_text(&summary),
+        Format::Csv => oracles_table(&summary).render(Format::Csv.into()),
+        Format::Json => format!("{:#}\n", oracles_json(&summary)),
+    });
+    output::print_diagnostics(&summary.warnings());
+    Ok(summary.exit_code())
+}
+
+fn summarise(args: &CheckOraclesArgs, env: &Env, trials: &[Trial]) -> OracleSummary {
+    let mut properties: Vec<String> = Vec::new();
+    for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
+        for iri in &action.success_properties {
+            if !properties.contains(iri) {
+                properties.push(iri.clone());
+            }
+        }
+    }
+    let plain: Vec<OracleTrial> = trials.iter().map(plain).collect();
+    let matrix = oracle_matrix(&FAULTS.map(|fault| fault.name), &properties, &plain);
+    let name = |iri: &String| env.ontology.properties.get(iri).map_or_else(|| iri.clone(), |p| p.name.clone());
+    OracleSummary {
+        config: args.config.display().to_string(),
+        seed: env.campaign.seed,
+        planned: env.planned_runs(),
+        faults: FAULTS.iter().map(|fault| (fault.name.to_owned(), fault.what.to_owned())).collect(),
+        names: properties.iter().map(name).collect(),
+        // The first fault is that of a robot which does nothing.
+        gaps: matrix.gaps(FAULTS[0].name),
+        matrix,
+    }
+}
+
+fn plain(trial: &Trial) -> OracleTrial {
+    OracleTrial {
+        index: trial.index,
+        fault: trial.fault.map(str::to_owned),
+        came_about: trial.came_about,
+        outcomes: trial.outcomes.clone(),
+    }
+}

@@ -1,0 +1,58 @@
+//! What can happen to an object by no doing of the robot's.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::world::convert::{to_pose, to_real, to_vector};
+use crate::world::{Mishap, World};
+
+/// Gap that is left below an object that is laid down, so that it falls into contact and is not pushed out. Unit: metres.
+const DROP_M: f64 = 2e-3;
+
+impl World {
+    /// Lets something happen to an object. False if there is no such object.
+    pub fn befall(&mut self, id: &str, mishap: Mishap) -> bool {
+        let Some(object) = self.objects.iter().find(|object| object.id == id) else { return false };
+        let pose = match mishap {
+            Mishap::Pose(pose) => pose.to_isometry(),
+            Mishap::Fall => lying(&self.pose_of(object), object.model.size_m),
+            Mishap::Friction(friction) => {
+                let colliders = self.engine.bodies.get(object.body).map(rapier3d::prelude::RigidBody::colliders);
+                for handle in colliders.unwrap_or_default() {
+                    if let Some(collider) = self.engine.colliders.get_mut(*handle) {
+                        collider.set_friction(to_real(friction));
+                    }
+                }
+                return true;
+            }
+        };
+        let Some(body) = self.engine.bodies.get_mut(object.body) else { return false };
+        body.set_position(to_pose(&pose), true);
+        body.set_linvel(to_vector(&Vector3::zeros()), true);
+        body.set_angvel(to_vector(&Vector3::zeros()), true);
+        true
+    }
+}
+
+/// A standing object of a size, laid on its side about where it stood: its middle stays above the same place.
+fn lying(standing: &Isometry3<f64>, [width, _, height]: [f64; 3]) -> Isometry3<f64> {
+    // About its own y axis: what was its top points along its own x axis, its width is what stands up now.
+    let turned = standing.rotation * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::FRAC_PI_2);
+    let top = turned * Vector3::z();
+    let foot = standing.translation.vector - top * (height / 2.0) + Vector3::z() * (width / 2.0 + DROP_M);
+    Isometry3::from_parts(Translation3::from(foot), turned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Pose;
+
+    #[test]
+    fn what_has_fallen_lies_above_the_place_where_it_stood() {
+        let standing = Pose::upright([0.3, -0.2, 0.4], 0.7);
+        let fallen = lying(&standing.to_isometry(), [0.06, 0.06, 0.2]);
+        assert!((Pose::from_isometry(&fallen).tilt() - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
+        let middle = fallen * nalgebra::Point3::new(0.0, 0.0, 0.1);
+        assert!((middle.coords - Vector3::new(0.3, -0.2, 0.432)).norm() < 1e-9, "{middle}");
+    }
+}
