@@ -3,6 +3,7 @@
 mod bounds;
 mod broken;
 mod campaign;
+mod check_oracles;
 mod commands;
 mod compare;
 mod config;

@@ -3,6 +3,7 @@
 //! The skill is the same as ever and the recorder sees physics only: neither is told.
 
 use crate::actions::{ActionCall, ActionReport};
+use crate::base::Pose;
 use crate::world::{BodyState, Command, Mishap, Observation, Sighting, Snapshot, World};
 
 /// Designator of the thing that the action is about.
@@ -13,6 +14,8 @@ const REACHING_M: f64 = 0.1;
 /// Height above its place from which on an object that only the hand touches counts as carried. Unit: metres. More than
 /// half of the lowest lift: what is dropped there ends far from the hand.
 const CARRIED_M: f64 = 0.05;
+/// How far a teleported object goes. Unit: metres. Out of any hand, and not out of the world.
+const TELEPORT_M: f64 = 0.5;
 /// How long a robot that does nothing takes for it. Unit: seconds.
 pub(super) const IDLE_SECS: f64 = 1.0;
 /// Room that the widest opening has to leave beside another object for it to be taken by mistake. Unit: metres.
@@ -56,8 +59,8 @@ pub enum Accident {
     HandOpens,
     /// The object has no friction any more.
     Slippery,
-    /// The object is where it stood before the action again.
-    PutBack,
+    /// The object is farther from the robot from one moment to the next.
+    Teleport,
     /// The object's nearest neighbour lies on its side.
     NeighbourFalls,
 }
@@ -203,7 +206,11 @@ impl Saboteur {
                 true
             }
             Accident::Slippery => world.befall(object, Mishap::Friction(0.0)),
-            Accident::PutBack => body(start, object).is_some_and(|was| world.befall(object, Mishap::Pose(was.pose))),
+            Accident::Teleport => {
+                let now = world.snapshot();
+                body(&now, object)
+                    .is_some_and(|is| world.befall(object, Mishap::Pose(farther(is, now.robot.base_true))))
+            }
             Accident::NeighbourFalls => {
                 let neighbour = others_by_distance(start, object).first().map(|body| body.id.clone());
                 neighbour.is_some_and(|id| world.befall(&id, Mishap::Fall))
@@ -220,6 +227,14 @@ fn body<'a>(snapshot: &'a Snapshot, id: &str) -> Option<&'a BodyState> {
 fn box_distance(body: &BodyState, point: [f64; 3]) -> f64 {
     let outside = |axis: usize| (body.aabb_min[axis] - point[axis]).max(point[axis] - body.aabb_max[axis]).max(0.0);
     (0..3).map(|axis| outside(axis) * outside(axis)).sum::<f64>().sqrt()
+}
+
+/// The pose of a body, moved on a level line away from the robot's base.
+fn farther(body: &BodyState, [base_x, base_y, _]: [f64; 3]) -> Pose {
+    let [x, y, z] = body.pose.position;
+    let (dx, dy) = (x - base_x, y - base_y);
+    let scale = TELEPORT_M / libm::hypot(dx, dy).max(1e-6);
+    Pose { position: [x + dx * scale, y + dy * scale, z], ..body.pose }
 }
 
 /// Everything that can move but one object, the nearest to it first.

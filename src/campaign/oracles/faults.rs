@@ -40,8 +40,8 @@ pub const FAULTS: [Fault; 9] = [
     },
     Fault {
         name: "teleport",
-        what: "the object is back in its old place while it is carried",
-        sabotage: Sabotage { world: Some((Moment::Carrying, Accident::PutBack)), ..NONE },
+        what: "the object is half a metre farther away from one moment to the next while it is carried",
+        sabotage: Sabotage { world: Some((Moment::Carrying, Accident::Teleport)), ..NONE },
     },
     Fault {
         name: "neighbour-falls",

@@ -1,0 +1,135 @@
+//! Tests of the oracles: every fault is noticed, every property notices one, and a weak rule is named.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use actcheck::actions::{Sabotage, Saboteur};
+use actcheck::analysis::{Notice, OracleGap, OracleMatrix, OracleTrial, oracle_matrix};
+use actcheck::base::Choices;
+use actcheck::campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
+use actcheck::campaign::{Clock, Env, Manner, run_line, run_sabotaged};
+use actcheck::config::Overrides;
+use serde_json::Value;
+
+use crate::support::{actcheck, edit, project, root, stderr, stdout};
+
+const MANNER: Manner = Manner { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
+
+fn env(folder: &Path, runs: u32) -> Env {
+    let overrides = Overrides { runs: Some(runs), ..Overrides::default() };
+    Env::prepare(&folder.join("configs/pick.toml"), &overrides).unwrap()
+}
+
+fn named(names: &[&str]) -> Vec<Fault> {
+    FAULTS.into_iter().filter(|fault| names.contains(&fault.name)).collect()
+}
+
+fn trials(env: &Env, faults: &[Fault], jobs: usize) -> Vec<Trial> {
+    try_faults(env, faults, &TrialOptions { jobs, manner: MANNER }, &AtomicBool::new(false), || {}).unwrap()
+}
+
+fn matrix(env: &Env, faults: &[Fault]) -> OracleMatrix {
+    let trials: Vec<OracleTrial> = trials(env, faults, 2)
+        .into_iter()
+        .map(|trial| OracleTrial {
+            index: trial.index,
+            fault: trial.fault.map(str::to_owned),
+            came_about: trial.came_about,
+            outcomes: trial.outcomes,
+        })
+        .collect();
+    let names: Vec<&str> = faults.iter().map(|fault| fault.name).collect();
+    oracle_matrix(&names, &env.ontology.actions["Pick"].success_properties, &trials)
+}
+
+/// On the shipped campaign: no gap, so every fault is noticed, every property notices one, and a robot that does nothing
+/// passes nowhere.
+#[test]
+fn the_shipped_properties_notice_every_fault() {
+    let output = actcheck(root(), &["check-oracles", "configs/pick.toml", "--runs", "11", "--format", "json"]);
+    let told: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(output.status.code(), Some(0), "{}", told["gaps"]);
+    assert_eq!(told["gaps"], serde_json::json!([]));
+    let faults = told["faults"].as_array().unwrap();
+    assert_eq!(faults.len(), FAULTS.len());
+    let notices = |fault: &Value, idx: usize| fault["properties"][idx]["verdict"] == "noticed";
+    for fault in faults {
+        assert!((0..5).any(|idx| notices(fault, idx)), "{fault}");
+        assert!(fault["came_about"].as_u64().unwrap() >= 7, "{fault}");
+        // A fault that came about spoils every action.
+        assert_eq!(fault["passed_anyway"], 0, "{fault}");
+    }
+    for idx in 0..5 {
+        assert!(faults.iter().any(|fault| notices(fault, idx)), "property {idx}: {faults:?}");
+    }
+    // What only the world can tell is noticed whatever the report says.
+    let noticing = |name: &str| -> Vec<&str> {
+        let fault = faults.iter().find(|fault| fault["fault"] == name).unwrap();
+        let properties = fault["properties"].as_array().unwrap();
+        let noticing = properties.iter().filter(|property| property["verdict"] == "noticed");
+        noticing.map(|property| property["property"].as_str().unwrap().rsplit('#').next().unwrap()).collect()
+    };
+    assert!(noticing("false-success").contains(&"ObjectInGripper"));
+    assert!(!noticing("false-success").contains(&"ObjectGrasped"));
+    assert_eq!(noticing("false-failure"), ["ObjectGrasped"]);
+    assert_eq!(noticing("neighbour-falls"), ["NoGraspCollisions"]);
+}
+
+/// A report is never believed to be a failure any more: nothing notices a robot that says so.
+#[test]
+fn a_rule_weakened_on_purpose_is_named() {
+    let project = project();
+    let rule = project.path().join("rules/object_grasped.rq");
+    edit(&rule, "FILTER (?report != \"succeeded\")", "FILTER (?report = \"something else\")");
+    let faults = named(&["no-op", "false-failure"]);
+    let weak = matrix(&env(project.path(), 10), &faults);
+    let gaps = weak.gaps("no-op");
+    assert!(gaps.contains(&OracleGap::FaultUnnoticed("false-failure".into())), "{gaps:?}");
+    assert!(gaps.contains(&OracleGap::PropertyNoticesNothing("http://actions#ObjectGrasped".into())), "{gaps:?}");
+    let noticed = |matrix: &OracleMatrix, property: &str| {
+        let cells = matrix.rows.iter().flat_map(|row| &row.cells);
+        cells.filter(|cell| cell.property.ends_with(property)).any(|cell| cell.notice == Notice::Noticed)
+    };
+    assert!(noticed(&weak, "MovedObject"));
+    let shipped = matrix(&env(root(), 10), &faults);
+    assert!(noticed(&shipped, "ObjectGrasped"));
+}
+
+#[test]
+fn too_few_scenes_tell_nothing_and_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = root().join("configs/pick.toml");
+    let output =
+        actcheck(folder.path(), &["check-oracles", config.to_str().unwrap(), "--runs", "1", "--format", "csv"]);
+    assert_eq!(output.status.code(), Some(1));
+    let (rows, told) = (stdout(&output), stderr(&output));
+    assert_eq!(rows.lines().count(), 1 + 5 * FAULTS.len(), "{rows}");
+    assert!(rows.lines().skip(1).all(|line| line.ends_with(",too few")), "{rows}");
+    assert!(told.contains("V003") && told.contains("V004") && told.contains("--runs"), "{told}");
+    assert!(!told.contains("V001") && !told.contains("V002"), "too few scenes are no proof:\n{told}");
+    // Nothing of it counts among the robot's runs.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let missing = actcheck(folder.path(), &["check-oracles", "nowhere.toml"]);
+    assert_eq!(missing.status.code(), Some(2));
+}
+
+/// Sabotage that touches neither the robot nor the world leaves every bit of every state as it is.
+#[test]
+fn who_only_lies_changes_no_physics() {
+    let env = env(root(), 2);
+    let choices = || Choices::random(env.campaign.seed, 0);
+    let sound = run_line(&env, "k", 0, choices(), &MANNER).unwrap();
+    let mut saboteur = Saboteur::new(Sabotage { robot: None, world: None, report: Some(false) });
+    let lied = run_sabotaged(&env, "k", 0, choices(), &MANNER, Some(&mut saboteur)).unwrap();
+    assert_eq!(lied.trace.hash, sound.trace.hash);
+    assert_eq!(lied.choices, sound.choices);
+    let reported = |record: &actcheck::history::RunRecord| record.trace.actions[0].report.clone().unwrap().succeeded;
+    assert_eq!((reported(&sound), reported(&lied), saboteur.came_about()), (true, false, true));
+}
+
+#[test]
+fn faults_are_the_same_for_any_number_of_workers() {
+    let env = env(root(), 2);
+    let faults = named(&["release", "wrong-object"]);
+    assert_eq!(trials(&env, &faults, 1), trials(&env, &faults, 2));
+}
