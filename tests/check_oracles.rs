@@ -120,7 +120,7 @@ fn who_only_lies_changes_no_physics() {
     let choices = || Choices::random(env.campaign.seed, 0);
     let sound = run_line(&env, "k", 0, choices(), &MANNER).unwrap();
     let mut saboteur = Saboteur::new(Sabotage { robot: None, world: None, report: Some(false) });
-    let lied = run_sabotaged(&env, "k", 0, choices(), &MANNER, Some(&mut saboteur)).unwrap();
+    let lied = run_sabotaged(&env, "k", (0, choices()), &MANNER, &mut saboteur).unwrap();
     assert_eq!(lied.trace.hash, sound.trace.hash);
     assert_eq!(lied.choices, sound.choices);
     let reported = |record: &actcheck::history::RunRecord| record.trace.actions[0].report.clone().unwrap().succeeded;
