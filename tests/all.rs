@@ -12,6 +12,7 @@ mod facts;
 mod floors;
 mod fuzz_corpus;
 mod history;
+mod merge;
 mod no_panic;
 mod ontology;
 mod oracle;

@@ -57,9 +57,15 @@ impl Env {
         config: Option<&Path>,
     ) -> Result<(Self, CampaignRecord), Diagnostics> {
         let record = history.campaign(campaign)?;
+        // Of several parts those that are missing belong to it too: it is taken as a whole.
+        let shard = match record.shards.as_slice() {
+            [only] => Some(*only),
+            _ => None,
+        };
         let overrides = Overrides {
             seed: Some(record.seed),
             repeat: Some(record.repeat),
+            shard,
             history: Some(history.dir().to_path_buf()),
             ..Overrides::default()
         };
@@ -130,6 +136,7 @@ impl Env {
             time_secs: self.campaign.limits.time_secs,
             until_width: self.campaign.limits.until_width,
             max_failures: self.campaign.limits.max_failures,
+            shards: self.campaign.shard.into_iter().collect(),
             started,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
         }
@@ -138,6 +145,11 @@ impl Env {
     /// Runs of all tests together.
     pub fn planned_runs(&self) -> u64 {
         self.campaign.tests.len() as u64 * self.runs_of_a_test()
+    }
+
+    /// Those of them that this part of the campaign makes.
+    pub fn runs_to_make(&self) -> u64 {
+        self.campaign.shard.map_or(self.planned_runs(), |shard| shard.share(self.planned_runs()))
     }
 
     /// Which test a run performs: all runs of the first one come first. An index past the end means the last one.

@@ -3,7 +3,7 @@
 //! A schedule depends on its configuration and on what came of earlier batches, and on nothing else: neither the number of
 //! workers nor the moment at which somebody stopped and resumed the campaign changes it.
 
-use crate::base::Choices;
+use crate::base::{Choices, Shard};
 use crate::campaign::Env;
 use crate::history::{Repetition, RunRecord};
 use crate::verdict::Outcome;
@@ -92,7 +92,11 @@ pub trait Schedule {
 pub fn schedule_of(env: &Env) -> Box<dyn Schedule> {
     let tests = env.campaign.tests.len() as u64;
     let repeat = u64::from(env.campaign.repeat);
-    Box::new(InTurns { tests, scenes: u64::from(env.campaign.test_count), repeat, made: 0 })
+    let all = Box::new(InTurns { tests, scenes: u64::from(env.campaign.test_count), repeat, made: 0 });
+    match env.campaign.shard {
+        None => all,
+        Some(shard) => Box::new(OneShard { all, shard }),
+    }
 }
 
 /// Every scene of every test, as often as it is run. Tests take turns, so that whatever ends a campaign early leaves as
@@ -122,6 +126,26 @@ impl Schedule for InTurns {
         let batch: Vec<Planned> = (self.made..planned).take(BATCH).map(|place| self.planned(place)).collect();
         self.made += batch.len() as u64;
         batch
+    }
+}
+
+/// The runs of another schedule that belong to one part of the campaign. That schedule must not depend on what it is told.
+struct OneShard {
+    all: Box<dyn Schedule>,
+    shard: Shard,
+}
+
+impl Schedule for OneShard {
+    fn next_batch(&mut self, told: &[Told]) -> Vec<Planned> {
+        loop {
+            let mut batch = self.all.next_batch(told);
+            let last = batch.is_empty();
+            batch.retain(|planned| self.shard.has(planned.index));
+            // A batch without a run of this part is not the end.
+            if last || !batch.is_empty() {
+                return batch;
+            }
+        }
     }
 }
 
@@ -166,6 +190,24 @@ mod tests {
         assert_eq!(drawn(1, Some(0)).0, drawn(1, None).0);
         assert_ne!(drawn(1, Some(0)).1, drawn(1, Some(1)).1);
         assert_ne!(drawn(1, Some(0)).1, drawn(2, Some(0)).1);
+    }
+
+    #[test]
+    fn parts_have_every_run_once() {
+        let mut indices = Vec::new();
+        for number in 1..=7 {
+            let all = Box::new(InTurns { tests: 2, scenes: 3_334, repeat: 3, made: 0 });
+            let mut schedule = OneShard { all, shard: Shard::new(number, 7).expect("a part") };
+            loop {
+                let batch = schedule.next_batch(&[]);
+                if batch.is_empty() {
+                    break;
+                }
+                indices.extend(batch.iter().map(|planned| planned.index));
+            }
+        }
+        indices.sort_unstable();
+        assert_eq!(indices, (0..20_004).collect::<Vec<u64>>());
     }
 
     #[test]

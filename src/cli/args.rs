@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::base::Shard;
 use crate::cli::recheck::RecheckArgs;
 use crate::cli::shrink::ShrinkArgs;
 use crate::config::duration_secs;
@@ -72,6 +73,18 @@ pub enum Command {
     /// List the runs of a history
     #[command(after_help = "Example:\n  actcheck list --format csv")]
     List(ListArgs),
+    /// Join histories into one: parts of a campaign (`run --shard`) become the campaign, what is met twice is kept once
+    ///
+    /// Everything comes along: runs with their traces and facts, later judgements, shrunk runs. Parts belong together that have the
+    /// same configuration, seed and number of runs; they must have been made with the same program, ontology, rules and models, and
+    /// agree on every run that several have. A conflict is told with its way out, and then nothing is written.
+    ///
+    /// Exit code: 0 done, 1 done, but a campaign of parts lacks runs (they are told), 2 conflict or fault, 130 stopped by Ctrl-C
+    /// (what was written is whole; merging again goes on).
+    #[command(
+        after_help = "Example:\n  actcheck run configs/pick.toml --shard 1/2 --history /tmp/h1\n  actcheck run configs/pick.toml --shard 2/2 --history /tmp/h2\n  actcheck merge /tmp/h1 /tmp/h2 --into /tmp/all"
+    )]
+    Merge(crate::cli::merge::MergeArgs),
     /// Show one run: its scene, and every property's outcome with margin and witness
     #[command(
         after_help = "Example:\n  actcheck show k7f3-3    (an id that `actcheck list` prints; its beginning is enough)"
@@ -145,6 +158,9 @@ pub struct RunArgs {
     /// Workers, one simulation each; results don't depend on it [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
+    /// Only part I of N: every N-th run, beginning with the I-th; `actcheck merge` joins the parts
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
     /// Shrink one run of each failure mode afterwards, as `actcheck shrink` does
     #[arg(long)]
     pub shrink: bool,

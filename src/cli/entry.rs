@@ -20,6 +20,7 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => crate::cli::compare::compare(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
         Command::List(args) => list::list(&args).map(|()| 0),
+        Command::Merge(args) => crate::cli::merge::merge(&args),
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Shrink(args) => shrink::shrink(&args),
         Command::Query(args) => query::query(&args).map(|()| 0),

@@ -14,6 +14,7 @@ mod datalog;
 mod entry;
 mod history_dir;
 mod list;
+mod merge;
 mod new;
 mod output;
 mod progress;

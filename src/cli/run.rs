@@ -29,7 +29,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let clock = clock::system();
     let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     let name = args.config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let mut progress = Progress::new(env.planned_runs(), env.campaign.limits.time_secs);
+    let mut progress = Progress::new(env.runs_to_make(), env.campaign.limits.time_secs);
     // From here on there is a campaign to end.
     shown.get_or_init(|| progress.bar());
     history.begin_campaign(&env.record(id.clone(), name, (clock.now)()))?;
@@ -45,6 +45,8 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         })
     });
     progress.finish();
+    // Sums are taken by index, so that a campaign that is joined from parts has the same last bit.
+    runs.sort_by_key(|run| run.index);
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
     let mut summary = summarise(&env, &args.config, id.clone(), runs, &end);
     if finished.is_ok() {
@@ -68,6 +70,7 @@ fn overrides(args: &RunArgs) -> Overrides {
         runs: args.runs,
         seed: args.seed,
         repeat: args.repeat,
+        shard: args.shard,
         time_secs: args.time,
         until_width: args.until_width,
         max_failures: args.max_failures,
@@ -159,14 +162,7 @@ fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureM
         .map_err(|error| Diagnostic::error("X020", format!("failure modes could not be computed: {error}")).into())
 }
 
-fn summarise(
-    env: &Env,
-    config: &Path,
-    campaign: String,
-    mut runs: Vec<RunSummary>,
-    end: &CampaignEnd,
-) -> CampaignSummary {
-    runs.sort_by_key(|run| run.index);
+fn summarise(env: &Env, config: &Path, campaign: String, runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
     for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
         for iri in &action.success_properties {
@@ -185,7 +181,7 @@ fn summarise(
         properties,
         failure_modes: Vec::new(),
         runs,
-        planned: env.planned_runs(),
+        planned: env.runs_to_make(),
         discards: end.discards.len() as u64,
         ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), told: spent.to_string() }),
         interrupted: !is_whole(end),

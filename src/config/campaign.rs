@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::base::{Diagnostic, Files, Source, Span};
+use crate::base::{Diagnostic, Files, Shard, Source, Span};
 use crate::config::{ObjectModel, RobotProfile};
 
 /// One campaign: every test in `test_count` scenes, in each `repeat` times.
@@ -46,6 +46,8 @@ pub struct Campaign {
     pub budget: Budget,
     /// Budgets of a run and of the whole campaign (`[budget]`).
     pub limits: Limits,
+    /// The part of its runs that is to be made; nothing: all of them.
+    pub shard: Option<Shard>,
     /// History folder (`[history] dir`), `.actcheck` beside the configuration by default.
     pub history: PathBuf,
     /// Where things are written, for faults that only a later stage can see: `tests.0.1` is the second action of
@@ -79,6 +81,8 @@ pub struct Overrides {
     pub until_width: Option<f64>,
     /// Instead of `[budget] max_failures`.
     pub max_failures: Option<u64>,
+    /// Only this part of the runs.
+    pub shard: Option<Shard>,
     /// Instead of `[history] dir`; relative to where the program runs.
     pub history: Option<PathBuf>,
 }

@@ -65,6 +65,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         repeat: overrides.repeat.or(repeat).unwrap_or(1).max(1),
         launcher,
         seed: overrides.seed.unwrap_or(seed),
+        shard: overrides.shard,
         ontology,
         models: shelf.models,
         robot,

@@ -53,6 +53,16 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
 
 const SHRUNK: &str = "SELECT DISTINCT ?campaign WHERE { ?run act:shrunkFrom ?original ; act:campaign ?campaign }";
 
+/// All of them, with what sets them apart.
+const LATER: &str = "
+SELECT ?run ?step ?property ?at ?outcome ?rule WHERE {
+    GRAPH act:rechecked {
+        ?assertion earl:subject ?execution ; earl:test ?property ; act:recheckedAt ?at ; earl:result ?result .
+        ?result act:outcome ?outcome ; act:ruleDigest ?rule .
+    }
+    ?execution act:ofRun ?run ; act:step ?step .
+}";
+
 type Row = Vec<Option<Term>>;
 
 fn text(row: &Row, column: usize) -> String {
@@ -167,6 +177,12 @@ pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeR
 /// The judgements made after the run that nothing supersedes, each with the digest of its rule, in no order.
 pub(super) fn rechecked(store: &Store, filter: &RunFilter) -> Result<Vec<(OutcomeRow, String)>, QueryEvaluationError> {
     Ok(select(store, RECHECKED, given(filter))?.iter().map(|row| (outcome_row(row), text(row, 10))).collect())
+}
+
+/// Ids of runs, each with a judgement that was made after it, as one text; in no order.
+pub(super) fn later_judgements(store: &Store) -> Result<Vec<(String, String)>, QueryEvaluationError> {
+    let told = |row: &Row| (1..6).map(|column| text(row, column)).collect::<Vec<_>>().join(" ");
+    Ok(select(store, LATER, Vec::new())?.iter().map(|row| (id(row, 0), told(row))).collect())
 }
 
 /// A row of [`OUTCOMES`] or of [`RECHECKED`].

@@ -9,6 +9,7 @@ mod folder;
 mod frames;
 mod graphs;
 mod lists;
+pub mod merge;
 mod newest;
 mod query;
 mod read;

@@ -3,9 +3,10 @@
 use oxigraph::model::Term;
 use oxigraph::store::{StorageError, Store};
 
+use crate::base::Shard;
 use crate::history::CampaignRecord;
 use crate::history::detail::version;
-use crate::history::read::Node;
+use crate::history::read::{Node, text_of};
 use crate::history::write_campaign::campaign_node;
 
 /// What was asked for, judged by and simulated with; nothing where the history has no such campaign.
@@ -41,9 +42,16 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         time_secs: node.number("act:timeBudget"),
         until_width: node.number("act:untilWidth"),
         max_failures: node.count("act:maxFailures"),
+        shards: shards(&node),
         started: text(&node, "prov:startedAtTime"),
         program_version: version(&node),
     }))
+}
+
+fn shards(node: &Node) -> Vec<Shard> {
+    let mut shards: Vec<Shard> = node.all("act:shard").iter().filter_map(|shard| text_of(shard).parse().ok()).collect();
+    shards.sort();
+    shards
 }
 
 /// The things that a property names.

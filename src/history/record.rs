@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::actions::Trace;
-use crate::base::Choice;
+use crate::base::{Choice, Shard};
 use crate::facts::RunFacts;
 use crate::scenario::Scene;
 use crate::verdict::{Judgement, Outcome};
@@ -39,6 +39,8 @@ pub struct CampaignRecord {
     pub until_width: Option<f64>,
     /// Number of failed runs at which the campaign ends.
     pub max_failures: Option<u64>,
+    /// The parts of these runs that it is made of, sorted; none: it was run as a whole.
+    pub shards: Vec<Shard>,
     /// RFC 3339.
     pub started: String,
     /// Version of this program.

@@ -1,7 +1,7 @@
 //! A history that is open: its folder, and the RDF store in it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{PoisonError, RwLock};
 
 use oxigraph::model::vocab::rdf;
@@ -64,7 +64,7 @@ impl History {
 
     /// Closes the store and opens it anew: that is when it gives up the logs of what is long in its tables, which are as
     /// large as the tables of a hundred runs.
-    fn reopen(&self) -> Result<(), Diagnostics> {
+    pub(super) fn reopen(&self) -> Result<(), Diagnostics> {
         let mut store = self.store.write().unwrap_or_else(PoisonError::into_inner);
         *store = None;
         *store = Some(open_store(&self.folder)?);
@@ -278,6 +278,11 @@ impl History {
         query::answer(&self.store()?, text, cancel)
     }
 
+    /// The file of a run's trace, whether it is there or not.
+    pub(super) fn trace_path(&self, run: &str) -> PathBuf {
+        self.folder.trace(run)
+    }
+
     fn decoded<T>(&self, id: &str, decode: impl FnOnce(&[u8]) -> Result<T, String>) -> Result<T, Diagnostics> {
         let file = self.folder.trace(id);
         let bytes = std::fs::read(&file).map_err(|error| {
@@ -372,7 +377,7 @@ fn open_store(folder: &Folder) -> Result<Store, Diagnostics> {
 }
 
 /// A letter and three letters or digits, without those that look alike.
-fn campaign_id(config_digest: &str, seed: u64, counter: u64) -> String {
+pub(super) fn campaign_id(config_digest: &str, seed: u64, counter: u64) -> String {
     const LETTERS: &[u8] = b"abcdefghjkmnpqrstvwxyz";
     const ALL: &[u8] = b"abcdefghjkmnpqrstvwxyz23456789";
     let mut digest = Digest::new();

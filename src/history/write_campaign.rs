@@ -32,6 +32,9 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .may("act:maxFailures", record.max_failures.map(count))
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version));
+    for shard in &record.shards {
+        statements.about(campaign.clone()).text("act:shard", &shard.to_string());
+    }
     for (number, (property, path, digest)) in record.rules.iter().enumerate() {
         let rule = NamedNode::new_unchecked(format!("{}/rule/{}", campaign.as_str(), number + 1));
         statements.about(campaign.clone()).has("act:usedRule", rule.clone());

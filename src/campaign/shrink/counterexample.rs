@@ -132,6 +132,7 @@ pub fn keep(
     let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     let mut campaign = env.record(id.clone(), format!("shrunk {original}"), (manner.clock.now)());
     (campaign.planned_runs, campaign.repeat) = (1, 1);
+    campaign.shards.clear();
     let mut record = run_line(env, &id, index, Choices::recorded(&shrunk.choices), manner)
         .map_err(|failure| Diagnostic::error("S051", format!("the shrunk scene can't be made again: {failure}")))?;
     record.shrunk_from = Some(original.to_owned());

@@ -1,0 +1,109 @@
+//! One of several equal parts of a campaign.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// A part of a campaign: every `of`-th run, beginning with the `number`-th.
+///
+/// The parts of a campaign have all its runs, each once, whoever makes them and wherever.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Shard {
+    of: u64,
+    number: u64,
+}
+
+impl Shard {
+    /// Part `number` (from 1) of `of`; nothing where there is no such part.
+    pub fn new(number: u64, of: u64) -> Option<Self> {
+        (1 <= number && number <= of).then_some(Self { of, number })
+    }
+
+    /// Position among the parts, from 1.
+    pub fn number(self) -> u64 {
+        self.number
+    }
+
+    /// How many parts there are.
+    pub fn of(self) -> u64 {
+        self.of
+    }
+
+    /// Whether the run with this index (from 0) belongs to it.
+    pub fn has(self, index: u64) -> bool {
+        index % self.of == self.number - 1
+    }
+
+    /// How many of the first `runs` runs belong to it.
+    pub fn share(self, runs: u64) -> u64 {
+        runs / self.of + u64::from(runs % self.of >= self.number)
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+/// What is no part.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("a part such as 1/4 is needed: its number, from 1, and how many parts there are")]
+pub struct NoShard;
+
+impl FromStr for Shard {
+    type Err = NoShard;
+
+    fn from_str(text: &str) -> Result<Self, NoShard> {
+        // Digits alone: the library would read a sign too.
+        let number = |text: &str| match text.bytes().all(|byte| byte.is_ascii_digit()) {
+            true => text.parse::<u64>().map_err(|_| NoShard),
+            false => Err(NoShard),
+        };
+        let (part, of) = text.split_once('/').ok_or(NoShard)?;
+        Self::new(number(part)?, number(of)?).ok_or(NoShard)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_run_is_in_one_part() {
+        for of in 1..9 {
+            let shards: Vec<Shard> = (1..=of).filter_map(|number| Shard::new(number, of)).collect();
+            assert_eq!(shards.len() as u64, of);
+            for runs in 0..30 {
+                assert_eq!(shards.iter().map(|shard| shard.share(runs)).sum::<u64>(), runs);
+                for shard in &shards {
+                    assert_eq!(shard.share(runs), (0..runs).filter(|index| shard.has(*index)).count() as u64);
+                }
+                assert_eq!(shards.iter().filter(|shard| shard.has(runs)).count(), 1);
+            }
+        }
+    }
+
+    #[test]
+    fn only_parts_can_be_read() {
+        assert_eq!("2/4".parse(), Ok(Shard { number: 2, of: 4 }));
+        assert_eq!("2/4".parse::<Shard>().map(|shard| shard.to_string()), Ok("2/4".to_owned()));
+        for wrong in [
+            "",
+            "/",
+            "0/4",
+            "5/4",
+            "1",
+            "1/",
+            "/4",
+            "-1/4",
+            "+1/4",
+            "1/4/2",
+            "1 / 4",
+            "1/0",
+            "a/b",
+            "1/99999999999999999999",
+        ] {
+            assert_eq!(wrong.parse::<Shard>(), Err(NoShard), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! `actcheck merge`
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::args::Format;
+use crate::cli::progress::Progress;
+use crate::cli::{output, stop};
+use crate::history::History;
+use crate::history::merge::{MergeOptions, MergePlan, PlannedMerge, carry_out, plan};
+use crate::report::Table;
+
+/// Run numbers that a message tells; the table in JSON has all.
+const TOLD: usize = 10;
+
+/// `actcheck merge`
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// The histories to merge, in any order; they stay as they are
+    #[arg(value_name = "DIR", required = true)]
+    pub dirs: Vec<PathBuf>,
+    /// The history that gets all of them: a new folder, or one that is added to
+    #[arg(long, value_name = "DIR")]
+    pub into: PathBuf,
+    /// Give a campaign a new id where another campaign has its id (parts of one campaign need none)
+    #[arg(long)]
+    pub rename: bool,
+    /// Leave this campaign out: ID, or DIR#ID as messages name it; may be given several times
+    #[arg(long, value_name = "CAMPAIGN")]
+    pub leave_out: Vec<String>,
+    /// How the campaigns that are then there are printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Merges histories and prints which campaigns they gave. Returns the exit code.
+pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
+    let sources = open_all(args)?;
+    let known = is_there(&args.into).then(|| History::open_existing(&args.into)).transpose()?;
+    let options = MergeOptions { rename: args.rename, leave_out: args.leave_out.clone() };
+    let plan = plan(&sources, known.as_ref(), &options)?;
+    let into = match known {
+        Some(history) => history,
+        None => History::open(&args.into)?,
+    };
+    let progress = Progress::new(plan.campaigns.iter().map(|campaign| campaign.added).sum());
+    let bar = progress.bar();
+    let stop = stop::on_interrupt(move || bar.println("stopping after this run; merging again goes on"));
+    let merged = carry_out(&plan, &sources, &into, &stop, || progress.judged(1, 0));
+    progress.finish();
+    let merged = merged?;
+    if merged.interrupted {
+        let fault = Diagnostic::error("X030", "interrupted");
+        return Err(fault.help("what was written is whole; merge again to add the rest").into()).or_else(|faults| {
+            output::print_diagnostics(&faults);
+            Ok(stop::INTERRUPTED)
+        });
+    }
+    output::print(&printed(&plan, args.format));
+    let mut warnings = Diagnostics::new();
+    merged.warning().into_iter().for_each(|warning| warnings.push(warning));
+    plan.campaigns.iter().filter_map(lacking).for_each(|warning| warnings.push(warning));
+    if !warnings.is_empty() {
+        output::print_diagnostics(&warnings);
+    }
+    Ok(u8::from(plan.campaigns.iter().any(|campaign| !campaign.missing.is_empty())))
+}
+
+/// Opens each history once, and leaves the destination out: what it has is there already.
+fn open_all(args: &MergeArgs) -> Result<Vec<History>, Diagnostics> {
+    let same = |dir: &Path| std::fs::canonicalize(dir).unwrap_or_else(|_| dir.to_path_buf());
+    let (mut seen, mut sources, mut faults) = (vec![same(&args.into)], Vec::new(), Diagnostics::new());
+    for dir in &args.dirs {
+        if seen.contains(&same(dir)) {
+            continue;
+        }
+        seen.push(same(dir));
+        match History::open_existing(dir) {
+            Ok(history) => sources.push(history),
+            Err(found) => faults.extend(found),
+        }
+    }
+    faults.or(sources)
+}
+
+/// Whether there is something that has to be a history.
+fn is_there(dir: &Path) -> bool {
+    dir.join("VERSION").exists()
+}
+
+fn printed(plan: &MergePlan, format: Format) -> String {
+    if format == Format::Json {
+        return format!("{:#}\n", Value::Array(plan.campaigns.iter().map(campaign_json).collect()));
+    }
+    let mut table = Table::new(["campaign", "name", "from", "runs", "added", "planned", "missing"]);
+    for campaign in &plan.campaigns {
+        table.rows.push(vec![
+            campaign.id.clone().into(),
+            campaign.name.clone().into(),
+            campaign.from.join(" ").into(),
+            campaign.runs.into(),
+            campaign.added.into(),
+            campaign.planned.into(),
+            campaign.missing.len().into(),
+        ]);
+    }
+    table.render(format.into())
+}
+
+fn campaign_json(campaign: &PlannedMerge) -> Value {
+    json!({
+        "campaign": campaign.id,
+        "name": campaign.name,
+        "from": campaign.from,
+        "joined": campaign.joined,
+        "runs": campaign.runs,
+        "added": campaign.added,
+        "planned": campaign.planned,
+        "missing": campaign.missing.iter().map(|index| index + 1).collect::<Vec<u64>>(),
+    })
+}
+
+/// The runs that no part of a campaign has.
+fn lacking(campaign: &PlannedMerge) -> Option<Diagnostic> {
+    let missing = &campaign.missing;
+    let mut numbers: Vec<String> = missing.iter().take(TOLD).map(|index| (index + 1).to_string()).collect();
+    if missing.len() > TOLD {
+        numbers.push("…".to_owned());
+    }
+    let message = format!(
+        "campaign {} lacks {} of its {} runs: {}",
+        campaign.id,
+        missing.len(),
+        campaign.planned,
+        numbers.join(", ")
+    );
+    (!missing.is_empty())
+        .then(|| Diagnostic::warning("X080", message).help("merge the parts that are missing into the same folder"))
+}

@@ -1,0 +1,211 @@
+//! Writes what was planned: a campaign's statements, then its runs, each whole, then its end.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use oxigraph::model::{GraphName, GraphNameRef, NamedNode, Quad, Term};
+use oxigraph::store::{StorageError, Store};
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::history::folder::write_whole;
+use crate::history::merge::copy::about;
+use crate::history::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
+use crate::history::merge::renames::Renames;
+use crate::history::read::text_of;
+use crate::history::statements::{Statements, iri, time};
+use crate::history::write_campaign::{self, campaign_node};
+use crate::history::write_run::run_node;
+use crate::history::{History, fault};
+
+/// What was written.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Merged {
+    /// Runs that were added.
+    pub runs: u64,
+    /// Runs whose traces their histories had lost: what the store says of them is there.
+    pub without_trace: Vec<String>,
+    /// Whether somebody asked for the end before all was written.
+    pub interrupted: bool,
+}
+
+/// Brings what was planned into a history, and tells `on_run` of each run that is added.
+///
+/// Whatever ends it early, the destination is whole: a campaign that is not complete has no end yet, and merging again completes it.
+///
+/// # Errors
+/// A history can't be read, or the destination not be written.
+pub fn carry_out(
+    plan: &MergePlan,
+    sources: &[History],
+    into: &History,
+    stop: &AtomicBool,
+    mut on_run: impl FnMut(),
+) -> Result<Merged, Diagnostics> {
+    let renames: Vec<Renames> = (0..sources.len())
+        .map(|place| {
+            let of_place = plan.ids.iter().filter(|((of, _), _)| *of == place);
+            Renames::new(of_place.map(|((_, old), new)| (old.clone(), new.clone())))
+        })
+        .collect();
+    let mut writer = Writer { sources, renames, into, merged: Merged::default() };
+    for campaign in &plan.campaigns {
+        writer.begin(campaign)?;
+        for (index, (place, run)) in &campaign.work.runs {
+            if stop.load(Ordering::Relaxed) {
+                writer.merged.interrupted = true;
+                into.flush()?;
+                return Ok(writer.merged);
+            }
+            let new = format!("{}-{}", campaign.id, index + 1);
+            writer.run(*place, run, &new)?;
+            on_run();
+        }
+        for (place, run) in campaign.work.judgements.values() {
+            writer.judgements(*place, run)?;
+        }
+        writer.end(campaign)?;
+    }
+    into.flush()?;
+    into.reopen()?;
+    Ok(writer.merged)
+}
+
+struct Writer<'a> {
+    sources: &'a [History],
+    renames: Vec<Renames>,
+    into: &'a History,
+    merged: Merged,
+}
+
+impl Writer<'_> {
+    /// What is said of a campaign, without its end: whoever looks at it now finds it unfinished.
+    fn begin(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
+        let work = &campaign.work;
+        let node = campaign_node(&campaign.id);
+        let mut quads = Vec::new();
+        if let Some((place, id)) = &work.statements {
+            let source = &self.sources[*place];
+            quads = self.about(*place, &campaign_node(id))?;
+            let start = iri("prov:startedAtTime");
+            let path = iri("act:configPath");
+            let first = quads.iter().any(|quad| quad.predicate == iri("act:firstId"));
+            quads.retain(|quad| !(is_end(quad) || work.started.is_some() && quad.predicate == start));
+            for quad in quads.iter_mut().filter(|quad| quad.predicate == path) {
+                quad.object = Term::from(oxigraph::model::Literal::new_simple_literal(moved(
+                    &text_of(&quad.object),
+                    source.dir(),
+                    self.into.dir(),
+                )));
+            }
+            if *id != campaign.id && !campaign.joined && !first {
+                let mut statements = Statements::default();
+                statements.about(node.clone()).text("act:firstId", id);
+                quads.extend(statements.quads);
+            }
+        }
+        let mut statements = Statements::default();
+        let mut about = statements.about(node.clone());
+        work.shards.iter().for_each(|shard| {
+            about.text("act:shard", shard);
+        });
+        about.may("prov:startedAtTime", work.started.as_deref().map(time));
+        quads.extend(statements.quads);
+        let ends = if matches!(work.end, PlannedEnd::Same) { Vec::new() } else { self.ends(&node)? };
+        self.write(&quads, &ends)
+    }
+
+    fn run(&mut self, place: usize, run: &str, new: &str) -> Result<(), Diagnostics> {
+        let doing = format!("writing run {new}");
+        match std::fs::read(self.sources[place].trace_path(run)) {
+            Ok(bytes) => write_whole(&self.into.trace_path(new), &bytes)
+                .map_err(|error| fault::io(self.into.dir(), &doing, &error))?,
+            Err(_) => self.merged.without_trace.push(new.to_owned()),
+        }
+        self.write(&self.about(place, &run_node(run))?, &[])?;
+        self.merged.runs += 1;
+        Ok(())
+    }
+
+    /// Only what was judged later: the rest is there.
+    fn judgements(&self, place: usize, run: &str) -> Result<(), Diagnostics> {
+        let later = GraphName::from(iri("act:rechecked"));
+        let mut quads = self.about(place, &run_node(run))?;
+        quads.retain(|quad| quad.graph_name == later);
+        self.write(&quads, &[])
+    }
+
+    fn end(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
+        let quads = match &campaign.work.end {
+            PlannedEnd::Same => return Ok(()),
+            PlannedEnd::Of(place, id) => {
+                let mut quads = self.about(*place, &campaign_node(id))?;
+                quads.retain(is_end);
+                quads
+            }
+            PlannedEnd::Computed(end) => write_campaign::end(&campaign.id, end),
+        };
+        self.write(&quads, &[])?;
+        self.into.flush()
+    }
+
+    /// All that a history says of a campaign or run, as the destination calls it.
+    fn about(&self, place: usize, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
+        let source = &self.sources[place];
+        let quads = about(&source.store()?, node).map_err(|error| source.fault("reading it", &error))?;
+        Ok(self.renames[place].apply(quads))
+    }
+
+    fn ends(&self, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
+        let store = self.into.store()?;
+        let quads = store.quads_for_pattern(Some(node.into()), None, None, Some(GraphNameRef::DefaultGraph));
+        let ends: Result<Vec<Quad>, StorageError> = quads.filter(|quad| quad.as_ref().map_or(true, is_end)).collect();
+        ends.map_err(|error| self.into.fault("reading a campaign", &error))
+    }
+
+    /// In one transaction.
+    fn write(&self, new: &[Quad], old: &[Quad]) -> Result<(), Diagnostics> {
+        if new.is_empty() && old.is_empty() {
+            return Ok(());
+        }
+        replace(&self.into.store()?, new, old).map_err(|error| self.into.fault("writing what is merged", &error))
+    }
+}
+
+fn replace(store: &Store, new: &[Quad], old: &[Quad]) -> Result<(), StorageError> {
+    let mut transaction = store.start_transaction()?;
+    for quad in old {
+        transaction.remove(quad);
+    }
+    for quad in new {
+        transaction.insert(quad);
+    }
+    transaction.commit()
+}
+
+/// Whether a quad about a campaign says how it ended.
+fn is_end(quad: &Quad) -> bool {
+    let known =
+        ["prov:endedAtTime", "act:score", "act:scoreWithoutBroken", "act:discards", "act:interrupted", "act:endedBy"];
+    known.iter().any(|property| quad.predicate == iri(property))
+        || crate::verdict::Outcome::ALL.iter().any(|outcome| quad.predicate == iri(&format!("act:{outcome}Count")))
+}
+
+/// A path that is seen from one folder, as it is seen from another; as it is where nothing lies there.
+fn moved(path: &str, from: &Path, to: &Path) -> String {
+    let absolute = std::fs::canonicalize(from.join(path)).ok();
+    let seen = absolute.zip(std::fs::canonicalize(to).ok()).and_then(|(path, to)| pathdiff::diff_paths(path, to));
+    seen.map_or_else(|| path.to_owned(), |path| path.display().to_string())
+}
+
+/// What a merge came to lack, as a warning.
+impl Merged {
+    /// The runs whose traces were lost before.
+    pub fn warning(&self) -> Option<Diagnostic> {
+        let first = self.without_trace.first()?;
+        let message = format!("{} runs have lost their traces before, the first is {first}", self.without_trace.len());
+        Some(
+            Diagnostic::warning("H009", message)
+                .help("their outcomes and facts are there; replay and recheck need traces"),
+        )
+    }
+}

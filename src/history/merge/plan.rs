@@ -1,0 +1,334 @@
+//! What will be in the destination, checked against everything that is known.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Diagnostic, Diagnostics, did_you_mean};
+use crate::history::merge::conflict;
+use crate::history::merge::survey::{Found, FoundRun, survey};
+use crate::history::store::campaign_id;
+use crate::history::{CampaignEnd, History, RunStatus};
+use crate::verdict::{Counts, Outcome, mean};
+
+/// How histories are merged.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct MergeOptions {
+    /// A campaign whose id another one has gets a new one. Without, that is a fault.
+    pub rename: bool,
+    /// Campaigns that are left out: `ID`, or `DIR#ID`.
+    pub leave_out: Vec<String>,
+}
+
+/// What is to be written, without a conflict.
+#[derive(Debug, Clone)]
+pub struct MergePlan {
+    /// By start, then by id.
+    pub campaigns: Vec<PlannedMerge>,
+    /// New ids of campaigns, by history and old id; those that keep theirs too.
+    pub(super) ids: BTreeMap<(usize, String), String>,
+}
+
+/// One campaign of the destination.
+#[derive(Debug, Clone)]
+pub struct PlannedMerge {
+    /// Its id in the destination.
+    pub id: String,
+    /// Name of its configuration.
+    pub name: String,
+    /// What it is made from: `DIR#ID`.
+    pub from: Vec<String>,
+    /// Whether it is made of parts.
+    pub joined: bool,
+    /// Runs that it will have.
+    pub runs: u64,
+    /// Runs that the destination does not have yet.
+    pub added: u64,
+    /// How many runs were asked for.
+    pub planned: u64,
+    /// Indices of the runs that no part has; empty for a campaign that was run as a whole.
+    pub missing: Vec<u64>,
+    pub(super) work: Work,
+}
+
+/// What has to be written for a campaign.
+#[derive(Debug, Clone)]
+pub(super) struct Work {
+    /// History and id there of the campaign whose statements are taken; nothing: the destination's own.
+    pub(super) statements: Option<(usize, String)>,
+    /// Parts that the destination's campaign does not say yet.
+    pub(super) shards: Vec<String>,
+    /// When the first part began; nothing where it stays as it is.
+    pub(super) started: Option<String>,
+    /// History and id there of the runs to copy, by index.
+    pub(super) runs: BTreeMap<u64, (usize, String)>,
+    /// The same for runs of which only later judgements are new.
+    pub(super) judgements: BTreeMap<u64, (usize, String)>,
+    pub(super) end: PlannedEnd,
+}
+
+/// How the campaign's end is written.
+#[derive(Debug, Clone)]
+pub(super) enum PlannedEnd {
+    /// It stays as it is, or there is none.
+    Same,
+    /// As in a history under an id.
+    Of(usize, String),
+    /// Computed from the parts.
+    Computed(Box<CampaignEnd>),
+}
+
+/// Reads all histories and says what merging them into another would give. Nothing is written.
+///
+/// # Errors
+/// `H020` results differ, `H021` parts were made with different things, `H022` an id is taken, `H023` parts lie in the destination,
+/// `H024` later judgements differ, `H025` what is to be left out is not there; all of them at once.
+pub fn plan(sources: &[History], into: Option<&History>, options: &MergeOptions) -> Result<MergePlan, Diagnostics> {
+    let mut found = Vec::new();
+    for (place, source) in sources.iter().enumerate() {
+        found.extend(survey(source, Some(place))?);
+    }
+    let found = without(found, &options.leave_out)?;
+    let own = into.map(|history| survey(history, None)).transpose()?.unwrap_or_default();
+    let all: Vec<Found> = own.into_iter().chain(found).collect();
+    let mut faults = check_parts(&all);
+    let groups = groups(&all);
+    for group in &groups {
+        check_group(group, &mut faults);
+    }
+    let ids = choose_ids(&groups, options.rename, &mut faults);
+    faults.or(())?;
+    let mut campaigns: Vec<(String, PlannedMerge)> =
+        groups.iter().zip(ids).map(|(group, id)| (started(group), planned(group, id))).collect();
+    campaigns.sort_by(|a, b| (&a.0, &a.1.id).cmp(&(&b.0, &b.1.id)));
+    let campaigns: Vec<PlannedMerge> = campaigns.into_iter().map(|(_, campaign)| campaign).collect();
+    Ok(MergePlan { ids: new_ids(&groups, &campaigns), campaigns })
+}
+
+/// Leaves out the campaigns that the user named.
+fn without(found: Vec<Found>, names: &[String]) -> Result<Vec<Found>, Diagnostics> {
+    let known: Vec<String> = found.iter().flat_map(|found| [found.record.id.clone(), found.name()]).collect();
+    let mut faults = Diagnostics::new();
+    for name in names.iter().filter(|name| !known.contains(name)) {
+        let fault = Diagnostic::error("H025", format!("none of the histories has a campaign `{name}` to leave out"));
+        faults.push(fault.help(did_you_mean(name, known.iter().map(String::as_str))));
+    }
+    let kept = found.into_iter().filter(|found| !names.contains(&found.record.id) && !names.contains(&found.name()));
+    faults.or(kept.collect())
+}
+
+/// Parts that were asked for alike have to be made with the same things.
+fn check_parts(all: &[Found]) -> Diagnostics {
+    let mut first_of: BTreeMap<(&str, u64, u64), &Found> = BTreeMap::new();
+    let mut faults = Diagnostics::new();
+    for found in all.iter().filter(|found| !found.record.shards.is_empty()) {
+        let record = &found.record;
+        let first = first_of.entry((&record.config_digest, record.seed, record.planned_runs)).or_insert(found);
+        if first.whole() != found.whole() {
+            faults.push(conflict::other_ingredients(first, found));
+        }
+    }
+    faults
+}
+
+/// What makes two campaigns the same one.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Identity {
+    /// Parts of the same whole.
+    Parts(String),
+    /// Copies of the same campaign.
+    Whole { first_id: String, started: String, whole: String, content: Option<String> },
+}
+
+fn identity(found: &Found) -> Identity {
+    if !found.record.shards.is_empty() {
+        return Identity::Parts(found.whole());
+    }
+    Identity::Whole {
+        first_id: found.first_id.clone(),
+        started: found.record.started.clone(),
+        whole: found.whole(),
+        // Shrinking gives the same id to the small runs of several parts, and may do so in the same second.
+        content: found.shrunk.then(|| found.runs.values().map(|run| run.content.as_str()).collect()),
+    }
+}
+
+/// Campaigns that are the same one; the destination's first, then by start, id and folder.
+fn groups(all: &[Found]) -> Vec<Vec<&Found>> {
+    let mut groups: BTreeMap<Identity, Vec<&Found>> = BTreeMap::new();
+    for found in all {
+        groups.entry(identity(found)).or_default().push(found);
+    }
+    let mut groups: Vec<Vec<&Found>> = groups.into_values().collect();
+    for group in &mut groups {
+        group.sort_by(|a, b| order(a).cmp(&order(b)));
+    }
+    groups.sort_by(|a, b| order(a[0]).cmp(&order(b[0])));
+    groups
+}
+
+fn order(found: &Found) -> (bool, &str, &str, &str) {
+    (found.place.is_some(), &found.record.started, &found.record.id, &found.dir)
+}
+
+fn check_group(group: &[&Found], faults: &mut Diagnostics) {
+    let own: Vec<&Found> = group.iter().copied().filter(|found| found.place.is_none()).collect();
+    if own.len() > 1 {
+        faults.push(conflict::parts_in_place(&own));
+    }
+    for (at, first) in group.iter().enumerate() {
+        for second in &group[at + 1..] {
+            let both = || first.runs.iter().filter_map(|(index, run)| Some((*index, run, second.runs.get(index)?)));
+            let differing: Vec<u64> =
+                both().filter(|(_, a, b)| a.content != b.content).map(|(index, ..)| index).collect();
+            if !differing.is_empty() {
+                faults.push(conflict::other_results(first, second, &differing));
+                continue;
+            }
+            let apart = |a: &BTreeSet<String>, b: &BTreeSet<String>| !a.is_subset(b) && !b.is_subset(a);
+            let judged: Vec<u64> =
+                both().filter(|(_, a, b)| apart(&a.later, &b.later)).map(|(index, ..)| index).collect();
+            if !judged.is_empty() {
+                faults.push(conflict::other_judgements(first, second, &judged));
+            }
+        }
+    }
+}
+
+/// An id for each group: its own where that is free.
+fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) -> Vec<String> {
+    let everywhere: BTreeSet<&str> = groups.iter().flatten().map(|found| found.record.id.as_str()).collect();
+    let mut taken: BTreeMap<String, &Found> = BTreeMap::new();
+    let mut ids = Vec::new();
+    for group in groups {
+        let found = group[0];
+        let id = match taken.get(&found.record.id) {
+            None => found.record.id.clone(),
+            Some(first) => {
+                // Nobody chose the ids of shrunk runs, and parts that were shrunk apart come to the same ones.
+                if !rename && !found.shrunk {
+                    faults.push(conflict::id_taken(first, found));
+                }
+                free_id(found, |id| everywhere.contains(id) || taken.contains_key(id))
+            }
+        };
+        taken.insert(id.clone(), found);
+        ids.push(id);
+    }
+    ids
+}
+
+fn free_id(found: &Found, taken: impl Fn(&str) -> bool) -> String {
+    let record = &found.record;
+    let mut ids = (0..1_000_000).map(|counter| campaign_id(&record.config_digest, record.seed, counter));
+    ids.find(|id| !taken(id)).unwrap_or_else(|| record.config_digest.clone())
+}
+
+fn new_ids(groups: &[Vec<&Found>], campaigns: &[PlannedMerge]) -> BTreeMap<(usize, String), String> {
+    let of_name: BTreeMap<&String, &String> =
+        campaigns.iter().flat_map(|campaign| campaign.from.iter().map(|name| (name, &campaign.id))).collect();
+    let ids = groups
+        .iter()
+        .flatten()
+        .filter_map(|found| Some(((found.place?, found.record.id.clone()), (*of_name.get(&found.name())?).clone())));
+    ids.collect()
+}
+
+fn started(group: &[&Found]) -> String {
+    group.iter().map(|found| found.record.started.clone()).min().unwrap_or_default()
+}
+
+/// A run and where it is.
+type Copy<'a> = (&'a Found, &'a FoundRun);
+
+/// What becomes of a group.
+fn planned(group: &[&Found], id: String) -> PlannedMerge {
+    let own = group.iter().find(|found| found.place.is_none());
+    let first = group[0];
+    let mut copies: BTreeMap<u64, Vec<Copy<'_>>> = BTreeMap::new();
+    for found in group {
+        for (index, run) in &found.runs {
+            copies.entry(*index).or_default().push((found, run));
+        }
+    }
+    // The one that was judged last, then the one that was made first: whatever the order of the histories.
+    let best: BTreeMap<u64, Copy<'_>> = copies
+        .into_iter()
+        .filter_map(|(index, copies)| {
+            let best = copies.into_iter().min_by(|(a, x), (b, y)| {
+                let rank = |run: &FoundRun| std::cmp::Reverse(run.later.len());
+                (rank(x), &x.row.started, order(a)).cmp(&(rank(y), &y.row.started, order(b)))
+            });
+            Some((index, best?))
+        })
+        .collect();
+    let of = |(found, run): &Copy<'_>| Some((found.place?, run.row.run.clone()));
+    let known = |index: &u64| own.and_then(|own| own.runs.get(index));
+    let runs: BTreeMap<u64, (usize, String)> = best
+        .iter()
+        .filter(|(index, _)| known(index).is_none())
+        .filter_map(|(index, copy)| Some((*index, of(copy)?)))
+        .collect();
+    let judgements = best
+        .iter()
+        .filter(|(index, (_, run))| known(index).is_some_and(|own| own.later.len() < run.later.len()))
+        .filter_map(|(index, copy)| Some((*index, of(copy)?)))
+        .collect();
+    let joined = !first.record.shards.is_empty();
+    let missing: Vec<u64> = match joined {
+        true => (0..first.record.planned_runs).filter(|index| !best.contains_key(index)).collect(),
+        false => Vec::new(),
+    };
+    let end = if joined { end_of_parts(group, &best, &missing, !runs.is_empty()) } else { end_of_copies(group) };
+    let said: BTreeSet<String> =
+        own.map(|own| own.record.shards.iter().map(ToString::to_string).collect()).unwrap_or_default();
+    let shards: BTreeSet<String> =
+        group.iter().flat_map(|found| found.record.shards.iter().map(ToString::to_string)).collect();
+    PlannedMerge {
+        id,
+        name: first.record.name.clone(),
+        from: group.iter().map(|found| found.name()).collect(),
+        joined,
+        runs: best.len() as u64,
+        added: runs.len() as u64,
+        planned: first.record.planned_runs,
+        missing,
+        work: Work {
+            statements: first.place.map(|place| (place, first.record.id.clone())),
+            shards: shards.difference(&said).cloned().collect(),
+            started: own.is_none().then(|| started(group)),
+            runs,
+            judgements,
+            end,
+        },
+    }
+}
+
+/// The end of the copy that came farthest.
+fn end_of_copies(group: &[&Found]) -> PlannedEnd {
+    let rank =
+        |found: &&&Found| (found.runs.len(), found.row.ended.is_some(), !found.row.interrupted, found.place.is_none());
+    match group.iter().max_by_key(rank) {
+        Some(found) => found.place.map_or(PlannedEnd::Same, |place| PlannedEnd::Of(place, found.record.id.clone())),
+        None => PlannedEnd::Same,
+    }
+}
+
+/// The end of all parts together, as the whole campaign would have written it.
+fn end_of_parts(group: &[&Found], best: &BTreeMap<u64, Copy<'_>>, missing: &[u64], more: bool) -> PlannedEnd {
+    let own = group.iter().find(|found| found.place.is_none());
+    let Some(ended) = group.iter().filter_map(|found| found.row.ended.clone()).max() else { return PlannedEnd::Same };
+    if own.is_some_and(|own| own.row.ended.is_some()) && !more {
+        return PlannedEnd::Same;
+    }
+    let runs = || best.values().map(|(_, run)| run);
+    let mut counts = Counts::default();
+    runs().for_each(|run| counts.add_all(run.counts));
+    PlannedEnd::Computed(Box::new(CampaignEnd {
+        ended,
+        score: mean(runs().map(|run| run.row.score)),
+        score_without_broken: mean(runs().filter(|run| run.row.status != RunStatus::Broken).map(|run| run.row.score)),
+        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
+        discards: runs().map(|run| run.discards).sum(),
+        ended_by: None,
+        interrupted: !missing.is_empty(),
+    }))
+}

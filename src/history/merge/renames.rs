@@ -1,0 +1,178 @@
+//! New ids for campaigns, and with them for their runs and all that is named after these.
+
+use std::collections::BTreeMap;
+
+use oxigraph::model::{BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term};
+
+use crate::base::names;
+use crate::history::read::text_of;
+use crate::history::statements::iri;
+use crate::history::write_run::unique;
+
+/// How the campaigns of one history are called in another.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Renames {
+    new_ids: BTreeMap<String, String>,
+}
+
+impl Renames {
+    /// From pairs of an old and a new id.
+    pub(super) fn new(pairs: impl IntoIterator<Item = (String, String)>) -> Self {
+        Self { new_ids: pairs.into_iter().filter(|(old, new)| old != new).collect() }
+    }
+
+    /// The new id of a run.
+    pub(super) fn run(&self, id: &str) -> String {
+        let renamed =
+            id.rsplit_once('-').and_then(|(old, number)| Some(format!("{}-{number}", self.new_ids.get(old)?)));
+        renamed.unwrap_or_else(|| id.to_owned())
+    }
+
+    /// An IRI, renamed where it is of a campaign or run or below one.
+    fn iri(&self, text: &str) -> String {
+        let of = |namespace: &str, new: &dyn Fn(&str) -> Option<String>| {
+            let rest = text.strip_prefix(namespace)?;
+            let (id, below) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
+            Some(format!("{namespace}{}{below}", new(id)?))
+        };
+        of(names::RUN, &|id| Some(self.run(id)))
+            .or_else(|| of(names::CAMPAIGN, &|id| self.new_ids.get(id).cloned()))
+            .unwrap_or_else(|| text.to_owned())
+    }
+
+    /// The quads of a run or of a campaign as they would be if it had been made under its new id.
+    pub(super) fn apply(&self, quads: Vec<Quad>) -> Vec<Quad> {
+        if self.new_ids.is_empty() {
+            return quads;
+        }
+        let labels = Labels::read(self, &quads);
+        quads.into_iter().map(|quad| self.quad(&quad, &labels)).collect()
+    }
+
+    fn quad(&self, quad: &Quad, labels: &Labels) -> Quad {
+        let named = |node: &NamedNode| NamedNode::new_unchecked(self.iri(node.as_str()));
+        let subject = match &quad.subject {
+            NamedOrBlankNode::NamedNode(node) => NamedOrBlankNode::from(named(node)),
+            NamedOrBlankNode::BlankNode(node) => labels.of(node).into(),
+        };
+        let object = match &quad.object {
+            Term::NamedNode(node) => Term::from(named(node)),
+            Term::BlankNode(node) => labels.of(node).into(),
+            Term::Literal(literal) if quad.predicate == iri("rdfs:label") => self.label(literal).into(),
+            other => other.clone(),
+        };
+        let graph = match &quad.graph_name {
+            GraphName::NamedNode(node) => GraphName::from(named(node)),
+            other => other.clone(),
+        };
+        Quad::new(subject, quad.predicate.clone(), object, graph)
+    }
+
+    /// A campaign's label may end in the id of the run that was shrunk.
+    fn label(&self, literal: &Literal) -> Literal {
+        match literal.value().rsplit_once(' ') {
+            Some((words, run)) => Literal::new_simple_literal(format!("{words} {}", self.run(run))),
+            None => literal.clone(),
+        }
+    }
+}
+
+/// Labels of the blank nodes of a run: digests of what they are about, so that they change with its id.
+#[derive(Default)]
+struct Labels {
+    new: BTreeMap<String, BlankNode>,
+}
+
+/// What the label of an assertion is made of.
+#[derive(Default)]
+struct Assertion {
+    execution: String,
+    property: String,
+    at: Option<String>,
+    supersedes: Option<String>,
+    result: Option<String>,
+}
+
+impl Labels {
+    fn read(renames: &Renames, quads: &[Quad]) -> Self {
+        let mut assertions: BTreeMap<String, Assertion> = BTreeMap::new();
+        let (subject, test, result) = (iri("earl:subject"), iri("earl:test"), iri("earl:result"));
+        let (at, supersedes) = (iri("act:recheckedAt"), iri("act:supersedes"));
+        for quad in quads {
+            let NamedOrBlankNode::BlankNode(node) = &quad.subject else { continue };
+            let assertion = assertions.entry(node.as_str().to_owned()).or_default();
+            let text = text_of(&quad.object);
+            match &quad.predicate {
+                known if *known == subject => assertion.execution = renames.iri(&text),
+                known if *known == test => assertion.property = text,
+                known if *known == result => assertion.result = Some(text),
+                known if *known == at => assertion.at = Some(text),
+                known if *known == supersedes => assertion.supersedes = Some(text),
+                _ => {}
+            }
+        }
+        assertions.retain(|_, assertion| !assertion.execution.is_empty());
+        let mut labels = Self::default();
+        // Each names the one before it, which therefore comes first; what is in a circle is damaged and keeps its label.
+        loop {
+            let ready: Vec<String> = assertions
+                .iter()
+                .filter(|(_, assertion)| {
+                    assertion
+                        .supersedes
+                        .as_ref()
+                        .is_none_or(|before| labels.new.contains_key(before) || !assertions.contains_key(before))
+                })
+                .map(|(label, _)| label.clone())
+                .collect();
+            if ready.is_empty() {
+                return labels;
+            }
+            for label in ready {
+                if let Some(assertion) = assertions.remove(&label) {
+                    labels.add(label, assertion);
+                }
+            }
+        }
+    }
+
+    /// As the writers of outcomes and of later judgements label them.
+    fn add(&mut self, label: String, assertion: Assertion) {
+        let Assertion { execution, property, at, supersedes, result } = assertion;
+        let [own, of_result] = match &at {
+            None => ["assertion", "result"].map(|part| unique(&[&execution, &property, part])),
+            Some(at) => {
+                let before = supersedes.map(|before| self.new.get(&before).map_or(before, ToString::to_string));
+                let before = before.unwrap_or_default();
+                ["recheck", "recheck result"].map(|part| unique(&[&execution, &property, part, at, &before]))
+            }
+        };
+        self.new.insert(label, own);
+        if let Some(result) = result {
+            self.new.insert(result, of_result);
+        }
+    }
+
+    fn of(&self, node: &BlankNode) -> BlankNode {
+        self.new.get(node.as_str()).unwrap_or(node).clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_campaign_of_that_id_is_renamed() {
+        let renames = Renames::new([("k".to_owned(), "m".to_owned()), ("a".to_owned(), "a".to_owned())]);
+        let run = |rest: &str| format!("{}{rest}", names::RUN);
+        assert_eq!(renames.iri(&run("k-1/state/0")), run("m-1/state/0"));
+        assert_eq!(renames.iri(&run("k-12")), run("m-12"));
+        assert_eq!(renames.iri(&run("kk-1")), run("kk-1"));
+        assert_eq!(renames.iri(&format!("{}k/rule/1", names::CAMPAIGN)), format!("{}m/rule/1", names::CAMPAIGN));
+        assert_eq!(renames.iri(&names::act("k-1")), names::act("k-1"));
+        assert_eq!(renames.run("a-1"), "a-1");
+        assert_eq!(renames.label(&Literal::new_simple_literal("shrunk k-3")).value(), "shrunk m-3");
+        assert_eq!(renames.label(&Literal::new_simple_literal("pick")).value(), "pick");
+    }
+}

@@ -1,0 +1,139 @@
+//! What a history holds, as far as merging has to know it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::{Diagnostics, Digest};
+use crate::history::read::Node;
+use crate::history::write_campaign::campaign_node;
+use crate::history::write_run::run_node;
+use crate::history::{CampaignRecord, CampaignRow, History, OutcomeRow, RunFilter, RunRow, lists};
+use crate::verdict::Counts;
+
+/// A campaign of one of the histories.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    /// Position of its history among those that are merged; nothing: it is in the destination.
+    pub(super) place: Option<usize>,
+    /// The folder of its history, as it was given.
+    pub(super) dir: String,
+    pub(super) record: CampaignRecord,
+    pub(super) row: CampaignRow,
+    /// Id that it had where it was run.
+    pub(super) first_id: String,
+    /// Whether it holds the smaller form of a run.
+    pub(super) shrunk: bool,
+    /// By index.
+    pub(super) runs: BTreeMap<u64, FoundRun>,
+}
+
+/// A run of one of the histories.
+#[derive(Debug, Clone)]
+pub(super) struct FoundRun {
+    pub(super) row: RunRow,
+    /// Digest over everything that must be the same wherever it is made.
+    pub(super) content: String,
+    pub(super) counts: Counts,
+    pub(super) discards: u64,
+    /// The judgements that were made later.
+    pub(super) later: BTreeSet<String>,
+}
+
+impl Found {
+    /// As it is called in messages.
+    pub(super) fn name(&self) -> String {
+        format!("{}#{}", self.dir, self.record.id)
+    }
+
+    /// Digest over everything that its results depend on.
+    pub(super) fn whole(&self) -> String {
+        let record = &self.record;
+        let mut digest = Digest::new();
+        for text in [&record.config_digest, &record.ontology_digest, &record.program_version] {
+            digest.update(text.as_bytes());
+        }
+        for number in [record.seed, record.planned_runs, u64::from(record.repeat)] {
+            digest.update(&number.to_le_bytes());
+        }
+        for (name, of) in record.rules.iter().map(|(property, _, of)| (property, of)).chain(
+            // Both are sorted.
+            record.models.iter().map(|(name, of)| (name, of)),
+        ) {
+            digest.update(name.as_bytes());
+            digest.update(of.as_bytes());
+        }
+        digest.finish()
+    }
+}
+
+/// All campaigns of a history.
+///
+/// # Errors
+/// It can't be read.
+pub(super) fn survey(history: &History, place: Option<usize>) -> Result<Vec<Found>, Diagnostics> {
+    let shrunk = history.shrunk_campaigns()?;
+    let store = history.store()?;
+    let mut later: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for (run, judgement) in lists::later_judgements(&store).map_err(|error| history.query_fault(&error))? {
+        later.entry(run).or_default().insert(judgement);
+    }
+    let mut all = Vec::new();
+    for row in history.campaigns()? {
+        let node =
+            Node::read(&store, &campaign_node(&row.id)).map_err(|error| history.fault("reading a campaign", &error))?;
+        let runs = runs(history, &row.id, &mut later)?;
+        all.push(Found {
+            place,
+            dir: history.dir().display().to_string(),
+            record: history.campaign(&row.id)?,
+            first_id: node.text("act:firstId").unwrap_or_else(|| row.id.clone()),
+            shrunk: shrunk.contains(&row.id),
+            runs,
+            row,
+        });
+    }
+    Ok(all)
+}
+
+fn runs(
+    history: &History,
+    campaign: &str,
+    later: &mut BTreeMap<String, BTreeSet<String>>,
+) -> Result<BTreeMap<u64, FoundRun>, Diagnostics> {
+    let filter = RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() };
+    let mut outcomes: BTreeMap<String, Vec<OutcomeRow>> = BTreeMap::new();
+    for row in history.outcomes(&filter)? {
+        outcomes.entry(row.run.clone()).or_default().push(row);
+    }
+    let store = history.store()?;
+    let mut runs = BTreeMap::new();
+    for row in history.runs(&filter)? {
+        let node = Node::read(&store, &run_node(&row.run)).map_err(|error| history.fault("reading a run", &error))?;
+        let outcomes = outcomes.remove(&row.run).unwrap_or_default();
+        let run = FoundRun {
+            content: content(&row, &outcomes),
+            counts: Counts::of(outcomes.iter().map(|outcome| outcome.outcome)),
+            discards: node.count("act:discards").unwrap_or_default(),
+            later: later.remove(&row.run).unwrap_or_default(),
+            row,
+        };
+        runs.insert(run.row.index, run);
+    }
+    Ok(runs)
+}
+
+/// Times and ids are left out.
+fn content(row: &RunRow, outcomes: &[OutcomeRow]) -> String {
+    let mut digest = Digest::new();
+    for text in [&row.test, row.status.word(), &row.trace_hash] {
+        digest.update(text.as_bytes());
+    }
+    digest.update(&row.score.to_bits().to_le_bytes());
+    for outcome in outcomes {
+        digest.update(&outcome.step.to_le_bytes());
+        for text in [&outcome.action, &outcome.property, outcome.outcome.word()] {
+            digest.update(text.as_bytes());
+        }
+        digest.update(&outcome.margin.map_or(0, f64::to_bits).to_le_bytes());
+    }
+    digest.finish()
+}
