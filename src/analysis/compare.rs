@@ -25,8 +25,8 @@ pub enum Compared {
 pub struct ComparedRun {
     /// Its id.
     pub run: String,
-    /// Position in the campaign, from 0.
-    pub index: u64,
+    /// Number of its scene in the campaign, and of the run among those of the scene, both from 0.
+    pub place: (u64, u64),
     /// Its scene.
     pub scene: SceneDigest,
     outcomes: BTreeMap<Compared, Outcome>,
@@ -62,9 +62,9 @@ pub struct Comparison {
     pub pairs: u64,
     /// Of those, the ones whose objects have other masses, frictions or restitutions.
     pub other_physics: u64,
-    /// Runs whose index the other side lacks, of the first and of the second.
+    /// Runs whose place the other side lacks, of the first and of the second.
     pub alone: [Vec<String>; 2],
-    /// Runs with the same index and another scene.
+    /// Runs with the same place and another scene.
     pub other_scene: Vec<(String, String)>,
     /// What only one side judged, of the first and of the second.
     pub judged_alone: [Vec<Compared>; 2],
@@ -72,7 +72,7 @@ pub struct Comparison {
     pub lines: Vec<ComparedLine>,
 }
 
-/// The runs of a campaign for a comparison, by index. What is unknown of a run leaves it out.
+/// The runs of a campaign for a comparison, by place. What is unknown of a run leaves it out.
 pub fn compared_runs(
     runs: &[RunRow],
     scenes: &BTreeMap<String, SceneDigest>,
@@ -97,9 +97,10 @@ pub fn compared_runs(
             }
         };
         outcomes.insert(Compared::WholeRun, whole);
-        found.push(ComparedRun { run: row.run.clone(), index: row.index, scene: scene.clone(), outcomes });
+        let place = row.repetition.map_or((row.index, 0), |repetition| (repetition.scene, repetition.number));
+        found.push(ComparedRun { run: row.run.clone(), place, scene: scene.clone(), outcomes });
     }
-    found.sort_by(|a, b| (a.index, &a.run).cmp(&(b.index, &b.run)));
+    found.sort_by(|a, b| (a.place, &a.run).cmp(&(b.place, &b.run)));
     found
 }
 
@@ -110,40 +111,71 @@ fn together(one: Outcome, other: Outcome) -> Outcome {
     STRONGEST_FIRST.into_iter().find(|outcome| [one, other].contains(outcome)).unwrap_or(one)
 }
 
-/// Compares two campaigns run by run: those with the same index and the same scene.
+/// Compares two campaigns run by run: those with the same place in it and the same scene.
+///
+/// Where scenes are run more than once, a scene passes when all of its runs do: runs of one scene are too alike to count each. Only as
+/// many of them as both sides have are looked at.
 pub fn compare(first: &[ComparedRun], second: &[ComparedRun]) -> Comparison {
-    let by_index =
-        |runs: &'_ [ComparedRun]| runs.iter().enumerate().map(|(at, run)| (run.index, at)).collect::<BTreeMap<_, _>>();
-    let (firsts, seconds) = (by_index(first), by_index(second));
-    let alone = |runs: &[ComparedRun], other: &BTreeMap<u64, usize>| {
-        runs.iter().filter(|run| !other.contains_key(&run.index)).map(|run| run.run.clone()).collect::<Vec<_>>()
+    let by_place = |runs: &'_ [ComparedRun]| runs.iter().enumerate().map(|(at, run)| (run.place, at)).collect();
+    let (firsts, seconds): (BTreeMap<_, usize>, BTreeMap<_, usize>) = (by_place(first), by_place(second));
+    let alone = |runs: &[ComparedRun], other: &BTreeMap<(u64, u64), usize>| {
+        runs.iter().filter(|run| !other.contains_key(&run.place)).map(|run| run.run.clone()).collect::<Vec<_>>()
     };
-    let met: Vec<(&ComparedRun, &ComparedRun)> =
-        firsts.iter().filter_map(|(index, at)| Some((&first[*at], &second[*seconds.get(index)?]))).collect();
-    let (pairs, others): (Vec<_>, Vec<_>) =
-        met.into_iter().partition(|(a, b)| a.scene.arrangement == b.scene.arrangement);
-    let judged = [judged(pairs.iter().map(|(a, _)| *a)), judged(pairs.iter().map(|(_, b)| *b))];
+    let met: Vec<[&ComparedRun; 2]> =
+        firsts.iter().filter_map(|(place, at)| Some([&first[*at], &second[*seconds.get(place)?]])).collect();
+    let (same, others): (Vec<_>, Vec<_>) =
+        met.into_iter().partition(|[a, b]| a.scene.arrangement == b.scene.arrangement);
+    let pairs = scene_pairs(&same);
+    let judged = [0, 1].map(|side| pairs.iter().flat_map(|pair| pair.outcomes[side].keys().cloned()).collect());
+    let [judged_first, judged_second]: [BTreeSet<Compared>; 2] = judged;
     Comparison {
         pairs: pairs.len() as u64,
-        other_physics: pairs.iter().filter(|(a, b)| a.scene.physics != b.scene.physics).count() as u64,
+        other_physics: pairs.iter().filter(|pair| pair.other_physics).count() as u64,
         alone: [alone(first, &seconds), alone(second, &firsts)],
-        other_scene: others.into_iter().map(|(a, b)| (a.run.clone(), b.run.clone())).collect(),
+        other_scene: others.into_iter().map(|[a, b]| (a.run.clone(), b.run.clone())).collect(),
         judged_alone: [
-            judged[0].difference(&judged[1]).cloned().collect(),
-            judged[1].difference(&judged[0]).cloned().collect(),
+            judged_first.difference(&judged_second).cloned().collect(),
+            judged_second.difference(&judged_first).cloned().collect(),
         ],
-        lines: lines(&pairs, judged[0].intersection(&judged[1])),
+        lines: lines(&pairs, judged_first.intersection(&judged_second)),
     }
 }
 
-fn judged<'a>(runs: impl Iterator<Item = &'a ComparedRun>) -> BTreeSet<Compared> {
-    runs.flat_map(|run| run.outcomes.keys().cloned()).collect()
+/// One scene in both campaigns.
+struct ScenePair {
+    /// The first run of the scene in each.
+    runs: (String, String),
+    outcomes: [BTreeMap<Compared, Outcome>; 2],
+    other_physics: bool,
 }
 
-fn lines<'a>(
-    pairs: &[(&ComparedRun, &ComparedRun)],
-    compared: impl Iterator<Item = &'a Compared>,
-) -> Vec<ComparedLine> {
+/// The runs of each scene together. Shape of the argument: sorted by place.
+fn scene_pairs(same: &[[&ComparedRun; 2]]) -> Vec<ScenePair> {
+    let mut pairs: Vec<(u64, ScenePair)> = Vec::new();
+    for [first, second] in same {
+        match pairs.last_mut() {
+            Some((scene, pair)) if *scene == first.place.0 => {
+                for (known, run) in pair.outcomes.iter_mut().zip([first, second]) {
+                    for (of, outcome) in &run.outcomes {
+                        let before = known.get(of).copied();
+                        known.insert(of.clone(), before.map_or(*outcome, |before| together(before, *outcome)));
+                    }
+                }
+            }
+            _ => pairs.push((
+                first.place.0,
+                ScenePair {
+                    runs: (first.run.clone(), second.run.clone()),
+                    outcomes: [first.outcomes.clone(), second.outcomes.clone()],
+                    other_physics: first.scene.physics != second.scene.physics,
+                },
+            )),
+        }
+    }
+    pairs.into_iter().map(|(_, pair)| pair).collect()
+}
+
+fn lines<'a>(pairs: &[ScenePair], compared: impl Iterator<Item = &'a Compared>) -> Vec<ComparedLine> {
     let mut lines: Vec<ComparedLine> = compared.map(|of| line(pairs, of)).collect();
     let two_sided = holm(&lines.iter().map(|line| line.test.two_sided).collect::<Vec<f64>>());
     let worse = holm(&lines.iter().map(|line| line.test.second_worse).collect::<Vec<f64>>());
@@ -153,20 +185,19 @@ fn lines<'a>(
     lines
 }
 
-fn line(pairs: &[(&ComparedRun, &ComparedRun)], of: &Compared) -> ComparedLine {
+fn line(pairs: &[ScenePair], of: &Compared) -> ComparedLine {
     let mut table = PairedTable::default();
     let (mut worse, mut better, mut left_out) = (Vec::new(), Vec::new(), [Counts::default(); 2]);
-    for (first, second) in pairs {
-        let outcomes = [first, second].map(|run| run.outcomes.get(of).copied().unwrap_or(Outcome::Untested));
+    for pair in pairs {
+        let outcomes = pair.outcomes.each_ref().map(|known| known.get(of).copied().unwrap_or(Outcome::Untested));
         let [Some(a), Some(b)] = outcomes.map(decided) else {
             left_out.iter_mut().zip(outcomes).for_each(|(counts, outcome)| counts.add(outcome));
             continue;
         };
         table.add(a, b);
-        let ids = || (first.run.clone(), second.run.clone());
         match (a, b) {
-            (true, false) => worse.push(ids()),
-            (false, true) => better.push(ids()),
+            (true, false) => worse.push(pair.runs.clone()),
+            (false, true) => better.push(pair.runs.clone()),
             _ => {}
         }
     }
@@ -273,6 +304,30 @@ mod tests {
         assert_eq!(whole(&[("p", Passed), ("q", Inapplicable)]), Passed);
         assert_eq!(whole(&[("p", Inapplicable)]), Inapplicable);
         assert_eq!(whole(&[]), Untested);
+    }
+
+    #[test]
+    fn a_scene_that_is_run_often_counts_once_and_passes_when_all_its_runs_do() {
+        let runs = |outcomes: &[&[Outcome]]| -> Vec<ComparedRun> {
+            let scenes = (0u64..).zip(outcomes).flat_map(|(scene, outcomes)| {
+                (0u64..).zip(*outcomes).map(move |(number, outcome)| {
+                    let index = 10 * scene + number;
+                    ComparedRun { place: (scene, number), ..run(index, "s", &[("p", *outcome)]) }
+                })
+            });
+            scenes.collect()
+        };
+        let a = runs(&[&[Passed, Passed, Failed], &[Passed, Passed, Passed], &[Passed, Broken, Passed]]);
+        let b = runs(&[&[Passed, Passed], &[Passed, Failed], &[Passed, Passed]]);
+        let found = compare(&a, &b);
+        assert_eq!((found.pairs, found.alone[0].len(), found.alone[1].len()), (3, 3, 0));
+        for line in &found.lines {
+            assert_eq!(line.table, PairedTable { both: 1, only_first: 1, ..PairedTable::default() });
+            assert_eq!(
+                (line.worse.as_slice(), line.left_out[0].broken),
+                (&[("k-11".to_owned(), "k-11".to_owned())][..], 1)
+            );
+        }
     }
 
     #[test]

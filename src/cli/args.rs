@@ -48,7 +48,7 @@ pub enum Command {
     /// Compare two campaigns on the same scenes: which properties hold less or more often, and where it flipped
     ///
     /// Runs with the same number and the same scene (test, world, what stands where) make a pair; other runs are counted and named.
-    /// For each property, and for whole runs (some property passed, none failed), both rates, their difference with a 95 %
+    /// Of a scene that is run more than once all runs have to pass. For each property, and for whole runs (some property passed, none failed), both rates, their difference with a 95 %
     /// interval (Tango's score interval for pairs), McNemar's exact test, and Holm's correction for the number of lines.
     ///
     /// Only passed and failed say something of the robot: a scene in which either side is inapplicable, broken, timed out or
