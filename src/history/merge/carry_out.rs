@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use oxigraph::model::{GraphName, GraphNameRef, NamedNode, Quad, Term};
+use oxigraph::model::{GraphName, GraphNameRef, Literal, NamedNode, Quad};
 use oxigraph::store::{StorageError, Store};
 
 use crate::base::{Diagnostic, Diagnostics};
@@ -82,36 +82,35 @@ impl Writer<'_> {
     fn begin(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
         let work = &campaign.work;
         let node = campaign_node(&campaign.id);
-        let mut quads = Vec::new();
-        if let Some((place, id)) = &work.statements {
-            let source = &self.sources[*place];
-            quads = self.about(*place, &campaign_node(id))?;
-            let start = iri("prov:startedAtTime");
-            let path = iri("act:configPath");
-            let first = quads.iter().any(|quad| quad.predicate == iri("act:firstId"));
-            quads.retain(|quad| !(is_end(quad) || work.started.is_some() && quad.predicate == start));
-            for quad in quads.iter_mut().filter(|quad| quad.predicate == path) {
-                quad.object = Term::from(oxigraph::model::Literal::new_simple_literal(moved(
-                    &text_of(&quad.object),
-                    source.dir(),
-                    self.into.dir(),
-                )));
-            }
-            if *id != campaign.id && !campaign.joined && !first {
-                let mut statements = Statements::default();
-                statements.about(node.clone()).text("act:firstId", id);
-                quads.extend(statements.quads);
-            }
-        }
         let mut statements = Statements::default();
         let mut about = statements.about(node.clone());
-        work.shards.iter().for_each(|shard| {
+        for shard in &work.shards {
             about.text("act:shard", shard);
-        });
+        }
         about.may("prov:startedAtTime", work.started.as_deref().map(time));
-        quads.extend(statements.quads);
+        let mut quads = statements.quads;
+        if let Some((place, id)) = &work.statements {
+            quads.extend(self.statements(campaign, *place, id)?);
+        }
         let ends = if matches!(work.end, PlannedEnd::Same) { Vec::new() } else { self.ends(&node)? };
         self.write(&quads, &ends)
+    }
+
+    /// What a history says of a campaign that the destination lacks, without its times.
+    fn statements(&self, campaign: &PlannedMerge, place: usize, id: &str) -> Result<Vec<Quad>, Diagnostics> {
+        let [start, path, first] = ["prov:startedAtTime", "act:configPath", "act:firstId"].map(iri);
+        let mut quads = self.about(place, &campaign_node(id))?;
+        quads.retain(|quad| !is_end(quad) && quad.predicate != start);
+        for quad in quads.iter_mut().filter(|quad| quad.predicate == path) {
+            let moved = moved(&text_of(&quad.object), self.sources[place].dir(), self.into.dir());
+            quad.object = Literal::new_simple_literal(moved).into();
+        }
+        if id != campaign.id && !campaign.joined && !quads.iter().any(|quad| quad.predicate == first) {
+            let mut statements = Statements::default();
+            statements.about(campaign_node(&campaign.id)).text("act:firstId", id);
+            quads.extend(statements.quads);
+        }
+        Ok(quads)
     }
 
     fn run(&mut self, place: usize, run: &str, new: &str) -> Result<(), Diagnostics> {

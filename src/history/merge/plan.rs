@@ -1,8 +1,9 @@
 //! What will be in the destination, checked against everything that is known.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostic, Diagnostics, did_you_mean};
+use crate::base::{Diagnostic, Diagnostics, Shard, did_you_mean};
 use crate::history::merge::conflict;
 use crate::history::merge::survey::{Found, FoundRun, survey};
 use crate::history::store::campaign_id;
@@ -241,47 +242,19 @@ type Copy<'a> = (&'a Found, &'a FoundRun);
 
 /// What becomes of a group.
 fn planned(group: &[&Found], id: String) -> PlannedMerge {
-    let own = group.iter().find(|found| found.place.is_none());
+    let own = group.iter().copied().find(|found| found.place.is_none());
     let first = group[0];
-    let mut copies: BTreeMap<u64, Vec<Copy<'_>>> = BTreeMap::new();
-    for found in group {
-        for (index, run) in &found.runs {
-            copies.entry(*index).or_default().push((found, run));
-        }
-    }
-    // The one that was judged last, then the one that was made first: whatever the order of the histories.
-    let best: BTreeMap<u64, Copy<'_>> = copies
-        .into_iter()
-        .filter_map(|(index, copies)| {
-            let best = copies.into_iter().min_by(|(a, x), (b, y)| {
-                let rank = |run: &FoundRun| std::cmp::Reverse(run.later.len());
-                (rank(x), &x.row.started, order(a)).cmp(&(rank(y), &y.row.started, order(b)))
-            });
-            Some((index, best?))
-        })
-        .collect();
-    let of = |(found, run): &Copy<'_>| Some((found.place?, run.row.run.clone()));
-    let known = |index: &u64| own.and_then(|own| own.runs.get(index));
-    let runs: BTreeMap<u64, (usize, String)> = best
-        .iter()
-        .filter(|(index, _)| known(index).is_none())
-        .filter_map(|(index, copy)| Some((*index, of(copy)?)))
-        .collect();
-    let judgements = best
-        .iter()
-        .filter(|(index, (_, run))| known(index).is_some_and(|own| own.later.len() < run.later.len()))
-        .filter_map(|(index, copy)| Some((*index, of(copy)?)))
-        .collect();
+    let best = best_copies(group);
     let joined = !first.record.shards.is_empty();
     let missing: Vec<u64> = match joined {
         true => (0..first.record.planned_runs).filter(|index| !best.contains_key(index)).collect(),
         false => Vec::new(),
     };
+    let runs = copies(&best, |index, _| own.is_none_or(|own| !own.runs.contains_key(&index)));
+    let judgements = copies(&best, |index, run| {
+        own.and_then(|own| own.runs.get(&index)).is_some_and(|known| known.later.len() < run.later.len())
+    });
     let end = if joined { end_of_parts(group, &best, &missing, !runs.is_empty()) } else { end_of_copies(group) };
-    let said: BTreeSet<String> =
-        own.map(|own| own.record.shards.iter().map(ToString::to_string).collect()).unwrap_or_default();
-    let shards: BTreeSet<String> =
-        group.iter().flat_map(|found| found.record.shards.iter().map(ToString::to_string)).collect();
     PlannedMerge {
         id,
         name: first.record.name.clone(),
@@ -293,13 +266,43 @@ fn planned(group: &[&Found], id: String) -> PlannedMerge {
         missing,
         work: Work {
             statements: first.place.map(|place| (place, first.record.id.clone())),
-            shards: shards.difference(&said).cloned().collect(),
+            shards: new_shards(group, own),
             started: own.is_none().then(|| started(group)),
             runs,
             judgements,
             end,
         },
     }
+}
+
+/// Of each run the copy that was judged last, then the one that was made first: whatever the order of the histories.
+fn best_copies<'a>(group: &[&'a Found]) -> BTreeMap<u64, Copy<'a>> {
+    let mut best: BTreeMap<u64, Copy<'a>> = BTreeMap::new();
+    // The destination's is the first of all, and stays where another is no better.
+    for found in group {
+        for (index, run) in &found.runs {
+            let rank = |run: &FoundRun| (Reverse(run.later.len()), run.row.started.clone());
+            let better = best.get(index).is_none_or(|(_, known)| rank(run) < rank(known));
+            if better {
+                best.insert(*index, (found, run));
+            }
+        }
+    }
+    best
+}
+
+/// History and id there of the runs that are to be taken from one.
+fn copies(best: &BTreeMap<u64, Copy<'_>>, wanted: impl Fn(u64, &FoundRun) -> bool) -> BTreeMap<u64, (usize, String)> {
+    let wanted = best.iter().filter(|(index, (_, run))| wanted(**index, run));
+    wanted.filter_map(|(index, (found, run))| Some((*index, (found.place?, run.row.run.clone())))).collect()
+}
+
+/// Parts of the group that the destination's campaign does not say yet.
+fn new_shards(group: &[&Found], own: Option<&Found>) -> Vec<String> {
+    let of = |found: &Found| found.record.shards.iter().copied().collect::<BTreeSet<Shard>>();
+    let said = own.map(of).unwrap_or_default();
+    let all: BTreeSet<Shard> = group.iter().flat_map(|found| of(found)).collect();
+    all.difference(&said).map(ToString::to_string).collect()
 }
 
 /// The end of the copy that came farthest.
