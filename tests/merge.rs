@@ -99,6 +99,7 @@ fn four_parts_in_any_order_are_the_campaign() {
     assert_eq!(listed(folder, "from one"), wanted);
     let one = open(folder, "from one");
     assert_eq!((table(&one, END), table(&one, ALL).len()), (wanted_end.clone(), wanted_all.len()));
+    drop(one);
 
     let parts: Vec<PathBuf> = (1..=4).map(|part| folder.join(format!("s{part}"))).collect();
     for (number, order) in permutations(4).into_iter().enumerate() {
@@ -152,7 +153,8 @@ fn part(folder: &Path, name: &str, id: &str, shard: &str, change: impl Fn(&mut C
 
 fn fails(folder: &Path, arguments: &[&str], wanted: &[&str]) {
     let output = actcheck(folder, &[&["merge"], arguments].concat());
-    let text = stderr(&output);
+    // Long lines are broken.
+    let text = stderr(&output).replace('│', "").split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(output.status.code(), Some(2), "{arguments:?} {text}");
     wanted.iter().for_each(|wanted| assert!(text.contains(wanted), "no `{wanted}` in {text}"));
 }
@@ -209,11 +211,7 @@ fn conflicts_are_told_with_the_way_out_and_write_nothing() {
     whole.commit(&sample_run("k", 0)).unwrap();
     drop(whole);
 
-    fails(
-        folder,
-        &["a", "rules", "--into", "new"],
-        &["H021", "rule `../rules/CloseObject.rls`", "--leave-out rules#k"],
-    );
+    fails(folder, &["a", "rules", "--into", "new"], &["H021", "CloseObject.rls`", "--leave-out rules#k"]);
     fails(folder, &["differing", "a", "--into", "new"], &["H020", "of a run: 1", "--leave-out"]);
     fails(folder, &["a", "whole", "--into", "new"], &["H022", "`a#k`", "`whole#k`", "--rename"]);
     fails(folder, &["a", "--into", "new", "--leave-out", "a#m"], &["H025", "did you mean `a#k`?"]);

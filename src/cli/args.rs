@@ -158,7 +158,7 @@ pub struct RunArgs {
     /// Workers, one simulation each; results don't depend on it [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// Only part I of N: every N-th run, beginning with the I-th; `actcheck merge` joins the parts
+    /// Only part I of N: every N-th run, beginning with the I-th; `actcheck merge` joins the parts. Budgets count for the part alone
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
     /// Shrink one run of each failure mode afterwards, as `actcheck shrink` does

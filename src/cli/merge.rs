@@ -46,7 +46,7 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
         Some(history) => history,
         None => History::open(&args.into)?,
     };
-    let progress = Progress::new(plan.campaigns.iter().map(|campaign| campaign.added).sum());
+    let progress = Progress::new(plan.campaigns.iter().map(|campaign| campaign.added).sum(), None);
     let bar = progress.bar();
     let stop = stop::on_interrupt(move || bar.println("stopping after this run; merging again goes on"));
     let merged = carry_out(&plan, &sources, &into, &stop, || progress.judged(1, 0));

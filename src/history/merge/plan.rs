@@ -205,7 +205,7 @@ fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) ->
             None => found.record.id.clone(),
             Some(first) => {
                 // Nobody chose the ids of shrunk runs, and parts that were shrunk apart come to the same ones.
-                if !rename && !found.shrunk {
+                if !rename && !found.shrunk && !asked_alike(first, found) {
                     faults.push(conflict::id_taken(first, found));
                 }
                 free_id(found, |id| everywhere.contains(id) || taken.contains_key(id))
@@ -215,6 +215,13 @@ fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) ->
         ids.push(id);
     }
     ids
+}
+
+/// Whether two parts belong to what should be one campaign: then it was told why it is not.
+fn asked_alike(first: &Found, second: &Found) -> bool {
+    let asked = |found: &Found| (found.record.config_digest.clone(), found.record.seed, found.record.planned_runs);
+    let parts = |found: &Found| !found.record.shards.is_empty();
+    parts(first) && parts(second) && asked(first) == asked(second)
 }
 
 fn free_id(found: &Found, taken: impl Fn(&str) -> bool) -> String {
