@@ -3,7 +3,7 @@
 //! Takes the failing runs of `configs/clutter.toml` (eight to twelve other objects) in order, at most eight of each failure
 //! mode, and shrinks each with the noise as recorded. Wanted: at least 20 runs of three modes, in the median at most two
 //! other objects left and at most 60 simulations, and the same set of failed properties in all. `--runs N` takes fewer;
-//! `--pictures DIR` draws the first small scene of each mode.
+//! `--pictures DIR` draws every small scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -64,8 +64,7 @@ fn main() {
             continue;
         }
         *seen += 1;
-        let draws = (*seen == 1).then_some(pictures.as_deref()).flatten();
-        let line = shrunk_line(&env, &record, mode, &manner, draws);
+        let line = shrunk_line(&env, &record, mode, &manner, pictures.as_deref());
         print_line(&line);
         lines.push(line);
     }
@@ -86,7 +85,10 @@ fn shrunk_line(env: &Env, record: &RunRecord, mode: Signature, manner: &Manner, 
         index: record.index,
         same: signature(&again) == mode,
         mode,
-        others: (others_before, again.scene.objects.iter().filter(|object| object.role == Role::Other).count()),
+        others: (
+            others_before,
+            again.scene.objects.iter().filter(|object| matches!(object.role, Role::Other | Role::Obstacle)).count(),
+        ),
         special: (special_before, shrunk.explained.influences.len()),
         simulations,
         explaining,
@@ -104,7 +106,7 @@ fn draw(record: &RunRecord, mode: &Signature, folder: &Path) {
         record.scene.objects.iter().find(|object| object.role == Role::Target).map(|object| object.id.as_str());
     let title = format!("run {} of clutter.toml, shrunk: {}", record.index + 1, words(mode));
     if let Some(picture) = run_picture(&record.trace, target, &title) {
-        let file = folder.join(format!("{}.svg", words(mode).replace(" + ", "-")));
+        let file = folder.join(format!("{:03}-{}.svg", record.index + 1, words(mode).replace(" + ", "-")));
         std::fs::create_dir_all(folder).and_then(|()| std::fs::write(file, picture)).expect("a folder to write to");
     }
 }

@@ -3,6 +3,7 @@
 mod bounds;
 mod broken;
 mod campaign;
+mod cases;
 mod check_oracles;
 mod commands;
 mod compare;
@@ -25,6 +26,7 @@ mod replay;
 mod rules;
 mod scenario;
 mod shrink;
+mod shrunk;
 mod stops;
 mod support;
 mod trust;

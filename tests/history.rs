@@ -151,6 +151,7 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         shards: Vec::new(),
         started: format!("2026-08-01T12:{minute:02}:00Z"),
         program_version: "0.1.0".to_owned(),
+        program_digest: digest_of("program"),
     }
 }
 

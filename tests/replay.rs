@@ -41,6 +41,24 @@ fn stored_runs_go_the_same_way_in_a_new_process_at_any_number_of_workers() {
 }
 
 #[test]
+fn runs_by_chance_go_the_same_way_at_one_and_two_workers() {
+    let project = project();
+    let arguments = ["run", "configs/lone_glass.toml", "--runs", "22", "--history", "h"];
+    assert_ne!(actcheck(project.path(), &arguments).status.code(), Some(2));
+    let (code, one) = replayed(project.path(), &["--sample", "20", "--jobs", "1", "--exact"]);
+    let (_, two) = replayed(project.path(), &["--sample", "20", "--jobs", "2", "--exact"]);
+    assert_eq!((code, &one), (0, &two), "{one:#}");
+    let runs = one.as_array().unwrap();
+    assert_eq!(runs.iter().filter(|run| run["same"] == true).count(), 20);
+    let (_, other) = replayed(project.path(), &["--sample", "2", "--seed", "1"]);
+    let names = |list: &Value| list.as_array().unwrap().iter().map(|run| run["run"].clone()).collect::<Vec<_>>();
+    assert_ne!(names(&other), names(&replayed(project.path(), &["--sample", "2", "--seed", "2"]).1));
+    let digest = ["query", "SELECT ?d WHERE { ?c act:programDigest ?d }", "--history", "h", "--format", "csv"];
+    let answer = stdout(&actcheck(project.path(), &digest));
+    assert!(answer.lines().nth(1).is_some_and(|digest| digest.len() == 32), "{answer}");
+}
+
+#[test]
 fn a_changed_model_is_named_with_the_first_thing_that_went_another_way() {
     let project = project();
     let id = campaign(project.path(), "1");

@@ -96,6 +96,12 @@ impl Choices {
         Self::of(Origin::Recorded { values: by_name(record), rest: Rest::Nominal })
     }
 
+    /// Decisions by name, in order where a name repeats. What is not there gets its nominal value.
+    pub fn named(values: &BTreeMap<String, Vec<f64>>) -> Self {
+        let values = values.iter().map(|(name, values)| (name.clone(), values.iter().copied().collect())).collect();
+        Self { origin: Origin::Recorded { values, rest: Rest::Nominal }, noise: None, made: Vec::new() }
+    }
+
     /// The decisions of a record, by name; what it lacks is drawn, as [`Choices::random`] does.
     pub fn partly_recorded(record: &[Choice], seed: u64, index: u64) -> Self {
         let rest = Rest::Random(generator(seed, index));

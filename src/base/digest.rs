@@ -2,6 +2,9 @@
 
 use sha2::{Digest as _, Sha256};
 
+/// Digest of the sources that this program was built from, what it depends on included.
+pub const PROGRAM_DIGEST: &str = env!("ACTCHECK_SOURCES_DIGEST");
+
 /// A running SHA-256 over parts that can't run into each other (each is preceded by its length).
 #[derive(Debug, Clone, Default)]
 pub struct Digest(Sha256);

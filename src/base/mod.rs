@@ -15,7 +15,7 @@ mod term;
 
 pub use choices::{Choice, ChoiceKind, Choices};
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
-pub use digest::{Digest, digest_of};
+pub use digest::{Digest, PROGRAM_DIGEST, digest_of};
 pub use files::Files;
 pub use geometry::Pose;
 pub use shard::{NoShard, Shard};

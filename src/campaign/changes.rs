@@ -20,7 +20,7 @@ pub struct Change {
 /// What can change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChangeKind {
-    /// This program, by its version.
+    /// This program, by its version and the digest of its sources.
     Program,
     /// The configuration's text.
     Config,
@@ -54,8 +54,9 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<Change> {
         was: Some(was.to_owned()),
         is: Some(is.to_owned()),
     };
+    let [program_was, program_is] = programs(was, is);
     let mut all = vec![
-        single(ChangeKind::Program, "actcheck", &was.program_version, &is.program_version),
+        single(ChangeKind::Program, "actcheck", &program_was, &program_is),
         single(ChangeKind::Config, &was.name, &was.config_digest, &is.config_digest),
         single(ChangeKind::Ontology, "all files", &was.ontology_digest, &is.ontology_digest),
     ];
@@ -70,6 +71,15 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<Change> {
     all
 }
 
+/// Version and digest of both programs; the version alone where one of the records has no digest.
+fn programs(was: &CampaignRecord, is: &CampaignRecord) -> [String; 2] {
+    let without = was.program_digest.is_empty() || is.program_digest.is_empty();
+    [was, is].map(|record| match without {
+        true => record.program_version.clone(),
+        false => format!("{} ({})", record.program_version, record.program_digest),
+    })
+}
+
 /// One entry for every name that either side has.
 fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String, String>) -> Vec<Change> {
     let mut names: Vec<&String> = was.keys().chain(is.keys()).collect();
@@ -79,4 +89,41 @@ fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String,
         .into_iter()
         .map(|name| Change { kind, name: name.clone(), was: was.get(name).cloned(), is: is.get(name).cloned() })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(digest: &str) -> CampaignRecord {
+        CampaignRecord {
+            id: "k7f3".to_owned(),
+            name: "pick".to_owned(),
+            config_text: String::new(),
+            config_digest: String::new(),
+            config_path: String::new(),
+            ontology_digest: String::new(),
+            rules: Vec::new(),
+            models: Vec::new(),
+            seed: 7,
+            planned_runs: 1,
+            repeat: 1,
+            time_secs: None,
+            until_width: None,
+            max_failures: None,
+            started: String::new(),
+            program_version: "0.1.0".to_owned(),
+            program_digest: digest.to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_changed_program_is_named_though_its_version_is_the_same() {
+        let found = changes(&record("aa"), &record("bb"));
+        let [change] = found.as_slice() else { panic!("{found:?}") };
+        assert_eq!((change.kind, change.name.as_str()), (ChangeKind::Program, "actcheck"));
+        assert_eq!((change.was.as_deref(), change.is.as_deref()), (Some("0.1.0 (aa)"), Some("0.1.0 (bb)")));
+        assert!(changes(&record("aa"), &record("aa")).is_empty());
+        assert!(changes(&record(""), &record("bb")).is_empty(), "an earlier program wrote no digest");
+    }
 }

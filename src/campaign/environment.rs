@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use crate::actions;
-use crate::base::{Diagnostic, Diagnostics, Source};
+use crate::base::{Choice, Diagnostic, Diagnostics, PROGRAM_DIGEST, Source};
 use crate::campaign::budget::ceiling;
+use crate::campaign::case::check_case;
+use crate::campaign::line::TEST_LEFT_OUT;
 use crate::config::{self, Campaign, Launcher, Overrides};
 use crate::history::{CampaignRecord, History};
 use crate::ontology::{self, Ontology};
@@ -90,6 +92,35 @@ impl Env {
         Ok((Self::of(loaded, Budget::default())?, record))
     }
 
+    /// The same for a configuration's text that lies nowhere: paths in it are relative to `folder`.
+    ///
+    /// # Errors
+    /// As [`Env::prepare`].
+    pub fn prepare_text(source: Source, folder: &Path, overrides: &Overrides) -> Result<Self, Diagnostics> {
+        Self::of(config::load_text(source, folder, overrides)?, Budget::default())
+    }
+
+    /// An index in this campaign whose run performs the actions of a stored run with this test and these decisions, those
+    /// included that the run leaves out.
+    ///
+    /// # Errors
+    /// `S040` the configuration has no such test.
+    pub fn index_of(&self, performed: &str, choices: &[Choice]) -> Result<u64, Diagnostics> {
+        let left_out = choices.iter().find(|choice| choice.name == TEST_LEFT_OUT).map_or(0.0, |choice| choice.value);
+        let fits = |test: &Vec<String>| {
+            let done = test.len().checked_sub(left_out as usize);
+            done.is_some_and(|done| test[..done].join(" ") == performed)
+        };
+        match self.campaign.tests.iter().position(fits) {
+            Some(test) => Ok(test as u64 * self.runs_of_a_test()),
+            None => {
+                let message = format!("the configuration {} has no test `{performed}`", self.campaign.source.name);
+                let tests: Vec<String> = self.campaign.tests.iter().map(|test| test.join(" ")).collect();
+                Err(Diagnostic::error("S040", message).help(format!("its tests: {}", tests.join("; "))).into())
+            }
+        }
+    }
+
     fn of(campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let (files, path) = &campaign.ontology;
         let ontology = ontology::load(files, path)?;
@@ -103,7 +134,8 @@ impl Env {
         let rules = RuleBook::prepare_within(&ontology, &rule_budget).map_err(|found| faults.extend(found)).ok();
         match (space, rules) {
             (Some(space), Some(rules)) if !faults.has_errors() => {
-                Ok(Self { campaign, ontology, space, rules, rule_budget })
+                faults.extend(check_case(&campaign, &space));
+                faults.or(Self { campaign, ontology, space, rules, rule_budget })
             }
             _ => Err(faults),
         }
@@ -139,6 +171,7 @@ impl Env {
             shards: self.campaign.shard.into_iter().collect(),
             started,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
+            program_digest: PROGRAM_DIGEST.to_owned(),
         }
     }
 

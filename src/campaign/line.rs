@@ -114,10 +114,13 @@ fn run_line_with(
     Ok(record)
 }
 
+/// The choice that leaves out so many of the last actions.
+pub(super) const TEST_LEFT_OUT: &str = "test.left_out";
+
 /// The actions of a run. Only a shrunk record leaves the last ones out.
 fn test_to_perform<'a>(env: &'a Env, index: u64, choices: &mut Choices) -> &'a [String] {
     let test = &env.campaign.tests[env.test_of(index)];
-    let left_out = choices.exception("test.left_out", test.len());
+    let left_out = choices.exception(TEST_LEFT_OUT, test.len());
     &test[..test.len() - left_out]
 }
 

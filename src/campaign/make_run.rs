@@ -59,7 +59,7 @@ fn kept(planned: &Planned, record: RunRecord, discards: Vec<String>) -> RunRecor
 }
 
 /// When a run that begins now is cut off.
-fn cut_of(env: &Env, manner: &Manner) -> Cut {
+pub(super) fn cut_of(env: &Env, manner: &Manner) -> Cut {
     let secs = manner.clock.secs;
     env.campaign.limits.run_secs.map_or(Cut::Never, |limit| Cut::Clock { secs, at_secs: secs() + limit })
 }

@@ -6,9 +6,11 @@
 mod replay;
 
 mod budget;
+mod case;
 mod changes;
 mod difference;
 mod environment;
+mod export;
 mod judging;
 mod line;
 mod make_run;
@@ -23,9 +25,11 @@ pub mod shrink;
 pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Recalled, Replay, replay_all};
 
 pub use budget::Spent;
+pub use case::{CaseRun, run_cases};
 pub use changes::{Change, ChangeKind, changes};
 pub use difference::{Difference, first_difference};
 pub use environment::Env;
+pub use export::{export, regressions_folder};
 pub use line::{Clock, Disturbance, Failure, Manner, run_line, run_sabotaged};
 pub use outcome::{CampaignEnd, Ending};
 pub use recheck::{RecheckEnd, RecheckOptions, recheck};

@@ -132,11 +132,11 @@ fn replay(
 ) -> Result<Replay, Diagnostics> {
     let run = &detail.row.run;
     let (choices, was) = (history.choices(run)?, history.trace(run)?);
-    let index = index_of(env, detail)?;
+    let index = env.index_of(&detail.row.test, &choices)?;
     // What the clock on the wall did is no part of a run's decisions: it is cut off at the same moment of simulated time.
     let cut_secs = cut_secs(&was);
     let cut = cut_secs.map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
-    let is = again(env, &record.id, (index, &choices), manner, cut).map_err(|why| {
+    let is = again(env, &record.id, (index, &|| Choices::recorded(&choices)), manner, cut).map_err(|why| {
         refused(detail, &why).help("a model, the configuration or the program changed: see the digests in the history")
     })?;
     let misfits = misfits(&choices, &is.choices);
@@ -169,29 +169,14 @@ fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
     Diagnostic::error("S041", format!("run {} can't be run again: {why}", detail.row.run))
 }
 
-/// An index in today's campaign whose run performs the run's test.
-fn index_of(env: &Env, detail: &RunDetail) -> Result<u64, Diagnostics> {
-    let tests: Vec<String> = env.campaign.tests.iter().map(|test| test.join(" ")).collect();
-    match tests.iter().position(|test| *test == detail.row.test) {
-        Some(test) => Ok(test as u64 * env.runs_of_a_test()),
-        None => Err(Diagnostic::error(
-            "S040",
-            format!("the configuration {} has no test `{}`", env.campaign.source.name, detail.row.test),
-        )
-        .help(format!("its tests: {}", tests.join("; ")))
-        .into()),
-    }
-}
-
 /// The run, once more. A crash of simulation is a run too.
-fn again(
+pub(super) fn again(
     env: &Env,
     campaign: &str,
-    (index, choices): (u64, &[Choice]),
+    (index, recorded): (u64, &dyn Fn() -> Choices),
     manner: &Manner,
     cut: Cut,
 ) -> Result<RunRecord, String> {
-    let recorded = || Choices::recorded(choices);
     match catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, recorded()), manner, cut))) {
         Ok(Ok(record)) => Ok(record),
         Ok(Err(Failure::Interrupted)) => Err(Failure::Interrupted.to_string()),

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::base::Shard;
+use crate::cli::export::ExportArgs;
 use crate::cli::recheck::RecheckArgs;
 use crate::cli::shrink::ShrinkArgs;
 use crate::config::duration_secs;
@@ -28,6 +29,10 @@ pub enum Command {
     /// It ends with the last planned run, or when a budget is spent: of time, of failures, or because every rate is
     /// known well enough. A limit on the clock for each run is `run_secs` in the configuration's `[budget]`.
     ///
+    /// What `actcheck export` writes is run as the one scene that it is, and said to fail as it did, otherwise, or no longer.
+    /// Such files in the folder `regressions`, beside the configuration or in the folder above, are run before the campaign
+    /// and told apart from it: they count for the exit code, and for no rate.
+    ///
     /// Exit code: 0 everything passed, 1 a property failed, 2 it could not run or nothing could be judged,
     /// 130 stopped by Ctrl-C (what was done is kept).
     #[command(after_help = "Example:\n  actcheck run configs/pick.toml --runs 5 --history /tmp/try")]
@@ -39,7 +44,7 @@ pub enum Command {
     ///
     /// Exit code: 0 every bit of every state is the same, 1 a run differs, 2 one could not be run again.
     #[command(
-        after_help = "Example:\n  actcheck replay k7f3-3    (an id that `actcheck list` prints; its beginning is enough)"
+        after_help = "Examples:\n  actcheck replay k7f3-3    (an id that `actcheck list` prints; its beginning is enough)\n  actcheck replay --sample 100 --jobs 2    (runs by chance, after `actcheck run configs/pick.toml`)"
     )]
     Replay(crate::cli::replay::ReplayArgs),
     /// Check configuration, ontology, rules and models without simulating; every mistake at once
@@ -70,6 +75,15 @@ pub enum Command {
     /// 130 stopped by Ctrl-C.
     #[command(after_help = "Example:\n  actcheck check-oracles configs/pick.toml")]
     CheckOracles(crate::cli::check_oracles::CheckOraclesArgs),
+    /// Write a stored run as a configuration of its own: one readable file that makes its scene again
+    ///
+    /// `actcheck run` takes the file like any other, and says whether it fails as it did. Values may be changed by hand: one
+    /// that can't be is refused at its line. Inside the project it names ontology and models by paths from there;
+    /// elsewhere it leaves them out where the program carries the same ones, and so runs anywhere.
+    #[command(
+        after_help = "Example:\n  actcheck export k7f3-3 -o case.toml    (an id that `actcheck list` prints; its beginning is enough)"
+    )]
+    Export(ExportArgs),
     /// List the runs of a history
     #[command(after_help = "Example:\n  actcheck list --format csv")]
     List(ListArgs),

@@ -6,20 +6,22 @@ use std::sync::atomic::AtomicBool;
 use crate::base::Diagnostics;
 use crate::campaign::Env;
 use crate::cli::args::CheckArgs;
-use crate::cli::output;
+use crate::cli::{output, regressions};
 use crate::config::Overrides;
 use crate::rules::Budget;
 
 /// Says what a campaign would use, or everything that is wrong with it, unless somebody stops it.
 pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
-    let env = Env::prepare_within(&args.config, &Overrides::default(), budget)?;
+    let env = Env::prepare_within(&args.config, &Overrides::default(), budget.clone())?;
+    let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget)? };
     output::print_diagnostics(env.rules.warnings());
     output::print(&format!(
-        "{}: {} tests, {} runs; {} actions and {} properties in {}; {} models; robot {}\n",
+        "{}: {} tests, {} runs, {} regressions; {} actions and {} properties in {}; {} models; robot {}\n",
         args.config.display(),
         env.campaign.tests.len(),
         env.planned_runs(),
+        cases.len(),
         env.ontology.actions.len(),
         env.ontology.properties.len(),
         env.ontology.sources.first().map_or("", |source| &source.name),

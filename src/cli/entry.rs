@@ -5,7 +5,9 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::cli::args::{Arguments, Command};
-use crate::cli::{check, check_oracles, datalog, list, new, output, query, recheck, rules, show, shrink, stop, why};
+use crate::cli::{
+    check, check_oracles, datalog, export, list, new, output, query, recheck, rules, show, shrink, stop, why,
+};
 
 /// Parses the process's arguments and does what they ask.
 ///
@@ -19,6 +21,7 @@ pub fn run() -> ExitCode {
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),
         Command::Compare(args) => crate::cli::compare::compare(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
+        Command::Export(args) => export::export(&args).map(|()| 0),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Merge(args) => crate::cli::merge::merge(&args),
         Command::Show(args) => show::show(&args).map(|()| 0),

@@ -1,16 +1,16 @@
 //! `actcheck replay`
 
 use std::collections::BTreeMap;
-use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-use crate::base::{Diagnostic, Diagnostics};
+use crate::base::{Choices, Diagnostic, Diagnostics};
 use crate::campaign::{Env, Fit, Manner, Recalled, Replay, replay_all};
 use crate::cli::args::{Format, HistoryArgs};
 use crate::cli::replay_text::{replay_json, replay_table, replay_text};
+use crate::cli::run::{all_cores, quietly};
 use crate::cli::{clock, history_dir, output};
 use crate::history::{History, RunDetail, RunFilter};
 
@@ -18,11 +18,17 @@ use crate::history::{History, RunDetail, RunFilter};
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
     /// Ids of runs, or their beginnings
-    #[arg(value_name = "RUN", required_unless_present = "campaign")]
+    #[arg(value_name = "RUN", required_unless_present_any = ["campaign", "sample"])]
     pub runs: Vec<String>,
     /// All runs of this campaign
     #[arg(long, value_name = "ID")]
     pub campaign: Option<String>,
+    /// So many runs by chance, of the campaign or of the whole history
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "runs")]
+    pub sample: Option<u32>,
+    /// Seed of that chance
+    #[arg(long, value_name = "S", default_value_t = 0, requires = "sample")]
+    pub seed: u64,
     /// Refuse, naming them, choices that are missing, left over or made from something else now
     #[arg(long, conflicts_with = "nearest")]
     pub exact: bool,
@@ -50,10 +56,9 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
     let campaigns = recall(&history, &runs, args)?;
     let bar = ProgressBar::with_draw_target(Some(runs.len() as u64), ProgressDrawTarget::stderr());
     let fit = if args.exact { Fit::Exact } else { Fit::Nearest };
-    let all_cores = || std::thread::available_parallelism().map_or(1, NonZero::get);
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
     let manner = Manner { clock: clock::system(), disturb: None };
-    let replayed = replay_all(&history, &campaigns, &runs, (fit, jobs), &manner, || bar.inc(1));
+    let replayed = quietly(|| replay_all(&history, &campaigns, &runs, (fit, jobs), &manner, || bar.inc(1)));
     bar.finish_and_clear();
     let (mut done, mut faults) = (Vec::new(), Diagnostics::new());
     for one in replayed? {
@@ -78,8 +83,14 @@ fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnost
     }
     if let Some(campaign) = &args.campaign {
         history.campaign(campaign)?;
-        let filter = RunFilter { campaign: Some(campaign.clone()), ..RunFilter::default() };
-        ids.extend(history.runs(&filter)?.into_iter().map(|row| row.run));
+    }
+    if args.campaign.is_some() || args.sample.is_some() {
+        let filter = RunFilter { campaign: args.campaign.clone(), ..RunFilter::default() };
+        let all = history.runs(&filter)?.into_iter().map(|row| row.run).collect();
+        ids.extend(match args.sample {
+            Some(size) => sample(all, size as usize, args.seed),
+            None => all,
+        });
     }
     let mut runs: Vec<RunDetail> = Vec::new();
     for id in ids {
@@ -93,6 +104,15 @@ fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnost
             .into());
     }
     Ok(runs)
+}
+
+/// So many of some runs, each as likely as any other, in their order.
+fn sample(mut runs: Vec<String>, size: usize, seed: u64) -> Vec<String> {
+    let mut choices = Choices::random(seed, 0);
+    while runs.len() > size {
+        runs.remove(choices.index("sample", runs.len()));
+    }
+    runs
 }
 
 /// The campaigns of the runs, as they are today and as they were.

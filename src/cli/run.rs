@@ -2,7 +2,7 @@
 
 use std::num::NonZero;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
@@ -12,10 +12,13 @@ use crate::base::{Diagnostic, Diagnostics};
 use crate::campaign::{CampaignEnd, Ending, Env, Manner, Options, Spent, run_all};
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
-use crate::cli::{clock, output, shrink, stop};
+use crate::cli::{case, clock, output, regressions, shrink, stop};
 use crate::config::Overrides;
 use crate::history::{self, History, RunFilter};
-use crate::report::{CampaignSummary, EndedBy, RunSummary, campaign_json, campaign_table, campaign_text};
+use crate::report::{
+    CampaignSummary, EndedBy, RunSummary, campaign_json, campaign_table, campaign_text, shrunk_json, shrunk_text,
+    with_shrunk,
+};
 use crate::rules::Budget;
 use crate::verdict::{Counts, Outcome, mean};
 
@@ -24,8 +27,14 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let overrides = overrides(args);
     let (stop, shown) = interrupt();
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
-    let env = Env::prepare_within(&args.config, &overrides, budget)?;
+    let env = Env::prepare_within(&args.config, &overrides, budget.clone())?;
+    if env.campaign.case.is_some() {
+        return case::run(args, env);
+    }
+    let cases = regressions::prepare(&env, &budget)?;
     let history = History::open(&env.campaign.history)?;
+    let jobs = args.jobs.map_or_else(all_cores, usize::from);
+    let cases = regressions::run(&cases, &history, jobs)?;
     let clock = clock::system();
     let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     let name = args.config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -34,8 +43,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     shown.get_or_init(|| progress.bar());
     history.begin_campaign(&env.record(id.clone(), name, (clock.now)()))?;
 
-    let options =
-        Options { jobs: args.jobs.map_or_else(all_cores, usize::from), manner: Manner { clock, disturb: None } };
+    let options = Options { jobs, manner: Manner { clock, disturb: None } };
     let mut runs = Vec::new();
     let end = quietly(|| {
         run_all(&env, &history, &id, &options, &stop, |record| {
@@ -49,17 +57,21 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     runs.sort_by_key(|run| run.index);
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
     let mut summary = summarise(&env, &args.config, id.clone(), runs, &end);
+    summary.regressions = cases;
     if finished.is_ok() {
         summary.failure_modes = failure_modes(&history, id)?;
     }
-    print(&summary, args.format);
-    warn_of_discards(&end);
-    if args.shrink && finished.is_ok() && is_whole(&end) {
-        let shrunk = shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, &stop)?;
-        output::print(&shrink::printed(&shrunk, args.format));
+    let results = Results { summary: &summary, format: args.format };
+    let shrinks = args.shrink && finished.is_ok() && is_whole(&end);
+    if shrinks {
+        results.print_with(|| shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, &stop))?;
+    } else {
+        results.print();
     }
+    warn_of_discards(&end);
     match end.ending {
         Ending::Stopped(faults) => Err(faults),
+        _ if shrinks && stop.load(Ordering::Relaxed) => finished.map(|()| stop::INTERRUPTED),
         Ending::Finished | Ending::Budget(_) => finished.map(|()| summary.exit_code()),
         Ending::Interrupted => finished.map(|()| stop::INTERRUPTED),
     }
@@ -89,12 +101,39 @@ fn interrupt() -> (Arc<AtomicBool>, Arc<OnceLock<ProgressBar>>) {
     (stop, shown)
 }
 
-fn print(summary: &CampaignSummary, format: Format) {
-    output::print(&match format {
-        Format::Table => campaign_text(summary, output::colour()),
-        Format::Csv => campaign_table(summary).render(format.into()),
-        Format::Json => format!("{:#}\n", campaign_json(summary)),
-    });
+/// What came of a campaign, as it is to be printed.
+struct Results<'a> {
+    summary: &'a CampaignSummary,
+    format: Format,
+}
+
+impl Results<'_> {
+    fn print(&self) {
+        output::print(&match self.format {
+            Format::Table => campaign_text(self.summary, output::colour()),
+            Format::Csv => campaign_table(self.summary).render(self.format.into()),
+            Format::Json => format!("{:#}\n", campaign_json(self.summary)),
+        });
+    }
+
+    /// The same with the smaller forms of runs. People read the campaign's results while these are still being made;
+    /// programs get one document.
+    fn print_with(&self, shrink: impl FnOnce() -> shrink::ShrunkModes) -> Result<(), Diagnostics> {
+        if self.format == Format::Table {
+            self.print();
+        }
+        let shrunk = shrink();
+        output::print(&match self.format {
+            Format::Table => shrunk.done.iter().map(|one| format!("\n{}", shrunk_text(one))).collect(),
+            Format::Csv => with_shrunk(campaign_table(self.summary), &shrunk.done).render(self.format.into()),
+            Format::Json => {
+                let mut json = campaign_json(self.summary);
+                json["shrunk"] = shrunk.done.iter().map(shrunk_json).collect();
+                format!("{json:#}\n")
+            }
+        });
+        shrunk.faults.or(())
+    }
 }
 
 /// The first run of each failure mode, with its place in the campaign.
@@ -180,6 +219,7 @@ fn summarise(env: &Env, config: &Path, campaign: String, runs: Vec<RunSummary>, 
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
         properties,
         failure_modes: Vec::new(),
+        regressions: Vec::new(),
         runs,
         planned: env.runs_to_make(),
         discards: end.discards.len() as u64,

@@ -23,7 +23,8 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     }
 }
 
-fn outcomes(run: &RunDetail) -> Table {
+/// One row for each property of each action of a run.
+pub(super) fn outcomes(run: &RunDetail) -> Table {
     let mut table = Table::new(["run", "step", "action", "property", "outcome", "margin", "witness"]);
     for action in &run.actions {
         for judgement in &action.judgements {

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use crate::base::{Choice, Diagnostic, Diagnostics};
 use crate::campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk, unit_of};
 use crate::campaign::{Env, Manner};
-use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::args::HistoryArgs;
 use crate::cli::run::{all_cores, quietly};
 use crate::cli::{clock, history_dir, output, show, stop};
 use crate::history::{History, RunRecord};
@@ -79,7 +79,9 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
         manner,
         stop: &stop,
     };
-    let shrunk = shrink_one(&env, &history, (&run.row.run, run.row.index), &options)?;
+    let recorded = history.choices(&run.row.run)?;
+    let index = env.index_of(&run.row.test, &recorded)?;
+    let shrunk = shrink_one(&env, &history, (&run.row.run, index), &options)?;
     output::print(&match args.format {
         ShrinkFormat::Text => shrunk_text(&shrunk),
         ShrinkFormat::Json => format!("{:#}\n", shrunk_json(&shrunk)),
@@ -90,28 +92,35 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     Ok(if asked.load(Ordering::Relaxed) { stop::INTERRUPTED } else { 0 })
 }
 
-/// Shrinks one run of each failure mode of a campaign that has just ended.
+/// Smaller forms of a campaign's runs, and why some have none.
+pub struct ShrunkModes {
+    /// Those that were found.
+    pub done: Vec<ShrunkSummary>,
+    /// What went wrong with the others.
+    pub faults: Diagnostics,
+}
+
+/// Shrinks one run of each failure mode of a campaign that has just ended, until somebody asks to stop.
 pub fn shrink_modes(
     env: &Env,
     history: &History,
     examples: &[(String, u64)],
     jobs: usize,
     asked: &AtomicBool,
-) -> Result<Vec<ShrunkSummary>, Diagnostics> {
+) -> ShrunkModes {
     let manner = Manner { clock: clock::system(), disturb: None };
     let stop = || asked.load(Ordering::Relaxed);
     let options = ShrinkOptions { property: None, trials: TRIALS, jobs, repeat: None, manner, stop: &stop };
-    let wanted = examples.iter().take_while(|_| !stop());
-    wanted.map(|(run, index)| shrink_one(env, history, (run, *index), &options)).collect()
-}
-
-/// Shrunk runs behind a campaign's own results: texts, lines of JSON, or for CSV nothing, because its table has ended.
-pub fn printed(shrunk: &[ShrunkSummary], format: Format) -> String {
-    match format {
-        Format::Table => shrunk.iter().map(|one| format!("\n{}", shrunk_text(one))).collect(),
-        Format::Json => shrunk.iter().map(|one| format!("{:#}\n", shrunk_json(one))).collect(),
-        Format::Csv => String::new(),
+    let mut shrunk = ShrunkModes { done: Vec::new(), faults: Diagnostics::new() };
+    for (run, index) in examples.iter().take_while(|_| !stop()) {
+        match shrink_one(env, history, (run, *index), &options) {
+            Ok(one) => shrunk.done.push(one),
+            // Stopped in the middle of a rule, nothing fails as it should.
+            Err(_) if stop() => {}
+            Err(found) => shrunk.faults.extend(found),
+        }
     }
+    shrunk
 }
 
 fn shrink_one(

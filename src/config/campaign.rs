@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::base::{Diagnostic, Files, Shard, Source, Span};
-use crate::config::{ObjectModel, RobotProfile};
+use crate::config::{Case, ObjectModel, RobotProfile};
 
 /// One campaign: every test in `test_count` scenes, in each `repeat` times.
 #[derive(Debug, Clone)]
@@ -48,6 +48,8 @@ pub struct Campaign {
     pub limits: Limits,
     /// The part of its runs that is to be made; nothing: all of them.
     pub shard: Option<Shard>,
+    /// The one scene that every run makes (`[case]`); without one, scenes are drawn.
+    pub case: Option<Case>,
     /// History folder (`[history] dir`), `.actcheck` beside the configuration by default.
     pub history: PathBuf,
     /// Where things are written, for faults that only a later stage can see: `tests.0.1` is the second action of

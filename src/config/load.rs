@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::{Diagnostic, Diagnostics, Files, Source, Span};
 use crate::config::designators::{self, Designators};
-use crate::config::{Campaign, Launcher, Overrides, Table, ranges, shelf};
+use crate::config::{Campaign, Launcher, Overrides, Table, case, ranges, shelf};
 
 /// The ontology that the program carries.
 const SHIPPED_ONTOLOGY: &str = "ontology/actions.ttl";
@@ -50,8 +50,11 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let sensing = ranges::read_sensing(&mut table, &mut found);
     let (budget, limits) = ranges::read_budget(&mut table, &mut found);
     let history = read_history(&mut table, folder, &mut found);
-    let Designators { candidates, other_count, nav_obstacles, nav_obstacle_count } =
-        designators::read(&mut table, &shelf, &mut places, &mut found);
+    // Before the tables of designators, which may have any name.
+    let case = table.table("case");
+    let designators = designators::read(&mut table, &shelf, &mut places, &mut found);
+    let case = case.map(|table| case::read(table, &designators, &mut places, &mut found));
+    let Designators { candidates, other_count, nav_obstacles, nav_obstacle_count } = designators;
     table.finish(&mut found);
 
     let robot = match robot {
@@ -77,6 +80,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         sensing,
         budget,
         limits: limits.overridden(overrides),
+        case,
         history: overrides.history.clone().unwrap_or(history),
         places,
     })

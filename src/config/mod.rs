@@ -3,6 +3,8 @@
 //! Never: draws a choice, knows what an action means, or reads the ontology.
 
 mod campaign;
+mod case;
+mod case_text;
 mod designators;
 mod duration;
 mod load;
@@ -15,6 +17,8 @@ mod value;
 mod words;
 
 pub use campaign::{Budget, Campaign, Launcher, Limits, Overrides, Physics, Range, Sensing};
+pub use case::Case;
+pub use case_text::{CaseText, case_text, written_paths};
 pub use duration::duration_secs;
 pub(crate) use load::{beside, in_order_of_place};
 pub use load::{load, load_text};

@@ -63,6 +63,11 @@ impl Table {
         self.entries.get(key).is_some_and(|entry| matches!(entry.value.value, Value::Array(_)))
     }
 
+    /// Keys that were not taken yet, sorted.
+    pub fn untaken_keys(&self) -> Vec<String> {
+        self.entries.keys().cloned().collect()
+    }
+
     /// The only key of an untaken sub-table, where there is just one and it holds a list of strings.
     pub fn only_list_of(&self, table: &str) -> Option<String> {
         let Value::Table(entries) = &self.entries.get(table)?.value.value else { return None };

@@ -45,6 +45,7 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         shards: shards(&node),
         started: text(&node, "prov:startedAtTime"),
         program_version: version(&node),
+        program_digest: text(&node, "act:programDigest"),
     }))
 }
 

@@ -45,6 +45,8 @@ pub struct CampaignRecord {
     pub started: String,
     /// Version of this program.
     pub program_version: String,
+    /// Digest of its sources; empty where an earlier one wrote the campaign.
+    pub program_digest: String,
 }
 
 /// How a run ended as a whole.

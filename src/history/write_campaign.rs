@@ -31,7 +31,8 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .may("act:untilWidth", record.until_width.map(Literal::from))
         .may("act:maxFailures", record.max_failures.map(count))
         .has("prov:startedAtTime", time(&record.started))
-        .text("act:program", &program(&record.program_version));
+        .text("act:program", &program(&record.program_version))
+        .text("act:programDigest", &record.program_digest);
     for shard in &record.shards {
         statements.about(campaign.clone()).text("act:shard", &shard.to_string());
     }

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::analysis::FailureMode;
 use crate::report::repeated_text::repeated_json;
-use crate::report::{CampaignSummary, RunSummary, Share};
+use crate::report::{CampaignSummary, RunSummary, Share, case_json};
 use crate::verdict::Judgement;
 
 /// The same that [`crate::report::campaign_text`] says, as one JSON object.
@@ -35,6 +35,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         "score_without_broken": summary.total_score_without_broken(),
         "runs_passed": summary.pass_rate().as_ref().map(share),
         "exit_code": summary.exit_code(),
+        "regressions": summary.regressions.iter().map(case_json).collect::<Vec<_>>(),
         "properties": properties,
         "repetitions": repeated_json(summary),
         "failure_modes": summary.failure_modes.iter().map(failure_mode).collect::<Vec<_>>(),

@@ -7,7 +7,7 @@ use comfy_table::{Attribute, Cell, Color};
 use crate::base::names;
 use crate::report::repeated_text::repeated_text;
 use crate::report::table::ruled;
-use crate::report::{CampaignSummary, RunSummary, Share};
+use crate::report::{CampaignSummary, RunSummary, Share, regressions_text};
 use crate::verdict::Outcome;
 
 /// Rows of the table of runs, and failed runs told in words; the rest are a command away.
@@ -16,7 +16,10 @@ const FAILURES_TOLD: usize = 20;
 
 /// The table of runs × properties, the scores, and for each failed property its witness in words.
 pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
-    let mut out = String::new();
+    let mut out = regressions_text(&summary.regressions);
+    if !out.is_empty() {
+        out.push('\n');
+    }
     runs_table(&mut out, summary, colour);
     out.push('\n');
     properties_table(&mut out, summary);

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::base::names;
 use crate::history::{Role, RunDetail};
+use crate::report::Table;
 use crate::report::table::ruled;
 
 /// What shrinking found, as plain data.
@@ -61,7 +62,7 @@ pub struct ShrunkChoice {
 impl ShrunkSummary {
     /// Other objects that are left.
     pub fn others(&self) -> usize {
-        self.run.objects.iter().filter(|object| object.role == Role::Other).count()
+        self.run.objects.iter().filter(|object| matches!(object.role, Role::Other | Role::Obstacle)).count()
     }
 }
 
@@ -155,6 +156,18 @@ fn number(value: f64) -> String {
 
 fn with_unit(value: f64, unit: &str) -> String {
     format!("{} {unit}", number(value)).trim_end().to_owned()
+}
+
+/// A campaign's table with one more column: the run that is the smaller form of a row's run, where there is one.
+pub fn with_shrunk(mut table: Table, shrunk: &[ShrunkSummary]) -> Table {
+    let of = table.columns.iter().position(|column| column == "run");
+    table.columns.push("shrunk_to".to_owned());
+    for row in &mut table.rows {
+        let run = of.and_then(|of| row[of].as_str());
+        let small = shrunk.iter().find(|one| run == Some(one.original.as_str()));
+        row.push(small.map_or(Value::Null, |one| one.run.row.run.clone().into()));
+    }
+    table
 }
 
 /// The same for programs.

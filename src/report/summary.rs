@@ -2,6 +2,7 @@
 
 use crate::analysis::{FailureMode, Interval, wilson};
 use crate::history::{Repetition, RunRecord, RunStatus};
+use crate::report::CaseSummary;
 use crate::verdict::{Counts, Judgement, Outcome, mean};
 
 /// A campaign in short.
@@ -21,6 +22,8 @@ pub struct CampaignSummary {
     pub runs: Vec<RunSummary>,
     /// Runs that share the same set of failed properties, most frequent first.
     pub failure_modes: Vec<FailureMode>,
+    /// The project's cases, which ran first. They count for the exit code, and for nothing else.
+    pub regressions: Vec<CaseSummary>,
     /// Runs that were asked for.
     pub planned: u64,
     /// Scenes that could not be built and were drawn again.
@@ -202,12 +205,16 @@ impl CampaignSummary {
             .collect()
     }
 
-    /// 0: everything passed. 1: a property failed. 2: something could not be tested and nothing failed.
+    /// 0: everything passed. 1: a property failed, in a run or a regression. 2: something could not be tested and nothing
+    /// failed.
     pub fn exit_code(&self) -> u8 {
         let counts = self.counts();
-        if counts.failed > 0 {
+        if counts.failed > 0 || self.regressions.iter().any(CaseSummary::fails) {
             1
-        } else if counts.passed > 0 && counts.passed + counts.inapplicable == counts.total() {
+        } else if counts.passed > 0
+            && counts.passed + counts.inapplicable == counts.total()
+            && self.regressions.iter().all(|case| case.exit_code() == 0)
+        {
             0
         } else {
             2
@@ -255,6 +262,7 @@ pub(super) mod tests {
                 .map(|i| (format!("http://actions#P{i}"), format!("property {i}"), Some("m".to_owned())))
                 .collect(),
             failure_modes: vec![],
+            regressions: vec![],
             planned: runs.len() as u64,
             runs,
             discards: 1,

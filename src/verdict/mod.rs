@@ -4,10 +4,12 @@
 
 mod judge;
 mod judgement;
+mod recurrence;
 mod score;
 mod wilson;
 
 pub use judge::{Fate, judge};
 pub use judgement::{Judgement, Outcome};
+pub use recurrence::Recurrence;
 pub use score::{Counts, action_score, mean, run_score};
 pub use wilson::{Interval, trials_for_width, wilson, wilson_share};

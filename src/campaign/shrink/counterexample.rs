@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::base::{Choice, ChoiceKind, Choices, Diagnostic, Diagnostics, did_you_mean, names};
+use crate::campaign::case::end_of;
+use crate::campaign::line::TEST_LEFT_OUT;
 use crate::campaign::shrink::list::{accepted_places, has};
 use crate::campaign::shrink::{Explained, Limits, Plan, Search, Tried, explain, reduce};
 use crate::campaign::{Env, Manner, run_line};
@@ -138,18 +140,7 @@ pub fn keep(
     record.shrunk_from = Some(original.to_owned());
     history.begin_campaign(&campaign)?;
     history.commit(&record)?;
-    let outcomes = record.judgements.iter().flatten().map(|judgement| judgement.outcome);
-    let counts = crate::verdict::Counts::of(outcomes);
-    let end = crate::history::CampaignEnd {
-        ended: (manner.clock.now)(),
-        score: Some(record.score),
-        score_without_broken: (record.status != RunStatus::Broken).then_some(record.score),
-        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
-        discards: 0,
-        ended_by: None,
-        interrupted: false,
-    };
-    history.finish_campaign(&id, &end)?;
+    history.finish_campaign(&id, &end_of(&record, (manner.clock.now)()))?;
     Ok(record)
 }
 
@@ -263,17 +254,25 @@ fn special(list: &[Choice]) -> usize {
     list.iter().filter(|choice| choice.value != choice.kind.nominal() && group(list, &choice.name).is_some()).count()
 }
 
-fn left_out(number: &str) -> Choice {
-    Choice { name: format!("other.{number}.left_out"), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
+/// The thing of many that a choice is of, such as `other.3`.
+fn thing_of(name: &str) -> Option<&str> {
+    let (thing, _) = name.rsplit_once('.')?;
+    let (kind, number) = thing.split_once('.')?;
+    (kind != "sense" && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(thing)
 }
 
-/// One for each other object: first those that moved, the farthest first, then those that stand nearest to the target.
+fn left_out(thing: &str) -> Choice {
+    Choice { name: format!("{thing}.left_out"), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
+}
+
+/// One for each object but target and platform: first those that moved, the farthest first, then those that stand nearest to the target.
 fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
-    let numbers = recorded.iter().filter_map(|choice| choice.name.strip_prefix("other.")?.strip_suffix(".model"));
-    let left = numbers.map(left_out).filter(|removal| !has(recorded, removal));
+    let things = recorded.iter().filter(|choice| choice.name.ends_with(".model"));
+    let things = things.filter_map(|choice| thing_of(&choice.name));
+    let left = things.map(left_out).filter(|removal| !has(recorded, removal));
     let objects = &record.scene.objects;
     let target = objects.iter().find(|object| object.role == Role::Target).map(|object| object.pose.position);
-    let others = objects.iter().filter(|object| object.role == Role::Other);
+    let others = objects.iter().filter(|object| matches!(object.role, Role::Other | Role::Obstacle));
     let mut ranked: Vec<(f64, f64, Choice)> = left
         .zip(others)
         .map(|(removal, object)| {
@@ -293,7 +292,7 @@ fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
 fn ends(env: &Env, index: u64) -> Vec<Choice> {
     let of = env.campaign.tests[env.test_of(index)].len();
     let end = |left_out: usize| Choice {
-        name: "test.left_out".to_owned(),
+        name: TEST_LEFT_OUT.to_owned(),
         kind: ChoiceKind::Index { of },
         value: left_out as f64,
     };
@@ -304,15 +303,15 @@ fn ends(env: &Env, index: u64) -> Vec<Choice> {
 /// things are. How many things there are is not for this.
 fn group(list: &[Choice], name: &str) -> Option<u8> {
     let behind = name.rsplit('.').next().unwrap_or(name);
-    let number = name.strip_prefix("other.").and_then(|rest| rest.split('.').next());
-    let gone = number.is_some_and(|number| has(list, &left_out(number)));
+    let thing = thing_of(name);
+    let gone = thing.is_some_and(|thing| has(list, &left_out(thing)));
     match (name, behind) {
-        ("other.count", _) | (_, "left_out") => None,
+        (_, "count" | "left_out") => None,
         _ if gone => None,
         _ if is_noise(name) => Some(0),
         (_, "mass_scale" | "friction_scale" | "restitution") => Some(1),
         _ if name.starts_with("robot.") => Some(2),
-        (_, "x" | "y" | "yaw") if number.is_some() => Some(3),
+        (_, "x" | "y" | "yaw") if thing.is_some() => Some(3),
         (_, "x" | "y" | "yaw") => Some(4),
         _ => Some(5),
     }

@@ -74,8 +74,9 @@ pub(super) fn spread(kind: &ChoiceKind) -> f64 {
 }
 
 /// Of a place that was tried several times, only the last try: the one that was accepted.
-pub(super) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
-    let placed = |name: &str| name.starts_with("target.") || name.starts_with("other.");
+pub(in crate::campaign) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
+    // What sensors get wrong is asked for again and again, and counts each time.
+    let placed = |name: &str| !name.starts_with("sense.");
     let kept = list
         .iter()
         .enumerate()

@@ -14,6 +14,7 @@ mod search;
 
 pub use counterexample::{Repeat, ShrinkOptions, Shrunk, keep, shrink};
 pub use explain::{Explained, Influence, Neighbour, explain};
+pub(super) use list::accepted_places;
 pub use list::{Id, ids, unit_of};
 pub use reduce::{Plan, reduce};
 pub use search::{Limits, Search, Tried};

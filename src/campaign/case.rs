@@ -1,0 +1,195 @@
+//! A configuration's one scene: whether it can be as it is written, and its run.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::base::{Choice, ChoiceKind, Choices, Diagnostic, Diagnostics, did_you_mean};
+use crate::campaign::make_run::cut_of;
+use crate::campaign::replay::again;
+use crate::campaign::{Env, Manner};
+use crate::config::{Campaign, Case};
+use crate::history::{CampaignEnd, History, RunRecord, RunStatus};
+use crate::scenario::{self, Scene, Space};
+use crate::verdict::{Counts, Outcome, Recurrence};
+
+/// What sensors get wrong is asked for only during a run; these are its names but for those that name an object.
+const SENSES: [&str; 4] =
+    ["sense.localisation.x", "sense.localisation.y", "sense.localisation.heading", "sense.gripper"];
+/// The same of one object.
+const SENSES_OF_OBJECT: [&str; 7] = ["x", "y", "z", "yaw", "width", "depth", "height"];
+
+/// What came of a case.
+#[derive(Debug, Clone)]
+pub struct CaseRun {
+    /// The run.
+    pub record: RunRecord,
+    /// Whether it fails as it did when it was taken.
+    pub recurrence: Recurrence,
+    /// Whether every bit of every state is the same; nothing where the case does not say what it was.
+    pub same_trace: Option<bool>,
+}
+
+/// Makes the runs of cases on several workers and keeps each, as a campaign of its own with the case's name. Tells of each
+/// in the order of `cases`, by its position.
+///
+/// # Errors
+/// `S064` a scene can't be made or does not stand still; or writing failed.
+pub fn run_cases(
+    cases: &[(String, Env)],
+    history: &History,
+    jobs: usize,
+    manner: &Manner,
+    on_case: &mut dyn FnMut(usize, CaseRun),
+) -> Result<(), Diagnostics> {
+    let jobs = jobs.clamp(1, cases.len().max(1));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs)
+        .build()
+        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
+    let mut faults = Diagnostics::new();
+    // No more traces at a time than there are workers.
+    for (number, some) in cases.chunks(jobs).enumerate() {
+        let made: Vec<_> = pool.install(|| some.par_iter().map(|(_, env)| make(env, manner)).collect());
+        for (at, ((name, env), made)) in some.iter().zip(made).enumerate() {
+            match made {
+                Ok(record) => on_case(number * jobs + at, keep(env, history, name, record, manner)?),
+                Err(found) => faults.extend(found),
+            }
+        }
+    }
+    faults.or(())
+}
+
+fn make(env: &Env, manner: &Manner) -> Result<RunRecord, Diagnostics> {
+    let none = BTreeMap::new();
+    let choices = env.campaign.case.as_ref().map_or(&none, |case| &case.choices);
+    again(env, "case", (0, &|| Choices::named(choices)), manner, cut_of(env, manner)).map_err(|why| {
+        env.campaign
+            .fault("S064", "case", format!("the scene of this case can't be made: {why}"))
+            .help("models, robot or program may have changed, or a value was edited: move what stands in the way")
+            .into()
+    })
+}
+
+fn keep(
+    env: &Env,
+    history: &History,
+    name: &str,
+    mut record: RunRecord,
+    manner: &Manner,
+) -> Result<CaseRun, Diagnostics> {
+    let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
+    record.id = format!("{id}-1");
+    record.campaign.clone_from(&id);
+    let mut campaign = env.record(id.clone(), name.to_owned(), record.started.clone());
+    campaign.planned_runs = 1;
+    history.begin_campaign(&campaign)?;
+    history.commit(&record)?;
+    history.finish_campaign(&id, &end_of(&record, (manner.clock.now)()))?;
+    let case = env.campaign.case.clone().unwrap_or_default();
+    let recurrence = Recurrence::of(&case.expect.into_iter().collect(), record.judgements.iter().flatten());
+    let same_trace = case.trace.map(|trace| trace == record.trace.hash);
+    Ok(CaseRun { record, recurrence, same_trace })
+}
+
+/// The end of a campaign of one run.
+pub(super) fn end_of(record: &RunRecord, ended: String) -> CampaignEnd {
+    let counts = Counts::of(record.judgements.iter().flatten().map(|judgement| judgement.outcome));
+    CampaignEnd {
+        ended,
+        score: Some(record.score),
+        score_without_broken: (record.status != RunStatus::Broken).then_some(record.score),
+        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
+        discards: 0,
+        ended_by: None,
+        interrupted: false,
+    }
+}
+
+/// Every choice of a case that can't be what it is written to be: S061 it is not asked for, S062 it is out of bounds,
+/// S063 something else stands there, S060 the scene can't be made at all.
+pub(super) fn check_case(campaign: &Campaign, space: &Space) -> Diagnostics {
+    let mut found = Diagnostics::new();
+    let Some(case) = &campaign.case else { return found };
+    let mut choices = Choices::named(&case.choices);
+    let drawn = scenario::draw(space, 0, &mut choices);
+    let mut made: BTreeMap<&str, Vec<&Choice>> = BTreeMap::new();
+    for choice in choices.made() {
+        made.entry(&choice.name).or_default().push(choice);
+    }
+    for (name, values) in &case.choices {
+        let fault = match made.get(name.as_str()) {
+            Some(made) => misplaced(campaign, name, values, made),
+            None if is_of_senses(name, drawn.as_ref().ok()) || is_of_left_out(name, case) => None,
+            None => Some(unknown(campaign, name, drawn.as_ref().ok(), made.keys().copied())),
+        };
+        fault.into_iter().for_each(|fault| found.push(fault));
+    }
+    if let (Err(discard), false) = (drawn, found.has_errors()) {
+        let message = format!("the scene of this case can't be made: {discard}");
+        found.push(campaign.fault("S060", "case", message).help("move what stands in the way, or leave it out"));
+    }
+    found
+}
+
+/// A choice that was made otherwise than it is written.
+fn misplaced(campaign: &Campaign, name: &str, written: &[f64], made: &[&Choice]) -> Option<Diagnostic> {
+    let place = Case::place_of(name);
+    let moved = written.iter().zip(made).find(|(written, made)| written.to_bits() != made.value.to_bits());
+    if let Some((written, made)) = moved {
+        let (is, bounds) = match made.kind {
+            ChoiceKind::Index { of } if name == "other.count" => {
+                let least = campaign.other_count.0;
+                (format!("{}", written + f64::from(least)), format!("{least} to {}", least as usize + of - 1))
+            }
+            ChoiceKind::Index { of } => (format!("{written}"), format!("whole numbers from 0 to {}", of - 1)),
+            ChoiceKind::Real { low, high, .. } => (format!("{written}"), format!("{low} to {high}")),
+            ChoiceKind::Normal { .. } => return None,
+        };
+        let message = format!("`{name}` is {is}, which is out of bounds here");
+        return Some(campaign.fault("S062", &place, message).help(format!("it may be from {bounds}")));
+    }
+    if written.len() > made.len() {
+        let message = format!("`{name}` has {} values, and is asked for {} times", written.len(), made.len());
+        return Some(campaign.fault("S061", &place, message).help("leave out what is too many"));
+    }
+    let thing = name.strip_suffix(".x")?;
+    (made.len() > written.len()).then(|| {
+        campaign
+            .fault("S063", &place, format!("`{thing}` can't stand there: something else does"))
+            .help("move one of the two, or leave one out")
+    })
+}
+
+/// Whether it is what the sensors get wrong about a scene.
+fn is_of_senses(name: &str, scene: Option<&Scene>) -> bool {
+    let of_object = |rest: &str| {
+        let (id, what) = rest.rsplit_once('.')?;
+        let is_there = scene.is_none_or(|scene| scene.objects.iter().any(|object| object.id == id));
+        Some(is_there && SENSES_OF_OBJECT.contains(&what))
+    };
+    SENSES.contains(&name) || name.strip_prefix("sense.").and_then(of_object).unwrap_or(false)
+}
+
+/// Whether it is of an object that the case leaves out.
+fn is_of_left_out(name: &str, case: &Case) -> bool {
+    let of = name.rsplit_once('.').and_then(|(of, _)| case.choices.get(&format!("{of}.left_out")));
+    of.is_some_and(|left_out| left_out.first().is_some_and(|value| *value != 0.0))
+}
+
+fn unknown<'a>(
+    campaign: &Campaign,
+    name: &str,
+    scene: Option<&'a Scene>,
+    made: impl Iterator<Item = &'a str>,
+) -> Diagnostic {
+    let objects = scene.map_or(&[][..], |scene| &scene.objects);
+    let of_objects =
+        objects.iter().flat_map(|object| SENSES_OF_OBJECT.map(|what| format!("sense.{}.{what}", object.id)));
+    let mut known: Vec<String> = made.map(str::to_owned).chain(SENSES.map(str::to_owned)).chain(of_objects).collect();
+    known.sort();
+    campaign
+        .fault("S061", &Case::place_of(name), format!("the scene of this case has no choice `{name}`"))
+        .help(did_you_mean(name, known.iter().map(String::as_str)))
+}

@@ -1,0 +1,71 @@
+//! `actcheck run` with a case: one scene, run again
+
+use serde_json::json;
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::campaign::{CaseRun, Env, Manner, run_cases};
+use crate::cli::args::{Format, RunArgs};
+use crate::cli::run::quietly;
+use crate::cli::{clock, output, show};
+use crate::history::History;
+use crate::report::{CaseSummary, case_json, case_text, run_json, run_text};
+
+/// Runs a case and prints whether it fails as it did. Returns the exit code.
+pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
+    refuse_campaign_options(args)?;
+    let history = History::open(&env.campaign.history)?;
+    let name = args.config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let cases = [(name, env)];
+    let manner = Manner { clock: clock::system(), disturb: None };
+    let mut summary = None;
+    quietly(|| {
+        run_cases(&cases, &history, 1, &manner, &mut |_, made| {
+            summary = Some(summarise(&args.config.display().to_string(), &cases[0].1, made));
+        })
+    })?;
+    let Some(summary) = summary else { return Ok(2) };
+    let run = history.run(&summary.run)?;
+    match args.format {
+        Format::Table => output::print(&format!("{}\n{}", run_text(&run), case_text(&summary))),
+        Format::Json => output::print(&format!("{:#}\n", json!({"case": case_json(&summary), "run": run_json(&run)}))),
+        Format::Csv => {
+            output::print(&show::outcomes(&run).render(Format::Csv.into()));
+            eprint!("{}", case_text(&summary));
+        }
+    }
+    Ok(summary.exit_code())
+}
+
+/// A case in short.
+pub(super) fn summarise(file: &str, env: &Env, made: CaseRun) -> CaseSummary {
+    CaseSummary {
+        file: file.to_owned(),
+        run: made.record.id,
+        expected: env.campaign.case.as_ref().map_or_else(Vec::new, |case| case.expect.clone()),
+        recurrence: made.recurrence,
+        same_trace: made.same_trace,
+        reason: made.record.reason,
+    }
+}
+
+/// A case has one scene and draws nothing: what asks for more of it is a mistake.
+fn refuse_campaign_options(args: &RunArgs) -> Result<(), Diagnostics> {
+    let given = [
+        ("--runs", args.runs.is_some()),
+        ("--time", args.time.is_some()),
+        ("--until-width", args.until_width.is_some()),
+        ("--max-failures", args.max_failures.is_some()),
+        ("--seed", args.seed.is_some()),
+        ("--repeat", args.repeat.is_some()),
+        ("--shrink", args.shrink),
+    ];
+    let mut found = Diagnostics::new();
+    for (option, _) in given.into_iter().filter(|(_, given)| *given) {
+        let message =
+            format!("`{option}` means nothing for {}: it is a case, which has one scene", args.config.display());
+        found.push(Diagnostic::error("X040", message).help(
+            "take the option away; `actcheck shrink` and `actcheck replay` take the id of the run that it makes",
+        ));
+    }
+    found.or(())
+}

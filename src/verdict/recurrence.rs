@@ -1,0 +1,102 @@
+//! Whether a scene that is run again fails as it did.
+
+use std::collections::BTreeSet;
+
+use crate::base::names;
+use crate::verdict::{Judgement, Outcome};
+
+/// How a scene's failures today compare with those that are expected of it. Properties go by their local names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Recurrence {
+    /// Just the expected properties fail; where none is expected, none fails.
+    AsBefore,
+    /// Some were expected to fail, and none does.
+    NoLonger,
+    /// Other properties fail than expected, or more, or fewer.
+    Otherwise(BTreeSet<String>),
+    /// Nothing fails, but of these it could not be decided, or there are none such any more.
+    Undecided(BTreeSet<String>),
+}
+
+impl Recurrence {
+    /// Compares what is expected to fail with what came of all actions.
+    pub fn of<'a>(expected: &BTreeSet<String>, judgements: impl Iterator<Item = &'a Judgement>) -> Self {
+        let (mut failed, mut undecided, mut decided) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
+        for judgement in judgements {
+            let name = names::local(&judgement.property).to_owned();
+            match judgement.outcome {
+                Outcome::Failed => failed.insert(name),
+                Outcome::Passed | Outcome::Inapplicable => decided.insert(name),
+                Outcome::Broken | Outcome::Timeout | Outcome::Untested => undecided.insert(name),
+            };
+        }
+        if !failed.is_empty() {
+            return if failed == *expected { Self::AsBefore } else { Self::Otherwise(failed) };
+        }
+        let gone = expected.iter().filter(|name| !decided.contains(*name)).cloned();
+        undecided.extend(gone);
+        match undecided.is_empty() {
+            false => Self::Undecided(undecided),
+            true if decided.is_empty() => Self::Undecided(undecided),
+            true if expected.is_empty() => Self::AsBefore,
+            true => Self::NoLonger,
+        }
+    }
+
+    /// The word for it.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::AsBefore => "as before",
+            Self::NoLonger => "no longer",
+            Self::Otherwise(_) => "otherwise",
+            Self::Undecided(_) => "undecided",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is expected to fail, what comes of each property, and what that is.
+    type Row = (&'static [&'static str], &'static [(&'static str, Outcome)], Recurrence);
+
+    fn recurrence(expected: &[&str], outcomes: &[(&str, Outcome)]) -> Recurrence {
+        let judgements: Vec<Judgement> = outcomes
+            .iter()
+            .map(|(name, outcome)| Judgement {
+                property: format!("http://actions#{name}"),
+                outcome: *outcome,
+                margin: None,
+                witness: String::new(),
+                rule_digest: String::new(),
+                held_before: None,
+            })
+            .collect();
+        Recurrence::of(&set(expected), judgements.iter())
+    }
+
+    fn set(names: &[&str]) -> BTreeSet<String> {
+        names.iter().map(|name| (*name).to_owned()).collect()
+    }
+
+    #[test]
+    fn every_way_to_come_again_is_told_apart() {
+        use Outcome::{Broken, Failed, Inapplicable, Passed};
+        let cases: [Row; 9] = [
+            (&["A"], &[("A", Failed), ("B", Passed)], Recurrence::AsBefore),
+            (&["A"], &[("A", Passed), ("B", Passed), ("A", Failed)], Recurrence::AsBefore),
+            (&["A"], &[("A", Passed), ("B", Passed)], Recurrence::NoLonger),
+            (&["A"], &[("A", Inapplicable), ("B", Passed)], Recurrence::NoLonger),
+            (&["A"], &[("A", Failed), ("B", Failed)], Recurrence::Otherwise(set(&["A", "B"]))),
+            (&[], &[("A", Failed)], Recurrence::Otherwise(set(&["A"]))),
+            (&[], &[("A", Passed)], Recurrence::AsBefore),
+            (&["A"], &[("A", Broken), ("B", Broken)], Recurrence::Undecided(set(&["A", "B"]))),
+            (&["Gone"], &[("A", Passed)], Recurrence::Undecided(set(&["Gone"]))),
+        ];
+        for (expected, outcomes, recurs) in cases {
+            assert_eq!(recurrence(expected, outcomes), recurs, "{expected:?} {outcomes:?}");
+        }
+        assert_eq!(recurrence(&[], &[]), Recurrence::Undecided(set(&[])));
+    }
+}

@@ -1,0 +1,249 @@
+//! Stored runs that travel as files, and the corpus of them that campaigns run first, with the built program.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::{actcheck, copy, edit, project, root, stderr, stdout};
+
+/// A project in which the second run of a campaign of two fails; the campaign's id.
+fn failing(folder: &Path) -> String {
+    let output =
+        actcheck(folder, &["run", "configs/clutter.toml", "--runs", "1", "--history", "h", "--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(json["exit_code"], 1, "the first run of clutter.toml fails: {json:#}");
+    format!("{}-1", json["campaign"].as_str().unwrap())
+}
+
+fn export(folder: &Path, run: &str, to: &str) {
+    let output = actcheck(folder, &["export", run, "-o", to, "--history", "h"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+}
+
+/// Exit code and what is said about the case.
+fn run_case(folder: &Path, file: &str) -> (Option<i32>, Value) {
+    let output = actcheck(folder, &["run", file, "--history", "h2", "--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    (output.status.code(), json["case"].clone())
+}
+
+fn refused(folder: &Path, arguments: &[&str]) -> String {
+    let output = actcheck(folder, arguments);
+    assert_eq!(output.status.code(), Some(2), "{}{}", stdout(&output), stderr(&output));
+    stderr(&output)
+}
+
+#[test]
+fn an_exported_run_goes_the_same_way_inside_the_project_and_anywhere() {
+    let project = project();
+    let run = failing(project.path());
+    export(project.path(), &run, "configs/case.toml");
+    let (code, case) = run_case(project.path(), "configs/case.toml");
+    assert_eq!(code, Some(1), "{case:#}");
+    assert_eq!((&case["recurrence"], &case["same_trace"]), (&"as before".into(), &true.into()), "{case:#}");
+    assert_eq!(case["failed"], case["expected"]);
+
+    let elsewhere = tempfile::tempdir().unwrap();
+    let file = elsewhere.path().join("case.toml");
+    export(project.path(), &run, file.to_str().unwrap());
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(!text.contains("model_dir") && !text.contains("ontology ="), "the program carries the same: {text}");
+    let machine = tempfile::tempdir().unwrap();
+    std::fs::copy(&file, machine.path().join("case.toml")).unwrap();
+    drop(project);
+    let (code, case) = run_case(machine.path(), "case.toml");
+    assert_eq!((code, &case["same_trace"]), (Some(1), &true.into()), "{case:#}");
+    let output = actcheck(machine.path(), &["run", "case.toml"]);
+    assert!(
+        stdout(&output).contains("still fails as it did: NoGraspCollisions; the same trace"),
+        "{}",
+        stdout(&output)
+    );
+    // The run of a case is a run like any other: it can be replayed and exported once more.
+    let again = case["run"].as_str().unwrap();
+    let replayed = actcheck(machine.path(), &["replay", again, "--history", "h2"]);
+    assert!(stdout(&replayed).contains("the same, every bit"), "{}{}", stdout(&replayed), stderr(&replayed));
+    let second = actcheck(machine.path(), &["export", again, "-o", "-", "--history", "h2"]);
+    let from = |text: &str| {
+        text.lines().filter(|line| !line.contains(again) && !line.contains(&run)).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(from(&stdout(&second)), from(&text));
+}
+
+#[test]
+fn a_case_is_readable_and_its_values_have_names_units_and_bounds() {
+    let project = project();
+    let run = failing(project.path());
+    let output = actcheck(project.path(), &["export", &run, "-o", "-", "--history", "h"]);
+    let text = stdout(&output);
+    for line in [
+        "tests = [[\"Pick\"]]",
+        "test_count = 1",
+        "expect = [\"NoGraspCollisions\"]",
+        "target.model = \"glass\"",
+        "other.count = 12",
+    ] {
+        assert!(text.lines().any(|known| known == line), "`{line}` in:\n{text}");
+    }
+    let yaw = text.lines().find(|line| line.starts_with("target.yaw = ")).unwrap();
+    assert!(yaw.ends_with("  # rad, -3.1416 to 3.1416"), "{yaw}");
+    assert_eq!(text.lines().filter(|line| line.starts_with("other.12.x = ")).count(), 1, "only the accepted place");
+    assert!(!text.contains("other.12.x = ["), "{text}");
+}
+
+#[test]
+fn a_case_survives_edits_of_rules_comments_and_ontology() {
+    let project = project();
+    let run = failing(project.path());
+    export(project.path(), &run, "case.toml");
+    edit(&project.path().join("case.toml"), "[case.choices]", "# Somebody's remark.\n[case.choices]");
+    let rule = project.path().join("rules/no_grasp_collisions.rls");
+    let kept = std::fs::read_to_string(&rule).unwrap();
+    std::fs::write(&rule, "violation(?x) :- during(?x, <http://nothing.of/that#sort>, ?x) .\n").unwrap();
+    let (code, case) = run_case(project.path(), "case.toml");
+    assert_eq!(
+        (code, &case["recurrence"], &case["same_trace"]),
+        (Some(0), &"no longer".into(), &true.into()),
+        "{case:#}"
+    );
+
+    std::fs::write(&rule, kept).unwrap();
+    std::fs::write(
+        project.path().join("rules/moved_object.rls"),
+        "@prefix w: <https://w3id.org/actcheck/world#> .\n\
+         success(?d) :- during(w:action, w:duration, ?d), ?d < 0.1 .\n",
+    )
+    .unwrap();
+    let (code, case) = run_case(project.path(), "case.toml");
+    assert_eq!((code, &case["recurrence"]), (Some(1), &"otherwise".into()), "{case:#}");
+    let output = actcheck(project.path(), &["run", "case.toml", "--history", "h2"]);
+    let told = "fails otherwise: MovedObject + NoGraspCollisions (it was NoGraspCollisions); the same trace";
+    assert!(stdout(&output).contains(told), "{}", stdout(&output));
+
+    let ontology = project.path().join("ontology/actions.ttl");
+    let added = "\nact:Extra a owl:Class ; rdfs:label \"extra\" .\n";
+    std::fs::write(&ontology, std::fs::read_to_string(&ontology).unwrap() + added).unwrap();
+    assert_eq!(run_case(project.path(), "case.toml").1["same_trace"], true);
+}
+
+#[test]
+fn values_that_can_not_be_are_refused_at_their_lines() {
+    let project = project();
+    let run = failing(project.path());
+    export(project.path(), &run, "case.toml");
+    let file = project.path().join("case.toml");
+    let good = std::fs::read_to_string(&file).unwrap();
+    let place = |text: &str, name: &str| {
+        let line = text.lines().find(|line| line.starts_with(&format!("{name} = "))).unwrap();
+        line.split_once(" = ").unwrap().1.split("  #").next().unwrap().to_owned()
+    };
+    let changed = |text: &str, name: &str, value: &str| {
+        let line = |line: &str| match line.strip_prefix(name).is_some_and(|rest| rest.starts_with(" = ")) {
+            true => format!("{name} = {value}\n"),
+            false => format!("{line}\n"),
+        };
+        text.lines().map(line).collect::<String>()
+    };
+    let with = |name: &str, value: &str| changed(&good, name, value);
+    let on_top = ["model", "yaw", "x", "y"].iter().fold(good.clone(), |text, what| {
+        changed(&text, &format!("other.2.{what}"), &place(&good, &format!("other.1.{what}")))
+    });
+    let cases = [
+        (with("target.x", "5.0"), "S062", "target.x = 5.0", "may be from"),
+        (with("target.mass_scale", "0.1"), "S062", "target.mass_scale = 0.1", "0.7 to 1.3"),
+        (with("other.count", "40"), "S062", "other.count = 40", "8 to 12"),
+        (with("target.model", "\"glas\""), "C015", "target.model = \"glas\"", "`glass`"),
+        (with("target.yaw", "\"left\""), "C004", "target.yaw = \"left\"", "a number"),
+        (good.replace("target.yaw = ", "target.yaww = "), "S061", "target.yaww = ", "`target.yaw`"),
+        (good.replace("sense.glass_1.x = ", "sense.glas_1.x = "), "S061", "sense.glas_1.x = ", "`sense.glass_1.x`"),
+        (good.replace("robot.gap = ", "\"target.x\" = 0.0\nrobot.gap = "), "C015", "", "twice"),
+        (on_top, "S063", "other.2.x = ", "move one of the two"),
+    ];
+    for (text, code, line, help) in cases {
+        std::fs::write(&file, &text).unwrap();
+        let told = refused(project.path(), &["run", "case.toml", "--history", "h2"]);
+        assert!(told.contains(code) && told.contains(line) && told.contains(help), "{code} {line}: {told}");
+        assert!(told.contains("case.toml:"), "the place: {told}");
+        let checked = refused(project.path(), &["check", "case.toml"]);
+        assert!(checked.contains(code), "{checked}");
+    }
+    std::fs::write(&file, with("target.mass_scale", "1.0")).unwrap();
+    let (_, case) = run_case(project.path(), "case.toml");
+    assert_eq!(case["same_trace"], false, "an edited value counts: {case:#}");
+    std::fs::write(&file, &good).unwrap();
+    let told = refused(project.path(), &["run", "case.toml", "--runs", "5", "--seed", "3", "--shrink"]);
+    assert_eq!(told.matches("X040").count(), 3, "{told}");
+}
+
+#[test]
+fn a_shrunk_run_and_a_run_of_several_tests_travel_too() {
+    let project = project();
+    let config = project.path().join("configs/clutter.toml");
+    edit(&config, "position_noise_m = 0.025", "position_noise_m = 0.2");
+    edit(&config, "count = [8, 12]", "count = [2, 3]");
+    edit(&config, "tests = [[\"Pick\"]]", "tests = [[\"Pick\", \"Pick\"], [\"Pick\"]]");
+    let run = failing(project.path());
+    let output = actcheck(project.path(), &["shrink", &run, "--trials", "8", "--history", "h", "--format", "json"]);
+    let small: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    let small = small["run"].as_str().unwrap();
+    // A shrunk run has one run in its campaign, and may perform fewer actions than its test.
+    let replayed = actcheck(project.path(), &["replay", small, "--history", "h"]);
+    assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
+    for exported in [run.as_str(), small] {
+        export(project.path(), exported, "case.toml");
+        let (code, case) = run_case(project.path(), "case.toml");
+        assert_eq!((code, &case["same_trace"]), (Some(1), &true.into()), "{exported}: {case:#}");
+    }
+    let text = std::fs::read_to_string(project.path().join("case.toml")).unwrap();
+    assert!(text.contains(".left_out = true") && !text.contains("test.left_out"), "{text}");
+}
+
+#[test]
+fn a_campaign_runs_its_regressions_first_and_reports_them_apart() {
+    let project = project();
+    let run = failing(project.path());
+    let added = actcheck(project.path(), &["export", &run, "--regression", "--history", "h"]);
+    assert!(stdout(&added).contains(&format!("regressions/{run}.toml holds run {run}")), "{}", stdout(&added));
+    let twice = refused(project.path(), &["export", &run, "--regression", "--history", "h"]);
+    assert!(twice.contains("X042"), "{twice}");
+    let arguments = ["run", "configs/lone_glass.toml", "--runs", "1", "--history", "h3"];
+    let campaign = |more: &[&str]| actcheck(project.path(), &[&arguments[..], more].concat());
+    let output = campaign(&["--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(json["regressions"][0]["recurrence"], "as before", "{json:#}");
+    assert_eq!(json["runs"].as_array().unwrap().len(), 1, "not counted among the runs");
+    assert_eq!((json["exit_code"].as_i64(), output.status.code()), (Some(1), Some(1)));
+    let text = stdout(&campaign(&["--jobs", "1"]));
+    let told = format!("regressions: 1 ran, 1 fails again: {run}.toml (NoGraspCollisions)\n");
+    assert!(text.starts_with(&told), "{text}");
+
+    let file = project.path().join(format!("regressions/{run}.toml"));
+    edit(&file, "target.model = \"glass\"", "target.model = \"glas\"");
+    std::fs::copy(project.path().join("configs/pick.toml"), project.path().join("regressions/pick.toml")).unwrap();
+    let told = refused(project.path(), &arguments);
+    assert!(told.contains("C015") && told.contains(&format!("{run}.toml:")), "{told}");
+    assert!(refused(project.path(), &["check", "configs/lone_glass.toml"]).contains("C015"));
+    edit(&file, "target.model = \"glas\"", "target.model = \"glass\"");
+    let told = refused(project.path(), &arguments);
+    assert!(told.contains("regressions/pick.toml") && told.contains("S0"), "{told}");
+}
+
+#[test]
+fn a_lone_configuration_keeps_its_regressions_beside_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&root().join("configs"), &folder.path().join("mine"));
+    let config = folder.path().join("mine/clutter.toml");
+    edit(&config, "ontology = \"../ontology/actions.ttl\"\nmodel_dir = \"../models\"\n", "");
+    let output = actcheck(folder.path(), &["run", "mine/clutter.toml", "--runs", "1", "--format", "csv"]);
+    let table = stdout(&output);
+    let run = table.lines().nth(1).unwrap().split(',').next().unwrap();
+    let added = actcheck(folder.path(), &["export", run, "--regression"]);
+    assert!(
+        stdout(&added).starts_with(&format!("mine/regressions/{run}.toml holds")),
+        "{}{}",
+        stdout(&added),
+        stderr(&added)
+    );
+    let output = actcheck(folder.path(), &["run", "mine/clutter.toml", "--runs", "1"]);
+    assert!(stdout(&output).starts_with("regressions: 1 ran, 1 fails again: "), "{}", stdout(&output));
+}
