@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::base::{Choice, ChoiceKind, Choices, Diagnostic, Diagnostics, did_you_mean};
+use crate::base::{Choice, ChoiceKind, Choices, Diagnostic, Diagnostics, nearest};
 use crate::campaign::make_run::cut_of;
 use crate::campaign::replay::again;
 use crate::campaign::{Env, Manner};
@@ -82,7 +82,9 @@ fn keep(
     let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     record.id = format!("{id}-1");
     record.campaign.clone_from(&id);
-    let mut campaign = env.record(id.clone(), name.to_owned(), record.started.clone());
+    // What stands for a crash has no beginning of its own.
+    let started = if record.started.is_empty() { (manner.clock.now)() } else { record.started.clone() };
+    let mut campaign = env.record(id.clone(), name.to_owned(), started);
     campaign.planned_runs = 1;
     history.begin_campaign(&campaign)?;
     history.commit(&record)?;
@@ -187,9 +189,12 @@ fn unknown<'a>(
     let objects = scene.map_or(&[][..], |scene| &scene.objects);
     let of_objects =
         objects.iter().flat_map(|object| SENSES_OF_OBJECT.map(|what| format!("sense.{}.{what}", object.id)));
-    let mut known: Vec<String> = made.map(str::to_owned).chain(SENSES.map(str::to_owned)).chain(of_objects).collect();
-    known.sort();
+    let known: Vec<String> = made.map(str::to_owned).chain(SENSES.map(str::to_owned)).chain(of_objects).collect();
     campaign
         .fault("S061", &Case::place_of(name), format!("the scene of this case has no choice `{name}`"))
-        .help(did_you_mean(name, known.iter().map(String::as_str)))
+        // There are too many of them to be listed.
+        .help(match nearest(name, known.iter().map(String::as_str)) {
+            Some(found) => format!("did you mean `{found}`?"),
+            None => "leave it out; `actcheck export` writes a case with every choice that its scene has".to_owned(),
+        })
 }
