@@ -111,6 +111,7 @@ mod tests {
             time_secs: None,
             until_width: None,
             max_failures: None,
+            shards: Default::default(),
             started: String::new(),
             program_version: "0.1.0".to_owned(),
             program_digest: digest.to_owned(),

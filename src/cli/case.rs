@@ -57,6 +57,7 @@ fn refuse_campaign_options(args: &RunArgs) -> Result<(), Diagnostics> {
         ("--max-failures", args.max_failures.is_some()),
         ("--seed", args.seed.is_some()),
         ("--repeat", args.repeat.is_some()),
+        ("--shard", args.shard.is_some()),
         ("--shrink", args.shrink),
     ];
     let mut found = Diagnostics::new();
