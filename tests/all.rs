@@ -26,7 +26,6 @@ mod replay;
 mod rules;
 mod scenario;
 mod shrink;
-mod shrunk;
 mod stops;
 mod support;
 mod trust;
