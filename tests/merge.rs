@@ -272,6 +272,29 @@ fn a_merge_that_was_stopped_is_completed_by_the_next() {
     assert!((all(&into), table(&into, END)) == wanted);
 }
 
+/// Every history of a project has its regressions, under the same id and made at another time.
+#[test]
+fn what_was_run_twice_with_the_same_results_is_kept_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (name, minute) in [("a", 1), ("b", 2)] {
+        let history = History::open(&folder.join(name)).unwrap();
+        history.begin_campaign(&sample_campaign("k", minute)).unwrap();
+        history.commit(&sample_run("k", 0)).unwrap();
+        let end = CampaignEnd { ended: format!("2026-08-01T13:0{minute}:00Z"), ..CampaignEnd::default() };
+        history.finish_campaign("k", &end).unwrap();
+    }
+    for (order, into) in [(["a", "b"], "ab"), (["b", "a"], "ba")] {
+        let output = actcheck(folder, &["merge", order[0], order[1], "--into", into]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let row = open(folder, into).campaigns().unwrap().remove(0);
+        assert_eq!(
+            (row.runs, row.started.as_str(), row.ended.as_deref()),
+            (1, "2026-08-01T12:01:00Z", Some("2026-08-01T13:01:00Z"))
+        );
+    }
+}
+
 #[test]
 fn a_copy_that_was_taken_too_early_is_completed() {
     let folder = tempfile::tempdir().unwrap();

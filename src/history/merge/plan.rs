@@ -135,8 +135,8 @@ fn check_parts(all: &[Found]) -> Diagnostics {
 enum Identity {
     /// Parts of the same whole.
     Parts(String),
-    /// Copies of the same campaign.
-    Whole { first_id: String, started: String, whole: String, content: Option<String> },
+    /// The same campaign, or the same regression of a project, which each of its histories has.
+    Whole { first_id: String, whole: String, content: Option<String> },
 }
 
 fn identity(found: &Found) -> Identity {
@@ -145,9 +145,8 @@ fn identity(found: &Found) -> Identity {
     }
     Identity::Whole {
         first_id: found.first_id.clone(),
-        started: found.record.started.clone(),
         whole: found.whole(),
-        // Shrinking gives the same id to the small runs of several parts, and may do so in the same second.
+        // Shrinking gives the same id to small runs of several parts.
         content: found.shrunk.then(|| found.runs.values().map(|run| run.content.as_str()).collect()),
     }
 }
@@ -316,7 +315,8 @@ fn new_shards(group: &[&Found], own: Option<&Found>) -> Vec<String> {
 fn end_of_copies(group: &[&Found]) -> PlannedEnd {
     let rank =
         |found: &&&Found| (found.runs.len(), found.row.ended.is_some(), !found.row.interrupted, found.place.is_none());
-    match group.iter().max_by_key(rank) {
+    // Of equals the first.
+    match group.iter().rev().max_by_key(rank) {
         Some(found) => found.place.map_or(PlannedEnd::Same, |place| PlannedEnd::Of(place, found.record.id.clone())),
         None => PlannedEnd::Same,
     }
