@@ -62,7 +62,7 @@ pub enum Command {
     ///
     /// Exit code: 0 done (B is not shown to be worse), 1 B is worse (only with --fail-if-worse), 2 it could not be done.
     #[command(
-        after_help = "Examples:\n  actcheck compare k7f3 m2x9 --fail-if-worse 0.05    (ids of campaigns: the beginnings of those that `actcheck list` prints)\n  actcheck compare main/.actcheck branch/.actcheck   (the newest campaigns of two histories)\n  actcheck compare k7f3 k7f3@rechecked               (the same runs by the rules of `actcheck recheck`)"
+        after_help = "Examples:\n  actcheck run configs/pick.toml --history /tmp/before\n  actcheck run configs/pick.toml --history /tmp/after    (with another skill, robot or physics)\n  actcheck compare /tmp/before /tmp/after --fail-if-worse 0.05\n  actcheck compare k7f3 k7f3@rechecked    (one campaign by the rules of `actcheck recheck`)"
     )]
     Compare(crate::cli::compare::CompareArgs),
     /// Test the properties themselves: put faults into the world and the robot, and see which property notices
