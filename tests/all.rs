@@ -2,6 +2,7 @@
 
 mod bounds;
 mod broken;
+mod budgets;
 mod campaign;
 mod cases;
 mod check_oracles;
@@ -23,6 +24,7 @@ mod readme;
 mod recheck;
 mod repeat;
 mod replay;
+mod resume;
 mod rules;
 mod scenario;
 mod shrink;

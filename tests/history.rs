@@ -128,6 +128,7 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
         judgements: vec![PROPERTIES.iter().map(|property| judgement(property, outcome(property))).collect()],
         started: "2026-08-01T12:00:00Z".to_owned(),
         wall_secs: 1.25,
+        elapsed_secs: 2.5,
     }
 }
 

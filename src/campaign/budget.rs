@@ -5,7 +5,7 @@ use std::fmt;
 
 use crate::campaign::{Env, Told};
 use crate::config::{Limits, Overrides};
-use crate::verdict::{Outcome, trials_for_width, wilson};
+use crate::verdict::{Outcome, trials_for_width, wilson_share};
 
 /// Runs of one test more than anybody waits for: the ceiling where only time ends a campaign.
 const MOST_RUNS: u32 = 10_000_000;
@@ -66,6 +66,8 @@ pub(super) fn ceiling(overrides: &Overrides) -> Option<u32> {
 /// stop is the same whatever the number of workers.
 pub(super) struct Tally {
     limits: Limits,
+    /// Runs of each scene.
+    repeat: u32,
     failures: u64,
     /// Passed and decided outcomes of every property of the campaign, by IRI.
     decided: BTreeMap<String, [u64; 2]>,
@@ -78,6 +80,7 @@ impl Tally {
         let properties = actions.flat_map(|action| &action.success_properties);
         Self {
             limits: env.campaign.limits,
+            repeat: env.campaign.repeat,
             failures: 0,
             decided: properties.map(|iri| (iri.clone(), [0, 0])).collect(),
         }
@@ -100,10 +103,13 @@ impl Tally {
         self.limits.until_width.filter(|width| self.is_narrow(*width)).map(Spent::Width)
     }
 
-    /// Whether every property has been decided often enough for an interval of this width.
+    /// Whether every property has been decided often enough for an interval of this width. The runs of one scene count as
+    /// one trial: how alike they are is not known beforehand.
     fn is_narrow(&self, width: f64) -> bool {
         let narrow = |[passed, decided]: &[u64; 2]| {
-            wilson(*passed, *decided).is_some_and(|interval| interval.high - interval.low <= width)
+            let (passed, decided) = (*passed as f64, *decided as f64);
+            let interval = wilson_share(passed / decided, decided / f64::from(self.repeat));
+            interval.is_some_and(|interval| interval.high - interval.low <= width)
         };
         !self.decided.is_empty() && self.decided.values().all(narrow)
     }
@@ -124,7 +130,7 @@ mod tests {
     }
 
     fn tally(limits: Limits) -> Tally {
-        Tally { limits, failures: 0, decided: ["a", "b"].map(|name| (name.to_owned(), [0, 0])).into() }
+        Tally { limits, repeat: 1, failures: 0, decided: ["a", "b"].map(|name| (name.to_owned(), [0, 0])).into() }
     }
 
     #[test]

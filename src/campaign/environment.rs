@@ -59,18 +59,7 @@ impl Env {
         config: Option<&Path>,
     ) -> Result<(Self, CampaignRecord), Diagnostics> {
         let record = history.campaign(campaign)?;
-        // Of several parts those that are missing belong to it too: it is taken as a whole.
-        let shard = match record.shards.as_slice() {
-            [only] => Some(*only),
-            _ => None,
-        };
-        let overrides = Overrides {
-            seed: Some(record.seed),
-            repeat: Some(record.repeat),
-            shard,
-            history: Some(history.dir().to_path_buf()),
-            ..Overrides::default()
-        };
+        let overrides = asked_for(history, &record);
         let loaded = match config {
             Some(config) => config::load(config, &overrides),
             None => {
@@ -87,8 +76,7 @@ impl Env {
             }
         };
         let mut loaded = loaded?;
-        let runs_of_a_scene = loaded.tests.len().max(1) as u64 * u64::from(record.repeat);
-        loaded.test_count = u32::try_from(record.planned_runs / runs_of_a_scene).unwrap_or(loaded.test_count).max(1);
+        loaded.test_count = Self::scenes_of_a_test(&loaded, &record);
         Ok((Self::of(loaded, Budget::default())?, record))
     }
 
@@ -122,6 +110,13 @@ impl Env {
     }
 
     fn of(campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
+    /// How many scenes of each test a campaign of the history was asked for.
+    pub(super) fn scenes_of_a_test(campaign: &Campaign, record: &CampaignRecord) -> u32 {
+        let runs_of_a_scene = campaign.tests.len().max(1) as u64 * u64::from(record.repeat.max(1));
+        u32::try_from(record.planned_runs / runs_of_a_scene).unwrap_or(campaign.test_count).max(1)
+    }
+
+    pub(super) fn of(campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let (files, path) = &campaign.ontology;
         let ontology = ontology::load(files, path)?;
         let mut faults = Diagnostics::new();
@@ -194,6 +189,25 @@ impl Env {
     /// Every scene of a test, as often as it is run.
     pub(super) fn runs_of_a_test(&self) -> u64 {
         u64::from(self.campaign.test_count) * u64::from(self.campaign.repeat)
+    }
+}
+
+/// What the command line had asked for when a campaign of a history began, but for the number of its runs.
+pub(super) fn asked_for(history: &History, record: &CampaignRecord) -> Overrides {
+    // Of several parts those that are missing belong to it too: it is taken as a whole.
+    let shard = match record.shards.as_slice() {
+        [only] => Some(*only),
+        _ => None,
+    };
+    Overrides {
+        runs: None,
+        seed: Some(record.seed),
+        repeat: Some(record.repeat),
+        shard,
+        time_secs: record.time_secs,
+        until_width: record.until_width,
+        max_failures: record.max_failures,
+        history: Some(history.dir().to_path_buf()),
     }
 }
 

@@ -163,6 +163,7 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
         judgements,
         started: String::new(),
         wall_secs: 0.0,
+        elapsed_secs: 0.0,
     })
 }
 

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use crate::actions::Cut;
 use crate::base::{Diagnostic, Diagnostics};
 use crate::campaign::line::{crashed, run_line_until};
-use crate::campaign::{Env, Failure, Manner, Planned};
+use crate::campaign::{Env, Failure, Manner, Planned, Told};
 use crate::history::RunRecord;
 
 /// Scenes drawn for one run before the campaign is given up.
@@ -17,6 +17,8 @@ const SCENES_PER_RUN: u64 = 50;
 pub(super) enum Making {
     /// The run, with the discards before it.
     Run(Box<RunRecord>),
+    /// It is in the history: somebody resumed the campaign.
+    Stored(Told),
     /// Somebody asked for the end.
     Interrupted,
     /// There is no such run, and why.

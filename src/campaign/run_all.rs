@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::base::{Diagnostic, Diagnostics};
 use crate::campaign::budget::Tally;
 use crate::campaign::make_run::{Making, make_run};
-use crate::campaign::{CampaignEnd, Ending, Env, Manner, Planned, Schedule, Spent, Told, schedule_of};
+use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Planned, Schedule, Spent, Told, schedule_of};
 use crate::history::{History, RunRecord};
 
 /// The store is brought to the disk at least this often. Unit: seconds.
@@ -51,13 +51,27 @@ pub fn run_all(
     campaign: &str,
     options: &Options,
     stop: &AtomicBool,
+    on_run: impl FnMut(&RunRecord),
+) -> CampaignEnd {
+    resume_all(env, (history, Kept::default()), campaign, options, stop, on_run)
+}
+
+/// The same for a campaign of which some runs are in the history: they count, but are neither made nor told again.
+pub fn resume_all(
+    env: &Env,
+    (history, mut kept): (&History, Kept),
+    campaign: &str,
+    options: &Options,
+    stop: &AtomicBool,
     mut on_run: impl FnMut(&RunRecord),
 ) -> CampaignEnd {
     let jobs = options.jobs.max(1);
     let halt = AtomicBool::new(false);
-    let mut keeper = Keeper::new(env, history, options.manner, &mut on_run);
     let secs = options.manner.clock.secs;
-    let time_up_at = env.campaign.limits.time_secs.map_or(f64::INFINITY, |limit| secs() + limit);
+    let began_secs = secs() - kept.elapsed_secs;
+    let mut keeper = Keeper::new(env, history, (options.manner, began_secs), &mut on_run);
+    keeper.end.discards = std::mem::take(&mut kept.discards);
+    let time_up_at = env.campaign.limits.time_secs.map_or(f64::INFINITY, |limit| began_secs + limit);
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
         Ok(pool) => pool,
         Err(error) => {
@@ -77,7 +91,7 @@ pub fn run_all(
                 });
             });
         }
-        conduct(&mut *schedule_of(env), &mut keeper, &orders, &made, jobs * AHEAD);
+        conduct((&mut *schedule_of(env), kept.runs), &mut keeper, (&orders, &made), jobs * AHEAD);
         if let (Ending::Interrupted, Some(limit), false) =
             (&keeper.end.ending, env.campaign.limits.time_secs, stop.load(Ordering::Relaxed))
         {
@@ -109,12 +123,11 @@ fn work(
     }
 }
 
-/// Hands out what the schedule plans and has kept what comes back, in order.
+/// Hands out what the schedule plans and has kept what comes back, in order. `stored` is in the history already.
 fn conduct(
-    schedule: &mut dyn Schedule,
+    (schedule, mut stored): (&mut dyn Schedule, BTreeMap<u64, Told>),
     keeper: &mut Keeper<'_>,
-    orders: &Sender<Order>,
-    made: &Receiver<Made>,
+    (orders, made): (&Sender<Order>, &Receiver<Made>),
     ahead: usize,
 ) {
     let mut batch = VecDeque::new();
@@ -131,20 +144,22 @@ fn conduct(
         while ordered - kept < ahead as u64
             && let Some(planned) = batch.pop_front()
         {
-            let order = Order { place: ordered, planned };
-            if orders.send(order).is_err() {
+            if let Some(told) = stored.remove(&planned.index) {
+                early.insert(ordered, Making::Stored(told));
+            } else if orders.send(Order { place: ordered, planned }).is_err() {
                 return;
             }
             ordered += 1;
         }
-        let Ok(Made { place, making }) = made.recv() else { return };
-        early.insert(place, making);
-        while let Some(making) = early.remove(&kept) {
+        if let Some(making) = early.remove(&kept) {
             if keeper.keep(making).is_break() {
                 return;
             }
             kept += 1;
+            continue;
         }
+        let Ok(Made { place, making }) = made.recv() else { return };
+        early.insert(place, making);
     }
 }
 
@@ -152,6 +167,8 @@ fn conduct(
 struct Keeper<'a> {
     history: &'a History,
     manner: Manner,
+    /// When the campaign would have begun if nobody had interrupted it, by the manner's clock.
+    began_secs: f64,
     on_run: &'a mut dyn FnMut(&RunRecord),
     end: CampaignEnd,
     tally: Tally,
@@ -161,34 +178,31 @@ struct Keeper<'a> {
 }
 
 impl<'a> Keeper<'a> {
-    fn new(env: &Env, history: &'a History, manner: Manner, on_run: &'a mut dyn FnMut(&RunRecord)) -> Self {
+    fn new(
+        env: &Env,
+        history: &'a History,
+        (manner, began_secs): (Manner, f64),
+        on_run: &'a mut dyn FnMut(&RunRecord),
+    ) -> Self {
         let end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new() };
         let flushed_at = (manner.clock.secs)();
-        Self { history, manner, on_run, end, tally: Tally::new(env), told: Vec::new(), flushed_at }
+        Self { history, manner, began_secs, on_run, end, tally: Tally::new(env), told: Vec::new(), flushed_at }
     }
 
     /// Keeps the schedule's next run, and says whether there may be another one.
     fn keep(&mut self, making: Making) -> ControlFlow<()> {
         match making {
-            Making::Run(record) => {
+            Making::Run(mut record) => {
+                record.elapsed_secs = (self.manner.clock.secs)() - self.began_secs;
                 if let Err(faults) = self.commit(&record) {
                     self.stop(faults);
                     return ControlFlow::Break(());
                 }
-                self.end.committed += 1;
                 self.end.discards.extend(record.discards.iter().map(|reason| (record.index, reason.clone())));
                 (self.on_run)(&record);
-                let told = Told::of(&record);
-                let spent = self.tally.count(&told);
-                self.told.push(told);
-                match spent {
-                    Some(spent) => {
-                        self.end.ending = Ending::Budget(spent);
-                        ControlFlow::Break(())
-                    }
-                    None => ControlFlow::Continue(()),
-                }
+                self.count(Told::of(&record))
             }
+            Making::Stored(told) => self.count(told),
             Making::Interrupted => {
                 self.end.ending = Ending::Interrupted;
                 ControlFlow::Break(())
@@ -197,6 +211,20 @@ impl<'a> Keeper<'a> {
                 self.stop(faults);
                 ControlFlow::Break(())
             }
+        }
+    }
+
+    /// Counts a run that is in the history.
+    fn count(&mut self, told: Told) -> ControlFlow<()> {
+        self.end.committed += 1;
+        let spent = self.tally.count(&told);
+        self.told.push(told);
+        match spent {
+            Some(spent) => {
+                self.end.ending = Ending::Budget(spent);
+                ControlFlow::Break(())
+            }
+            None => ControlFlow::Continue(()),
         }
     }
 

@@ -5,8 +5,8 @@
 
 use crate::base::{Choices, Shard};
 use crate::campaign::Env;
-use crate::history::{Repetition, RunRecord};
-use crate::verdict::Outcome;
+use crate::history::{Repetition, RunDetail, RunRecord};
+use crate::verdict::{Judgement, Outcome};
 
 /// Runs of a plain campaign that are planned at a time. Workers wait for each other only between batches, so a large number
 /// costs nothing; it bounds the memory of a campaign of millions of runs.
@@ -70,13 +70,20 @@ pub struct ToldOutcome {
 impl Told {
     /// What there is to tell of a new run.
     pub fn of(record: &RunRecord) -> Self {
-        let judgements = record.judgements.iter().flatten();
-        let outcomes = judgements.map(|judgement| ToldOutcome {
-            property: judgement.property.clone(),
-            outcome: judgement.outcome,
-            margin: judgement.margin,
-        });
+        let outcomes = record.judgements.iter().flatten().map(ToldOutcome::of);
         Self { index: record.index, discards: record.discards.len() as u64, outcomes: outcomes.collect() }
+    }
+
+    /// The same of a run that is read from the history.
+    pub fn again(run: &RunDetail) -> Self {
+        let outcomes = run.actions.iter().flat_map(|action| &action.judgements).map(ToldOutcome::of);
+        Self { index: run.row.index, discards: run.discards.len() as u64, outcomes: outcomes.collect() }
+    }
+}
+
+impl ToldOutcome {
+    fn of(judgement: &Judgement) -> Self {
+        Self { property: judgement.property.clone(), outcome: judgement.outcome, margin: judgement.margin }
     }
 }
 

@@ -149,7 +149,13 @@ pub enum Command {
 #[derive(Debug, Args)]
 pub struct RunArgs {
     /// The campaign's configuration (TOML)
-    pub config: PathBuf,
+    #[arg(required_unless_present = "resume")]
+    pub config: Option<PathBuf>,
+    /// Go on with the newest campaign that was killed or interrupted (of CONFIG, where one is named), or with the one
+    /// with this id, as it was begun: what comes out is the same as without the interruption
+    #[arg(long, value_name = "ID", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    #[arg(conflicts_with_all = ["runs", "time", "until_width", "max_failures", "seed", "repeat", "shard"])]
+    pub resume: Option<String>,
     /// Scenes of each test, instead of the configuration's `test_count`; where a budget ends the campaign, at most so many
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,

@@ -25,6 +25,7 @@ mod recheck;
 mod regressions;
 mod rules;
 mod run;
+mod session;
 mod show;
 mod shrink;
 mod stop;

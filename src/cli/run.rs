@@ -3,17 +3,20 @@
 use std::num::NonZero;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
 
 use crate::analysis;
 use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::{CampaignEnd, Ending, Env, Manner, Options, Spent, run_all};
+use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, resume_all};
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
 use crate::cli::{case, clock, output, regressions, shrink, stop};
 use crate::config::Overrides;
+use crate::cli::session::{self, Session};
+use crate::cli::{clock, output, shrink, stop};
 use crate::history::{self, History, RunFilter};
 use crate::report::{
     CampaignSummary, EndedBy, RunSummary, campaign_json, campaign_table, campaign_text, shrunk_json, shrunk_text,
@@ -24,7 +27,6 @@ use crate::verdict::{Counts, Outcome, mean};
 
 /// Runs a campaign and prints what came of it. Returns the exit code.
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
-    let overrides = overrides(args);
     let (stop, shown) = interrupt();
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let env = Env::prepare_within(&args.config, &overrides, budget.clone())?;
@@ -36,17 +38,26 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
     let cases = regressions::run(&cases, &history, jobs)?;
     let clock = clock::system();
-    let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
-    let name = args.config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let Session { env, history, id, kept } = match &args.resume {
+        Some(id) => session::resume(args, (!id.is_empty()).then_some(id), budget)?,
+        None => session::prepare(args, budget)?,
+    };
     let mut progress = Progress::new(env.runs_to_make(), env.campaign.limits.time_secs);
     // From here on there is a campaign to end.
     shown.get_or_init(|| progress.bar());
-    history.begin_campaign(&env.record(id.clone(), name, (clock.now)()))?;
+    match &args.resume {
+        Some(_) => history.reopen_campaign(&id)?,
+        None => history.begin_campaign(&env.record(id.clone(), session::name(&env), (clock.now)()))?,
+    }
 
     let options = Options { jobs, manner: Manner { clock, disturb: None } };
     let mut runs = Vec::new();
+    let options =
+        Options { jobs: args.jobs.map_or_else(all_cores, usize::from), manner: Manner { clock, disturb: None } };
+    let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::again).collect();
+    runs.iter().for_each(|run| progress.run(run));
     let end = quietly(|| {
-        run_all(&env, &history, &id, &options, &stop, |record| {
+        resume_all(&env, (&history, Kept::of(&kept)), &id, &options, &stop, |record| {
             let summary = RunSummary::of(record);
             progress.run(&summary);
             runs.push(summary);
@@ -58,6 +69,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
     let mut summary = summarise(&env, &args.config, id.clone(), runs, &end);
     summary.regressions = cases;
+    let mut summary = summarise(&env, id.clone(), runs, &end);
     if finished.is_ok() {
         summary.failure_modes = failure_modes(&history, id)?;
     }
@@ -74,19 +86,6 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         _ if shrinks && stop.load(Ordering::Relaxed) => finished.map(|()| stop::INTERRUPTED),
         Ending::Finished | Ending::Budget(_) => finished.map(|()| summary.exit_code()),
         Ending::Interrupted => finished.map(|()| stop::INTERRUPTED),
-    }
-}
-
-fn overrides(args: &RunArgs) -> Overrides {
-    Overrides {
-        runs: args.runs,
-        seed: args.seed,
-        repeat: args.repeat,
-        shard: args.shard,
-        time_secs: args.time,
-        until_width: args.until_width,
-        max_failures: args.max_failures,
-        history: args.history.clone(),
     }
 }
 
@@ -201,7 +200,7 @@ fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureM
         .map_err(|error| Diagnostic::error("X020", format!("failure modes could not be computed: {error}")).into())
 }
 
-fn summarise(env: &Env, config: &Path, campaign: String, runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
+fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
     for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
         for iri in &action.success_properties {
@@ -214,7 +213,7 @@ fn summarise(env: &Env, config: &Path, campaign: String, runs: Vec<RunSummary>, 
     }
     CampaignSummary {
         campaign,
-        config: config.display().to_string(),
+        config: env.campaign.source.name.to_string(),
         history: env.campaign.history.display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
         properties,

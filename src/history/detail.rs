@@ -22,6 +22,7 @@ pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageE
         reason: node.text("act:reason"),
         discards: discards(store, run, &node)?,
         wall_secs: node.number("act:wallSeconds").unwrap_or_default(),
+        elapsed_secs: node.number("act:elapsedSeconds").unwrap_or_default(),
         world: node.text("act:worldName").unwrap_or_default(),
         program_version: version(&node),
         robot_base: ["w:baseX", "w:baseY", "w:baseYaw"].map(|property| node.number(property).unwrap_or_default()),

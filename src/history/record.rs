@@ -150,4 +150,6 @@ pub struct RunRecord {
     pub started: String,
     /// Wall time. Unit: seconds.
     pub wall_secs: f64,
+    /// Time on the clock that the campaign had taken when it was kept. Unit: seconds.
+    pub elapsed_secs: f64,
 }

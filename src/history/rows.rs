@@ -113,6 +113,8 @@ pub struct RunDetail {
     pub discards: Vec<String>,
     /// Unit: seconds.
     pub wall_secs: f64,
+    /// Time on the clock that the campaign had taken when it was kept. Unit: seconds.
+    pub elapsed_secs: f64,
     /// Name of the world.
     pub world: String,
     /// Version of the program that ran it.

@@ -100,6 +100,29 @@ impl History {
         self.flush()
     }
 
+    /// Takes back the end of a campaign that goes on, and removes what killed processes left.
+    ///
+    /// # Errors
+    /// Writing failed: `H005`, `H006`.
+    pub fn reopen_campaign(&self, id: &str) -> Result<(), Diagnostics> {
+        let (campaign, store) = (campaign_node(id), self.store()?);
+        let taken_back = || -> Result<(), StorageError> {
+            let mut ends = Vec::new();
+            for property in write_campaign::end_properties() {
+                let (subject, graph) = (campaign.as_ref().into(), GraphNameRef::DefaultGraph);
+                for quad in store.quads_for_pattern(Some(subject), Some(property.as_ref()), None, Some(graph)) {
+                    ends.push(quad?);
+                }
+            }
+            let mut transaction = store.start_transaction()?;
+            ends.iter().for_each(|quad| transaction.remove(quad));
+            transaction.commit()
+        };
+        taken_back().map_err(|error| self.fault("reopening the campaign", &error))?;
+        self.remove_orphans()?;
+        self.flush()
+    }
+
     /// Keeps a run: when this returns, it is there whole; when it fails, nothing of it is.
     ///
     /// # Errors

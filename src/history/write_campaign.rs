@@ -5,6 +5,7 @@ use oxigraph::model::{Literal, NamedNode, Quad};
 use crate::base::names;
 use crate::history::statements::{Statements, count, iri, time};
 use crate::history::{CampaignEnd, CampaignRecord};
+use crate::verdict::Outcome;
 
 /// A campaign's node.
 pub(super) fn campaign_node(id: &str) -> NamedNode {
@@ -69,6 +70,18 @@ pub(super) fn end(id: &str, end: &CampaignEnd) -> Vec<Quad> {
         about.has(&format!("act:{outcome}Count"), count(*times));
     }
     statements.quads
+}
+
+/// Everything that [`end`] can state of a campaign.
+pub(super) fn end_properties() -> Vec<NamedNode> {
+    let whole = CampaignEnd {
+        score: Some(0.0),
+        score_without_broken: Some(0.0),
+        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, 0)).collect(),
+        ended_by: Some(String::new()),
+        ..CampaignEnd::default()
+    };
+    end("", &whole).into_iter().map(|quad| quad.predicate).collect()
 }
 
 /// Program and version as one text.

@@ -54,6 +54,7 @@ fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
         .may("act:shrunkFrom", record.shrunk_from.as_deref().map(run_node))
         .has("prov:startedAtTime", time(&record.started))
         .has("act:wallSeconds", Literal::from(record.wall_secs))
+        .has("act:elapsedSeconds", Literal::from(record.elapsed_secs))
         .text("act:program", &program(env!("CARGO_PKG_VERSION")));
     write_designators(&record.scene.designators, record, &mut about);
 }

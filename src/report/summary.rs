@@ -3,6 +3,8 @@
 use crate::analysis::{FailureMode, Interval, wilson};
 use crate::history::{Repetition, RunRecord, RunStatus};
 use crate::report::CaseSummary;
+use crate::base::names;
+use crate::history::{Repetition, RunDetail, RunRecord, RunStatus};
 use crate::verdict::{Counts, Judgement, Outcome, mean};
 
 /// A campaign in short.
@@ -146,6 +148,25 @@ impl RunSummary {
             reason: record.reason.clone(),
             score: record.score,
             actions,
+        }
+    }
+
+    /// The short form of a run that is read from the history: the same as that of its record.
+    pub fn again(run: &RunDetail) -> Self {
+        let actions = run.actions.iter().map(|action| ActionSummary {
+            name: names::local(&action.action).to_owned(),
+            score: action.score,
+            judgements: action.judgements.clone(),
+        });
+        Self {
+            id: run.row.run.clone(),
+            index: run.row.index,
+            repetition: run.row.repetition,
+            test: run.row.test.clone(),
+            status: run.row.status,
+            reason: run.reason.clone(),
+            score: run.row.score,
+            actions: actions.collect(),
         }
     }
 

@@ -119,6 +119,9 @@ pub fn shrink(
     })
 }
 
+/// What the names of campaigns begin with that keep a shrunk run.
+pub(in crate::campaign) const SHRUNK: &str = "shrunk ";
+
 /// Runs the small scene once more and keeps it in the history: a campaign of its own, whose run says what it was shrunk
 /// from. Returns the run.
 ///
@@ -132,7 +135,7 @@ pub fn keep(
     manner: &Manner,
 ) -> Result<RunRecord, Diagnostics> {
     let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
-    let mut campaign = env.record(id.clone(), format!("shrunk {original}"), (manner.clock.now)());
+    let mut campaign = env.record(id.clone(), format!("{SHRUNK}{original}"), (manner.clock.now)());
     (campaign.planned_runs, campaign.repeat) = (1, 1);
     campaign.shards.clear();
     let mut record = run_line(env, &id, index, Choices::recorded(&shrunk.choices), manner)

@@ -12,6 +12,7 @@ mod list;
 mod reduce;
 mod search;
 
+pub(super) use counterexample::SHRUNK;
 pub use counterexample::{Repeat, ShrinkOptions, Shrunk, keep, shrink};
 pub use explain::{Explained, Influence, Neighbour, explain};
 pub(super) use list::accepted_places;

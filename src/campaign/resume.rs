@@ -1,0 +1,119 @@
+//! Goes on with a campaign that was ended from outside: which one, whether everything is still as it was, what is there.
+//!
+//! A resumed campaign follows the schedule from its beginning. What is in the history is taken from there instead of being
+//! made, so that budgets and guided schedules see the same runs in the same order as if nobody had interrupted it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::campaign::environment::asked_for;
+use crate::campaign::shrink::SHRUNK;
+use crate::campaign::{Change, Env, Told, changes};
+use crate::config;
+use crate::history::{CampaignRecord, CampaignRow, History, RunDetail};
+use crate::rules::Budget;
+
+/// What is in the history of a campaign that goes on.
+#[derive(Debug, Clone, Default)]
+pub struct Kept {
+    /// Its runs by index.
+    pub(super) runs: BTreeMap<u64, Told>,
+    /// Scenes that were discarded for them, with the reason, by index.
+    pub(super) discards: Vec<(u64, String)>,
+    /// Time on the clock that it has taken. Unit: seconds.
+    pub(super) elapsed_secs: f64,
+}
+
+impl Kept {
+    /// From the runs as they are read from the history.
+    pub fn of(runs: &[RunDetail]) -> Self {
+        let discards = runs.iter().flat_map(|run| run.discards.iter().map(|reason| (run.row.index, reason.clone())));
+        Self {
+            runs: runs.iter().map(|run| (run.row.index, Told::again(run))).collect(),
+            discards: discards.collect(),
+            elapsed_secs: runs.iter().map(|run| run.elapsed_secs).fold(0.0, f64::max),
+        }
+    }
+}
+
+/// The campaign to go on with: the one with an id, or the newest unfinished one, of a configuration where one is named.
+///
+/// # Errors
+/// `H014` there is no such campaign, `X040` none is unfinished, or that one is finished.
+pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) -> Result<CampaignRecord, Diagnostics> {
+    if let Some(id) = id {
+        let record = history.campaign(id)?;
+        let finished = history.campaigns()?.iter().any(|row| row.id == id && is_finished(row));
+        return if finished { Err(finished_already(id)) } else { Ok(record) };
+    }
+    for row in history.campaigns()?.iter().rev() {
+        if is_finished(row) || row.name.starts_with(SHRUNK) {
+            continue;
+        }
+        let record = history.campaign(&row.id)?;
+        if config.is_none_or(|config| is_same_file(&config_of(history, &record), config)) {
+            return Ok(record);
+        }
+    }
+    let of = config.map_or_else(String::new, |config| format!(" of {}", config.display()));
+    Err(Diagnostic::error("X040", format!("the history `{}` has no unfinished campaign{of}", history.dir().display()))
+        .help("`actcheck run CONFIG` begins one; `--history DIR` names another history")
+        .into())
+}
+
+fn is_finished(row: &CampaignRow) -> bool {
+    row.ended.is_some() && !row.interrupted
+}
+
+fn finished_already(id: &str) -> Diagnostics {
+    Diagnostic::error("X040", format!("campaign {id} is finished: there is nothing to go on with"))
+        .help(format!("`actcheck list --campaign {id}` shows its runs"))
+        .into()
+}
+
+/// Where the configuration of a campaign lies.
+fn config_of(history: &History, record: &CampaignRecord) -> PathBuf {
+    config::beside(history.dir(), &record.config_path)
+}
+
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    match (std::fs::canonicalize(one), std::fs::canonicalize(other)) {
+        (Ok(one), Ok(other)) => one == other,
+        _ => one == other,
+    }
+}
+
+impl Env {
+    /// What a campaign needs to go on: its configuration, ontology, rules and models as they lie there now, with what
+    /// the command line had asked for when it began.
+    ///
+    /// # Errors
+    /// As [`Env::prepare`]; `X041` something is no longer as it was when the campaign began.
+    pub fn resume(history: &History, record: &CampaignRecord, rule_budget: Budget) -> Result<Self, Diagnostics> {
+        let mut campaign = config::load(&config_of(history, record), &asked_for(history, record))?;
+        campaign.test_count = Self::scenes_of_a_test(&campaign, record);
+        let env = Self::of(campaign, rule_budget)?;
+        let now = env.record(record.id.clone(), record.name.clone(), record.started.clone());
+        match changes(record, &now).as_slice() {
+            [] => Ok(env),
+            changed => Err(changed_since(record, changed)),
+        }
+    }
+}
+
+fn changed_since(record: &CampaignRecord, changed: &[Change]) -> Diagnostics {
+    let mut faults = Diagnostics::new();
+    let gone = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "not there".to_owned());
+    for change in changed {
+        let (kind, name, was, is) = (change.kind.word(), &change.name, gone(&change.was), gone(&change.is));
+        faults.push(
+            Diagnostic::error(
+                "X041",
+                format!("campaign {} can't go on: the {kind} `{name}` was {was}, is {is}", record.id),
+            )
+            .help("bring back what it began with, or begin a new campaign: its runs stay in the history"),
+        );
+    }
+    faults
+}

@@ -1,0 +1,186 @@
+//! A campaign that was killed goes on as if nobody had killed it.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::support::{actcheck, edit, project, stderr, stdout};
+
+/// A crowded small table on which scenes are discarded too.
+const CROWDED: &str = "tests = [[\"Pick\"]]\ntest_count = 24\nseed = 3\nontology = \"../ontology/actions.ttl\"\n\
+    model_dir = \"../models\"\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n[pickObject]\n\
+    model_list = [\"glass\"]\n[surfaceObjects]\nmodel_list = [\"bottle\", \"plate\", \"bowl\", \"mug\"]\n\
+    count = [9, 12]\n[sensing]\nposition_noise_m = 0.025\n";
+
+fn crowded() -> tempfile::TempDir {
+    let project = project();
+    std::fs::write(project.path().join("configs/crowded.toml"), CROWDED).unwrap();
+    project
+}
+
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let output = actcheck(folder, &[arguments, &["--format", "json"]].concat());
+    let text = stdout(&output);
+    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text}\n{}", stderr(&output)))
+}
+
+fn listed(folder: &Path, history: &str) -> String {
+    let output = actcheck(folder, &["list", "--history", history, "--format", "csv"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    stdout(&output)
+}
+
+fn traces(folder: &Path, history: &str) -> usize {
+    std::fs::read_dir(folder.join(history).join("traces")).map_or(0, Iterator::count)
+}
+
+/// The summary but for where its history lies: all outcomes, margins, witnesses, scores and discards.
+fn without_place(mut summary: Value) -> Value {
+    summary.as_object_mut().unwrap().remove("history");
+    summary
+}
+
+/// What the history says of the discards, run by run.
+fn discards(folder: &Path, history: &str) -> String {
+    let query = "SELECT ?run ?n ?attempt ?reason WHERE { ?run act:discards ?n ; a act:Run \
+                 OPTIONAL { ?d act:ofRun ?run ; a act:Discard ; act:attempt ?attempt ; act:reason ?reason } } \
+                 ORDER BY ?run ?attempt";
+    stdout(&actcheck(folder, &["query", "--history", history, "--format", "csv", query]))
+}
+
+/// Twenty kills at moments that a small generator chooses: some before the first run, some within a run, some within a
+/// write. The campaign comes out bit by bit as the one that nobody killed.
+#[test]
+fn twenty_kills_change_nothing() {
+    let project = crowded();
+    let folder = project.path();
+    let whole = json(folder, &["run", "configs/crowded.toml", "--history", "whole", "--jobs", "2"]);
+    let (expected, expected_discards) = (listed(folder, "whole"), discards(folder, "whole"));
+    assert!(whole["discarded_scenes"].as_u64().unwrap() > 0, "the scenes are too roomy for this test");
+    let (mut kills, mut round, mut state) = (0, 0, 88_172_645_463_325_252_u64);
+    while kills < 20 {
+        round += 1;
+        let history = format!("h{round}");
+        let begin = ["run", "configs/crowded.toml", "--jobs", "2", "--history", &history];
+        let go_on = ["run", "--resume", "--jobs", "2", "--history", &history];
+        let mut before = 0;
+        while kills < 20 && before < 20 {
+            // A campaign that was killed before it was begun can't go on, but only begin.
+            let begun = folder.join(&history).join("store").exists() && {
+                let asked = "SELECT ?c WHERE { ?c a act:Campaign }";
+                let known = actcheck(folder, &["query", "--history", &history, "--format", "csv", asked]);
+                stdout(&known).lines().count() > 1
+            };
+            let mut child = start(folder, if begun { &go_on } else { &begin });
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            // Every third kill may come before there is a new run; the others wait for one, so that the test ends.
+            let started = Instant::now();
+            while state % 3 != 0 && traces(folder, &history) <= before && started.elapsed() < Duration::from_secs(60) {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            std::thread::sleep(Duration::from_millis(state % 500));
+            if child.try_wait().unwrap().is_some() {
+                break;
+            }
+            child.kill().unwrap();
+            child.wait().unwrap();
+            kills += 1;
+            before = traces(folder, &history);
+        }
+        let resumed = actcheck(folder, &[&go_on[..], &["--format", "json"]].concat());
+        let text = stdout(&resumed);
+        if resumed.status.code() == Some(2) {
+            // It had come to its end before the last kill.
+            assert!(stderr(&resumed).contains("no unfinished campaign"), "{}", stderr(&resumed));
+        } else {
+            let summary: Value = serde_json::from_str(&text).unwrap();
+            assert_eq!(without_place(summary), without_place(whole.clone()), "round {round}");
+        }
+        assert_eq!(listed(folder, &history), expected, "round {round}");
+        assert_eq!(discards(folder, &history), expected_discards, "round {round}");
+        let left = std::fs::read_dir(folder.join(&history).join("traces")).unwrap().count();
+        assert_eq!(left, 24, "traces without runs were left in round {round}");
+    }
+    println!("{kills} kills in {round} campaigns");
+}
+
+/// Ctrl-C keeps the runs in flight, and the campaign goes on later with another number of workers; budgets count what was there.
+#[test]
+fn an_interrupted_campaign_goes_on_with_its_budgets() {
+    let project = project();
+    let folder = project.path();
+    let budgets = ["--runs", "60", "--max-failures", "6", "--seed", "11"];
+    let whole = json(folder, &[&["run", "configs/pick.toml", "--history", "whole"][..], &budgets].concat());
+    assert_eq!((&whole["ended_by"], &whole["interrupted"]), (&Value::from("failures"), &Value::from(false)));
+    let begin = [&["run", "configs/pick.toml", "--history", "h", "--jobs", "1"][..], &budgets].concat();
+    let mut child = start(folder, &begin);
+    let started = Instant::now();
+    while traces(folder, "h") < 2 {
+        assert!(started.elapsed() < Duration::from_secs(120), "no runs in two minutes");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let there = listed(folder, "h").lines().count();
+    assert!(there > 1 && there < listed(folder, "whole").lines().count(), "{there}");
+    // A configuration is found by its path, and another one has no campaign here.
+    let other = actcheck(folder, &["run", "configs/clutter.toml", "--resume", "--history", "h"]);
+    assert_eq!(other.status.code(), Some(2));
+    assert!(stderr(&other).contains("X040") && stderr(&other).contains("clutter.toml"), "{}", stderr(&other));
+    let resumed = json(folder, &["run", "configs/pick.toml", "--resume", "--history", "h", "--jobs", "2"]);
+    assert_eq!(without_place(resumed), without_place(whole));
+    assert_eq!(listed(folder, "h"), listed(folder, "whole"));
+}
+
+#[test]
+fn what_can_not_go_on_is_refused_with_the_reason() {
+    let project = project();
+    let folder = project.path();
+    let refused = |arguments: &[&str], words: &[&str]| {
+        let output = actcheck(folder, arguments);
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
+        let text = text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        for word in words {
+            assert!(text.contains(word), "{arguments:?}: no `{word}` in {text}");
+        }
+    };
+    refused(&["run", "--resume"], &["X002", "there is none in this folder"]);
+    refused(&["run"], &["CONFIG"]);
+    refused(&["run", "configs/pick.toml", "--resume", "--runs", "3"], &["--runs"]);
+    let done = json(folder, &["run", "configs/pick.toml", "--runs", "1", "--history", "h"]);
+    let id = done["campaign"].as_str().unwrap();
+    refused(&["run", "--resume", "--history", "h"], &["X040", "has no unfinished campaign"]);
+    refused(&["run", &format!("--resume={id}"), "--history", "h"], &["X040", id, "is finished"]);
+    refused(&["run", "--resume=zzzz", "--history", "h"], &["H014", "zzzz"]);
+    let mut child = start(folder, &["run", "configs/pick.toml", "--runs", "400", "--history", "h"]);
+    let started = Instant::now();
+    while traces(folder, "h") < 2 {
+        assert!(started.elapsed() < Duration::from_secs(120), "no runs in two minutes");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    refused(&["run", "--resume", "--history", "h"], &["H002", "another process"]);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    edit(&folder.join("configs/pick.toml"), "position_noise_m = 0.025", "position_noise_m = 0.026");
+    refused(&["run", "--resume", "--history", "h"], &["X041", "the configuration `pick` was"]);
+    edit(&folder.join("configs/pick.toml"), "position_noise_m = 0.026", "position_noise_m = 0.025");
+    edit(&folder.join("models/objects/glass.toml"), "mass_kg = ", "mass_kg = 1");
+    refused(&["run", "--resume", "--history", "h"], &["X041", "the model `glass` was"]);
+    let before = listed(folder, "h");
+    assert!(before.lines().count() > 1, "{before}");
+}
