@@ -12,7 +12,7 @@ use crate::support::{actcheck, edit, project, stderr, stdout};
 const CROWDED: &str = "tests = [[\"Pick\"]]\ntest_count = 24\nseed = 3\nontology = \"../ontology/actions.ttl\"\n\
     model_dir = \"../models\"\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n[pickObject]\n\
     model_list = [\"glass\"]\n[surfaceObjects]\nmodel_list = [\"bottle\", \"plate\", \"bowl\", \"mug\"]\n\
-    count = [9, 12]\n[sensing]\nposition_noise_m = 0.025\n";
+    count = [6, 9]\n[sensing]\nposition_noise_m = 0.025\n";
 
 fn crowded() -> tempfile::TempDir {
     let project = project();

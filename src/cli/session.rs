@@ -7,7 +7,7 @@ use crate::campaign::{Env, unfinished};
 use crate::cli::args::{HistoryArgs, RunArgs};
 use crate::cli::history_dir;
 use crate::config::{self, Overrides};
-use crate::history::{History, RunDetail, RunFilter};
+use crate::history::{ActionDetail, History, RunDetail, RunFilter};
 use crate::rules::Budget;
 
 /// A campaign and its history.
@@ -43,8 +43,17 @@ pub fn resume(args: &RunArgs, id: Option<&String>, budget: Budget) -> Result<Ses
     let record = unfinished(&history, id.map(String::as_str), args.config.as_deref())?;
     let env = Env::resume(&history, &record, budget)?;
     let rows = history.runs(&RunFilter { campaign: Some(record.id.clone()), ..RunFilter::default() })?;
-    let kept = rows.iter().map(|row| history.run(&row.run)).collect::<Result<_, _>>()?;
+    let mut kept: Vec<RunDetail> = rows.iter().map(|row| history.run(&row.run)).collect::<Result<_, _>>()?;
+    kept.iter_mut().flat_map(|run| &mut run.actions).for_each(|action| order(action, &env));
     Ok(Session { env, history, id: record.id, kept })
+}
+
+/// Puts the outcomes of an action as a new run has them: in the order of its success properties.
+fn order(action: &mut ActionDetail, env: &Env) {
+    if let Some(known) = env.ontology.actions.values().find(|known| known.iri == action.action) {
+        let place = |property: &str| known.success_properties.iter().position(|iri| iri == property);
+        action.judgements.sort_by_key(|judgement| place(&judgement.property));
+    }
 }
 
 fn overrides(args: &RunArgs) -> Overrides {

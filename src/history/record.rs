@@ -144,7 +144,7 @@ pub struct RunRecord {
     pub facts: RunFacts,
     /// IRIs of the actions, one for each action of the trace.
     pub actions: Vec<String>,
-    /// One list for each action, sorted by property.
+    /// One list for each action, in the order of its success properties.
     pub judgements: Vec<Vec<Judgement>>,
     /// RFC 3339.
     pub started: String,
