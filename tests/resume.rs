@@ -140,7 +140,7 @@ fn an_interrupted_campaign_goes_on_with_its_budgets() {
     // A configuration is found by its path, and another one has no campaign here.
     let other = actcheck(folder, &["run", "configs/clutter.toml", "--resume", "--history", "h"]);
     assert_eq!(other.status.code(), Some(2));
-    assert!(stderr(&other).contains("X040") && stderr(&other).contains("clutter.toml"), "{}", stderr(&other));
+    assert!(stderr(&other).contains("X050") && stderr(&other).contains("clutter.toml"), "{}", stderr(&other));
     let resumed = json(folder, &["run", "configs/pick.toml", "--resume", "--history", "h", "--jobs", "2"]);
     assert_eq!(without_place(resumed), without_place(whole));
     assert_eq!(listed(folder, "h"), listed(folder, "whole"));
@@ -164,8 +164,8 @@ fn what_can_not_go_on_is_refused_with_the_reason() {
     refused(&["run", "configs/pick.toml", "--resume", "--runs", "3"], &["--runs"]);
     let done = json(folder, &["run", "configs/pick.toml", "--runs", "1", "--history", "h"]);
     let id = done["campaign"].as_str().unwrap();
-    refused(&["run", "--resume", "--history", "h"], &["X040", "has no unfinished campaign"]);
-    refused(&["run", &format!("--resume={id}"), "--history", "h"], &["X040", id, "is finished"]);
+    refused(&["run", "--resume", "--history", "h"], &["X050", "has no unfinished campaign"]);
+    refused(&["run", &format!("--resume={id}"), "--history", "h"], &["X050", id, "is finished"]);
     refused(&["run", "--resume=zzzz", "--history", "h"], &["H014", "zzzz"]);
     let mut child = start(folder, &["run", "configs/pick.toml", "--runs", "400", "--history", "h"]);
     let started = Instant::now();
@@ -177,10 +177,10 @@ fn what_can_not_go_on_is_refused_with_the_reason() {
     child.kill().unwrap();
     child.wait().unwrap();
     edit(&folder.join("configs/pick.toml"), "position_noise_m = 0.025", "position_noise_m = 0.026");
-    refused(&["run", "--resume", "--history", "h"], &["X041", "the configuration `pick` was"]);
+    refused(&["run", "--resume", "--history", "h"], &["X051", "the configuration `pick` was"]);
     edit(&folder.join("configs/pick.toml"), "position_noise_m = 0.026", "position_noise_m = 0.025");
     edit(&folder.join("models/objects/glass.toml"), "mass_kg = ", "mass_kg = 1");
-    refused(&["run", "--resume", "--history", "h"], &["X041", "the model `glass` was"]);
+    refused(&["run", "--resume", "--history", "h"], &["X051", "the model `glass` was"]);
     let before = listed(folder, "h");
     assert!(before.lines().count() > 1, "{before}");
 }

@@ -109,7 +109,6 @@ impl Env {
         }
     }
 
-    fn of(campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
     /// How many scenes of each test a campaign of the history was asked for.
     pub(super) fn scenes_of_a_test(campaign: &Campaign, record: &CampaignRecord) -> u32 {
         let runs_of_a_scene = campaign.tests.len().max(1) as u64 * u64::from(record.repeat.max(1));

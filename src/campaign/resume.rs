@@ -40,7 +40,7 @@ impl Kept {
 /// The campaign to go on with: the one with an id, or the newest unfinished one, of a configuration where one is named.
 ///
 /// # Errors
-/// `H014` there is no such campaign, `X040` none is unfinished, or that one is finished.
+/// `H014` there is no such campaign, `X050` none is unfinished, or that one is finished.
 pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) -> Result<CampaignRecord, Diagnostics> {
     if let Some(id) = id {
         let record = history.campaign(id)?;
@@ -57,7 +57,7 @@ pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) ->
         }
     }
     let of = config.map_or_else(String::new, |config| format!(" of {}", config.display()));
-    Err(Diagnostic::error("X040", format!("the history `{}` has no unfinished campaign{of}", history.dir().display()))
+    Err(Diagnostic::error("X050", format!("the history `{}` has no unfinished campaign{of}", history.dir().display()))
         .help("`actcheck run CONFIG` begins one; `--history DIR` names another history")
         .into())
 }
@@ -67,7 +67,7 @@ fn is_finished(row: &CampaignRow) -> bool {
 }
 
 fn finished_already(id: &str) -> Diagnostics {
-    Diagnostic::error("X040", format!("campaign {id} is finished: there is nothing to go on with"))
+    Diagnostic::error("X050", format!("campaign {id} is finished: there is nothing to go on with"))
         .help(format!("`actcheck list --campaign {id}` shows its runs"))
         .into()
 }
@@ -89,7 +89,7 @@ impl Env {
     /// the command line had asked for when it began.
     ///
     /// # Errors
-    /// As [`Env::prepare`]; `X041` something is no longer as it was when the campaign began.
+    /// As [`Env::prepare`]; `X051` something is no longer as it was when the campaign began.
     pub fn resume(history: &History, record: &CampaignRecord, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let mut campaign = config::load(&config_of(history, record), &asked_for(history, record))?;
         campaign.test_count = Self::scenes_of_a_test(&campaign, record);
@@ -109,7 +109,7 @@ fn changed_since(record: &CampaignRecord, changed: &[Change]) -> Diagnostics {
         let (kind, name, was, is) = (change.kind.word(), &change.name, gone(&change.was), gone(&change.is));
         faults.push(
             Diagnostic::error(
-                "X041",
+                "X051",
                 format!("campaign {} can't go on: the {kind} `{name}` was {was}, is {is}", record.id),
             )
             .help("bring back what it began with, or begin a new campaign: its runs stay in the history"),

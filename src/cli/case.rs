@@ -1,5 +1,7 @@
 //! `actcheck run` with a case: one scene, run again
 
+use std::path::Path;
+
 use serde_json::json;
 
 use crate::base::{Diagnostic, Diagnostics};
@@ -12,15 +14,17 @@ use crate::report::{CaseSummary, case_json, case_text, run_json, run_text};
 
 /// Runs a case and prints whether it fails as it did. Returns the exit code.
 pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
-    refuse_campaign_options(args)?;
+    refuse_campaign_options(args, &env.campaign.source.name)?;
     let history = History::open(&env.campaign.history)?;
-    let name = args.config.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let file = env.campaign.source.name.to_string();
+    let stem = Path::new(&file).file_stem();
+    let name = stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let cases = [(name, env)];
     let manner = Manner { clock: clock::system(), disturb: None };
     let mut summary = None;
     quietly(|| {
         run_cases(&cases, &history, 1, &manner, &mut |_, made| {
-            summary = Some(summarise(&args.config.display().to_string(), &cases[0].1, made));
+            summary = Some(summarise(&file, &cases[0].1, made));
         })
     })?;
     let Some(summary) = summary else { return Ok(2) };
@@ -49,7 +53,7 @@ pub(super) fn summarise(file: &str, env: &Env, made: CaseRun) -> CaseSummary {
 }
 
 /// A case has one scene and draws nothing: what asks for more of it is a mistake.
-fn refuse_campaign_options(args: &RunArgs) -> Result<(), Diagnostics> {
+fn refuse_campaign_options(args: &RunArgs, file: &str) -> Result<(), Diagnostics> {
     let given = [
         ("--runs", args.runs.is_some()),
         ("--time", args.time.is_some()),
@@ -62,8 +66,7 @@ fn refuse_campaign_options(args: &RunArgs) -> Result<(), Diagnostics> {
     ];
     let mut found = Diagnostics::new();
     for (option, _) in given.into_iter().filter(|(_, given)| *given) {
-        let message =
-            format!("`{option}` means nothing for {}: it is a case, which has one scene", args.config.display());
+        let message = format!("`{option}` means nothing for {file}: it is a case, which has one scene");
         found.push(Diagnostic::error("X040", message).help(
             "take the option away; `actcheck shrink` and `actcheck replay` take the id of the run that it makes",
         ));

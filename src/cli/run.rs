@@ -1,9 +1,7 @@
 //! `actcheck run`
 
 use std::num::NonZero;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
@@ -13,10 +11,8 @@ use crate::base::{Diagnostic, Diagnostics};
 use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, resume_all};
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
-use crate::cli::{case, clock, output, regressions, shrink, stop};
-use crate::config::Overrides;
-use crate::cli::session::{self, Session};
-use crate::cli::{clock, output, shrink, stop};
+use crate::cli::session::{self, Opened, Session};
+use crate::cli::{case, clock, output, shrink, stop};
 use crate::history::{self, History, RunFilter};
 use crate::report::{
     CampaignSummary, EndedBy, RunSummary, campaign_json, campaign_table, campaign_text, shrunk_json, shrunk_text,
@@ -29,31 +25,19 @@ use crate::verdict::{Counts, Outcome, mean};
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let (stop, shown) = interrupt();
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
-    let env = Env::prepare_within(&args.config, &overrides, budget.clone())?;
-    if env.campaign.case.is_some() {
-        return case::run(args, env);
-    }
-    let cases = regressions::prepare(&env, &budget)?;
-    let history = History::open(&env.campaign.history)?;
-    let jobs = args.jobs.map_or_else(all_cores, usize::from);
-    let cases = regressions::run(&cases, &history, jobs)?;
     let clock = clock::system();
-    let Session { env, history, id, kept } = match &args.resume {
-        Some(id) => session::resume(args, (!id.is_empty()).then_some(id), budget)?,
-        None => session::prepare(args, budget)?,
+    let jobs = args.jobs.map_or_else(all_cores, usize::from);
+    let session = match session::open(args, &budget, jobs)? {
+        Opened::Case(env) => return case::run(args, *env),
+        Opened::Campaign(session) => *session,
     };
-    let mut progress = Progress::new(env.runs_to_make(), env.campaign.limits.time_secs);
+    let mut progress = Progress::new(session.env.runs_to_make(), session.env.campaign.limits.time_secs);
     // From here on there is a campaign to end.
     shown.get_or_init(|| progress.bar());
-    match &args.resume {
-        Some(_) => history.reopen_campaign(&id)?,
-        None => history.begin_campaign(&env.record(id.clone(), session::name(&env), (clock.now)()))?,
-    }
+    session.begin((clock.now)())?;
+    let Session { env, history, id, kept, regressions, .. } = session;
 
     let options = Options { jobs, manner: Manner { clock, disturb: None } };
-    let mut runs = Vec::new();
-    let options =
-        Options { jobs: args.jobs.map_or_else(all_cores, usize::from), manner: Manner { clock, disturb: None } };
     let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::again).collect();
     runs.iter().for_each(|run| progress.run(run));
     let end = quietly(|| {
@@ -67,9 +51,8 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     // Sums are taken by index, so that a campaign that is joined from parts has the same last bit.
     runs.sort_by_key(|run| run.index);
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
-    let mut summary = summarise(&env, &args.config, id.clone(), runs, &end);
-    summary.regressions = cases;
     let mut summary = summarise(&env, id.clone(), runs, &end);
+    summary.regressions = regressions;
     if finished.is_ok() {
         summary.failure_modes = failure_modes(&history, id)?;
     }

@@ -1,14 +1,23 @@
-//! What `actcheck run` has in hand before the first run: a new campaign, or one that goes on.
+//! What `actcheck run` has in hand before the first run: a new campaign, one that goes on, or a case.
 
 use std::path::Path;
 
 use crate::base::{Diagnostics, digest_of};
 use crate::campaign::{Env, unfinished};
 use crate::cli::args::{HistoryArgs, RunArgs};
-use crate::cli::history_dir;
+use crate::cli::{history_dir, regressions};
 use crate::config::{self, Overrides};
-use crate::history::{ActionDetail, History, RunDetail, RunFilter};
+use crate::history::{ActionDetail, CampaignRecord, History, RunDetail, RunFilter};
+use crate::report::CaseSummary;
 use crate::rules::Budget;
+
+/// What a configuration asks for.
+pub enum Opened {
+    /// One scene.
+    Case(Box<Env>),
+    /// A campaign; its regressions have been run.
+    Campaign(Box<Session>),
+}
 
 /// A campaign and its history.
 pub struct Session {
@@ -18,34 +27,73 @@ pub struct Session {
     pub history: History,
     /// Its id.
     pub id: String,
+    /// Whether it goes on.
+    goes_on: bool,
     /// Runs that are in the history already, by index.
     pub kept: Vec<RunDetail>,
+    /// What came of the project's cases.
+    pub regressions: Vec<CaseSummary>,
 }
 
-/// A new campaign; nothing of it is in the history yet.
-pub fn prepare(args: &RunArgs, budget: Budget) -> Result<Session, Diagnostics> {
-    // clap asks for a configuration where no campaign is resumed.
-    let config = args.config.as_deref().unwrap_or(Path::new(""));
-    let env = Env::prepare_within(config, &overrides(args), budget)?;
-    let history = History::open(&env.campaign.history)?;
-    let id = history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?;
-    Ok(Session { env, history, id, kept: Vec::new() })
+/// Prepares what the arguments ask for, and runs the project's cases. They are run when a campaign goes on too: whether they
+/// fail is part of what it says.
+pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diagnostics> {
+    let going_on = args.resume.as_deref().map(|id| find(args, id)).transpose()?;
+    let env = match &going_on {
+        Some((history, record)) => Env::resume(history, record, budget.clone())?,
+        // clap asks for a configuration where no campaign is resumed.
+        None => {
+            let config = args.config.as_deref().unwrap_or(Path::new(""));
+            Env::prepare_within(config, &overrides(args), budget.clone())?
+        }
+    };
+    if env.campaign.case.is_some() {
+        return Ok(Opened::Case(Box::new(env)));
+    }
+    let cases = regressions::prepare(&env, budget)?;
+    let (history, goes_on) = match going_on {
+        Some((history, record)) => (history, Some(record.id)),
+        None => (History::open(&env.campaign.history)?, None),
+    };
+    let regressions = regressions::run(&cases, &history, jobs)?;
+    let kept = goes_on.as_deref().map_or_else(|| Ok(Vec::new()), |id| stored(&history, &env, id))?;
+    let (id, goes_on) = match goes_on {
+        Some(id) => (id, true),
+        None => (history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?, false),
+    };
+    Ok(Opened::Campaign(Box::new(Session { env, history, id, goes_on, kept, regressions })))
 }
 
-/// A campaign that goes on: the one with an id, or the newest unfinished one.
-pub fn resume(args: &RunArgs, id: Option<&String>, budget: Budget) -> Result<Session, Diagnostics> {
+impl Session {
+    /// Writes that the campaign begins, or takes back how it ended.
+    pub fn begin(&self, now: String) -> Result<(), Diagnostics> {
+        if self.goes_on {
+            return self.history.reopen_campaign(&self.id);
+        }
+        let stem = Path::new(&*self.env.campaign.source.name).file_stem();
+        let name = stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        self.history.begin_campaign(&self.env.record(self.id.clone(), name, now))
+    }
+}
+
+/// The campaign to go on with: the one with an id, or, where that is empty, the newest unfinished one.
+fn find(args: &RunArgs, id: &str) -> Result<(History, CampaignRecord), Diagnostics> {
     let folder = match (&args.history, &args.config) {
         (Some(folder), _) => Some(folder.clone()),
         (None, Some(config)) => Some(config::load(config, &overrides(args))?.history),
         (None, None) => None,
     };
     let history = history_dir::open(&HistoryArgs { history: folder })?;
-    let record = unfinished(&history, id.map(String::as_str), args.config.as_deref())?;
-    let env = Env::resume(&history, &record, budget)?;
-    let rows = history.runs(&RunFilter { campaign: Some(record.id.clone()), ..RunFilter::default() })?;
+    let record = unfinished(&history, (!id.is_empty()).then_some(id), args.config.as_deref())?;
+    Ok((history, record))
+}
+
+/// Runs of a campaign that are in the history.
+fn stored(history: &History, env: &Env, id: &str) -> Result<Vec<RunDetail>, Diagnostics> {
+    let rows = history.runs(&RunFilter { campaign: Some(id.to_owned()), ..RunFilter::default() })?;
     let mut kept: Vec<RunDetail> = rows.iter().map(|row| history.run(&row.run)).collect::<Result<_, _>>()?;
-    kept.iter_mut().flat_map(|run| &mut run.actions).for_each(|action| order(action, &env));
-    Ok(Session { env, history, id: record.id, kept })
+    kept.iter_mut().flat_map(|run| &mut run.actions).for_each(|action| order(action, env));
+    Ok(kept)
 }
 
 /// Puts the outcomes of an action as a new run has them: in the order of its success properties.
@@ -67,10 +115,4 @@ fn overrides(args: &RunArgs) -> Overrides {
         max_failures: args.max_failures,
         history: args.history.clone(),
     }
-}
-
-/// What the history calls a campaign: its configuration's file name without the ending.
-pub fn name(env: &Env) -> String {
-    let stem = Path::new(&*env.campaign.source.name).file_stem();
-    stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
 }

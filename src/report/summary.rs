@@ -1,10 +1,9 @@
 //! What is said about a campaign when it is over, as plain data.
 
 use crate::analysis::{FailureMode, Interval, wilson};
-use crate::history::{Repetition, RunRecord, RunStatus};
-use crate::report::CaseSummary;
 use crate::base::names;
 use crate::history::{Repetition, RunDetail, RunRecord, RunStatus};
+use crate::report::CaseSummary;
 use crate::verdict::{Counts, Judgement, Outcome, mean};
 
 /// A campaign in short.
