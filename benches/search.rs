@@ -6,7 +6,7 @@
 //! `cargo bench --bench search -- 200` for 200 seeds; without a number it takes 60. `-- points` prints values of the
 //! functions, against which the script checks its own.
 
-use actcheck::search::{Dimension, Search, Space, Strategy, Told};
+use actcheck::search::{Dimension, GENERATION, Search, Space, Strategy, Told};
 
 const WIDTH: usize = 8;
 
@@ -119,7 +119,7 @@ fn search(planted: Planted, strategy: Strategy) -> Outcome {
     let mut seen = [false; 2];
     let (mut covered, mut rate) = (false, 0.0);
     while samples < RATE_SAMPLES || (first.is_none() && samples < MOST_SAMPLES) {
-        for ask in search.ask() {
+        for ask in search.ask(GENERATION) {
             samples += 1;
             let (margin, region) = planted.margin(&ask.point);
             if let Some(region) = region {

@@ -27,6 +27,7 @@ mod replay;
 mod resume;
 mod rules;
 mod scenario;
+mod search;
 mod shrink;
 mod stops;
 mod support;

@@ -150,6 +150,7 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         until_width: Some(0.05),
         max_failures: Some(3),
         shards: Vec::new(),
+        strategy: "random".to_owned(),
         started: format!("2026-08-01T12:{minute:02}:00Z"),
         program_version: "0.1.0".to_owned(),
         program_digest: digest_of("program"),

@@ -12,6 +12,7 @@ use crate::history::{CampaignRecord, History};
 use crate::ontology::{self, Ontology};
 use crate::rules::{Budget, RuleBook};
 use crate::scenario::Space;
+use crate::search::Strategy;
 use crate::world;
 
 /// A configuration with its ontology, scene space and rules, prepared once and shared by all workers.
@@ -120,6 +121,7 @@ impl Env {
         let ontology = ontology::load(files, path)?;
         let mut faults = Diagnostics::new();
         check_launcher(&campaign, &mut faults);
+        check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
         if let Err(error) = world::check_robot(&campaign.robot) {
             faults.push(error.diagnostic());
@@ -163,6 +165,7 @@ impl Env {
             until_width: self.campaign.limits.until_width,
             max_failures: self.campaign.limits.max_failures,
             shards: self.campaign.shard.into_iter().collect(),
+            strategy: self.campaign.search.name().to_owned(),
             started,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
             program_digest: PROGRAM_DIGEST.to_owned(),
@@ -202,6 +205,7 @@ pub(super) fn asked_for(history: &History, record: &CampaignRecord) -> Overrides
         runs: None,
         seed: Some(record.seed),
         repeat: Some(record.repeat),
+        search: Strategy::by_name(&record.strategy),
         shard,
         time_secs: record.time_secs,
         until_width: record.until_width,
@@ -218,6 +222,25 @@ fn path_from(folder: &Path, path: &Path) -> String {
         _ => path.to_path_buf(),
     };
     seen.display().to_string()
+}
+
+/// What a search that looks for failures can't be: ended by the width of a raw rate's interval, or made in parts that don't
+/// hear of each other.
+fn check_search(campaign: &Campaign, faults: &mut Diagnostics) {
+    if !campaign.search.is_guided() {
+        return;
+    }
+    let name = campaign.search.name();
+    let help = "choose the strategy `random`, `halton` or `latin-hypercube`";
+    let mut refuse = |why: &str| {
+        faults.push(campaign.fault("S024", "search", format!("a {name} search looks for failures: {why}")).help(help));
+    };
+    if campaign.limits.until_width.is_some() {
+        refuse("counts of its runs are no rates, so that no width of their interval can end it");
+    }
+    if campaign.shard.is_some() {
+        refuse("each scene depends on what came of the ones before, so that it can't be made in parts");
+    }
 }
 
 fn check_launcher(campaign: &Campaign, faults: &mut Diagnostics) {

@@ -57,7 +57,9 @@ pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, manner: &Ma
 /// The record with what its plan says of it. Discards are of a scene: its first run has them.
 fn kept(planned: &Planned, record: RunRecord, discards: Vec<String>) -> RunRecord {
     let first = planned.repetition.is_none_or(|number| number == 0);
-    RunRecord { discards: if first { discards } else { Vec::new() }, repetition: planned.repetition(), ..record }
+    let weight = planned.steering.as_ref().and_then(|steering| steering.weight);
+    let discards = if first { discards } else { Vec::new() };
+    RunRecord { discards, repetition: planned.repetition(), weight, ..record }
 }
 
 /// When a run that begins now is cut off.

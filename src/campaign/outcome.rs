@@ -2,6 +2,7 @@
 
 use crate::base::Diagnostics;
 use crate::campaign::Spent;
+use crate::search::Estimate;
 
 /// What there is to say when no more runs come.
 #[derive(Debug)]
@@ -12,6 +13,21 @@ pub struct CampaignEnd {
     pub committed: u64,
     /// Scenes that could not be used for the runs that are in the history, with the reason, by index of the run.
     pub discards: Vec<(u64, String)>,
+    /// Of a guided search: how often each property of each test fails.
+    pub rates: Vec<WeightedRate>,
+}
+
+/// How often a property fails in scenes as the configuration draws them, whichever a search looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WeightedRate {
+    /// Names of the test's actions, joined by a space.
+    pub test: String,
+    /// IRI of the property.
+    pub property: String,
+    /// Share of the scenes in which it fails in at least one action of the test.
+    pub failing: Estimate,
+    /// Scenes that this is known from.
+    pub scenes: u64,
 }
 
 /// Why a campaign ended.

@@ -79,6 +79,7 @@ pub fn resume_all(
             return keeper.end;
         }
     };
+    let mut schedule = schedule_of(env);
     let (orders, taken) = channel();
     let (give, made) = channel();
     let taken = Mutex::new(taken);
@@ -91,7 +92,7 @@ pub fn resume_all(
                 });
             });
         }
-        conduct((&mut *schedule_of(env), kept.runs), &mut keeper, (&orders, &made), jobs * AHEAD);
+        conduct((&mut *schedule, kept.runs), &mut keeper, (&orders, &made), jobs * AHEAD);
         if let (Ending::Interrupted, Some(limit), false) =
             (&keeper.end.ending, env.campaign.limits.time_secs, stop.load(Ordering::Relaxed))
         {
@@ -101,6 +102,7 @@ pub fn resume_all(
         halt.store(true, Ordering::Relaxed);
         drop(orders);
     });
+    keeper.end.rates = schedule.rates();
     keeper.finish()
 }
 
@@ -184,7 +186,7 @@ impl<'a> Keeper<'a> {
         (manner, began_secs): (Manner, f64),
         on_run: &'a mut dyn FnMut(&RunRecord),
     ) -> Self {
-        let end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new() };
+        let end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
         let flushed_at = (manner.clock.secs)();
         Self { history, manner, began_secs, on_run, end, tally: Tally::new(env), told: Vec::new(), flushed_at }
     }

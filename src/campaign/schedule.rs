@@ -3,9 +3,14 @@
 //! A schedule depends on its configuration and on what came of earlier batches, and on nothing else: neither the number of
 //! workers nor the moment at which somebody stopped and resumed the campaign changes it.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use crate::base::{Choices, Shard};
-use crate::campaign::Env;
+use crate::campaign::searching::Searching;
+use crate::campaign::{Env, WeightedRate};
 use crate::history::{Repetition, RunDetail, RunRecord};
+use crate::search::Strategy;
 use crate::verdict::{Judgement, Outcome};
 
 /// Runs of a plain campaign that are planned at a time. Workers wait for each other only between batches, so a large number
@@ -24,6 +29,17 @@ pub struct Planned {
     pub scene: u64,
     /// Number of the run among those of its scene, from 0; nothing where every scene is run once.
     pub repetition: Option<u64>,
+    /// What of its scene is not left to chance; nothing where all is.
+    pub steering: Option<Arc<Steering>>,
+}
+
+/// What a search decided of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Steering {
+    /// Quantiles of choices by their names.
+    pub quantiles: BTreeMap<String, f64>,
+    /// Importance weight of the scene, where scenes are not drawn as the configuration's ranges say.
+    pub weight: Option<f64>,
 }
 
 impl Planned {
@@ -32,7 +48,12 @@ impl Planned {
     /// Attempts have streams of their own, so that a discard moves no other run's decisions; and so has the noise of each
     /// repetition, whatever the number of repetitions.
     pub fn choices(&self, seed: u64, attempt: u64) -> Choices {
-        let scene = Choices::random(seed, self.scene | (attempt << 48));
+        let stream = self.scene | (attempt << 48);
+        // Where the steered scene can't be built, one that nobody steers stands in for it.
+        let scene = match self.steering.as_ref().filter(|_| attempt == 0) {
+            Some(steering) => Choices::steered(&steering.quantiles, seed, stream),
+            None => Choices::random(seed, stream),
+        };
         match self.repetition {
             None => scene,
             Some(number) => scene.with_noise(seed, NOISE | (number << 40) | self.scene),
@@ -93,13 +114,22 @@ pub trait Schedule {
     ///
     /// It is asked when every run of the batch before is in the history; `told` are those, in the same order.
     fn next_batch(&mut self, told: &[Told]) -> Vec<Planned>;
+
+    /// How often properties fail, where counts of runs don't tell: from the batches that it was told of as a whole.
+    fn rates(&self) -> Vec<WeightedRate> {
+        Vec::new()
+    }
 }
 
 /// The schedule that a campaign's configuration asks for.
 pub fn schedule_of(env: &Env) -> Box<dyn Schedule> {
-    let tests = env.campaign.tests.len() as u64;
-    let repeat = u64::from(env.campaign.repeat);
-    let all = Box::new(InTurns { tests, scenes: u64::from(env.campaign.test_count), repeat, made: 0 });
+    let all: Box<dyn Schedule> = if env.campaign.search == Strategy::Random {
+        let tests = env.campaign.tests.len() as u64;
+        let repeat = u64::from(env.campaign.repeat);
+        Box::new(InTurns { tests, scenes: u64::from(env.campaign.test_count), repeat, made: 0 })
+    } else {
+        Box::new(Searching::new(env))
+    };
     match env.campaign.shard {
         None => all,
         Some(shard) => Box::new(OneShard { all, shard }),
@@ -123,7 +153,8 @@ impl InTurns {
     fn planned(&self, place: u64) -> Planned {
         let (turn, repetition) = (place / self.repeat, place % self.repeat);
         let scene = turn % self.tests * self.scenes + turn / self.tests;
-        Planned { index: scene * self.repeat + repetition, scene, repetition: (self.repeat > 1).then_some(repetition) }
+        let repetition_of_several = (self.repeat > 1).then_some(repetition);
+        Planned { index: scene * self.repeat + repetition, scene, repetition: repetition_of_several, steering: None }
     }
 }
 
@@ -188,7 +219,7 @@ mod tests {
     #[test]
     fn repetitions_differ_in_noise_alone() {
         let drawn = |scene, repetition| {
-            let mut choices = Planned { index: 0, scene, repetition }.choices(7, 0);
+            let mut choices = Planned { index: 0, scene, repetition, steering: None }.choices(7, 0);
             let yaw = choices.real("yaw", 0.0, 1.0, 0.0).to_bits();
             choices.begin_noise();
             (yaw, choices.normal("sense.x", 1.0).to_bits())
@@ -220,7 +251,10 @@ mod tests {
     #[test]
     fn attempts_and_runs_have_decisions_of_their_own() {
         let first = |index, attempt| {
-            Planned { index, scene: index, repetition: None }.choices(7, attempt).real("x", 0.0, 1.0, 0.0).to_bits()
+            Planned { index, scene: index, repetition: None, steering: None }
+                .choices(7, attempt)
+                .real("x", 0.0, 1.0, 0.0)
+                .to_bits()
         };
         assert_eq!(first(1, 0), first(1, 0));
         assert_ne!(first(1, 0), first(2, 0));

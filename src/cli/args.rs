@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::base::Shard;
+use crate::base::{Shard, did_you_mean};
 use crate::cli::export::ExportArgs;
 use crate::cli::recheck::RecheckArgs;
 use crate::cli::shrink::ShrinkArgs;
 use crate::config::duration_secs;
 use crate::report::TableFormat;
+use crate::search::Strategy;
 
 /// QuickCheck for robot actions: generated scenes, physics simulation, verdicts by rules that you edit.
 #[derive(Debug, Parser)]
@@ -145,6 +146,12 @@ pub enum Command {
     Datalog(DatalogArgs),
 }
 
+/// A search strategy by its name.
+fn strategy(name: &str) -> Result<Strategy, String> {
+    let names = Strategy::ALL.map(Strategy::name);
+    Strategy::by_name(name).ok_or_else(|| did_you_mean(name, names))
+}
+
 /// `actcheck run`
 #[derive(Debug, Args)]
 pub struct RunArgs {
@@ -154,7 +161,7 @@ pub struct RunArgs {
     /// Go on with the newest campaign that was killed or interrupted (of CONFIG, where one is named), or with the one
     /// with this id, as it was begun: what comes out is the same as without the interruption
     #[arg(long, value_name = "ID", num_args = 0..=1, require_equals = true, default_missing_value = "")]
-    #[arg(conflicts_with_all = ["runs", "time", "until_width", "max_failures", "seed", "repeat", "shard"])]
+    #[arg(conflicts_with_all = ["runs", "time", "until_width", "max_failures", "seed", "repeat", "strategy", "shard"])]
     pub resume: Option<String>,
     /// Scenes of each test, instead of the configuration's `test_count`; where a budget ends the campaign, at most so many
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -172,6 +179,10 @@ pub struct RunArgs {
     /// Seed of all randomness, instead of the configuration's `seed`
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
+    /// How scenes are chosen: random, halton, latin-hypercube, cross-entropy, bandit or boundary, instead of the
+    /// configuration's `[search] strategy`; the last three look for failures, with the properties' margins as a guide
+    #[arg(long, value_name = "NAME", value_parser = strategy)]
+    pub strategy: Option<Strategy>,
     /// Runs of each scene, each with other noise, instead of the configuration's `repeat`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub repeat: Option<u32>,

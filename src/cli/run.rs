@@ -6,17 +6,17 @@ use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
 
-use crate::analysis;
+use crate::analysis::{self, Interval};
 use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, resume_all};
+use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, WeightedRate, resume_all};
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
 use crate::cli::session::{self, Opened, Session};
 use crate::cli::{case, clock, output, shrink, stop};
 use crate::history::{self, History, RunFilter};
 use crate::report::{
-    CampaignSummary, EndedBy, RunSummary, campaign_json, campaign_table, campaign_text, shrunk_json, shrunk_text,
-    with_shrunk,
+    CampaignSummary, EndedBy, GuidedSearch, RunSummary, WeightedLine, campaign_json, campaign_table, campaign_text,
+    shrunk_json, shrunk_text, with_shrunk,
 };
 use crate::rules::Budget;
 use crate::verdict::{Counts, Outcome, mean};
@@ -194,8 +194,9 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
             }
         }
     }
-    CampaignSummary {
+    let mut summary = CampaignSummary {
         campaign,
+        search: None,
         config: env.campaign.source.name.to_string(),
         history: env.campaign.history.display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
@@ -207,7 +208,25 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
         discards: end.discards.len() as u64,
         ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), told: spent.to_string() }),
         interrupted: !is_whole(end),
-    }
+    };
+    summary.search = guided_search(env, &summary, end);
+    summary
+}
+
+/// What a guided search knows of failure rates; nothing where another strategy chose the scenes.
+fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignEnd) -> Option<GuidedSearch> {
+    let line = |found: &WeightedRate| WeightedLine {
+        test: found.test.clone(),
+        property: found.property.clone(),
+        label: env.ontology.properties.get(&found.property).map_or_else(String::new, |known| known.name.clone()),
+        failing: Interval { rate: found.failing.rate, low: found.failing.low, high: found.failing.high },
+        scenes: found.scenes,
+        raw: summary.raw_failures(&found.test, &found.property),
+    };
+    let strategy = env.campaign.search;
+    strategy
+        .is_guided()
+        .then(|| GuidedSearch { strategy: strategy.name().to_owned(), lines: end.rates.iter().map(line).collect() })
 }
 
 fn warn_of_discards(end: &CampaignEnd) {

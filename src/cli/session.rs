@@ -109,6 +109,7 @@ fn overrides(args: &RunArgs) -> Overrides {
         runs: args.runs,
         seed: args.seed,
         repeat: args.repeat,
+        search: args.strategy,
         shard: args.shard,
         time_secs: args.time,
         until_width: args.until_width,

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::base::{Diagnostic, Files, Shard, Source, Span};
 use crate::config::{Case, ObjectModel, RobotProfile};
+use crate::search::Strategy;
 
 /// One campaign: every test in `test_count` scenes, in each `repeat` times.
 #[derive(Debug, Clone)]
@@ -22,6 +23,8 @@ pub struct Campaign {
     pub launcher: Launcher,
     /// Seed of all randomness (`seed`); without one, 0.
     pub seed: u64,
+    /// How scenes are chosen (`[search] strategy`); without one, at random.
+    pub search: Strategy,
     /// The ontology's root file (`ontology`) and where it is read from.
     pub ontology: (Files, PathBuf),
     /// Models by name: all that `model_dir` (or the shipped folder) holds and the campaign can speak of.
@@ -85,6 +88,8 @@ pub struct Overrides {
     pub max_failures: Option<u64>,
     /// Only this part of the runs.
     pub shard: Option<Shard>,
+    /// Instead of `[search] strategy`.
+    pub search: Option<Strategy>,
     /// Instead of `[history] dir`; relative to where the program runs.
     pub history: Option<PathBuf>,
 }

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Files, Source, Span};
+use crate::base::{Diagnostic, Diagnostics, Files, Source, Span, did_you_mean};
 use crate::config::designators::{self, Designators};
 use crate::config::{Campaign, Launcher, Overrides, Table, case, ranges, shelf};
+use crate::search::Strategy;
 
 /// The ontology that the program carries.
 const SHIPPED_ONTOLOGY: &str = "ontology/actions.ttl";
@@ -49,6 +50,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let physics = ranges::read_physics(&mut table, &mut found);
     let sensing = ranges::read_sensing(&mut table, &mut found);
     let (budget, limits) = ranges::read_budget(&mut table, &mut found);
+    let search = read_search(&mut table, &mut found);
     let history = read_history(&mut table, folder, &mut found);
     // Before the tables of designators, which may have any name.
     let case = table.table("case");
@@ -69,6 +71,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         launcher,
         seed: overrides.seed.unwrap_or(seed),
         shard: overrides.shard,
+        search: overrides.search.or(search).unwrap_or(Strategy::Random),
         ontology,
         models: shelf.models,
         robot,
@@ -136,6 +139,18 @@ fn read_ontology_path(table: &mut Table, folder: &Path) -> (Files, PathBuf) {
         );
     }
     (Files::Disk, path)
+}
+
+fn read_search(table: &mut Table, found: &mut Diagnostics) -> Option<Strategy> {
+    let mut search = table.table("search")?;
+    let written = search.string("strategy");
+    let strategy = written.as_ref().and_then(|written| Strategy::by_name(&written.value));
+    if let (Some(written), None) = (written, strategy) {
+        let help = did_you_mean(&written.value, Strategy::ALL.map(Strategy::name));
+        search.fault("C016", written.span, format!("there is no search strategy `{}`", written.value), help);
+    }
+    search.finish(found);
+    strategy
 }
 
 fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> PathBuf {

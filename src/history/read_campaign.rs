@@ -43,6 +43,7 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         until_width: node.number("act:untilWidth"),
         max_failures: node.count("act:maxFailures"),
         shards: shards(&node),
+        strategy: node.text("act:strategy").unwrap_or_else(|| "random".to_owned()),
         started: text(&node, "prov:startedAtTime"),
         program_version: version(&node),
         program_digest: text(&node, "act:programDigest"),

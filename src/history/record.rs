@@ -41,6 +41,8 @@ pub struct CampaignRecord {
     pub max_failures: Option<u64>,
     /// The parts of these runs that it is made of, sorted; none: it was run as a whole.
     pub shards: Vec<Shard>,
+    /// Name of the strategy by which its scenes were chosen.
+    pub strategy: String,
     /// RFC 3339.
     pub started: String,
     /// Version of this program.

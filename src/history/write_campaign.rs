@@ -31,6 +31,7 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .may("act:timeBudget", record.time_secs.map(Literal::from))
         .may("act:untilWidth", record.until_width.map(Literal::from))
         .may("act:maxFailures", record.max_failures.map(count))
+        .text("act:strategy", &record.strategy)
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version))
         .text("act:programDigest", &record.program_digest);

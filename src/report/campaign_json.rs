@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use crate::analysis::FailureMode;
 use crate::report::repeated_text::repeated_json;
+use crate::report::weighted::weighted_json;
 use crate::report::{CampaignSummary, RunSummary, Share, case_json};
 use crate::verdict::Judgement;
 
@@ -37,6 +38,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         "exit_code": summary.exit_code(),
         "regressions": summary.regressions.iter().map(case_json).collect::<Vec<_>>(),
         "properties": properties,
+        "search": weighted_json(summary),
         "repetitions": repeated_json(summary),
         "failure_modes": summary.failure_modes.iter().map(failure_mode).collect::<Vec<_>>(),
         "remarks": summary.remarks_json(),
@@ -63,7 +65,7 @@ fn run(run: &RunSummary) -> Value {
         })
         .collect();
     json!({
-        "run": run.id, "index": run.index, "test": run.test, "status": run.status.word(),
+        "run": run.id, "index": run.index, "weight": run.weight, "test": run.test, "status": run.status.word(),
         "reason": run.reason, "score": run.score, "actions": actions,
     })
 }

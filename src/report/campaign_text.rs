@@ -7,6 +7,7 @@ use comfy_table::{Attribute, Cell, Color};
 use crate::base::names;
 use crate::report::repeated_text::repeated_text;
 use crate::report::table::ruled;
+use crate::report::weighted::weighted_text;
 use crate::report::{CampaignSummary, RunSummary, Share, regressions_text};
 use crate::verdict::Outcome;
 
@@ -25,6 +26,7 @@ pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
     properties_table(&mut out, summary);
     out.push('\n');
     repeated_text(&mut out, summary);
+    weighted_text(&mut out, summary);
     scores(&mut out, summary);
     failure_modes(&mut out, summary);
     remarks(&mut out, summary);

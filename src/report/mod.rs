@@ -21,6 +21,7 @@ mod run_text;
 mod shrunk_text;
 mod summary;
 mod table;
+mod weighted;
 
 pub use answer::answer_table;
 pub use campaign_json::campaign_json;
@@ -40,3 +41,4 @@ pub use run_text::{run_json, run_text};
 pub use shrunk_text::{ShrunkChoice, ShrunkSummary, shrunk_json, shrunk_text, with_shrunk};
 pub use summary::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, RunSummary, Share};
 pub use table::{Table, TableFormat};
+pub use weighted::{GuidedSearch, WeightedLine};

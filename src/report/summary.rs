@@ -3,7 +3,7 @@
 use crate::analysis::{FailureMode, Interval, wilson};
 use crate::base::names;
 use crate::history::{Repetition, RunDetail, RunRecord, RunStatus};
-use crate::report::CaseSummary;
+use crate::report::{CaseSummary, GuidedSearch};
 use crate::verdict::{Counts, Judgement, Outcome, mean};
 
 /// A campaign in short.
@@ -21,6 +21,8 @@ pub struct CampaignSummary {
     pub properties: Vec<(String, String, Option<String>)>,
     /// The runs, by index.
     pub runs: Vec<RunSummary>,
+    /// How scenes were chosen, where counts of runs are no rates.
+    pub search: Option<GuidedSearch>,
     /// Runs that share the same set of failed properties, most frequent first.
     pub failure_modes: Vec<FailureMode>,
     /// The project's cases, which ran first. They count for the exit code, and for nothing else.
@@ -53,6 +55,8 @@ pub struct RunSummary {
     pub index: u64,
     /// Which run of which scene it is, where scenes are run more than once.
     pub repetition: Option<Repetition>,
+    /// Importance weight of its scene, where a search chose it.
+    pub weight: Option<f64>,
     /// Names of its actions.
     pub test: String,
     /// How it ended.
@@ -142,6 +146,7 @@ impl RunSummary {
             id: record.id.clone(),
             index: record.index,
             repetition: record.repetition,
+            weight: record.weight,
             test: record.test.clone(),
             status: record.status,
             reason: record.reason.clone(),
@@ -161,6 +166,7 @@ impl RunSummary {
             id: run.row.run.clone(),
             index: run.row.index,
             repetition: run.row.repetition,
+            weight: run.row.weight,
             test: run.row.test.clone(),
             status: run.row.status,
             reason: run.reason.clone(),
@@ -178,6 +184,12 @@ impl RunSummary {
     pub fn passed(&self) -> bool {
         let counts = Counts::of(self.outcomes());
         counts.passed > 0 && counts.passed + counts.inapplicable == counts.total()
+    }
+
+    /// Whether this property failed in one of its actions.
+    pub fn failed_property(&self, property: &str) -> bool {
+        let judgements = self.actions.iter().flat_map(|action| &action.judgements);
+        judgements.into_iter().any(|judgement| judgement.property == property && judgement.outcome == Outcome::Failed)
     }
 
     /// Whether a property failed.
@@ -264,6 +276,7 @@ pub(super) mod tests {
             id: format!("k7f3-{}", index + 1),
             index,
             repetition: None,
+            weight: None,
             test: "Pick".into(),
             status,
             reason: (status != RunStatus::Completed).then(|| "body left the world".into()),
@@ -281,6 +294,7 @@ pub(super) mod tests {
             properties: (0..2)
                 .map(|i| (format!("http://actions#P{i}"), format!("property {i}"), Some("m".to_owned())))
                 .collect(),
+            search: None,
             failure_modes: vec![],
             regressions: vec![],
             planned: runs.len() as u64,

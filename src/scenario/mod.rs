@@ -9,12 +9,14 @@
 
 mod draw;
 mod overlap;
+mod parameters;
 mod placement;
 mod scene;
 mod space;
 
 pub use draw::{Discard, draw};
 pub use overlap::{CLEARANCE_M, Solid};
+pub use parameters::{Parameter, ParameterKind};
 pub use scene::{RobotStart, Role, Scene, SceneObject};
 pub use space::Space;
 

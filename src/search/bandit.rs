@@ -16,8 +16,8 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
     }
     let axes = space.dimensions().iter().enumerate().map(|(axis, dimension)| {
         let arms = match dimension {
-            Dimension::Continuous => SLICES,
-            Dimension::Categorical(count) => *count,
+            Dimension::Continuous | Dimension::Normal => SLICES,
+            Dimension::Categorical(count) | Dimension::Rising(count) => *count,
         };
         play(&open, axis, arms)
     });

@@ -38,11 +38,11 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
 
 /// A cloud about a point; a category is kept in most draws.
 fn about(space: &Space, point: &[f64], sigma: f64) -> Component {
-    let axes = space.dimensions().iter().zip(point).map(|(dimension, value)| match dimension {
-        Dimension::Continuous => Marginal::Normal { mean: *value, sigma },
-        Dimension::Categorical(count) => {
-            let mut shares = vec![sigma; *count];
-            shares[bucket(*value, *count)] = 1.0;
+    let axes = space.dimensions().iter().zip(point).map(|(dimension, value)| match dimension.categories() {
+        None => Marginal::Normal { mean: *value, sigma },
+        Some(count) => {
+            let mut shares = vec![sigma; count];
+            shares[bucket(*value, count)] = 1.0;
             Marginal::steps(&shares)
         }
     });
@@ -92,9 +92,9 @@ impl Model {
         let mut point = Vec::with_capacity(space.dimensions().len());
         for dimension in space.dimensions() {
             let own = self.coefficients.rows(at, terms(*dimension));
-            let value = match dimension {
-                Dimension::Continuous => least_of_parabola(own[0], own[1]),
-                Dimension::Categorical(count) => (own.imin() as f64 + 0.5) / *count as f64,
+            let value = match dimension.categories() {
+                None => least_of_parabola(own[0], own[1]),
+                Some(count) => (own.imin() as f64 + 0.5) / count as f64,
             };
             point.push(value);
             at += terms(*dimension);
@@ -104,19 +104,16 @@ impl Model {
 }
 
 fn terms(dimension: Dimension) -> usize {
-    match dimension {
-        Dimension::Continuous => 2,
-        Dimension::Categorical(count) => count,
-    }
+    dimension.categories().unwrap_or(2)
 }
 
 fn features(space: &Space, point: &[f64]) -> DVector<f64> {
     let mut row = vec![1.0];
     for (dimension, value) in space.dimensions().iter().zip(point) {
-        match dimension {
-            Dimension::Continuous => row.extend([value - 0.5, (value - 0.5) * (value - 0.5)]),
-            Dimension::Categorical(count) => {
-                row.extend((0..*count).map(|category| f64::from(u8::from(category == bucket(*value, *count)))));
+        match dimension.categories() {
+            None => row.extend([value - 0.5, (value - 0.5) * (value - 0.5)]),
+            Some(count) => {
+                row.extend((0..count).map(|category| f64::from(u8::from(category == bucket(*value, count)))));
             }
         }
     }

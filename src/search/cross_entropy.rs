@@ -31,13 +31,13 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
 
 fn fit(dimension: Dimension, elite: &[&[f64]], axis: usize) -> Marginal {
     let count = elite.len() as f64;
-    match dimension {
-        Dimension::Continuous => {
+    match dimension.categories() {
+        None => {
             let mean = elite.iter().map(|point| point[axis]).sum::<f64>() / count;
             let variance = elite.iter().map(|point| (point[axis] - mean) * (point[axis] - mean)).sum::<f64>() / count;
             Marginal::Normal { mean, sigma: libm::sqrt(variance).max(LEAST_SIGMA) }
         }
-        Dimension::Categorical(categories) => {
+        Some(categories) => {
             let mut shares = vec![PRIOR / categories as f64; categories];
             elite.iter().for_each(|point| shares[bucket(point[axis], categories)] += 1.0);
             Marginal::steps(&shares)

@@ -21,19 +21,25 @@ pub(crate) fn random(seed: u64, index: u64, width: usize) -> Vec<f64> {
     (0..width).map(|_| unit(&mut generator)).collect()
 }
 
+/// Axes of Halton's sequence; further ones are random. Two axes of large bases go up and down together for many points.
+const HALTON_AXES: usize = 12;
+
 /// The point of an index in Halton's sequence, shifted around the cube by a vector that the seed gives.
 ///
 /// Source: Halton (1960); the shift of Cranley and Patterson (1976) makes each point uniform, so that means of it are
 /// unbiased.
 pub(crate) fn halton(seed: u64, index: u64, width: usize) -> Vec<f64> {
     let mut generator = stream(seed, 2, 0);
-    primes(width)
+    let mut point: Vec<f64> = primes(width.min(HALTON_AXES))
         .into_iter()
         .map(|base| {
             let shifted = radical_inverse(index, base) + unit(&mut generator);
             if shifted >= 1.0 { shifted - 1.0 } else { shifted }
         })
-        .collect()
+        .collect();
+    let mut rest = stream(seed, 6, index);
+    point.extend((point.len()..width).map(|_| unit(&mut rest)));
+    point
 }
 
 /// As many points as asked, one in each of as many slices of every axis.

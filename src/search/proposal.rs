@@ -9,6 +9,9 @@ use super::space::bucket;
 /// The largest number below 1, so that a point stays in the half-open cube.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
+/// No number is spread beyond so many of its own standard deviations: noise is never drawn from beyond them.
+const FARTHEST: f64 = 4.0;
+
 /// The distribution of one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Marginal {
@@ -19,6 +22,8 @@ pub enum Marginal {
         /// Standard deviation before the cut, positive.
         sigma: f64,
     },
+    /// The quantile of a number whose spread is multiplied, brought back to four of its own standard deviations.
+    Spread(f64),
     /// Constant in each of as many equal intervals as there are shares; the shares sum to 1.
     Steps(Vec<f64>),
 }
@@ -43,26 +48,38 @@ impl Marginal {
                 let peak = 1.0 / (sigma * libm::sqrt(std::f64::consts::TAU));
                 peak * libm::exp(-0.5 * distance * distance) / (high - low)
             }
+            Self::Spread(factor) => {
+                let (low, high) = spread_cut(*factor);
+                let deviation = quantile(value);
+                if deviation.abs() > FARTHEST {
+                    return 0.0;
+                }
+                // Two normal densities by each other.
+                libm::exp(0.5 * deviation * deviation * (1.0 - 1.0 / (factor * factor))) / (factor * (high - low))
+            }
             Self::Steps(shares) => shares[bucket(value, shares.len())] * shares.len() as f64,
         }
     }
 
     fn draw(&self, generator: &mut ChaCha8Rng) -> f64 {
-        let quantile = unit(generator);
+        let share = unit(generator);
         let value = match self {
             Self::Normal { mean, sigma } => {
                 let (low, high) = cut(*mean, *sigma);
-                let share = low + (high - low) * quantile;
-                mean + sigma * std::f64::consts::SQRT_2 * erf_inv(2.0 * share - 1.0)
+                mean + sigma * quantile(low + (high - low) * share)
+            }
+            Self::Spread(factor) => {
+                let (low, high) = spread_cut(*factor);
+                below((factor * quantile(low + (high - low) * share)).clamp(-FARTHEST, FARTHEST))
             }
             Self::Steps(shares) => {
                 let mut below = 0.0;
                 let mut step = 0;
-                while step + 1 < shares.len() && below + shares[step] <= quantile {
+                while step + 1 < shares.len() && below + shares[step] <= share {
                     below += shares[step];
                     step += 1;
                 }
-                let within = if shares[step] > 0.0 { (quantile - below) / shares[step] } else { 0.5 };
+                let within = if shares[step] > 0.0 { (share - below) / shares[step] } else { 0.5 };
                 (step as f64 + within.clamp(0.0, 1.0)) / shares.len() as f64
             }
         };
@@ -72,8 +89,22 @@ impl Marginal {
 
 /// The distribution function of a normal distribution at 0 and 1.
 fn cut(mean: f64, sigma: f64) -> (f64, f64) {
-    let below = |value: f64| 0.5 * (1.0 + erf((value - mean) / (sigma * std::f64::consts::SQRT_2)));
-    (below(0.0), below(1.0))
+    (below((0.0 - mean) / sigma), below((1.0 - mean) / sigma))
+}
+
+/// The shares of the standard normal distribution that stay where its spread is multiplied.
+fn spread_cut(factor: f64) -> (f64, f64) {
+    (below(-FARTHEST / factor), below(FARTHEST / factor))
+}
+
+/// The standard normal distribution function.
+fn below(deviation: f64) -> f64 {
+    0.5 * (1.0 + erf(deviation / std::f64::consts::SQRT_2))
+}
+
+/// Its inverse.
+fn quantile(share: f64) -> f64 {
+    std::f64::consts::SQRT_2 * erf_inv(2.0 * share - 1.0)
 }
 
 /// Independent axes.
@@ -123,6 +154,7 @@ mod tests {
         Proposal(vec![
             Component(vec![normal(0.1, 0.2), Marginal::steps(&[1.0, 3.0, 0.5])]),
             Component(vec![normal(0.9, 0.4), Marginal::steps(&[2.0, 1.0])]),
+            Component(vec![Marginal::Spread(2.0), Marginal::Spread(1.5)]),
         ])
     }
 

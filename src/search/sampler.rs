@@ -8,19 +8,23 @@ use super::fill;
 use super::proposal::Proposal;
 use super::space::Space;
 use super::strategy::Strategy;
-use super::{bandit, boundary, cross_entropy};
+use super::{bandit, boundary, cross_entropy, unusual};
 
-/// Points of one generation. It is fixed, so that what is asked does not depend on who runs it.
+/// Points of one generation at most. It is fixed, so that what is asked does not depend on who runs it.
 pub const GENERATION: usize = 20;
 
-/// Plain random points before the first that is chosen: twice as many as there are coefficients in a model of 8 axes.
+/// Share of unusual points among those that no margin chose, where the space says what is unusual: a weight is at most
+/// 5 then, or 8 with chosen points.
+const UNUSUAL: f64 = 0.8;
+
+/// Points that no margin chose before the first that one does: twice as many as there are coefficients in a model of 8 axes.
 const FIRST_PLAIN: usize = 40;
 
-/// Chosen points for each plain random one, so that at most 1.25 times as many points are needed as plain ones.
+/// Chosen points for each other one, so that at most 1.25 times as many points are needed as plain ones.
 const CHOSEN_FOR_A_PLAIN: f64 = 0.25;
 
-/// Chosen points of one generation at most: with 12 plain ones a weight is at most 20/12.
-const MOST_CHOSEN: usize = 8;
+/// Share of chosen points in one generation at most: with 12 plain ones of 20 a weight is at most 20/12.
+const MOST_CHOSEN: f64 = 0.4;
 
 /// A failing place is left for others when so many chosen points of one property have failed in it.
 const FAILURES_OF_A_PLACE: usize = 12;
@@ -52,8 +56,11 @@ pub struct Search {
     seed: u64,
     generation: u64,
     plain: usize,
+    unusual: usize,
     chosen: usize,
     waiting: VecDeque<Ask>,
+    /// What the generation's points told so far. Only as a whole are they as their weights say.
+    told: Vec<(f64, f64, Vec<bool>)>,
     archive: Archive,
     /// For each property: the tried points at which its present place was begun.
     begun: Vec<usize>,
@@ -69,32 +76,38 @@ impl Search {
             seed,
             generation: 0,
             plain: 0,
+            unusual: 0,
             chosen: 0,
             waiting: VecDeque::new(),
+            told: Vec::new(),
             archive: Archive::default(),
             begun: Vec::new(),
             rates: Vec::new(),
         }
     }
 
-    /// The points of the next generation. What was asked before and not told is given up.
-    pub fn ask(&mut self) -> Vec<Ask> {
-        let asked = match self.strategy {
-            Strategy::Random => self.plain_points(GENERATION).into_iter().map(plain).collect(),
+    /// The points of the next generation: [`GENERATION`], or as many as are wanted still.
+    ///
+    /// What was asked before and not told is given up, and counts for no rate: weights are right for whole generations.
+    pub fn ask(&mut self, wanted: usize) -> Vec<Ask> {
+        let size = wanted.min(GENERATION);
+        let asked: Vec<Ask> = match self.strategy {
+            Strategy::Random => self.plain_points(size).into_iter().map(plain).collect(),
             Strategy::Halton => {
                 let first = self.generation * GENERATION as u64;
                 // The sequence begins at 1: its point 0 is the same corner in every axis.
-                let indices = first + 1..=first + GENERATION as u64;
+                let indices = first + 1..=first + size as u64;
                 indices.map(|index| plain(fill::halton(self.seed, index, self.width()))).collect()
             }
             Strategy::LatinHypercube => {
-                let points = fill::latin_hypercube(self.seed, self.generation, GENERATION, self.width());
+                let points = fill::latin_hypercube(self.seed, self.generation, size, self.width());
                 points.into_iter().map(plain).collect()
             }
-            Strategy::CrossEntropy | Strategy::Bandit | Strategy::Boundary => self.guided(),
+            Strategy::CrossEntropy | Strategy::Bandit | Strategy::Boundary => self.guided(size),
         };
         self.generation += 1;
         self.waiting = asked.iter().cloned().collect();
+        self.told.clear();
         asked
     }
 
@@ -103,15 +116,51 @@ impl Search {
     /// A list may be empty, for a point of which nothing could be learnt. What was not asked for is ignored.
     pub fn tell(&mut self, told: Vec<Told>) {
         let Some(ask) = self.waiting.pop_front() else { return };
-        self.rates.resize(self.rates.len().max(told.len()), Weighted::default());
-        self.begun.resize(self.begun.len().max(told.len()), 0);
-        for (rate, told) in self.rates.iter_mut().zip(&told) {
-            rate.add(ask.weight, ask.largest_weight, told.failed);
+        self.count(&ask, &told);
+        self.learn(ask, told);
+    }
+
+    /// The same where the next point could not be tried, and one that was drawn at random from those that can be stood in.
+    ///
+    /// It takes over the weight: the points that can't be tried have, weighted, their nominal share, and what stands in for
+    /// them is as all the others are; so rates are unbiased for the distribution of what can be tried. Nothing is learnt.
+    pub fn tell_stand_in(&mut self, told: &[Told]) {
+        let Some(ask) = self.waiting.pop_front() else { return };
+        self.count(&ask, told);
+        self.learn(ask, Vec::new());
+    }
+
+    /// Counts an answer when its generation is whole.
+    fn count(&mut self, ask: &Ask, told: &[Told]) {
+        let failed = told.iter().map(|told| told.failed).collect();
+        self.told.push((ask.weight, ask.largest_weight, failed));
+        if !self.waiting.is_empty() {
+            return;
         }
+        for (weight, largest, failed) in self.told.drain(..) {
+            self.rates.resize(self.rates.len().max(failed.len()), Weighted::default());
+            for (rate, failed) in self.rates.iter_mut().zip(failed) {
+                rate.add(weight, largest, failed);
+            }
+        }
+    }
+
+    fn learn(&mut self, ask: Ask, told: Vec<Told>) {
+        self.begun.resize(self.begun.len().max(told.len()), 0);
         self.archive.tried.push(Tried { point: ask.point, told, focus: ask.focus });
         if let Some(property) = ask.focus {
             self.leave_if_done(property);
         }
+    }
+
+    /// How points are chosen.
+    pub fn strategy(&self) -> Strategy {
+        self.strategy
+    }
+
+    /// Points that the estimates are made from: those of generations that were told as a whole.
+    pub fn counted(&self) -> u64 {
+        self.rates.iter().map(Weighted::points).max().unwrap_or(0)
     }
 
     /// The probability of each property failing under the uniform distribution; nothing for one never told of.
@@ -129,34 +178,39 @@ impl Search {
         (first..self.plain).map(|index| fill::random(self.seed, index as u64, self.width())).collect()
     }
 
-    /// Plain points first, then those that are chosen with what is known.
-    fn guided(&mut self) -> Vec<Ask> {
-        let focus = if self.plain < FIRST_PLAIN { None } else { self.focus() };
+    /// Unusual points first, then plain ones, then those that are chosen with what is known.
+    fn guided(&mut self, size: usize) -> Vec<Ask> {
+        let focus = if self.plain + self.unusual < FIRST_PLAIN { None } else { self.focus() };
         let proposal = focus.map(|property| self.propose(property)).unwrap_or_default();
         // A proposal of nothing is the uniform distribution, of which plain points are as good.
-        let chosen = if proposal == Proposal::default() { 0 } else { self.credit() };
-        let plain_count = GENERATION - chosen;
+        let chosen = if proposal == Proposal::default() { 0 } else { self.credit(size) };
+        let hard = unusual::propose(&self.space);
+        let unusual = if hard == Proposal::default() { 0 } else { (UNUSUAL * (size - chosen) as f64) as usize };
+        let plain_count = size - chosen - unusual;
+        let mut generator = fill::stream(self.seed, 5, self.generation);
         let mut points: Vec<(Vec<f64>, Option<usize>)> =
-            self.plain_points(plain_count).into_iter().map(|point| (point, None)).collect();
+            (0..unusual).map(|_| (hard.draw(&mut generator, self.width()), None)).collect();
+        points.extend(self.plain_points(plain_count).into_iter().map(|point| (point, None)));
         let mut generator = fill::stream(self.seed, 4, self.generation);
         points.extend((0..chosen).map(|_| (proposal.draw(&mut generator, self.width()), focus)));
+        self.unusual += unusual;
         self.chosen += chosen;
-        let largest_weight = GENERATION as f64 / plain_count as f64;
+        let largest_weight = size as f64 / plain_count as f64;
         let weighted = |(point, focus): (Vec<f64>, Option<usize>)| {
             // The balance heuristic of Veach and Guibas (1995), within a generation: what a proposal depends on is then
             // told before any of its points is drawn, and the estimate stays unbiased.
-            let density = plain_count as f64 + chosen as f64 * proposal.density(&point);
-            Ask { point, weight: GENERATION as f64 / density, largest_weight, focus }
+            let density =
+                plain_count as f64 + unusual as f64 * hard.density(&point) + chosen as f64 * proposal.density(&point);
+            Ask { point, weight: size as f64 / density, largest_weight, focus }
         };
         points.into_iter().map(weighted).collect()
     }
 
     /// How many points may be chosen in the next generation.
-    fn credit(&self) -> usize {
-        let affordable = |count: usize| {
-            (self.chosen + count) as f64 <= CHOSEN_FOR_A_PLAIN * (self.plain + GENERATION - count) as f64
-        };
-        (0..=MOST_CHOSEN).rev().find(|count| affordable(*count)).unwrap_or(0)
+    fn credit(&self, size: usize) -> usize {
+        let others = |count: usize| self.plain + self.unusual + size - count;
+        let affordable = |count: usize| (self.chosen + count) as f64 <= CHOSEN_FOR_A_PLAIN * others(count) as f64;
+        (0..=(MOST_CHOSEN * size as f64) as usize).rev().find(|count| affordable(*count)).unwrap_or(0)
     }
 
     /// The property that the next points are chosen for: in turn, those that have not failed yet before all others.
@@ -228,7 +282,7 @@ mod tests {
         let mut search = Search::new(space(), strategy, seed);
         let mut asked = Vec::new();
         for _ in 0..generations {
-            let generation = search.ask();
+            let generation = search.ask(GENERATION);
             assert_eq!(generation.len(), GENERATION);
             for ask in &generation {
                 assert!(ask.point.iter().all(|value| (0.0..1.0).contains(value)), "{ask:?}");
@@ -305,7 +359,7 @@ mod tests {
         for strategy in Strategy::ALL {
             let mut search = Search::new(space(), strategy, 1);
             for _ in 0..10 {
-                for ask in search.ask() {
+                for ask in search.ask(GENERATION) {
                     assert_eq!((ask.weight, ask.focus), (1.0, None));
                     search.tell(vec![Told { failed: margin(&ask.point) < 0.0, margin: None }]);
                 }
@@ -320,7 +374,7 @@ mod tests {
             let mut search = Search::new(Space::new([Dimension::Continuous; 6]), strategy, 2);
             let mut failed = [0, 0];
             for _ in 0..50 {
-                for ask in search.ask() {
+                for ask in search.ask(GENERATION) {
                     let mean = ask.point.iter().sum::<f64>() / 6.0;
                     let margins = [mean - 0.2, 0.8 - mean];
                     (0..2).for_each(|property| failed[property] += usize::from(margins[property] < 0.0));
@@ -332,15 +386,97 @@ mod tests {
         }
     }
 
+    /// Fails where noise is large and there are many things: 0.0027 · 2/5 of the volume, or where neither is special.
+    #[test]
+    fn what_is_unusual_is_tried_early_and_rates_stay_unbiased() {
+        let space = Space::new([Dimension::Normal, Dimension::Rising(5), Dimension::Continuous]);
+        let fails = |point: &[f64]| {
+            // Beyond three standard deviations on either side.
+            [(point[0] - 0.5).abs() > 0.498_65 && point[1] > 0.6, point[1] < 0.4 && (point[0] - 0.5).abs() < 0.1]
+        };
+        let truth = [0.0027 * 0.4, 0.4 * 0.2];
+        let (mut rates, mut held, mut found) = ([0.0; 2], [0; 2], 0);
+        const SEEDS: u64 = 200;
+        for seed in 0..SEEDS {
+            let mut search = Search::new(space.clone(), Strategy::CrossEntropy, seed);
+            let mut failed = [0; 2];
+            for wanted in [GENERATION, GENERATION, 7, GENERATION] {
+                for ask in search.ask(wanted) {
+                    assert!(ask.weight > 0.0 && ask.weight <= ask.largest_weight, "{ask:?}");
+                    let told = fails(&ask.point);
+                    (0..2).for_each(|property| failed[property] += usize::from(told[property]));
+                    search.tell(told.map(|failed| Told { failed, margin: None }).to_vec());
+                }
+            }
+            found += failed[0];
+            for (property, estimate) in search.estimates().into_iter().enumerate() {
+                let estimate = estimate.expect("points were told");
+                rates[property] += estimate.rate / SEEDS as f64;
+                held[property] += u64::from((estimate.low..=estimate.high).contains(&truth[property]));
+            }
+        }
+        // Random would find 67 · 0.00108 · 200 = 14.
+        assert!(found > 500, "{found}");
+        assert!((rates[0] - truth[0]).abs() < 0.0003 && (rates[1] - truth[1]).abs() < 0.01, "{rates:?}");
+        assert!(held.iter().all(|held| held * 100 >= SEEDS * 93), "{held:?}");
+    }
+
+    /// A third of the cube can't be tried; what can fails in a fifth of it.
+    #[test]
+    fn stand_ins_keep_rates_unbiased() {
+        let space = Space::new([Dimension::Normal, Dimension::Continuous]);
+        let (mut rates, mut held) = (0.0, 0);
+        const SEEDS: u64 = 300;
+        for seed in 0..SEEDS {
+            let mut search = Search::new(space.clone(), Strategy::Boundary, seed);
+            let mut generator = fill::stream(seed, 99, 0);
+            let possible = |point: &[f64]| (point[0] - 0.5).abs() < 1.0 / 3.0;
+            let margin = |point: &[f64]| point[1] - 0.2;
+            for _ in 0..6 {
+                for ask in search.ask(GENERATION) {
+                    if possible(&ask.point) {
+                        search.tell(vec![told(margin(&ask.point))]);
+                    } else {
+                        let stand_in =
+                            std::iter::repeat_with(|| [fill::unit(&mut generator), fill::unit(&mut generator)])
+                                .find(|point| possible(point))
+                                .expect("there is no end");
+                        search.tell_stand_in(&[told(margin(&stand_in))]);
+                    }
+                }
+            }
+            let estimate = search.estimates()[0].expect("points were told");
+            rates += estimate.rate / SEEDS as f64;
+            held += u64::from((estimate.low..=estimate.high).contains(&0.2));
+        }
+        assert!((rates - 0.2).abs() < 0.01, "{rates}");
+        assert!(held * 100 >= SEEDS * 94, "{held}");
+    }
+
+    /// The rest of a generation that was stopped is not known, so its beginning counts for no rate.
+    #[test]
+    fn only_whole_generations_count() {
+        let mut search = Search::new(space(), Strategy::Bandit, 1);
+        let first = search.ask(5);
+        first.iter().for_each(|ask| search.tell(vec![told(margin(&ask.point))]));
+        let whole = search.estimates();
+        search.ask(GENERATION);
+        search.tell(vec![told(-1.0)]);
+        assert_eq!(search.estimates(), whole);
+        search.ask(GENERATION);
+        assert_eq!(search.estimates(), whole);
+    }
+
     #[test]
     fn what_was_not_asked_is_ignored() {
         let mut search = Search::new(Space::new([]), Strategy::Boundary, 1);
         search.tell(vec![told(-1.0)]);
         assert!(search.estimates().is_empty());
         (0..5).for_each(|_| {
-            search.ask();
+            search.ask(2);
             search.tell(Vec::new());
             search.tell(vec![told(f64::NAN)]);
+            search.tell(vec![told(-1.0)]);
         });
         assert_eq!(search.estimates().len(), 1);
     }

@@ -7,6 +7,21 @@ pub enum Dimension {
     Continuous,
     /// One of so many values, none nearer to another: value `i` of `k` is the interval [i/k, (i+1)/k).
     Categorical(usize),
+    /// A quantile of something that is normally distributed about what is nominal: the middle is nominal, the ends are
+    /// unusual.
+    Normal,
+    /// One of so many values in order, the last of which is the hardest: intervals as those of [`Dimension::Categorical`].
+    Rising(usize),
+}
+
+impl Dimension {
+    /// How many values there are where none is nearer to another.
+    pub(crate) fn categories(self) -> Option<usize> {
+        match self {
+            Self::Categorical(count) => Some(count),
+            Self::Continuous | Self::Normal | Self::Rising(_) => None,
+        }
+    }
 }
 
 /// The cube [0, 1)^d. Its nominal distribution is uniform.
@@ -20,7 +35,8 @@ impl Space {
     pub fn new(dimensions: impl IntoIterator<Item = Dimension>) -> Self {
         let whole = |dimension| match dimension {
             Dimension::Categorical(count) => Dimension::Categorical(count.max(1)),
-            Dimension::Continuous => Dimension::Continuous,
+            Dimension::Rising(count) => Dimension::Rising(count.max(1)),
+            Dimension::Continuous | Dimension::Normal => dimension,
         };
         Self { dimensions: dimensions.into_iter().map(whole).collect() }
     }
@@ -34,9 +50,9 @@ impl Space {
     pub(crate) fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let mut sum = 0.0;
         for ((dimension, a), b) in self.dimensions.iter().zip(a).zip(b) {
-            let gap = match dimension {
-                Dimension::Continuous => a - b,
-                Dimension::Categorical(count) => f64::from(u8::from(bucket(*a, *count) != bucket(*b, *count))),
+            let gap = match dimension.categories() {
+                None => a - b,
+                Some(count) => f64::from(u8::from(bucket(*a, count) != bucket(*b, count))),
             };
             sum += gap * gap;
         }

@@ -91,7 +91,7 @@ pub fn try_faults(
 fn without_fault(env: &Env, index: u64, manner: &Manner) -> Option<(Scene, Trial)> {
     let repeat = u64::from(env.campaign.repeat);
     let repetition = (repeat > 1).then_some(index % repeat);
-    let planned = Planned { index, scene: index / repeat, repetition };
+    let planned = Planned { index, scene: index / repeat, repetition, steering: None };
     (0..SCENES_PER_RUN).find_map(|attempt| {
         let choices = planned.choices(env.campaign.seed, attempt);
         let record = run(env, index, choices, manner, None)?;

@@ -1,0 +1,130 @@
+//! The schedule of a campaign whose scenes a search chooses.
+
+use std::sync::Arc;
+
+use crate::campaign::search_space::SearchSpace;
+use crate::campaign::{Env, Planned, Schedule, Steering, Told, WeightedRate};
+use crate::search::{Ask, Search, Told as ToldOfOne};
+use crate::verdict::Outcome;
+
+/// Asks the search of one test after the other for a generation of scenes, and tells it what came of them.
+///
+/// Which scenes are asked for depends on the seed and on what was told before, generation by generation: not on workers.
+pub(super) struct Searching {
+    space: SearchSpace,
+    tests: Vec<SearchedTest>,
+    /// Scenes of each test.
+    scenes: u64,
+    /// Runs of each scene.
+    repeat: u64,
+    /// The test whose generation is being made.
+    turn: usize,
+    /// Whether one is being made.
+    asked: bool,
+}
+
+struct SearchedTest {
+    /// Names of its actions, joined by a space.
+    name: String,
+    search: Search,
+    /// What it learns from, in this order: IRIs of the properties of its actions.
+    properties: Vec<String>,
+    /// Scenes that were asked for so far.
+    made: u64,
+}
+
+impl Searching {
+    pub fn new(env: &Env) -> Self {
+        let campaign = &env.campaign;
+        let space = SearchSpace::new(env);
+        let search = |number: usize| {
+            // Of its own: the campaign's seed itself gives the decisions that no search makes.
+            let seed = campaign.seed.rotate_left(17) ^ (0x5eed_0000_0000_0001 + number as u64);
+            Search::new(space.cube(), campaign.search, seed)
+        };
+        let tests = campaign.tests.iter().enumerate().map(|(number, test)| {
+            let actions = test.iter().filter_map(|name| env.ontology.actions.get(name));
+            let mut properties: Vec<String> =
+                actions.flat_map(|action| action.success_properties.iter().cloned()).collect();
+            properties.sort();
+            properties.dedup();
+            SearchedTest { name: test.join(" "), search: search(number), properties, made: 0 }
+        });
+        let (scenes, repeat) = (u64::from(campaign.test_count), u64::from(campaign.repeat));
+        Self { tests: tests.collect(), space, scenes, repeat, turn: 0, asked: false }
+    }
+
+    /// All runs of the scenes that a generation asks for.
+    fn planned(&self, asked: &[Ask], first: u64) -> Vec<Planned> {
+        let guided = self.tests[self.turn].search.strategy().is_guided();
+        let of_scene = |(ask, scene): (&Ask, u64)| {
+            let quantiles = self.space.quantiles(&ask.point);
+            let steering = Arc::new(Steering { quantiles, weight: guided.then_some(ask.weight) });
+            (0..self.repeat).map(move |repetition| Planned {
+                index: scene * self.repeat + repetition,
+                scene,
+                repetition: (self.repeat > 1).then_some(repetition),
+                steering: Some(Arc::clone(&steering)),
+            })
+        };
+        asked.iter().zip(first..).flat_map(of_scene).collect()
+    }
+}
+
+impl Schedule for Searching {
+    fn next_batch(&mut self, told: &[Told]) -> Vec<Planned> {
+        if self.asked {
+            self.tests[self.turn].tell(told, self.repeat);
+            self.turn = (self.turn + 1) % self.tests.len();
+        }
+        let (turn, scenes) = (self.turn, self.scenes);
+        self.asked = true;
+        let Some(test) = self.tests.get_mut(turn) else { return Vec::new() };
+        // All tests have as many scenes, so that one is done only when they all are.
+        let asked = test.search.ask(usize::try_from(scenes - test.made).unwrap_or(usize::MAX));
+        let first = turn as u64 * scenes + test.made;
+        test.made += asked.len() as u64;
+        self.planned(&asked, first)
+    }
+
+    fn rates(&self) -> Vec<WeightedRate> {
+        let guided = |test: &&SearchedTest| test.search.strategy().is_guided();
+        self.tests.iter().filter(guided).flat_map(SearchedTest::rates).collect()
+    }
+}
+
+impl SearchedTest {
+    /// Tells the first run of each scene: repetitions are of one scene, and an estimate must not count it twice.
+    fn tell(&mut self, told: &[Told], repeat: u64) {
+        for run in told.iter().filter(|run| run.index % repeat == 0) {
+            let said: Vec<ToldOfOne> = self.properties.iter().map(|property| said(run, property)).collect();
+            if run.discards == 0 {
+                self.search.tell(said);
+            } else {
+                // The scene that was asked for could not be built: the run's is one that could, drawn at random.
+                self.search.tell_stand_in(&said);
+            }
+        }
+    }
+
+    fn rates(&self) -> Vec<WeightedRate> {
+        let rates = self.properties.iter().zip(self.search.estimates());
+        let found = rates.filter_map(|(property, estimate)| {
+            Some(WeightedRate {
+                test: self.name.clone(),
+                property: property.clone(),
+                failing: estimate?,
+                scenes: self.search.counted(),
+            })
+        });
+        found.collect()
+    }
+}
+
+/// What a run says of a property: over all actions that have it, the worst.
+fn said(run: &Told, property: &str) -> ToldOfOne {
+    let own = || run.outcomes.iter().filter(|outcome| outcome.property == property);
+    let decided = own().filter(|outcome| matches!(outcome.outcome, Outcome::Passed | Outcome::Failed));
+    let margin = decided.filter_map(|outcome| outcome.margin).reduce(f64::min);
+    ToldOfOne { failed: own().any(|outcome| outcome.outcome == Outcome::Failed), margin }
+}
