@@ -78,9 +78,10 @@ fn what_is_asked_depends_on_the_seed_and_on_what_was_told() {
         assert_eq!(batches, made_up_campaign(&env).0, "{strategy:?}");
         let indices: Vec<u64> = batches.iter().flatten().map(|planned| planned.index).collect();
         assert_eq!(indices, (0..90).collect::<Vec<_>>(), "{strategy:?}");
-        assert_ne!(batches, made_up_campaign(&pick(90, 4, 1, strategy)).0, "{strategy:?}");
         if strategy != Strategy::Random {
             assert!(batches.iter().all(|batch| batch.len() <= GENERATION), "{strategy:?}");
+            // Random scenes are not planned but drawn: by the seed, when they are made.
+            assert_ne!(batches, made_up_campaign(&pick(90, 4, 1, strategy)).0, "{strategy:?}");
         }
         // A robot that never fails, and says by how much, leads elsewhere.
         let mut other = schedule_of(&env);
@@ -118,16 +119,15 @@ fn weighted_rates_are_those_of_scenes_as_configured() {
             assert_eq!((moved.test.as_str(), moved.scenes), ("Pick", 110));
             mean += moved.failing.rate / SEEDS as f64;
             held += u64::from((moved.failing.low..=moved.failing.high).contains(&0.05));
-            let last = batches.last().unwrap();
-            failing +=
-                last.iter().filter(|planned| made_up(&env, planned).outcomes[0].outcome == Outcome::Failed).count();
+            let all = batches.iter().flatten().map(|planned| made_up(&env, planned).outcomes[0].outcome);
+            failing += all.filter(|outcome| *outcome == Outcome::Failed).count();
             let weights = batches.iter().flatten().map(|planned| planned.steering.as_ref().unwrap().weight.unwrap());
             assert!(weights.into_iter().all(|weight| weight > 0.0));
         }
         assert!((mean - 0.05).abs() < 0.012, "{strategy:?}: {mean}");
         assert!(held * 100 >= SEEDS * 93, "{strategy:?}: {held} of {SEEDS}");
-        // Random would find 0.05 · 10 · 60 = 30 in the last ten scenes of each.
-        assert!(failing > 50, "{strategy:?}: {failing}");
+        // Random would find 0.05 · 110 · 60 = 330, with a standard deviation of 18.
+        assert!(failing > 390, "{strategy:?}: {failing}");
     }
 }
 
