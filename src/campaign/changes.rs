@@ -108,6 +108,7 @@ mod tests {
             seed: 7,
             planned_runs: 1,
             repeat: 1,
+            strategy: "random".to_owned(),
             time_secs: None,
             until_width: None,
             max_failures: None,
