@@ -29,6 +29,7 @@ mod rules;
 mod scenario;
 mod search;
 mod shrink;
+mod shrunk;
 mod stops;
 mod support;
 mod trust;

@@ -1,0 +1,195 @@
+//! Shrinking of real runs, with the built program: every option, Ctrl-C, and `run --shrink`.
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use serde_json::Value;
+
+use crate::support::{actcheck, edit, project, stderr, stdout};
+
+/// A project whose campaigns all fail: what the robot sees lies decimetres beside what is there.
+fn blind() -> tempfile::TempDir {
+    let project = project();
+    let config = project.path().join("configs/clutter.toml");
+    edit(&config, "position_noise_m = 0.025", "position_noise_m = 0.2");
+    edit(&config, "seed = 11", "seed = 1");
+    edit(&config, "count = [8, 12]", "count = [2, 3]");
+    project
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let output = actcheck(folder, &[arguments, &["--history", "h", "--format", "json"]].concat());
+    serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)))
+}
+
+/// Names of what failed in each run of a new campaign, with the runs' ids.
+fn campaign(folder: &Path) -> Vec<(String, Vec<String>)> {
+    let json = json(folder, &["run", "configs/clutter.toml", "--runs", "1"]);
+    let runs = json["runs"].as_array().unwrap();
+    runs.iter().map(|run| (run["run"].as_str().unwrap().to_owned(), failed(run))).collect()
+}
+
+/// IRIs of what failed in a run, each once, sorted.
+fn failed(run: &Value) -> Vec<String> {
+    let actions = run["actions"].as_array().unwrap();
+    let outcomes = actions.iter().flat_map(|action| action["outcomes"].as_array().unwrap());
+    let failed = outcomes.filter(|outcome| outcome["outcome"] == "failed");
+    let mut names: Vec<String> = failed.map(|outcome| outcome["property"].as_str().unwrap().to_owned()).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+fn names(list: &Value) -> Vec<String> {
+    list.as_array().unwrap().iter().map(|name| name.as_str().unwrap().to_owned()).collect()
+}
+
+/// The outcomes of a stored run that failed.
+fn failed_of(folder: &Path, run: &str) -> Vec<String> {
+    let output = actcheck(folder, &["show", run, "--history", "h", "--format", "csv"]);
+    let table = stdout(&output);
+    let rows = table.lines().filter(|line| line.split(',').nth(4) == Some("failed"));
+    let mut names: Vec<String> = rows.map(|line| line.split(',').nth(3).unwrap().to_owned()).collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+#[test]
+fn the_small_run_is_kept_fails_the_same_and_can_be_drawn() {
+    let project = blind();
+    let (run, failing) = campaign(project.path()).remove(0);
+    let small = json(project.path(), &["shrink", &run, "--picture", "small.svg"]);
+    assert_eq!(names(&small["failed"]), failing, "{small:#}");
+    let id = small["run"].as_str().unwrap();
+    assert_eq!(failed_of(project.path(), id), failing);
+    assert!(small["others"].as_u64() <= small["others_before"].as_u64(), "{small:#}");
+    let picture = std::fs::read_to_string(project.path().join("small.svg")).unwrap();
+    assert!(picture.starts_with("<svg") && picture.contains(id) && picture.contains("glass_1"), "{picture}");
+    let nowhere = actcheck(
+        project.path(),
+        &["shrink", &run, "--trials", "1", "--history", "h", "--picture", "no/such/folder.svg"],
+    );
+    assert_eq!(nowhere.status.code(), Some(2));
+    assert!(stderr(&nowhere).contains("X007"), "{}", stderr(&nowhere));
+}
+
+#[test]
+fn limits_and_repetitions_are_kept_to() {
+    let project = blind();
+    let (run, failing) = campaign(project.path()).remove(0);
+    let short = json(project.path(), &["shrink", &run, "--time", "0.001"]);
+    assert_eq!((&short["minimal"], &short["simulations"]), (&false.into(), &0.into()), "{short:#}");
+    assert_eq!(short["others"], short["others_before"]);
+    let few = json(project.path(), &["shrink", &run, "--trials", "5", "--jobs", "1"]);
+    assert!(few["simulations"].as_u64().unwrap() + few["explaining_simulations"].as_u64().unwrap() <= 5, "{few:#}");
+    let noisy = json(project.path(), &["shrink", &run, "--repeat", "2/3", "--trials", "30"]);
+    assert_eq!(noisy["fresh_noise"]["of"], 3, "{noisy:#}");
+    assert_eq!(failed_of(project.path(), noisy["run"].as_str().unwrap()), failing);
+    if noisy["noise_kept"] == false {
+        assert!(noisy["fresh_noise"]["failed"].as_u64().unwrap() >= 2, "confirmed in 2 of 3: {noisy:#}");
+    }
+    for wrong in [["--repeat", "4/3"], ["--time", "0"], ["--trials", "0"]] {
+        let output = actcheck(project.path(), &["shrink", &run, wrong[0], wrong[1], "--history", "h"]);
+        assert_eq!(output.status.code(), Some(2), "{wrong:?}");
+    }
+}
+
+#[test]
+fn one_property_can_be_kept_instead_of_all() {
+    let project = blind();
+    let (run, failing) = campaign(project.path()).remove(0);
+    let name = failing[0].rsplit('#').next().unwrap();
+    let small = json(project.path(), &["shrink", &run, "--property", name, "--trials", "20"]);
+    assert!(failed_of(project.path(), small["run"].as_str().unwrap()).contains(&failing[0]), "{small:#}");
+    let unknown = actcheck(project.path(), &["shrink", &run, "--property", "Nothing", "--history", "h"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(stderr(&unknown).contains("S050") && stderr(&unknown).contains(name), "{}", stderr(&unknown));
+}
+
+/// Once the run of a configuration's second test was shrunk to fewer actions, it was taken for a run of the first.
+#[test]
+fn a_run_of_several_actions_loses_those_that_the_failure_does_not_need() {
+    let project = blind();
+    edit(&project.path().join("configs/clutter.toml"), "[[\"Pick\"]]", "[[\"Pick\"], [\"Pick\", \"Pick\", \"Pick\"]]");
+    let (run, failing) = campaign(project.path()).remove(1);
+    let small = json(project.path(), &["shrink", &run, "--trials", "10"]);
+    let id = small["run"].as_str().unwrap();
+    assert_eq!(failed_of(project.path(), id), failing, "{small:#}");
+    let shown = json(project.path(), &["show", id]);
+    assert!(shown["actions"].as_array().unwrap().len() < 3, "{shown:#}");
+    let again = json(project.path(), &["shrink", id, "--trials", "3"]);
+    assert_eq!((&again["shrunk_from"], names(&again["failed"])), (&small["run"], failing), "{again:#}");
+}
+
+#[test]
+fn a_campaign_that_shrinks_prints_one_document() {
+    let project = blind();
+    let run = ["run", "configs/clutter.toml", "--runs", "1", "--shrink"];
+    let all = json(project.path(), &run);
+    let [small] = all["shrunk"].as_array().unwrap().as_slice() else { panic!("{all:#}") };
+    assert_eq!(small["shrunk_from"], all["runs"][0]["run"]);
+    let output = actcheck(project.path(), &[&run[..], &["--history", "h", "--format", "csv"]].concat());
+    let table = stdout(&output);
+    let mut lines = table.lines();
+    assert!(lines.next().unwrap().ends_with(",shrunk_to"), "{table}");
+    assert!(lines.all(|line| line.rsplit(',').next().unwrap().ends_with("-1")), "{table}");
+    assert_eq!(output.status.code(), Some(1));
+}
+
+fn started(folder: &Path, arguments: &[&str]) -> Child {
+    let program = env!("CARGO_BIN_EXE_actcheck");
+    let mut command = Command::new(program);
+    command.args(arguments).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn interrupt(child: &Child) {
+    let killed = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
+    assert!(killed.success());
+}
+
+/// Waits until a process catches Ctrl-C, as Linux says of it.
+fn until_it_catches(child: &mut Child) {
+    loop {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        let mask = caught.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+        // SIGINT is signal 2.
+        if mask & 0b10 != 0 {
+            return;
+        }
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it could be interrupted");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_interrupt_gives_the_smallest_so_far() {
+    let project = blind();
+    let (run, failing) = campaign(project.path()).remove(0);
+    let mut child = started(project.path(), &["shrink", &run, "--history", "h", "--format", "json"]);
+    until_it_catches(&mut child);
+    interrupt(&child);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+    let small: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(failed_of(project.path(), small["run"].as_str().unwrap()), failing, "{small:#}");
+}
+
+#[test]
+fn an_interrupt_while_a_campaign_shrinks_is_told_by_the_exit_code() {
+    let project = blind();
+    let arguments = ["run", "configs/clutter.toml", "--runs", "1", "--shrink", "--history", "h"];
+    let mut child = started(project.path(), &arguments);
+    let mut out = BufReader::new(child.stdout.take().unwrap());
+    let mut text = String::new();
+    while !text.contains("\ncampaign ") {
+        assert_ne!(out.read_line(&mut text).unwrap(), 0, "{text}");
+    }
+    interrupt(&child);
+    out.read_to_string(&mut text).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{text}{}", stderr(&output));
+}
