@@ -247,3 +247,21 @@ fn a_lone_configuration_keeps_its_regressions_beside_itself() {
     let output = actcheck(folder.path(), &["run", "mine/clutter.toml", "--runs", "1"]);
     assert!(stdout(&output).starts_with("regressions: 1 ran, 1 fails again: "), "{}", stdout(&output));
 }
+
+#[test]
+fn of_a_campaign_in_parts_the_first_runs_the_regressions() {
+    let project = project();
+    let run = failing(project.path());
+    actcheck(project.path(), &["export", &run, "--regression", "--history", "h"]);
+    for (part, cases) in [("1/2", 1), ("2/2", 0)] {
+        let history = format!("part{}", &part[..1]);
+        let arguments = ["run", "configs/lone_glass.toml", "--runs", "2", "--shard", part, "--history", &history];
+        let output = actcheck(project.path(), &[&arguments[..], &["--format", "json"]].concat());
+        let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+        assert_eq!(json["regressions"].as_array().unwrap().len(), cases, "{part}: {json:#}");
+    }
+    let merged = actcheck(project.path(), &["merge", "part2", "part1", "--into", "whole"]);
+    assert_eq!(merged.status.code(), Some(0), "{}", stderr(&merged));
+    let list = stdout(&actcheck(project.path(), &["list", "--history", "whole", "--format", "csv"]));
+    assert_eq!(list.lines().count(), 4, "two runs and the case: {list}");
+}

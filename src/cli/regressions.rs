@@ -11,7 +11,8 @@ use crate::history::History;
 use crate::report::CaseSummary;
 use crate::rules::Budget;
 
-/// The cases of a campaign's folder, by name of their files, sorted. Runs are kept in the campaign's history.
+/// The cases of a campaign's folder, by name of their files, sorted; none for a part of a campaign that is not its first.
+/// Runs are kept in the campaign's history.
 ///
 /// # Errors
 /// Every fault of every case at once: as of any configuration, or `S065` a file is no case.
@@ -33,7 +34,9 @@ pub fn prepare(env: &Env, budget: &Budget) -> Result<Vec<(String, Env)>, Diagnos
             Err(found) => faults.extend(found),
         }
     }
-    faults.or(cases)
+    // Of a campaign in parts, the first part runs them for all; faults are told by every part.
+    let is_first = env.campaign.shard.is_none_or(|shard| shard.number() == 1);
+    faults.or(if is_first { cases } else { Vec::new() })
 }
 
 fn files(folder: &Path) -> Result<Vec<PathBuf>, Diagnostics> {

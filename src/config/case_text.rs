@@ -10,7 +10,7 @@ use crate::config::Campaign;
 use crate::config::case::Form;
 
 /// Keys that mean nothing for a single scene.
-const OF_CAMPAIGNS: [&str; 4] = ["case", "history", "repeat", "search"];
+const OF_CAMPAIGNS: [&str; 5] = ["case", "history", "repeat", "search", "seed"];
 
 /// The same of `[budget]`.
 const BUDGETS_OF_CAMPAIGNS: [&str; 3] = ["max_failures", "time", "until_width"];
