@@ -60,6 +60,7 @@ fn refuse_campaign_options(args: &RunArgs, file: &str) -> Result<(), Diagnostics
         ("--until-width", args.until_width.is_some()),
         ("--max-failures", args.max_failures.is_some()),
         ("--seed", args.seed.is_some()),
+        ("--strategy", args.strategy.is_some()),
         ("--repeat", args.repeat.is_some()),
         ("--shard", args.shard.is_some()),
         ("--shrink", args.shrink),
