@@ -14,7 +14,7 @@ fn blind() -> tempfile::TempDir {
     let config = project.path().join("configs/clutter.toml");
     edit(&config, "position_noise_m = 0.025", "position_noise_m = 0.2");
     edit(&config, "seed = 11", "seed = 1");
-    edit(&config, "count = [8, 12]", "count = [2, 3]");
+    edit(&config, "count = [8, 12]", "count = [1, 2]");
     project
 }
 
@@ -84,7 +84,7 @@ fn limits_and_repetitions_are_kept_to() {
     assert_eq!(short["others"], short["others_before"]);
     let few = json(project.path(), &["shrink", &run, "--trials", "5", "--jobs", "1"]);
     assert!(few["simulations"].as_u64().unwrap() + few["explaining_simulations"].as_u64().unwrap() <= 5, "{few:#}");
-    let noisy = json(project.path(), &["shrink", &run, "--repeat", "2/3", "--trials", "30"]);
+    let noisy = json(project.path(), &["shrink", &run, "--repeat", "2/3", "--trials", "15"]);
     assert_eq!(noisy["fresh_noise"]["of"], 3, "{noisy:#}");
     assert_eq!(failed_of(project.path(), noisy["run"].as_str().unwrap()), failing);
     if noisy["noise_kept"] == false {
@@ -101,7 +101,7 @@ fn one_property_can_be_kept_instead_of_all() {
     let project = blind();
     let (run, failing) = campaign(project.path()).remove(0);
     let name = failing[0].rsplit('#').next().unwrap();
-    let small = json(project.path(), &["shrink", &run, "--property", name, "--trials", "20"]);
+    let small = json(project.path(), &["shrink", &run, "--property", name, "--trials", "8"]);
     assert!(failed_of(project.path(), small["run"].as_str().unwrap()).contains(&failing[0]), "{small:#}");
     let unknown = actcheck(project.path(), &["shrink", &run, "--property", "Nothing", "--history", "h"]);
     assert_eq!(unknown.status.code(), Some(2));
