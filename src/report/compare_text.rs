@@ -60,7 +60,7 @@ fn changes(out: &mut String, summary: &CompareSummary) {
     }
     out.push_str("\nwhat differs\n");
     let short = |digest: &Option<String>| match digest {
-        Some(digest) => digest.get(..8).unwrap_or(digest).to_owned(),
+        Some(digest) => shortened(digest),
         None => "not there".to_owned(),
     };
     for change in summary.changes.iter().take(TOLD) {
@@ -75,6 +75,16 @@ fn changes(out: &mut String, summary: &CompareSummary) {
         }
         more(out, lines.len());
     }
+}
+
+/// A text with only the first letters of each digest in it.
+fn shortened(text: &str) -> String {
+    let pieces = text.split_inclusive(|letter: char| !letter.is_ascii_hexdigit());
+    let short = |piece: &str| match piece.find(|letter: char| !letter.is_ascii_hexdigit()).unwrap_or(piece.len()) {
+        digits if digits >= 16 => format!("{}{}", &piece[..8], &piece[digits..]),
+        _ => piece.to_owned(),
+    };
+    pieces.map(short).collect()
 }
 
 fn lines(out: &mut String, summary: &CompareSummary) {
@@ -188,5 +198,18 @@ fn list(names: &[String]) -> String {
 fn more(out: &mut String, all: usize) {
     if all > TOLD {
         let _ = writeln!(out, "    and {} more: --format json has all", all - TOLD);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digests_are_told_by_their_first_letters() {
+        let digest = "4f6afc3d00112233445566778899aabb";
+        assert_eq!(shortened(digest), "4f6afc3d");
+        assert_eq!(shortened(&format!("0.1.0 ({digest})")), "0.1.0 (4f6afc3d)");
+        assert_eq!(shortened("actcheck é 0.1.0"), "actcheck é 0.1.0");
     }
 }

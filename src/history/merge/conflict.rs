@@ -48,8 +48,9 @@ pub(super) fn other_ingredients(first: &Found, second: &Found) -> Diagnostic {
 /// Names of what two campaigns were not made with alike.
 fn differences(first: &CampaignRecord, second: &CampaignRecord) -> Vec<String> {
     let mut found = Vec::new();
-    if first.program_version != second.program_version {
-        found.push(format!("program ({}, {})", first.program_version, second.program_version));
+    let program = |record: &CampaignRecord| format!("{} {}", record.program_version, record.program_digest);
+    if program(first) != program(second) {
+        found.push(format!("program ({}, {})", program(first).trim(), program(second).trim()));
     }
     if first.ontology_digest != second.ontology_digest {
         found.push("ontology".to_owned());

@@ -48,7 +48,8 @@ impl Found {
     pub(super) fn whole(&self) -> String {
         let record = &self.record;
         let mut digest = Digest::new();
-        for text in [&record.config_digest, &record.ontology_digest, &record.program_version] {
+        let program = [&record.program_version, &record.program_digest];
+        for text in [&record.config_digest, &record.ontology_digest].into_iter().chain(program) {
             digest.update(text.as_bytes());
         }
         for number in [record.seed, record.planned_runs, u64::from(record.repeat)] {
