@@ -49,7 +49,7 @@ impl Found {
         let record = &self.record;
         let mut digest = Digest::new();
         let program = [&record.program_version, &record.program_digest];
-        for text in [&record.config_digest, &record.ontology_digest].into_iter().chain(program) {
+        for text in [&record.config_digest, &record.ontology_digest, &record.strategy].into_iter().chain(program) {
             digest.update(text.as_bytes());
         }
         for number in [record.seed, record.planned_runs, u64::from(record.repeat)] {
