@@ -20,7 +20,7 @@ const END: &str = "SELECT ?p ?o WHERE { ?c a act:Campaign ; ?p ?o
         act:configDigest, act:ontologyDigest, act:program, rdfs:label)) } ORDER BY ?p";
 /// Everything but times, parts and paths.
 const ALL: &str = "SELECT ?g ?s ?p ?o WHERE { { ?s ?p ?o } UNION { GRAPH ?g { ?s ?p ?o } }
-    FILTER (?p NOT IN (prov:startedAtTime, prov:endedAtTime, act:wallSeconds, act:shard, act:configPath)) }";
+    FILTER (?p NOT IN (prov:startedAtTime, prov:endedAtTime, act:wallSeconds, act:elapsedSeconds, act:shard, act:configPath)) }";
 
 fn table(history: &History, query: &str) -> Vec<Vec<Option<Term>>> {
     match history.query(query) {

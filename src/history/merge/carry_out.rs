@@ -183,10 +183,7 @@ fn replace(store: &Store, new: &[Quad], old: &[Quad]) -> Result<(), StorageError
 
 /// Whether a quad about a campaign says how it ended.
 fn is_end(quad: &Quad) -> bool {
-    let known =
-        ["prov:endedAtTime", "act:score", "act:scoreWithoutBroken", "act:discards", "act:interrupted", "act:endedBy"];
-    known.iter().any(|property| quad.predicate == iri(property))
-        || crate::verdict::Outcome::ALL.iter().any(|outcome| quad.predicate == iri(&format!("act:{outcome}Count")))
+    write_campaign::end_properties().contains(&quad.predicate)
 }
 
 /// A path that is seen from one folder, as it is seen from another; as it is where nothing lies there.
