@@ -13,6 +13,7 @@ mod diagnostics;
 mod facts;
 mod floors;
 mod fuzz_corpus;
+mod health;
 mod history;
 mod merge;
 mod no_panic;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use actcheck::actions::ActionEnd;
+use actcheck::actions::{ActionEnd, Quality};
 use actcheck::base::{Choice, ChoiceKind, Diagnostics, Pose, Source, Term, digest_of, names};
 use actcheck::config::{ObjectModel, Physics, RobotProfile, Sensing};
 use actcheck::facts::{RunFacts, extract};
@@ -126,6 +126,7 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
         trace,
         actions: vec![names::act("Pick")],
         judgements: vec![PROPERTIES.iter().map(|property| judgement(property, outcome(property))).collect()],
+        quality: Some(Quality { deepest_penetration_m: 3e-4, energy_gain_j: 2e-5 }),
         started: "2026-08-01T12:00:00Z".to_owned(),
         wall_secs: 1.25,
         elapsed_secs: 2.5,

@@ -20,4 +20,4 @@ pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
 pub use trace::{ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace};
 
 // States are part of a trace: its readers meet them here.
-pub use crate::world::{BodyState, JointState, RobotState, Snapshot};
+pub use crate::world::{BodyState, JointState, Quality, RobotState, Snapshot};

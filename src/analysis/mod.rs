@@ -4,8 +4,10 @@
 
 mod compare;
 mod consistency;
+mod coverage;
 mod failure_modes;
 mod frame;
+mod health;
 mod holm;
 mod oracles;
 mod paired;
@@ -13,8 +15,10 @@ mod property_rates;
 
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, Flaky, PassPower, Repeated, Variance, consistency};
+pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
 pub use failure_modes::{FailureMode, failure_modes};
 pub use frame::AnalysisError;
+pub use health::{Ailment, Health, HealthMeter};
 pub use holm::holm;
 pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
 pub use paired::{Difference, PairedTable, PairedTest};

@@ -1,6 +1,6 @@
 //! The line, once, top to bottom: choices → scene → world → trace → facts → findings → verdict.
 
-use crate::actions::{self, ActionCall, ActionEnd, Cut, Interference, Saboteur, Trace};
+use crate::actions::{self, ActionCall, ActionEnd, Cut, Interference, Quality, Saboteur, Trace};
 use crate::base::Choices;
 use crate::campaign::Env;
 use crate::campaign::judging::judge_action;
@@ -106,9 +106,10 @@ fn run_line_with(
         }
     };
     choices.begin_noise();
-    let trace = perform((env, interference), test, &scene, &mut choices, disturb)?;
+    let (trace, quality) = perform((env, interference), test, &scene, &mut choices, disturb)?;
     let mut record = record(env, campaign, index, scene, trace)?;
     record.choices = choices.into_made();
+    record.quality = quality;
     record.started = started;
     record.wall_secs = (manner.clock.secs)() - start_secs;
     Ok(record)
@@ -161,23 +162,24 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
         trace,
         facts,
         judgements,
+        quality: None,
         started: String::new(),
         wall_secs: 0.0,
         elapsed_secs: 0.0,
     })
 }
 
-/// Builds the scene, lets it settle and performs the test in it.
+/// Builds the scene, lets it settle and performs the test in it. With the trace comes what simulation got wrong.
 fn perform(
     (env, interference): (&Env, Interference<'_>),
     test: &[String],
     scene: &Scene,
     choices: &mut Choices,
     disturb: impl FnOnce(&mut World),
-) -> Result<Trace, Failure> {
+) -> Result<(Trace, Option<Quality>), Failure> {
     let mut world = match world::build(scene) {
         Ok(world) => world,
-        Err(error) => return Ok(never_performed(test, scene, &error.to_string())),
+        Err(error) => return Ok((never_performed(test, scene, &error.to_string()), None)),
     };
     let settling = world.settle();
     if !settling.left.is_empty() {
@@ -187,7 +189,9 @@ fn perform(
         return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
     }
     disturb(&mut world);
-    Ok(actions::perform_with(&calls(test, scene), &mut world, choices, &env.campaign.budget, interference))
+    let calls = calls(test, scene);
+    let trace = actions::perform_with(&calls, &mut world, choices, &env.campaign.budget, interference);
+    Ok((trace, Some(world.quality())))
 }
 
 fn calls(test: &[String], scene: &Scene) -> Vec<ActionCall> {

@@ -85,6 +85,16 @@ pub enum Command {
         after_help = "Example:\n  actcheck export k7f3-3 -o case.toml    (an id that `actcheck list` prints; its beginning is enough)"
     )]
     Export(ExportArgs),
+    /// Say how healthy a campaign is: what was discarded, repeated, never tried, slow, or badly simulated
+    ///
+    /// Prints how much of each parameter's range was tried, against what so many random draws would, and the same for pairs of
+    /// parameters; and warns, with what to do, where the campaign says less than it seems to.
+    ///
+    /// Exit code: 0 healthy, 1 there is a warning, 2 it could not be done.
+    #[command(
+        after_help = "Example:\n  actcheck health    (the newest campaign, after `actcheck run configs/pick.toml`)"
+    )]
+    Health(crate::cli::health::HealthArgs),
     /// List the runs of a history
     #[command(after_help = "Example:\n  actcheck list --format csv")]
     List(ListArgs),

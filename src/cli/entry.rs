@@ -22,6 +22,7 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => crate::cli::compare::compare(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
         Command::Export(args) => export::export(&args).map(|()| 0),
+        Command::Health(args) => crate::cli::health::health(&args),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Merge(args) => crate::cli::merge::merge(&args),
         Command::Show(args) => show::show(&args).map(|()| 0),

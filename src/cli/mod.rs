@@ -14,6 +14,7 @@ mod compare;
 mod datalog;
 mod entry;
 mod export;
+mod health;
 mod history_dir;
 mod list;
 mod merge;

@@ -12,11 +12,11 @@ use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, We
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
 use crate::cli::session::{self, Opened, Session};
-use crate::cli::{case, clock, output, shrink, stop};
+use crate::cli::{case, clock, health, output, shrink, stop};
 use crate::history::{self, History, RunFilter};
 use crate::report::{
-    CampaignSummary, EndedBy, GuidedSearch, RunSummary, WeightedLine, campaign_json, campaign_table, campaign_text,
-    shrunk_json, shrunk_text, with_shrunk,
+    CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json, campaign_table,
+    campaign_text, health_json, health_lines, shrunk_json, shrunk_text, with_shrunk,
 };
 use crate::rules::Budget;
 use crate::verdict::{Counts, Outcome, mean};
@@ -56,14 +56,15 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     if finished.is_ok() {
         summary.failure_modes = failure_modes(&history, id)?;
     }
-    let results = Results { summary: &summary, format: args.format };
+    // Where the history failed, that is what has to be told.
+    let health = if finished.is_ok() { Some(health::examine(&history, &summary.campaign)?) } else { None };
+    let results = Results { summary: &summary, health: health.as_ref(), format: args.format };
     let shrinks = args.shrink && finished.is_ok() && is_whole(&end);
     if shrinks {
         results.print_with(|| shrink::shrink_modes(&env, &history, &examples(&summary), options.jobs, &stop))?;
     } else {
         results.print();
     }
-    warn_of_discards(&end);
     match end.ending {
         Ending::Stopped(faults) => Err(faults),
         _ if shrinks && stop.load(Ordering::Relaxed) => finished.map(|()| stop::INTERRUPTED),
@@ -86,16 +87,33 @@ fn interrupt() -> (Arc<AtomicBool>, Arc<OnceLock<ProgressBar>>) {
 /// What came of a campaign, as it is to be printed.
 struct Results<'a> {
     summary: &'a CampaignSummary,
+    /// How healthy it is: part of text and JSON, on the error stream beside a table.
+    health: Option<&'a HealthSummary>,
     format: Format,
 }
 
 impl Results<'_> {
     fn print(&self) {
         output::print(&match self.format {
-            Format::Table => campaign_text(self.summary, output::colour()),
+            Format::Table => {
+                campaign_text(self.summary, output::colour()) + &self.health.map(health_lines).unwrap_or_default()
+            }
             Format::Csv => campaign_table(self.summary).render(self.format.into()),
-            Format::Json => format!("{:#}\n", campaign_json(self.summary)),
+            Format::Json => format!("{:#}\n", self.json()),
         });
+        self.warn();
+    }
+
+    fn json(&self) -> serde_json::Value {
+        let mut campaign = campaign_json(self.summary);
+        campaign["health"] = self.health.map(health_json).into();
+        campaign
+    }
+
+    fn warn(&self) {
+        if self.format == Format::Csv {
+            output::print_diagnostics(&self.health.map(HealthSummary::warnings).unwrap_or_default());
+        }
     }
 
     /// The same with the smaller forms of runs. People read the campaign's results while these are still being made;
@@ -109,11 +127,12 @@ impl Results<'_> {
             Format::Table => shrunk.done.iter().map(|one| format!("\n{}", shrunk_text(one))).collect(),
             Format::Csv => with_shrunk(campaign_table(self.summary), &shrunk.done).render(self.format.into()),
             Format::Json => {
-                let mut json = campaign_json(self.summary);
+                let mut json = self.json();
                 json["shrunk"] = shrunk.done.iter().map(shrunk_json).collect();
                 format!("{json:#}\n")
             }
         });
+        self.warn();
         shrunk.faults.or(())
     }
 }
@@ -227,23 +246,4 @@ fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignEnd) -> Opt
     strategy
         .is_guided()
         .then(|| GuidedSearch { strategy: strategy.name().to_owned(), lines: end.rates.iter().map(line).collect() })
-}
-
-fn warn_of_discards(end: &CampaignEnd) {
-    // Up to a tenth is what a crowded table does; more than that skews what is tested.
-    let drawn = end.committed + end.discards.len() as u64;
-    if let Some((index, reason)) = end.discards.first()
-        && end.discards.len() as u64 * 10 > drawn
-    {
-        let fault = Diagnostic::warning(
-            "S032",
-            format!(
-                "{} of {drawn} scenes were discarded; the first, for run {}: {reason}",
-                end.discards.len(),
-                index + 1
-            ),
-        )
-        .help("fewer or smaller objects, or a larger surface, waste less and bias the sample less");
-        output::print_diagnostics(&fault.into());
-    }
 }

@@ -52,7 +52,7 @@ fn row(run: &NamedNode, node: &Node) -> RunRow {
 }
 
 /// Reasons of the discards before a run, in order.
-fn discards(store: &Store, run: &NamedNode, node: &Node) -> Result<Vec<String>, StorageError> {
+pub(super) fn discards(store: &Store, run: &NamedNode, node: &Node) -> Result<Vec<String>, StorageError> {
     if node.count("act:discards").unwrap_or_default() == 0 {
         return Ok(Vec::new());
     }

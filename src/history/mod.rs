@@ -23,6 +23,7 @@ mod store;
 mod syntax_fault;
 mod terms;
 mod trace_file;
+mod vitals;
 mod write_campaign;
 mod write_run;
 mod write_scene;
@@ -34,6 +35,7 @@ pub use record::{CampaignEnd, CampaignRecord, Repetition, RunRecord, RunStatus};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;
 pub use store::History;
+pub use vitals::RunVitals;
 
 // What the readers of a history meet in its products.
 pub use crate::actions::{BodyState, Snapshot, Trace};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::actions::Trace;
+use crate::actions::{Quality, Trace};
 use crate::base::{Choice, Shard};
 use crate::facts::RunFacts;
 use crate::scenario::Scene;
@@ -148,6 +148,8 @@ pub struct RunRecord {
     pub actions: Vec<String>,
     /// One list for each action, in the order of its success properties.
     pub judgements: Vec<Vec<Judgement>>,
+    /// What simulation got wrong; nothing where it did not come to that.
+    pub quality: Option<Quality>,
     /// RFC 3339.
     pub started: String,
     /// Wall time. Unit: seconds.

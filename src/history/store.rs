@@ -19,7 +19,7 @@ use crate::history::write_campaign::{self, campaign_node};
 use crate::history::write_run::{self, run_node};
 use crate::history::{
     CampaignEnd, CampaignRecord, CampaignRow, Cancel, OutcomeRow, QueryAnswer, RunDetail, RunFilter, RunRecord, RunRow,
-    detail, fault, query, trace_file,
+    RunVitals, detail, fault, query, trace_file, vitals,
 };
 use crate::history::{lists, read_campaign};
 
@@ -270,6 +270,20 @@ impl History {
     pub fn choices(&self, name: &str) -> Result<Vec<Choice>, Diagnostics> {
         let id = self.resolve(name)?;
         Ok(self.decoded(&id, trace_file::decode_states)?.0)
+    }
+
+    /// Tells what is kept of the health of a campaign's runs, one by one, in the order of their indices.
+    ///
+    /// # Errors
+    /// `H014` there is no such campaign, else as [`History::trace`].
+    pub fn each_vitals(&self, campaign: &str, mut each: impl FnMut(&RunVitals)) -> Result<(), Diagnostics> {
+        self.campaign(campaign)?;
+        for row in self.runs(&RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() })? {
+            let choices = self.decoded(&row.run, trace_file::decode_states)?.0;
+            let read = vitals::read(&self.store()?, &row.run, choices);
+            each(&read.map_err(|error| self.fault("reading a run", &error))?);
+        }
+        Ok(())
     }
 
     /// The facts of a run, named as in [`History::resolve`]: extracted from its trace, the same as when it was run.

@@ -55,6 +55,8 @@ fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
         .has("prov:startedAtTime", time(&record.started))
         .has("act:wallSeconds", Literal::from(record.wall_secs))
         .has("act:elapsedSeconds", Literal::from(record.elapsed_secs))
+        .may("act:deepestPenetration", record.quality.map(|quality| Literal::from(quality.deepest_penetration_m)))
+        .may("act:energyGain", record.quality.map(|quality| Literal::from(quality.energy_gain_j)))
         .text("act:program", &program(env!("CARGO_PKG_VERSION")));
     write_designators(&record.scene.designators, record, &mut about);
 }

@@ -17,6 +17,8 @@ pub const CONTACT_FLOOR_NEWTONS: f64 = 0.05;
 pub struct Touch {
     /// Sum of the normal forces' sizes. Unit: newtons.
     pub normal_n: f64,
+    /// How deep the second goes into the first. Unit: metres; 0 where they only meet.
+    pub depth_m: f64,
     /// Sum of normal and friction forces on the second of the pair. Unit: newtons. Frame: world.
     pub force_n: Vector3<f64>,
 }
@@ -40,7 +42,9 @@ pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
                 let last = f64::from(point.data.warmstart_impulse);
                 let share = if last > 0.0 { impulse / last } else { 0.0 };
                 let friction = from_vector(point.data.warmstart_tangent_world) * -share;
-                let touch = found.entry(key).or_insert(Touch { normal_n: 0.0, force_n: Vector3::zeros() });
+                let touch =
+                    found.entry(key).or_insert(Touch { normal_n: 0.0, depth_m: 0.0, force_n: Vector3::zeros() });
+                touch.depth_m = touch.depth_m.max(-f64::from(point.dist));
                 touch.normal_n += impulse * per_second;
                 touch.force_n += (normal * impulse + friction) * (sign * per_second);
             }

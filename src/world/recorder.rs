@@ -10,6 +10,7 @@ use crate::world::World;
 use crate::world::contacts::touches;
 use crate::world::convert::{from_pose, from_vector};
 use crate::world::engine::Owner;
+use crate::world::quality::QualityMeter;
 
 /// Time between two frames. Unit: seconds. Pictures and replays need no more, and a trace stays small.
 const FRAME_SECS: f64 = 0.1;
@@ -89,6 +90,7 @@ pub struct Recorder {
     extremes: Vec<[f64; 4]>,
     open: BTreeMap<(Owner, Owner), Episode>,
     closed: Vec<((Owner, Owner), Episode)>,
+    pub(super) quality: QualityMeter,
 }
 
 impl Recorder {
@@ -108,6 +110,7 @@ impl Recorder {
             extremes: vec![[0.0; 4]; n_objects],
             open: BTreeMap::new(),
             closed: Vec::new(),
+            quality: QualityMeter::default(),
         }
     }
 }
@@ -229,7 +232,9 @@ impl World {
     fn record_contacts(&mut self) {
         let now = self.recorder.n_ticks;
         let patience = SAME_CONTACT_SECS / self.recorder.tick_secs;
+        let mut deepest_m = 0.0f64;
         for (pair, touch) in touches(&self.engine) {
+            deepest_m = deepest_m.max(touch.depth_m);
             let episode =
                 self.recorder.open.entry(pair).or_insert(Episode { start: now, latest: now, max_force_n: 0.0 });
             if (now - episode.latest) as f64 > patience {
@@ -239,6 +244,8 @@ impl World {
             episode.latest = now;
             episode.max_force_n = episode.max_force_n.max(touch.normal_n);
         }
+        let energies = self.free_energies();
+        self.recorder.quality.tick(deepest_m, energies);
     }
 
     fn frame(&mut self) {

@@ -1,0 +1,279 @@
+//! How much of the space of scenes a campaign has tried, against what so many random draws would.
+//!
+//! Every decision falls into a bin; all bins of a parameter are equally probable. Parameters that differ only in which of
+//! the objects they belong to are one: `other.3.x` and `other.5.x` are `other.*.x`.
+
+use std::collections::BTreeMap;
+
+use statrs::distribution::{Binomial, DiscreteCDF};
+
+use crate::base::{Choice, ChoiceKind};
+
+/// Bins of a parameter that is a number. Fifths show a gap in the middle and at both ends, and fill in a hundred draws.
+const BINS: usize = 5;
+/// Probability that any bin of a whole campaign without a fault is called neglected.
+const LEVEL: f64 = 1e-3;
+/// Decisions whose name begins so belong to what robot and senses get wrong, each in its own right: no pairs of them.
+const NOISE: &str = "sense.";
+/// Pairs of bins are called neglected where fewer than this share of those that were to be expected were tried.
+const PAIR_SHARE: f64 = 0.75;
+/// … and that by so many standard deviations.
+const PAIR_SIGMAS: f64 = 5.0;
+
+/// Counts what a campaign's runs decided.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Coverage {
+    parameters: BTreeMap<(String, usize), Vec<u64>>,
+    pairs: BTreeMap<[(String, usize); 2], Vec<u64>>,
+}
+
+/// What was tried of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterCoverage {
+    /// Its name, `*` for the number or id of an object.
+    pub name: String,
+    /// How often it was decided.
+    pub draws: u64,
+    /// Decisions in each bin. Shape: one for each of the things chosen from, or for each fifth of the distribution.
+    pub counts: Vec<u64>,
+    /// Bins that so many random draws would hit in the mean.
+    pub expected_hits: f64,
+    /// A bin that was tried less than half as often as its share, beyond chance.
+    pub neglected: Option<usize>,
+}
+
+/// What was tried of two parameters together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairCoverage {
+    /// Their names.
+    pub names: [String; 2],
+    /// How often both were decided.
+    pub draws: u64,
+    /// Pairs of bins.
+    pub cells: usize,
+    /// Those that were tried.
+    pub hits: usize,
+    /// Those that so many random draws would hit in the mean.
+    pub expected_hits: f64,
+    /// Whether much less was tried, beyond chance.
+    pub neglected: bool,
+}
+
+impl ParameterCoverage {
+    /// Bins that were tried.
+    pub fn hits(&self) -> usize {
+        self.counts.iter().filter(|count| **count > 0).count()
+    }
+}
+
+/// A decision in its bin.
+struct Binned {
+    /// The object that it belongs to, where it belongs to one of several.
+    owner: Option<String>,
+    name: String,
+    bins: usize,
+    bin: usize,
+}
+
+impl Coverage {
+    /// Counts the decisions of one run. Of decisions that were made again the last one counts: it stands in the scene.
+    pub fn add(&mut self, choices: &[Choice]) {
+        let mut last: BTreeMap<&str, &Choice> = BTreeMap::new();
+        for choice in choices {
+            last.insert(&choice.name, choice);
+        }
+        let binned: Vec<Binned> = last.values().filter_map(|choice| binned(choice)).collect();
+        for one in &binned {
+            let counts = self.parameters.entry((one.name.clone(), one.bins)).or_insert_with(|| vec![0; one.bins]);
+            counts[one.bin] += 1;
+        }
+        for (idx, first) in binned.iter().enumerate() {
+            for second in &binned[idx + 1..] {
+                self.add_pair(first, second);
+            }
+        }
+    }
+
+    /// Two decisions about the whole scene, or about the same object.
+    fn add_pair(&mut self, first: &Binned, second: &Binned) {
+        let noise = first.name.starts_with(NOISE) || second.name.starts_with(NOISE);
+        if noise || first.owner != second.owner {
+            return;
+        }
+        let key = [(first.name.clone(), first.bins), (second.name.clone(), second.bins)];
+        let counts = self.pairs.entry(key).or_insert_with(|| vec![0; first.bins * second.bins]);
+        counts[first.bin * second.bins + second.bin] += 1;
+    }
+
+    /// Every parameter that could be decided one way or another, by name.
+    pub fn parameters(&self) -> Vec<ParameterCoverage> {
+        let bins: usize = self.parameters.values().map(Vec::len).sum();
+        self.parameters
+            .iter()
+            .map(|((name, _), counts)| {
+                let draws = counts.iter().sum();
+                ParameterCoverage {
+                    name: name.clone(),
+                    draws,
+                    counts: counts.clone(),
+                    expected_hits: occupied(counts.len(), draws).0,
+                    neglected: counts.iter().position(|count| is_neglected(*count, draws, counts.len(), bins)),
+                }
+            })
+            .collect()
+    }
+
+    /// Every pair of parameters of the scene, or of one object, by name.
+    pub fn pairs(&self) -> Vec<PairCoverage> {
+        self.pairs
+            .iter()
+            .map(|([(first, _), (second, _)], counts)| {
+                let draws = counts.iter().sum();
+                let hits = counts.iter().filter(|count| **count > 0).count();
+                let (expected_hits, variance) = occupied(counts.len(), draws);
+                let short = expected_hits - hits as f64;
+                PairCoverage {
+                    names: [first.clone(), second.clone()],
+                    draws,
+                    cells: counts.len(),
+                    hits,
+                    expected_hits,
+                    neglected: short > PAIR_SIGMAS * variance.sqrt().max(1.0)
+                        && (hits as f64) < PAIR_SHARE * expected_hits,
+                }
+            })
+            .collect()
+    }
+}
+
+/// Whether a bin's true share is less than half of an even one: so few draws would come of half a share once in a
+/// thousand campaigns, whichever of all the `bins` it were.
+fn is_neglected(count: u64, draws: u64, of: usize, bins: usize) -> bool {
+    let half = 0.5 / of as f64;
+    Binomial::new(half, draws).is_ok_and(|chance| chance.cdf(count) < LEVEL / bins.max(1) as f64)
+}
+
+/// How many of `cells` equally probable cells so many draws hit: mean, and a bound of the variance.
+///
+/// The cells exclude each other, so the variance of the sum is at most the sum of the variances.
+fn occupied(cells: usize, draws: u64) -> (f64, f64) {
+    let cells = cells as f64;
+    let empty = libm::pow(1.0 - 1.0 / cells, draws as f64);
+    (cells * (1.0 - empty), cells * empty * (1.0 - empty))
+}
+
+/// A decision in its bin; nothing where there was nothing to decide.
+fn binned(choice: &Choice) -> Option<Binned> {
+    let share = |share: f64| (BINS, ((share * BINS as f64).max(0.0) as usize).min(BINS - 1));
+    let (bins, bin) = match choice.kind {
+        ChoiceKind::Index { of } if of > 1 => (of, (choice.value.max(0.0) as usize).min(of - 1)),
+        ChoiceKind::Real { low, high, .. } if high > low => share((choice.value - low) / (high - low)),
+        ChoiceKind::Normal { sigma } if sigma > 0.0 => {
+            share(0.5 * libm::erfc(-choice.value / sigma / std::f64::consts::SQRT_2))
+        }
+        _ => return None,
+    };
+    let (owner, name) = pooled(&choice.name);
+    Some(Binned { owner, name, bins, bin })
+}
+
+/// The object in a name, where it is one of several, and the name with `*` in its place.
+fn pooled(name: &str) -> (Option<String>, String) {
+    let parts: Vec<&str> = name.split('.').collect();
+    match parts.as_slice() {
+        // Where the base believes that it stands belongs to no object.
+        [_, "localisation", ..] => (None, name.to_owned()),
+        [head, owner, rest @ ..] if !rest.is_empty() && (is_number(owner) || name.starts_with(NOISE)) => {
+            (Some(format!("{head}.{owner}")), format!("{head}.*.{}", rest.join(".")))
+        }
+        _ => (None, name.to_owned()),
+    }
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Choices;
+
+    /// Decisions of a scene with two objects; `lean` says how often the colour is drawn again when it is the last one.
+    fn scene(index: u64, lean: u32) -> Vec<Choice> {
+        let mut choices = Choices::random(5, index);
+        for name in ["other.1", "other.2"] {
+            choices.real(&format!("{name}.x"), -1.0, 1.0, 0.0);
+            choices.index(&format!("{name}.model"), 4);
+        }
+        for _ in 0..=lean {
+            if choices.index("colour", 5) < 4 {
+                break;
+            }
+        }
+        choices.real("fixed", 1.0, 1.0, 1.0);
+        choices.normal("sense.mug_1.x", 0.1);
+        choices.into_made()
+    }
+
+    fn coverage(runs: u64, lean: u32) -> Coverage {
+        let mut coverage = Coverage::default();
+        (0..runs).for_each(|index| coverage.add(&scene(index, lean)));
+        coverage
+    }
+
+    #[test]
+    fn objects_are_pooled_and_what_can_not_vary_is_no_parameter() {
+        let coverage = coverage(10, 0);
+        let names: Vec<String> = coverage.parameters().iter().map(|p| format!("{} {}", p.name, p.draws)).collect();
+        assert_eq!(names, ["colour 10", "other.*.model 20", "other.*.x 20", "sense.*.x 10"]);
+        let pairs: Vec<[String; 2]> = coverage.pairs().into_iter().map(|pair| pair.names).collect();
+        assert_eq!(pairs, [["other.*.model".to_owned(), "other.*.x".to_owned()]]);
+    }
+
+    #[test]
+    fn random_draws_neglect_nothing_however_many() {
+        for runs in [1, 5, 30, 300, 3_000] {
+            let coverage = coverage(runs, 0);
+            assert!(coverage.parameters().iter().all(|parameter| parameter.neglected.is_none()), "{runs}");
+            assert!(coverage.pairs().iter().all(|pair| !pair.neglected), "{runs}");
+        }
+    }
+
+    #[test]
+    fn so_many_draws_hit_as_many_bins_as_they_should() {
+        let mean = (0..200u64).map(|seed| {
+            let mut choices = Choices::random(seed, 1);
+            let hit: std::collections::BTreeSet<usize> = (0..8).map(|_| choices.index("x", 10)).collect();
+            hit.len() as f64
+        });
+        let mean = mean.sum::<f64>() / 200.0;
+        assert!((mean - occupied(10, 8).0).abs() < 0.25, "{mean}");
+    }
+
+    #[test]
+    fn a_value_that_is_mostly_drawn_again_is_neglected() {
+        let parameters = coverage(300, 3).parameters();
+        let neglected: Vec<(&str, Option<usize>)> = parameters
+            .iter()
+            .filter(|parameter| parameter.neglected.is_some())
+            .map(|parameter| (parameter.name.as_str(), parameter.neglected))
+            .collect();
+        assert_eq!(neglected, [("colour", Some(4))]);
+    }
+
+    #[test]
+    fn two_parameters_that_go_together_leave_pairs_out() {
+        let mut coverage = Coverage::default();
+        for index in 0..200 {
+            let mut choices = Choices::random(5, index);
+            let value = choices.real("a", 0.0, 1.0, 0.0);
+            let mut made = choices.into_made();
+            made.push(Choice { name: "b".into(), value, ..made[0].clone() });
+            coverage.add(&made);
+        }
+        assert!(coverage.parameters().iter().all(|parameter| parameter.neglected.is_none()));
+        let pair = &coverage.pairs()[0];
+        assert_eq!((pair.hits, pair.cells, pair.neglected), (5, 25, true));
+    }
+}

@@ -1,0 +1,293 @@
+//! Whether a campaign was a fair and sound test: what was discarded, tried twice, never tried, slow, or badly simulated.
+
+use std::collections::BTreeMap;
+
+use crate::analysis::{Coverage, PairCoverage, ParameterCoverage};
+use crate::base::Digest;
+use crate::history::{OutcomeRow, RunVitals};
+use crate::verdict::Outcome;
+
+/// Scenes may be discarded in this share: up to a tenth is what a crowded table does, more skews what is tested.
+const MOST_DISCARDS: f64 = 0.1;
+/// A property is nearly always inapplicable from this share on.
+const MOST_INAPPLICABLE: f64 = 0.9;
+/// Fewer judgements than this are no ground for "nearly always".
+const LEAST_JUDGED: u64 = 10;
+/// A run is out of the ordinary when it takes so many times the median: scenes of one campaign differ by a factor of 4.
+const SLOW_FACTOR: f64 = 10.0;
+/// … and so much longer. Unit: seconds. A busy machine delays a run by less.
+const SLOW_SECS: f64 = 10.0;
+/// Fewer runs than this have no ordinary time.
+const LEAST_TIMED: usize = 5;
+/// Things that push each other may go so deep into each other. Unit: metres. A grasp at 240 steps a second goes in by less
+/// than one millimetre and a hit by less than five; the walls of cups are 4 mm thick, and at 1 cm things pass through them.
+const DEEPEST_M: f64 = 0.01;
+/// Energy that may come from nowhere. Unit: joules. It lifts a full glass (0.3 kg) by 17 mm; the shipped campaigns stay
+/// below a fifth of it.
+const MOST_ENERGY_J: f64 = 0.05;
+
+/// Gathers what a campaign's runs show.
+#[derive(Debug, Clone, Default)]
+pub struct HealthMeter {
+    coverage: Coverage,
+    steered: bool,
+    runs: u64,
+    discards: u64,
+    first_discard: Option<(u64, String)>,
+    /// Digest of all decisions and the first run that made them.
+    seen: BTreeMap<String, String>,
+    duplicates: Vec<(String, String)>,
+    wall: Vec<(f64, String)>,
+    deepest: Option<(f64, String)>,
+    energy: Option<(f64, String)>,
+}
+
+/// How healthy a campaign is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Health {
+    /// Runs that are kept.
+    pub runs: u64,
+    /// Scenes that were discarded.
+    pub discards: u64,
+    /// What was tried of each parameter.
+    pub parameters: Vec<ParameterCoverage>,
+    /// What was tried of parameters two by two.
+    pub pairs: Vec<PairCoverage>,
+    /// Median of the runs' wall time. Unit: seconds.
+    pub median_secs: Option<f64>,
+    /// The slowest run and its wall time. Unit: seconds.
+    pub slowest: Option<(f64, String)>,
+    /// The deepest penetration and its run. Unit: metres.
+    pub deepest: Option<(f64, String)>,
+    /// The most energy that came from nowhere and its run. Unit: joules.
+    pub energy: Option<(f64, String)>,
+    /// What is wrong.
+    pub ailments: Vec<Ailment>,
+}
+
+/// Something that makes a campaign say less than it seems to.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ailment {
+    /// So many of the drawn scenes were discarded; the first one for this run (from 1), for this reason.
+    Discards(u64, u64, u64, String),
+    /// The property (IRI) was inapplicable in so many of so many judgements.
+    Inapplicable(String, u64, u64),
+    /// A value or range of a parameter was hardly tried.
+    Neglected(ParameterCoverage),
+    /// Pairs of values of two parameters were hardly tried.
+    PairNeglected(PairCoverage),
+    /// So many runs repeat another one in every decision, such as this one that one.
+    Duplicates(u64, String, String),
+    /// The run took so much longer than the median. Unit: seconds.
+    Slow(String, f64, f64),
+    /// In this run things went so deep into each other. Unit: metres.
+    Penetration(String, f64),
+    /// In this run so much energy came from nowhere. Unit: joules.
+    Energy(String, f64),
+}
+
+impl HealthMeter {
+    /// Counts one run.
+    pub fn add(&mut self, run: &RunVitals) {
+        self.runs += 1;
+        self.discards += run.discards.len() as u64;
+        if let (None, Some(reason)) = (&self.first_discard, run.discards.first()) {
+            self.first_discard = Some((run.index + 1, reason.clone()));
+        }
+        self.steered |= run.steered;
+        // A scene that is run again on purpose was tried once.
+        if run.repetition == 0 {
+            self.coverage.add(&run.choices);
+        }
+        match self.seen.get(&digest(run)) {
+            Some(first) => self.duplicates.push((run.run.clone(), first.clone())),
+            None => {
+                self.seen.insert(digest(run), run.run.clone());
+            }
+        }
+        self.wall.push((run.wall_secs, run.run.clone()));
+        larger(&mut self.deepest, run.deepest_penetration_m, &run.run);
+        larger(&mut self.energy, run.energy_gain_j, &run.run);
+    }
+
+    /// What all of it comes to, with the outcomes of the same runs.
+    pub fn finish(mut self, outcomes: &[OutcomeRow]) -> Health {
+        self.wall.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let median_secs = self.wall.get(self.wall.len() / 2).map(|(secs, _)| *secs);
+        let mut health = Health {
+            runs: self.runs,
+            discards: self.discards,
+            parameters: self.coverage.parameters(),
+            pairs: self.coverage.pairs(),
+            median_secs,
+            slowest: self.wall.last().cloned(),
+            deepest: self.deepest.clone(),
+            energy: self.energy.clone(),
+            ailments: Vec::new(),
+        };
+        let ailments = [
+            self.discarded(),
+            inapplicable(outcomes),
+            self.neglected(&health),
+            self.repeated(),
+            slow(&health, self.wall.len()),
+            badly_simulated(&health),
+        ];
+        health.ailments = ailments.into_iter().flatten().collect();
+        health
+    }
+
+    fn discarded(&self) -> Vec<Ailment> {
+        let drawn = self.runs + self.discards;
+        match &self.first_discard {
+            Some((run, reason)) if self.discards as f64 > MOST_DISCARDS * drawn as f64 => {
+                vec![Ailment::Discards(self.discards, drawn, *run, reason.clone())]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Parameters that were hardly tried; a search means to lean.
+    fn neglected(&self, health: &Health) -> Vec<Ailment> {
+        if self.steered {
+            return Vec::new();
+        }
+        let singles = health.parameters.iter().filter(|parameter| parameter.neglected.is_some());
+        let pairs = health.pairs.iter().filter(|pair| pair.neglected);
+        singles.cloned().map(Ailment::Neglected).chain(pairs.cloned().map(Ailment::PairNeglected)).collect()
+    }
+
+    fn repeated(&self) -> Vec<Ailment> {
+        let first = self.duplicates.first();
+        let ailment = first.map(|(run, of)| Ailment::Duplicates(self.duplicates.len() as u64, run.clone(), of.clone()));
+        ailment.into_iter().collect()
+    }
+}
+
+/// Digest over a run's decisions.
+fn digest(run: &RunVitals) -> String {
+    let mut digest = Digest::new();
+    for choice in &run.choices {
+        digest.update(choice.name.as_bytes());
+        digest.update(&[0]);
+        digest.update(&choice.value.to_bits().to_le_bytes());
+    }
+    digest.finish()
+}
+
+fn larger(largest: &mut Option<(f64, String)>, value: Option<f64>, run: &str) {
+    if let Some(value) = value
+        && largest.as_ref().is_none_or(|(known, _)| value > *known)
+    {
+        *largest = Some((value, run.to_owned()));
+    }
+}
+
+/// Properties that were nearly always inapplicable, by IRI.
+fn inapplicable(outcomes: &[OutcomeRow]) -> Vec<Ailment> {
+    let mut counts: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
+    for row in outcomes {
+        let (not, all) = counts.entry(&row.property).or_default();
+        *not += u64::from(row.outcome == Outcome::Inapplicable);
+        *all += u64::from(matches!(row.outcome, Outcome::Inapplicable | Outcome::Passed | Outcome::Failed));
+    }
+    counts
+        .into_iter()
+        .filter(|(_, (not, all))| *all >= LEAST_JUDGED && *not as f64 >= MOST_INAPPLICABLE * *all as f64)
+        .map(|(property, (not, all))| Ailment::Inapplicable(property.to_owned(), not, all))
+        .collect()
+}
+
+fn slow(health: &Health, runs: usize) -> Vec<Ailment> {
+    match (&health.slowest, health.median_secs) {
+        (Some((secs, run)), Some(median))
+            if runs >= LEAST_TIMED && *secs > SLOW_FACTOR * median && secs - median > SLOW_SECS =>
+        {
+            vec![Ailment::Slow(run.clone(), *secs, median)]
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn badly_simulated(health: &Health) -> Vec<Ailment> {
+    let deep = health.deepest.iter().filter(|(depth, _)| *depth > DEEPEST_M);
+    let hot = health.energy.iter().filter(|(energy, _)| *energy > MOST_ENERGY_J);
+    deep.map(|(depth, run)| Ailment::Penetration(run.clone(), *depth))
+        .chain(hot.map(|(energy, run)| Ailment::Energy(run.clone(), *energy)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Choices;
+
+    fn run(index: u64) -> RunVitals {
+        let mut choices = Choices::random(7, index);
+        choices.real("x", 0.0, 1.0, 0.0);
+        RunVitals {
+            run: format!("k-{}", index + 1),
+            index,
+            choices: choices.into_made(),
+            discards: Vec::new(),
+            steered: false,
+            repetition: 0,
+            wall_secs: 1.0 + index as f64 / 10.0,
+            deepest_penetration_m: Some(1e-3),
+            energy_gain_j: Some(1e-3),
+        }
+    }
+
+    fn ailments(change: impl Fn(&mut RunVitals)) -> Vec<Ailment> {
+        let mut meter = HealthMeter::default();
+        for index in 0..20 {
+            let mut run = run(index);
+            change(&mut run);
+            meter.add(&run);
+        }
+        meter.finish(&[]).ailments
+    }
+
+    #[test]
+    fn a_sound_campaign_has_no_ailment() {
+        assert_eq!(ailments(|_| ()), []);
+        // Histories of older programs say nothing of simulation.
+        assert_eq!(ailments(|run| (run.deepest_penetration_m, run.energy_gain_j) = (None, None)), []);
+    }
+
+    #[test]
+    fn each_ailment_is_told_with_its_run() {
+        let third = |run: &RunVitals| run.index == 2;
+        let slow = ailments(|run| run.wall_secs += if third(run) { 60.0 } else { 0.0 });
+        assert_eq!(slow, [Ailment::Slow("k-3".into(), 61.2, 2.0)]);
+        let same = ailments(|run| run.choices = self::run(run.index.min(17)).choices);
+        assert_eq!(same, [Ailment::Duplicates(2, "k-19".into(), "k-18".into())]);
+        let deep = ailments(|run| run.deepest_penetration_m = Some(if third(run) { 0.02 } else { 0.0 }));
+        assert_eq!(deep, [Ailment::Penetration("k-3".into(), 0.02)]);
+        let hot = ailments(|run| run.energy_gain_j = Some(if third(run) { 2.0 } else { 0.0 }));
+        assert_eq!(hot, [Ailment::Energy("k-3".into(), 2.0)]);
+        let crowded = ailments(|run| run.discards = vec!["no place".to_owned(); usize::from(run.index % 4 == 1)]);
+        assert_eq!(crowded, [Ailment::Discards(5, 25, 2, "no place".into())]);
+    }
+
+    #[test]
+    fn a_property_that_hardly_ever_applies_is_told() {
+        let row = |index: u64, outcome| OutcomeRow {
+            run: format!("k-{}", index + 1),
+            campaign: "k".to_owned(),
+            index,
+            test: "Pick".to_owned(),
+            step: 1,
+            action: "Pick".to_owned(),
+            property: "p".to_owned(),
+            outcome,
+            margin: None,
+        };
+        let rows = |applies: u64, all: u64| -> Vec<OutcomeRow> {
+            (0..all).map(|i| row(i, if i < applies { Outcome::Passed } else { Outcome::Inapplicable })).collect()
+        };
+        assert_eq!(inapplicable(&rows(1, 10)), [Ailment::Inapplicable("p".into(), 9, 10)]);
+        assert_eq!(inapplicable(&rows(2, 10)), []);
+        assert_eq!(inapplicable(&rows(0, 9)), []);
+    }
+}

@@ -1,0 +1,63 @@
+//! `actcheck health`
+
+use clap::Args;
+
+use crate::analysis::HealthMeter;
+use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::{history_dir, output};
+use crate::history::{History, RunFilter};
+use crate::report::{HealthSummary, health_json, health_table, health_text};
+
+/// `actcheck health`
+#[derive(Debug, Args)]
+pub struct HealthArgs {
+    /// Id of the campaign [default: the newest]
+    pub campaign: Option<String>,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How it is printed (csv: the table of parameters)
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// Prints how healthy a campaign is. Returns the exit code.
+pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
+    let history = history_dir::open(&args.history)?;
+    let campaign = match &args.campaign {
+        Some(id) => id.clone(),
+        None => history.campaigns()?.pop().map(|row| row.id).ok_or_else(|| {
+            Diagnostic::error("X040", "the history has no campaign").help("`actcheck run CONFIG` makes one")
+        })?,
+    };
+    let summary = examine(&history, &campaign)?;
+    if summary.health.runs == 0 {
+        return Err(Diagnostic::error("X041", format!("campaign {campaign} has no runs, so nothing is known of it"))
+            .help("`actcheck list` shows the runs of all campaigns")
+            .into());
+    }
+    output::print(&match args.format {
+        Format::Table => health_text(&summary),
+        Format::Csv => health_table(&summary).render(Format::Csv.into()),
+        Format::Json => format!("{:#}\n", health_json(&summary)),
+    });
+    output::print_diagnostics(&summary.warnings());
+    Ok(summary.exit_code())
+}
+
+/// How healthy a campaign of the history is.
+///
+/// # Errors
+/// `H014` there is no such campaign; the history can't be read.
+pub(super) fn examine(history: &History, campaign: &str) -> Result<HealthSummary, Diagnostics> {
+    let mut meter = HealthMeter::default();
+    history.each_vitals(campaign, |run| meter.add(run))?;
+    let outcomes = history.outcomes(&RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() })?;
+    Ok(HealthSummary {
+        campaign: campaign.to_owned(),
+        history: history.dir().display().to_string(),
+        program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
+        health: meter.finish(&outcomes),
+    })
+}

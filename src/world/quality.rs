@@ -1,0 +1,124 @@
+//! How good the simulation itself was: how deep things went into each other, and energy that came from nowhere.
+//!
+//! Reads the state of the engine after a tick and changes nothing of it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::world::World;
+use crate::world::engine::Owner;
+use crate::world::kinematics::GRAVITY;
+
+/// What physics got wrong in a run, at worst.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// How deep two things went into each other that pushed each other. Unit: metres.
+    pub deepest_penetration_m: f64,
+    /// Largest rise of the energy, kinetic and of height, of the objects that the robot could not have given any: it
+    /// neither touched them nor what they were next to. Unit: joules. Real objects only lose.
+    pub energy_gain_j: f64,
+}
+
+/// Follows penetration and energy tick by tick.
+#[derive(Debug, Default)]
+pub(super) struct QualityMeter {
+    deepest_m: f64,
+    /// Energy of each object after the tick before; nothing for those that are fixed or in the robot's reach.
+    before: Vec<Option<f64>>,
+    /// Sum of all changes since the beginning.
+    level_j: f64,
+    lowest_j: f64,
+    gain_j: f64,
+}
+
+impl QualityMeter {
+    /// What was worst up to now.
+    pub(super) fn quality(&self) -> Quality {
+        Quality { deepest_penetration_m: self.deepest_m, energy_gain_j: self.gain_j }
+    }
+
+    /// One tick: the deepest contact, and the energy of each object that is free of the robot.
+    pub(super) fn tick(&mut self, deepest_m: f64, energies: Vec<Option<f64>>) {
+        self.deepest_m = self.deepest_m.max(deepest_m);
+        let changes = self.before.iter().zip(&energies).filter_map(|(before, now)| Some((*now)? - (*before)?));
+        self.level_j += changes.sum::<f64>();
+        self.lowest_j = self.lowest_j.min(self.level_j);
+        self.gain_j = self.gain_j.max(self.level_j - self.lowest_j);
+        self.before = energies;
+    }
+}
+
+impl World {
+    /// What physics got wrong since the first record began, at worst.
+    pub fn quality(&self) -> Quality {
+        self.recorder.quality.quality()
+    }
+
+    /// Energy of each object, in scene order; nothing for those that are fixed, and for those that the robot is next to or
+    /// that are next to such. Unit: joules.
+    pub(super) fn free_energies(&self) -> Vec<Option<f64>> {
+        let reached = self.reached_by_robot();
+        let objects = self.objects.iter().zip(reached);
+        objects
+            .map(|(object, reached)| {
+                let body = self.engine.bodies.get(object.body).filter(|body| !reached && !body.is_fixed())?;
+                let height_m = f64::from(body.center_of_mass().z);
+                Some(f64::from(body.kinetic_energy()) + object.mass_kg * GRAVITY * height_m)
+            })
+            .collect()
+    }
+
+    /// Which objects the robot could have pushed, directly or through others. The boxes around them decide, so that no
+    /// contact is overlooked that began and ended within a tick.
+    fn reached_by_robot(&self) -> Vec<bool> {
+        let mut reached = vec![false; self.objects.len()];
+        let mut pairs: Vec<(usize, usize)> = Vec::new();
+        for pair in self.engine.narrow_phase.contact_pairs() {
+            let owner = |handle| self.engine.colliders.get(handle).map(|collider| Owner::from_tag(collider.user_data));
+            match (owner(pair.collider1), owner(pair.collider2)) {
+                (Some(Owner::Link(_)), Some(Owner::Object(idx))) | (Some(Owner::Object(idx)), Some(Owner::Link(_))) => {
+                    reached[idx] = true;
+                }
+                (Some(Owner::Object(first)), Some(Owner::Object(second))) => pairs.push((first, second)),
+                _ => {}
+            }
+        }
+        // What is fixed passes nothing on.
+        let fixed: Vec<bool> = self
+            .objects
+            .iter()
+            .map(|object| self.engine.bodies.get(object.body).is_none_or(rapier3d::prelude::RigidBody::is_fixed))
+            .collect();
+        pairs.retain(|(first, second)| !fixed[*first] && !fixed[*second]);
+        while let Some((first, second)) = pairs.iter().find(|(first, second)| reached[*first] != reached[*second]) {
+            (reached[*first], reached[*second]) = (true, true);
+        }
+        reached
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn energy_that_is_lost_and_energy_that_the_robot_gives_are_no_gain() {
+        let mut meter = QualityMeter::default();
+        for (first, second) in
+            [(Some(5.0), Some(1.0)), (Some(4.0), Some(1.5)), (Some(3.0), None), (Some(3.0), Some(9.0))]
+        {
+            meter.tick(0.0, vec![first, second, None]);
+        }
+        assert_eq!(meter.quality().energy_gain_j, 0.0);
+    }
+
+    #[test]
+    fn the_largest_rise_counts_once() {
+        let mut meter = QualityMeter::default();
+        for energy in [3.0, 1.0, 1.2, 1.1, 1.6, 0.5, 0.9] {
+            meter.tick(energy * 1e-3, vec![Some(energy)]);
+        }
+        let Quality { deepest_penetration_m, energy_gain_j } = meter.quality();
+        assert!((energy_gain_j - 0.6).abs() < 1e-12, "{energy_gain_j}");
+        assert_eq!(deepest_penetration_m, 3e-3);
+    }
+}

@@ -1,0 +1,140 @@
+//! The health of campaigns: the shipped ones are healthy, and each warning comes of a campaign that has the fault.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use actcheck::analysis::{Ailment, Coverage, Health, HealthMeter};
+use actcheck::base::Choices;
+use actcheck::campaign::{Clock, Ending, Env, Manner, Options, run_all};
+use actcheck::config::Overrides;
+use actcheck::history::{History, RunFilter};
+use actcheck::scenario;
+use actcheck::world::{Mishap, World};
+use serde_json::Value;
+
+use crate::support::{actcheck, edit, project, root, stderr, stdout};
+
+const STILL: Clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
+
+/// Runs a campaign of a configuration into a history of its own and examines it.
+fn health(config: &Path, runs: Option<u32>, manner: Manner) -> Health {
+    let folder = tempfile::tempdir().unwrap();
+    let overrides = Overrides { runs, history: Some(folder.path().join("h")), ..Overrides::default() };
+    let env = Env::prepare(config, &overrides).unwrap();
+    let history = History::open(&env.campaign.history).unwrap();
+    history.begin_campaign(&env.record("k".into(), "test".into(), (manner.clock.now)())).unwrap();
+    // One worker: its clock is that of all runs.
+    let options = Options { jobs: 1, manner };
+    let end = run_all(&env, &history, "k", &options, &AtomicBool::new(false), |_| {});
+    assert!(matches!(end.ending, Ending::Finished), "{:?}", end.ending);
+    let mut meter = HealthMeter::default();
+    history.each_vitals("k", |run| meter.add(run)).unwrap();
+    meter.finish(&history.outcomes(&RunFilter::default()).unwrap())
+}
+
+#[test]
+fn the_shipped_campaigns_are_healthy() {
+    for config in ["pick", "lone_glass", "clutter"] {
+        let path = root().join(format!("configs/{config}.toml"));
+        let health = health(&path, None, Manner { clock: STILL, disturb: None });
+        assert_eq!(health.ailments, [], "{config}");
+        assert!(health.runs >= 15 && !health.parameters.is_empty(), "{config}: {health:?}");
+        let depth = health.deepest.unwrap().0;
+        assert!(depth > 0.0, "{config}: things that push each other do go into each other a little");
+    }
+}
+
+/// Twelve things find no place on a coffee table, and a property that speaks of what is not there never applies.
+#[test]
+fn a_crowded_table_and_an_idle_property_are_told() {
+    let project = project();
+    edit(&project.path().join("configs/pick.toml"), "count = [1, 5]", "count = [1, 14]");
+    std::fs::write(
+        project.path().join("rules/idle.rls"),
+        "applicable(?o) :- after(?o, w:knockedOver, true), after(?o, w:z, ?z), ?z > 1000.0 .\n\
+         success(?o) :- after(?o, w:upright, true) .\n",
+    )
+    .unwrap();
+    let ontology = project.path().join("ontology/actions.ttl");
+    edit(&ontology, "act:CloseObject, act:ObjectGrasped", "act:Idle, act:CloseObject, act:ObjectGrasped");
+    let text = std::fs::read_to_string(&ontology).unwrap();
+    std::fs::write(&ontology, text + "\nact:Idle a act:Property ; act:verifiedBy <../rules/idle.rls> .\n").unwrap();
+    let run = ["run", "configs/pick.toml", "--runs", "10", "--history", "h"];
+    let output = actcheck(project.path(), &run);
+    let text = stdout(&output);
+    assert!(
+        text.contains("warning S032: ") && text.contains("warning Q001: Idle was inapplicable in 10 of 10"),
+        "{text}"
+    );
+
+    let output = actcheck(project.path(), &["health", "--history", "h", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let told: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let codes: Vec<&str> =
+        told["warnings"].as_array().unwrap().iter().map(|warning| warning["code"].as_str().unwrap()).collect();
+    assert_eq!(codes, ["S032", "Q001"]);
+    assert!(stderr(&output).contains("larger surface"), "what to do:\n{}", stderr(&output));
+    let table = stdout(&actcheck(project.path(), &["health", "--history", "h", "--format", "csv"]));
+    assert!(table.starts_with("parameter,draws,bins,hit,expected_hit,least,most\n"), "{table}");
+    assert!(table.contains("\nother.count,10,14,"), "{table}");
+    let text = stdout(&actcheck(project.path(), &["health", "--history", "h"]));
+    assert!(text.contains("deepest penetration: ") && text.contains("2 warnings"), "{text}");
+    let missing = actcheck(project.path(), &["health", "zzzz", "--history", "h"]);
+    assert_eq!(missing.status.code(), Some(2));
+}
+
+/// A crowded scene finds no place and is drawn again: what is left leans to few objects.
+#[test]
+fn counts_that_hardly_ever_find_a_place_are_neglected() {
+    let project = project();
+    edit(&project.path().join("configs/pick.toml"), "count = [1, 5]", "count = [1, 20]");
+    let env = Env::prepare(&project.path().join("configs/pick.toml"), &Overrides::default()).unwrap();
+    let mut coverage = Coverage::default();
+    for index in 0..1000 {
+        let drawn = (0..50u64).find_map(|attempt| {
+            let mut choices = Choices::random(env.campaign.seed, index | (attempt << 48));
+            scenario::draw(&env.space, 0, &mut choices).ok().map(|_| choices.into_made())
+        });
+        coverage.add(&drawn.unwrap());
+    }
+    let neglected: Vec<String> = coverage
+        .parameters()
+        .into_iter()
+        .filter(|parameter| parameter.neglected.is_some())
+        .map(|parameter| parameter.name)
+        .collect();
+    assert_eq!(neglected, ["other.count"]);
+}
+
+/// Moments that the fake clock below shows.
+static LATER_SECS: AtomicU64 = AtomicU64::new(0);
+
+#[test]
+fn a_run_that_takes_far_longer_than_the_others_is_told() {
+    let clock = Clock { secs: || LATER_SECS.load(Ordering::Relaxed) as f64, ..STILL };
+    let disturb = |index: u64, _: &mut World| {
+        LATER_SECS.fetch_add(if index == 3 { 500 } else { 2 }, Ordering::Relaxed);
+    };
+    let config = root().join("configs/lone_glass.toml");
+    let health = health(&config, Some(6), Manner { clock, disturb: Some(disturb) });
+    assert_eq!(health.ailments, [Ailment::Slow("k-4".into(), 500.0, 2.0)]);
+}
+
+/// One thing is put into another: physics pushes them apart, with energy that nothing gave them.
+#[test]
+fn bad_simulation_is_told() {
+    let disturb = |index: u64, world: &mut World| {
+        let bodies = world.snapshot().bodies;
+        let movable: Vec<_> = bodies.iter().filter(|body| !body.fixed).collect();
+        if index == 1 {
+            assert!(world.befall(&movable[1].id, Mishap::Pose(movable[0].pose)));
+        }
+    };
+    let config = root().join("configs/pick.toml");
+    let health = health(&config, Some(2), Manner { clock: STILL, disturb: Some(disturb) });
+    let [Ailment::Penetration(deep, metres), Ailment::Energy(hot, joules)] = health.ailments.as_slice() else {
+        panic!("{:?}", health.ailments)
+    };
+    assert_eq!((deep.as_str(), hot.as_str()), ("k-2", "k-2"));
+    assert!(*metres > 0.01 && *joules > 0.05, "{metres} m, {joules} J");
+}
