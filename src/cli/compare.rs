@@ -164,7 +164,10 @@ impl Side {
 }
 
 /// The newest campaign of a history that is no smaller form of a run.
-fn newest(history: &History) -> Result<String, Diagnostics> {
+///
+/// # Errors
+/// `X070` there is none.
+pub(super) fn newest(history: &History) -> Result<String, Diagnostics> {
     let shrunk = history.shrunk_campaigns()?;
     let mut ids = history.campaigns()?.into_iter().map(|row| row.id).rev();
     ids.find(|id| !shrunk.contains(id)).ok_or_else(|| {

@@ -5,7 +5,7 @@ use clap::Args;
 use crate::analysis::HealthMeter;
 use crate::base::{Diagnostic, Diagnostics};
 use crate::cli::args::{Format, HistoryArgs};
-use crate::cli::{history_dir, output};
+use crate::cli::{compare, history_dir, output};
 use crate::history::{History, RunFilter};
 use crate::report::{HealthSummary, health_json, health_table, health_text};
 
@@ -27,9 +27,7 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
     let history = history_dir::open(&args.history)?;
     let campaign = match &args.campaign {
         Some(id) => id.clone(),
-        None => history.campaigns()?.pop().map(|row| row.id).ok_or_else(|| {
-            Diagnostic::error("X040", "the history has no campaign").help("`actcheck run CONFIG` makes one")
-        })?,
+        None => compare::newest(&history)?,
     };
     let summary = examine(&history, &campaign)?;
     if summary.health.runs == 0 {
