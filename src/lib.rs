@@ -19,7 +19,7 @@
 //! | --- | --- | --- |
 //! | [`base`] | sources and diagnostics, terms, poses, recorded choices, shipped files | |
 //! | [`search`] | where in a cube to look next, learnt from margins; failure rates whatever was looked at | statrs |
-//! | [`config`] | TOML text to a `Campaign` in which nothing is left to check | toml |
+//! | [`config`] | TOML text to a `Campaign` in which nothing is left to check; models, ours and other people's | toml, roxmltree, mesh-loader |
 //! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxigraph (parsers) |
 //! | [`scenario`] | recorded choices to one concrete `Scene`; what "simpler" means | parry3d (overlaps) |
 //! | [`world`] | a `Scene` to a stepping simulation; the only place that knows the engine | rapier3d, parry3d, urdf-rs |

@@ -41,13 +41,13 @@ fn all_parameters_of_the_paper_are_read() {
         nav_obstacle_list = ["box", "bottle"]
         nav_obstacle_count = 2
         [world]
-        worlds = ["lab", "kitchen"]
+        worlds = ["lab", "apartment"]
         [objectLocation]
-        location_list = ["by the window"]
+        location_list = ["coffee_table_front"]
         [objectSurface]
-        object_surfaces = ["coffee_table"]
+        object_surfaces = ["coffee_table", "left_bench"]
         [placeSurface]
-        place_object_surfaces = ["mini_coffee_table", "table"]
+        place_object_surfaces = ["side_table", "right_bench"]
         [pickObject]
         model_list = ["glass"]
         [surfaceObjects]
@@ -63,12 +63,12 @@ fn all_parameters_of_the_paper_are_read() {
     assert_eq!(
         candidates,
         [
-            "objectLocation: by the window",
-            "objectSurface: coffee_table",
+            "objectLocation: coffee_table_front",
+            "objectSurface: coffee_table, left_bench",
             "pickObject: glass",
-            "placeSurface: mini_coffee_table, table",
+            "placeSurface: side_table, right_bench",
             "surfaceObjects: mug, can",
-            "world: lab, kitchen",
+            "world: lab, apartment",
         ]
     );
     assert_eq!(campaign.other_count, (1, 4));

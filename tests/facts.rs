@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use actcheck::actions::{
-    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace,
+    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, SceneMap, Trace,
 };
 use actcheck::base::{Choices, Pose, Term, TermId, names};
 use actcheck::facts::{RunFacts, extract};
@@ -158,7 +158,13 @@ pub fn sample_trace(seed: u64) -> Trace {
         phases: vec![Phase { name: "approach".to_owned(), start_secs: 2.0 }],
     };
     let hash = format!("{seed:032x}");
-    Trace { snapshots: vec![first, last], actions: vec![action], frames: frames(&mut choices, 25.0), hash }
+    Trace {
+        snapshots: vec![first, last],
+        actions: vec![action],
+        frames: frames(&mut choices, 25.0),
+        hash,
+        map: SceneMap::default(),
+    }
 }
 
 fn terms_of(facts: &RunFacts, triples: &[[TermId; 3]]) -> BTreeSet<[Term; 3]> {

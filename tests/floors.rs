@@ -29,8 +29,10 @@ const FLOORS: [(&str, &[&str]); 14] = [
 ];
 
 /// Libraries of the field and where they may be named.
-const FENCES: [(&str, &[&str]); 10] = [
+const FENCES: [(&str, &[&str]); 12] = [
     ("toml", &["config"]),
+    ("roxmltree", &["config"]),
+    ("mesh_loader", &["config"]),
     ("statrs", &["search", "analysis"]),
     ("oxigraph", &["ontology", "rules", "history"]),
     ("rapier3d", &["world"]),

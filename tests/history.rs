@@ -25,6 +25,9 @@ fn model(name: &str) -> Arc<ObjectModel> {
         restitution: 0.1,
         size_m: [0.1; 3],
         parts: Vec::new(),
+        origin_m: [0.0; 3],
+        fixed: false,
+        inertia: None,
         surface: None,
         digest: digest_of(name),
     })
@@ -46,6 +49,7 @@ fn robot() -> Arc<RobotProfile> {
         postures: Vec::new(),
         finger_friction: 1.0,
         grip_force_n: 10.0,
+        meshes: BTreeMap::new(),
         digest: String::new(),
     })
 }
@@ -62,6 +66,7 @@ fn scene() -> Scene {
         restitution: 0.05,
     };
     Scene {
+        map: actcheck::scenario::SceneMap::default(),
         world: "living room".to_owned(),
         objects: BODIES.iter().enumerate().map(object).collect(),
         robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1] },
@@ -78,6 +83,7 @@ fn scene() -> Scene {
         physics: Physics {
             mass_scale: (1.0, 1.0),
             friction_scale: (1.0, 1.0),
+            size_scale: (1.0, 1.0),
             restitution: (0.0, 0.0),
             steps_per_second: 240,
             iterations: 4,

@@ -42,6 +42,9 @@ fn block(size: [f64; 3]) -> Arc<ObjectModel> {
         restitution: 0.0,
         size_m: size,
         parts: vec![Part { pose, shape: Shape::Box { size } }],
+        origin_m: [0.0; 3],
+        fixed: false,
+        inertia: None,
         surface: None,
         digest: String::new(),
     })
@@ -54,6 +57,7 @@ fn object(id: &str, model: Arc<ObjectModel>, role: Role, pose: Pose, mass_kg: f6
 /// A scene with the robot out of the way.
 fn scene(objects: Vec<SceneObject>) -> Scene {
     Scene {
+        map: actcheck::scenario::SceneMap::default(),
         world: "empty".to_owned(),
         objects,
         robot: RobotStart { profile: robot(), base: [-5.0, 0.0, 0.0] },
@@ -62,6 +66,7 @@ fn scene(objects: Vec<SceneObject>) -> Scene {
         physics: Physics {
             mass_scale: (1.0, 1.0),
             friction_scale: (1.0, 1.0),
+            size_scale: (1.0, 1.0),
             restitution: (0.0, 0.0),
             steps_per_second: 240,
             iterations: 2,

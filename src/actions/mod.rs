@@ -19,5 +19,6 @@ pub use perform::{Interference, perform, perform_with};
 pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
 pub use trace::{ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace};
 
-// States are part of a trace: its readers meet them here.
+// States and the map are part of a trace: its readers meet them here.
+pub use crate::scenario::SceneMap;
 pub use crate::world::{BodyState, JointState, Quality, RobotState, Snapshot};

@@ -7,7 +7,7 @@ use crate::actions::{
     pick,
 };
 use crate::base::Choices;
-use crate::scenario::Budget;
+use crate::scenario::{Budget, SceneMap};
 use crate::world::World;
 
 /// Performs the actions in order with the reference skills.
@@ -58,7 +58,7 @@ pub fn perform_with(
     }
     let tracks = world.tracks();
     let frames = Frames { period_secs: tracks.period_secs, names: tracks.names, rows: tracks.rows };
-    Trace { snapshots, actions, frames, hash: world.state_digest() }
+    Trace { snapshots, actions, frames, hash: world.state_digest(), map: SceneMap::default() }
 }
 
 fn perform_one(

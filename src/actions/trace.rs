@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::base::Pose;
+use crate::scenario::SceneMap;
 use crate::world::Snapshot;
 
 /// A whole run as it was observed by simulation.
@@ -21,6 +22,8 @@ pub struct Trace {
     pub frames: Frames,
     /// Digest over the bits of every state at every control tick.
     pub hash: String,
+    /// The names of the world's places.
+    pub map: SceneMap,
 }
 
 /// One action as it was performed.

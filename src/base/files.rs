@@ -34,24 +34,31 @@ pub enum Files {
 }
 
 impl Files {
+    /// Reads a file's bytes.
+    ///
+    /// # Errors
+    /// As [`Files::read`], but for what is no text.
+    pub fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, String> {
+        match self {
+            Self::Shipped => {
+                let file = carried(&slashed(&normalised(path))).ok_or("the program carries no such file")?;
+                Ok(file.data.into_owned())
+            }
+            Self::Disk => std::fs::read(path).map_err(|error| describe(&error)),
+        }
+    }
+
     /// Reads a text. The source's name is the path, with `built-in:` before it where it was carried.
     ///
     /// # Errors
     /// A lower-case sentence that says why it can't be read (it does not repeat the path).
     pub fn read(&self, path: &Path) -> Result<Source, String> {
-        match self {
-            Self::Shipped => {
-                let key = slashed(&normalised(path));
-                let file = carried(&key).ok_or("the program carries no such file")?;
-                let text = String::from_utf8(file.data.into_owned()).map_err(|_| "it is not UTF-8 text")?;
-                Ok(Source::new(format!("built-in:{key}"), text))
-            }
-            Self::Disk => {
-                let bytes = std::fs::read(path).map_err(|error| describe(&error))?;
-                let text = String::from_utf8(bytes).map_err(|_| "it is not UTF-8 text")?;
-                Ok(Source::new(path.display().to_string(), text))
-            }
-        }
+        let name = match self {
+            Self::Shipped => format!("built-in:{}", slashed(&normalised(path))),
+            Self::Disk => path.display().to_string(),
+        };
+        let text = String::from_utf8(self.read_bytes(path)?).map_err(|_| "it is not UTF-8 text")?;
+        Ok(Source::new(name, text))
     }
 
     /// Paths of the files directly in a folder, sorted; none where there is no such folder.
@@ -75,6 +82,32 @@ impl Files {
                 .collect(),
         };
         paths.sort();
+        paths
+    }
+
+    /// Paths of the folders directly in a folder, sorted; none where there is no such folder.
+    pub fn folders(&self, folder: &Path) -> Vec<PathBuf> {
+        let mut paths: Vec<PathBuf> = match self {
+            Self::Shipped => {
+                let folder = normalised(folder);
+                let parents = Models::iter().map(|name| PathBuf::from(name.as_ref()));
+                let below = parents.filter_map(|path| {
+                    let mut below = path.strip_prefix(&folder).ok()?.components();
+                    let first = below.next()?;
+                    below.next().map(|_| folder.join(first))
+                });
+                below.collect()
+            }
+            Self::Disk => std::fs::read_dir(folder)
+                .into_iter()
+                .flatten()
+                .filter_map(Result::ok)
+                .map(|entry| entry.path())
+                .filter(|path| path.is_dir())
+                .collect(),
+        };
+        paths.sort();
+        paths.dedup();
         paths
     }
 }

@@ -310,7 +310,13 @@ mod tests {
     fn trace() -> Trace {
         let row = |x: f32| vec![x, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0];
         let frames = Frames { period_secs: 0.1, names: vec!["mug_1".into()], rows: vec![row(0.0), row(0.1), row(0.2)] };
-        Trace { snapshots: vec![state(1.0, 0.0), state(1.25, 0.2)], actions: vec![], frames, hash: "a".into() }
+        Trace {
+            snapshots: vec![state(1.0, 0.0), state(1.25, 0.2)],
+            actions: vec![],
+            frames,
+            hash: "a".into(),
+            map: Default::default(),
+        }
     }
 
     #[test]

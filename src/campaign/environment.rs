@@ -1,12 +1,15 @@
 //! All that a campaign needs before its first run, checked.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::actions;
 use crate::base::{Choice, Diagnostic, Diagnostics, PROGRAM_DIGEST, Source};
 use crate::campaign::budget::ceiling;
 use crate::campaign::case::check_case;
 use crate::campaign::line::TEST_LEFT_OUT;
+use crate::campaign::requirement::Requirement;
+use crate::campaign::solids;
 use crate::config::{self, Campaign, Launcher, Overrides};
 use crate::history::{CampaignRecord, History};
 use crate::ontology::{self, Ontology};
@@ -27,6 +30,8 @@ pub struct Env {
     pub rules: RuleBook,
     /// What judging one property may cost.
     pub rule_budget: Budget,
+    /// What scenes have to satisfy, where the configuration asks for something.
+    pub(super) requirement: Option<Requirement>,
 }
 
 impl Env {
@@ -116,10 +121,12 @@ impl Env {
         u32::try_from(record.planned_runs / runs_of_a_scene).unwrap_or(campaign.test_count).max(1)
     }
 
-    pub(super) fn of(campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
+    pub(super) fn of(mut campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let (files, path) = &campaign.ontology;
         let ontology = ontology::load(files, path)?;
         let mut faults = Diagnostics::new();
+        categorise(&mut campaign, &ontology);
+        solids::take_apart(&mut campaign, &mut faults);
         check_launcher(&campaign, &mut faults);
         check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
@@ -128,13 +135,22 @@ impl Env {
         }
         let space = Space::new(&campaign, &ontology).map_err(|found| faults.extend(found)).ok();
         let rules = RuleBook::prepare_within(&ontology, &rule_budget).map_err(|found| faults.extend(found)).ok();
+        let requirement = Requirement::prepare(&campaign, &ontology, &rule_budget);
+        let requirement = requirement.map_err(|found| faults.extend(found)).ok().flatten();
         match (space, rules) {
             (Some(space), Some(rules)) if !faults.has_errors() => {
                 faults.extend(check_case(&campaign, &space));
-                faults.or(Self { campaign, ontology, space, rules, rule_budget })
+                faults.or(Self { campaign, ontology, space, rules, rule_budget, requirement })
             }
             _ => Err(faults),
         }
+    }
+
+    /// What is left out, and what stands in the rules without effect.
+    pub fn warnings(&self) -> Diagnostics {
+        let mut warnings = self.campaign.warnings.clone();
+        warnings.extend(self.rules.warnings().iter().cloned().collect());
+        warnings
     }
 
     /// What the history keeps of the campaign.
@@ -148,6 +164,8 @@ impl Env {
         let mut models: Vec<(String, String)> =
             self.campaign.models.values().map(|model| (model.name.clone(), model.digest.clone())).collect();
         models.push((self.campaign.robot.name.clone(), self.campaign.robot.digest.clone()));
+        let worlds = self.campaign.worlds.values();
+        models.extend(worlds.map(|world| (format!("world {}", world.name), world.digest.clone())));
         models.sort();
         CampaignRecord {
             id,
@@ -211,6 +229,22 @@ pub(super) fn asked_for(history: &History, record: &CampaignRecord) -> Overrides
         until_width: record.until_width,
         max_failures: record.max_failures,
         history: Some(history.dir().to_path_buf()),
+    }
+}
+
+/// Other people's models say nothing of what they are: their names do, or else they are just objects.
+fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
+    let used = campaign.used_models();
+    for name in &campaign.uncategorised {
+        let Some(model) = campaign.models.get_mut(name) else { continue };
+        match ontology.class_called(name) {
+            Some(class) => Arc::make_mut(model).category = class.to_owned(),
+            None if used.contains(name) => campaign.warnings.push(
+                Diagnostic::warning("W039", format!("nothing says what `{name}` is: it counts as `act:Object`"))
+                    .help(format!("add `[categories]` with `{name} = \"act:Cup\"`, or whatever it is")),
+            ),
+            None => {}
+        }
     }
 }
 

@@ -106,7 +106,8 @@ fn run_line_with(
         }
     };
     choices.begin_noise();
-    let (trace, quality) = perform((env, interference), test, &scene, &mut choices, disturb)?;
+    let (mut trace, quality) = perform((env, interference), test, &scene, &mut choices, disturb)?;
+    trace.map = scene.map.clone();
     let mut record = record(env, campaign, index, scene, trace)?;
     record.choices = choices.into_made();
     record.quality = quality;
@@ -188,6 +189,9 @@ fn perform(
     if !settling.settled {
         return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
     }
+    if let Some(requirement) = &env.requirement {
+        requirement.check(scene, &world, &env.rule_budget)?;
+    }
     disturb(&mut world);
     let calls = calls(test, scene);
     let trace = actions::perform_with(&calls, &mut world, choices, &env.campaign.budget, interference);
@@ -214,7 +218,13 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
             phases: Vec::new(),
         })
         .collect();
-    Trace { snapshots: Vec::new(), actions, frames: actions::Frames::default(), hash: String::new() }
+    Trace {
+        snapshots: Vec::new(),
+        actions,
+        frames: actions::Frames::default(),
+        hash: String::new(),
+        map: scene.map.clone(),
+    }
 }
 
 /// Outcomes of every action of a trace: one list for each.

@@ -17,6 +17,7 @@ mod make_run;
 pub mod oracles;
 mod outcome;
 mod recheck;
+mod requirement;
 mod resume;
 mod rule_set;
 mod run_all;
@@ -24,6 +25,7 @@ mod schedule;
 mod search_space;
 mod searching;
 pub mod shrink;
+mod solids;
 
 pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Recalled, Replay, replay_all};
 

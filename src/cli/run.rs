@@ -31,6 +31,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         Opened::Case(env) => return case::run(args, *env),
         Opened::Campaign(session) => *session,
     };
+    output::print_diagnostics(&session.env.campaign.warnings);
     let mut progress = Progress::new(session.env.runs_to_make(), session.env.campaign.limits.time_secs);
     // From here on there is a campaign to end.
     shown.get_or_init(|| progress.bar());

@@ -1,11 +1,11 @@
 //! What a configuration file asks for, with nothing left to check.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::base::{Diagnostic, Files, Shard, Source, Span};
-use crate::config::{Case, ObjectModel, RobotProfile};
+use crate::base::{Diagnostic, Diagnostics, Files, Shard, Source, Span};
+use crate::config::{Case, ObjectModel, RobotProfile, WorldMap, designators};
 use crate::search::Strategy;
 
 /// One campaign: every test in `test_count` scenes, in each `repeat` times.
@@ -29,6 +29,10 @@ pub struct Campaign {
     pub ontology: (Files, PathBuf),
     /// Models by name: all that `model_dir` (or the shipped folder) holds and the campaign can speak of.
     pub models: BTreeMap<String, Arc<ObjectModel>>,
+    /// Names of models of which no file says what they are (`[categories]` may).
+    pub uncategorised: BTreeSet<String>,
+    /// The worlds that scenes lie in (`[world] worlds`), by name; without one there is a floor and nothing else.
+    pub worlds: BTreeMap<String, Arc<WorldMap>>,
     /// The robot (`[robot]`).
     pub robot: Arc<RobotProfile>,
     /// Names of obstacle models in the way of the base (`nav_obstacle_list`).
@@ -41,6 +45,13 @@ pub struct Campaign {
     pub candidates: BTreeMap<String, Vec<String>>,
     /// How many other objects stand on the surface (`[surfaceObjects] count = [least, most]`).
     pub other_count: (u32, u32),
+    /// Rules that a scene has to satisfy (`[scene] require`).
+    pub scene_rule: Option<Source>,
+    /// Shares of targets and of other objects that lie on their side (`[pickObject] lying`, `[surfaceObjects] lying`).
+    pub lying: (f64, f64),
+    /// Ranges of x, y and heading in which the base starts (`[robot] start_x_m`, `start_y_m`, `start_heading_rad`); without
+    /// them it starts in front of the surface. Units: metres and radians.
+    pub start: Option<[Range; 3]>,
     /// Ranges of what physics draws (`[physics]`).
     pub physics: Physics,
     /// What the sensors get wrong (`[sensing]`).
@@ -58,9 +69,18 @@ pub struct Campaign {
     /// Where things are written, for faults that only a later stage can see: `tests.0.1` is the second action of
     /// the first test, `pickObject` the table's header, `pickObject.2` its third candidate.
     pub places: BTreeMap<String, Span>,
+    /// What is left out of models that are named, and which of the others are wrong.
+    pub warnings: Diagnostics,
 }
 
 impl Campaign {
+    /// Names of the models that can stand in its scenes.
+    pub fn used_models(&self) -> BTreeSet<String> {
+        let named = designators::named_models(&self.candidates, &self.nav_obstacles);
+        let standing = self.worlds.values().flat_map(|world| &world.furniture).map(|piece| piece.model.as_str());
+        named.into_iter().chain(standing).map(str::to_owned).collect()
+    }
+
     /// A fault of the configuration that a later stage found, at the place of `key` (see [`Campaign::places`]).
     pub fn fault(&self, code: &'static str, key: &str, message: impl Into<String>) -> Diagnostic {
         let fault = Diagnostic::error(code, message);
@@ -113,6 +133,8 @@ pub struct Physics {
     pub mass_scale: Range,
     /// Factor on the model's friction.
     pub friction_scale: Range,
+    /// Factor on the model's size.
+    pub size_scale: Range,
     /// Coefficient of restitution.
     pub restitution: Range,
     /// Physics steps in a second.

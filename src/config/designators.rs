@@ -1,19 +1,28 @@
 //! Tables named after designators: the candidate values that scenes are made from.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::{Diagnostics, Span};
 use crate::config::shelf::Shelf;
 use crate::config::{Located, Table};
 
-/// The paper's tables with the key that holds their candidates, and whether these are names of models.
-const PAPER_TABLES: [(&str, &str, bool); 6] = [
-    ("world", "worlds", false),
-    ("objectLocation", "location_list", false),
-    ("objectSurface", "object_surfaces", true),
-    ("placeSurface", "place_object_surfaces", true),
-    ("pickObject", "model_list", true),
-    ("surfaceObjects", "model_list", true),
+/// What a table's candidates are names of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    World,
+    Location,
+    Surface,
+    Model,
+}
+
+/// The paper's tables with the key that holds their candidates. Worlds come first: they have the places.
+const PAPER_TABLES: [(&str, &str, Kind); 6] = [
+    ("world", "worlds", Kind::World),
+    ("objectLocation", "location_list", Kind::Location),
+    ("objectSurface", "object_surfaces", Kind::Surface),
+    ("placeSurface", "place_object_surfaces", Kind::Surface),
+    ("pickObject", "model_list", Kind::Model),
+    ("surfaceObjects", "model_list", Kind::Model),
 ];
 
 /// More things than this on one table are a slip of the finger.
@@ -25,6 +34,7 @@ const DEFAULT_COUNT: (u32, u32) = (1, 4);
 pub(crate) struct Designators {
     pub(crate) candidates: BTreeMap<String, Vec<String>>,
     pub(crate) other_count: (u32, u32),
+    pub(crate) lying: (f64, f64),
     pub(crate) nav_obstacles: Vec<String>,
     pub(crate) nav_obstacle_count: u32,
 }
@@ -33,21 +43,31 @@ pub(crate) struct Designators {
 /// a designator of such a name only the ontology knows, so the place is kept for later.
 pub(crate) fn read(
     root: &mut Table,
-    shelf: &Shelf,
+    shelf: &mut Shelf,
     places: &mut BTreeMap<String, Span>,
     found: &mut Diagnostics,
 ) -> Designators {
     let mut candidates = BTreeMap::new();
     let mut other_count = (0, 0);
-    for (name, key, are_models) in PAPER_TABLES {
+    let mut lying = (0.0, 0.0);
+    for (name, key, kind) in PAPER_TABLES {
         let Some(mut table) = root.table(name) else { continue };
         table.require(&[key]);
         let values = table.some_strings(key).unwrap_or_default();
-        if are_models {
-            values.iter().for_each(|value| shelf.check_name(&mut table, value));
+        for value in &values {
+            match kind {
+                Kind::World => shelf.read_world(&mut table, value, found),
+                Kind::Location => shelf.check_location(&mut table, value),
+                Kind::Surface => shelf.check_surface(&mut table, value),
+                Kind::Model => shelf.check_name(&mut table, value),
+            }
         }
         if name == "surfaceObjects" {
             other_count = read_count(&mut table);
+            lying.1 = table.number("lying", 0.0..=1.0).unwrap_or(0.0);
+        }
+        if name == "pickObject" {
+            lying.0 = table.number("lying", 0.0..=1.0).unwrap_or(0.0);
         }
         keep(name, table.span(), values, &mut candidates, places);
         table.finish(found);
@@ -56,7 +76,17 @@ pub(crate) fn read(
         read_own_table(root, &name, &mut candidates, places, found);
     }
     let (nav_obstacles, nav_obstacle_count) = read_obstacles(root, shelf);
-    Designators { candidates, other_count, nav_obstacles, nav_obstacle_count }
+    Designators { candidates, other_count, lying, nav_obstacles, nav_obstacle_count }
+}
+
+/// Names of the models that a configuration may put into scenes.
+pub(crate) fn named_models<'a>(
+    candidates: &'a BTreeMap<String, Vec<String>>,
+    nav_obstacles: &'a [String],
+) -> BTreeSet<&'a str> {
+    let tables = PAPER_TABLES.iter().filter(|(.., kind)| matches!(kind, Kind::Surface | Kind::Model));
+    let listed = tables.filter_map(|(name, ..)| candidates.get(*name)).flatten();
+    listed.chain(nav_obstacles).map(String::as_str).collect()
 }
 
 fn keep(

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Files, Source, Span, did_you_mean};
+use crate::base::{Diagnostic, Diagnostics, Files, Severity, Source, Span, did_you_mean};
 use crate::config::designators::{self, Designators};
 use crate::config::{Campaign, Launcher, Overrides, Table, case, ranges, shelf};
 use crate::search::Strategy;
@@ -45,7 +45,8 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let launcher = read_launcher(&mut table);
     let seed = table.integer("seed", 0..=i64::MAX).map_or(0, i64::unsigned_abs);
     let ontology = read_ontology_path(&mut table, folder);
-    let shelf = shelf::read(&mut table, folder, &mut found);
+    let scene_rule = read_scene_rule(&mut table, folder, &mut found);
+    let mut shelf = shelf::read(&mut table, folder, &mut found);
     let robot = shelf.read_robot(&mut table, folder, &mut found);
     let physics = ranges::read_physics(&mut table, &mut found);
     let sensing = ranges::read_sensing(&mut table, &mut found);
@@ -54,10 +55,14 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let history = read_history(&mut table, folder, &mut found);
     // Before the tables of designators, which may have any name.
     let case = table.table("case");
-    let designators = designators::read(&mut table, &shelf, &mut places, &mut found);
+    let designators = designators::read(&mut table, &mut shelf, &mut places, &mut found);
     let case = case.map(|table| case::read(table, &designators, &mut places, &mut found));
-    let Designators { candidates, other_count, nav_obstacles, nav_obstacle_count } = designators;
+    let Designators { candidates, other_count, lying, nav_obstacles, nav_obstacle_count } = designators;
     table.finish(&mut found);
+    let named = designators::named_models(&candidates, &nav_obstacles);
+    let report = shelf.report(&named);
+    let warnings: Diagnostics = report.iter().filter(|fault| fault.severity == Severity::Warning).cloned().collect();
+    found.extend(report);
 
     let robot = match robot {
         Some(robot) if !found.has_errors() => robot,
@@ -74,11 +79,16 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         search: overrides.search.or(search).unwrap_or(Strategy::Random),
         ontology,
         models: shelf.models,
+        uncategorised: shelf.uncategorised,
+        worlds: shelf.worlds,
         robot,
         nav_obstacles,
         nav_obstacle_count,
         candidates,
         other_count,
+        lying,
+        scene_rule,
+        start: shelf.start,
         physics,
         sensing,
         budget,
@@ -86,6 +96,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         case,
         history: overrides.history.clone().unwrap_or(history),
         places,
+        warnings,
     })
 }
 
@@ -151,6 +162,25 @@ fn read_search(table: &mut Table, found: &mut Diagnostics) -> Option<Strategy> {
     }
     search.finish(found);
     strategy
+}
+
+/// `[scene] require`: a file of rules.
+fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Option<Source> {
+    let mut scene = table.table("scene")?;
+    scene.require(&["require"]);
+    let read = scene.string("require").and_then(|written| {
+        let path = beside(folder, &written.value);
+        let is_rules = path.extension().is_some_and(|ending| ending == "rls" || ending == "rq");
+        let read =
+            if is_rules { Files::Disk.read(&path) } else { Err("it ends neither in `.rls` nor in `.rq`".to_owned()) };
+        read.map_err(|reason| {
+            let message = format!("cannot read the scene's rules {}: {reason}", path.display());
+            scene.fault("C022", written.span, message, "the path is relative to the configuration");
+        })
+        .ok()
+    });
+    scene.finish(found);
+    read
 }
 
 fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> PathBuf {

@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::base::{Diagnostic, Diagnostics, Pose, Source, digest_of, names};
-use crate::config::Table;
+use crate::config::shape::bounds;
+use crate::config::{Part, Shape, Table};
 
 /// A rigid object that a scene can hold, made of primitive shapes.
 ///
@@ -21,58 +22,29 @@ pub struct ObjectModel {
     pub friction: f64,
     /// Coefficient of restitution in [0, 1].
     pub restitution: f64,
+    /// Where the origin of its file is: another place than the model's own in files of other people. Unit: metres.
+    pub origin_m: [f64; 3],
     /// Outer dimensions as it stands. Unit: metres. Shape: x, y, z.
     pub size_m: [f64; 3],
     /// What it is made of. Their volumes share the mass.
     pub parts: Vec<Part>,
+    /// Whether it stands where it is put whatever pushes it.
+    pub fixed: bool,
+    /// How its mass is spread, where its file says so; otherwise evenly over the parts.
+    pub inertia: Option<Inertia>,
     /// For platforms: the flat rectangle on top where things can stand.
     pub surface: Option<Surface>,
-    /// Digest of the file it was read from.
+    /// Digest of the files it was read from.
     pub digest: String,
 }
 
-/// One shape of a model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Part {
-    /// Pose of the shape's centre. Frame: the model's.
-    pub pose: Pose,
-    /// Its form.
-    pub shape: Shape,
-}
-
-/// Primitive shapes. Unit: metres.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Shape {
-    /// A box by its full extents.
-    Box {
-        /// x, y, z.
-        size: [f64; 3],
-    },
-    /// A cylinder about z.
-    Cylinder {
-        /// Radius.
-        radius: f64,
-        /// Full height.
-        height: f64,
-    },
-    /// A sphere.
-    Sphere {
-        /// Radius.
-        radius: f64,
-    },
-    /// A hollow wall about z, open above and below: what makes a glass a glass. Built from `staves` boxes.
-    Tube {
-        /// Outer radius at the lower rim.
-        radius_low: f64,
-        /// Outer radius at the upper rim.
-        radius_high: f64,
-        /// Thickness of the wall.
-        wall: f64,
-        /// Full height.
-        height: f64,
-        /// How many boxes approximate the round.
-        staves: u32,
-    },
+/// How a model's mass is spread. Frame: the model's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Inertia {
+    /// Centre of mass. Unit: metres.
+    pub com_m: [f64; 3],
+    /// Moments about the centre of mass for the model's own mass, row by row. Unit: kg·m².
+    pub about_com: [[f64; 3]; 3],
 }
 
 /// A horizontal rectangle where objects can stand. Frame: the model's, centred on its origin.
@@ -82,54 +54,6 @@ pub struct Surface {
     pub height_m: f64,
     /// Extent. Unit: metres. Shape: x, y.
     pub size_m: [f64; 2],
-}
-
-impl Shape {
-    /// Volume of the material. Unit: cubic metres.
-    pub fn volume(&self) -> f64 {
-        use std::f64::consts::PI;
-        match self {
-            Self::Box { size: [x, y, z] } => x * y * z,
-            Self::Cylinder { radius, height } => PI * radius * radius * height,
-            Self::Sphere { radius } => 4.0 / 3.0 * PI * radius * radius * radius,
-            Self::Tube { .. } => self.staves().iter().map(|stave| stave.shape.volume()).sum(),
-        }
-    }
-
-    /// The boxes that a tube is built from, in its own frame; nothing for other shapes.
-    ///
-    /// The outer edges of the boxes lie on the tube's outer radius, so the whole never exceeds it.
-    fn staves(&self) -> Vec<Part> {
-        let Self::Tube { radius_low, radius_high, wall, height, staves } = *self else { return Vec::new() };
-        let half_angle = std::f64::consts::PI / f64::from(staves);
-        let slant = libm::atan2(radius_high - radius_low, height);
-        let middle = (radius_low + radius_high) / 2.0;
-        let width = 2.0 * middle * libm::sin(half_angle);
-        let reach = middle * libm::cos(half_angle) - wall / 2.0;
-        let size = [wall, width, height / libm::cos(slant)];
-        let leaning = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), slant);
-        (0..staves)
-            .map(|idx| {
-                let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.0 * half_angle * f64::from(idx));
-                let at =
-                    Isometry3::from_parts(Translation3::from(turned * Vector3::new(reach, 0.0, 0.0)), turned * leaning);
-                Part { pose: Pose::from_isometry(&at), shape: Self::Box { size } }
-            })
-            .collect()
-    }
-
-    /// Half the extents of the box around the shape in its own frame. Unit: metres.
-    fn half_extents(&self) -> [f64; 3] {
-        match *self {
-            Self::Box { size } => size.map(|extent| extent / 2.0),
-            Self::Cylinder { radius, height } => [radius, radius, height / 2.0],
-            Self::Sphere { radius } => [radius; 3],
-            Self::Tube { radius_low, radius_high, height, .. } => {
-                let radius = radius_low.max(radius_high);
-                [radius, radius, height / 2.0]
-            }
-        }
-    }
 }
 
 impl ObjectModel {
@@ -149,6 +73,32 @@ impl ObjectModel {
             }
         }
         solids
+    }
+
+    /// The same thing, larger or smaller in all directions, of the same mass.
+    #[must_use]
+    pub fn scaled(&self, by: f64) -> Self {
+        let placed = |pose: &Pose| Pose { position: pose.position.map(|x| x * by), rotation: pose.rotation };
+        let surface = |surface: Surface| Surface {
+            height_m: surface.height_m * by,
+            size_m: surface.size_m.map(|extent| extent * by),
+        };
+        let inertia = |inertia: Inertia| Inertia {
+            com_m: inertia.com_m.map(|x| x * by),
+            about_com: inertia.about_com.map(|row| row.map(|moment| moment * by * by)),
+        };
+        Self {
+            size_m: self.size_m.map(|extent| extent * by),
+            origin_m: self.origin_m.map(|x| x * by),
+            parts: self
+                .parts
+                .iter()
+                .map(|part| Part { pose: placed(&part.pose), shape: part.shape.sized(by) })
+                .collect(),
+            surface: self.surface.map(surface),
+            inertia: self.inertia.map(inertia),
+            ..self.clone()
+        }
     }
 
     /// Volume of the material. Unit: cubic metres.
@@ -194,8 +144,11 @@ pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
         mass_kg,
         friction,
         restitution,
+        origin_m: [0.0; 3],
         size_m,
         parts,
+        fixed: false,
+        inertia: None,
         surface,
         digest,
     };
@@ -209,7 +162,7 @@ const POSITIVE: (std::ops::Bound<f64>, std::ops::Bound<f64>) =
     (std::ops::Bound::Excluded(0.0), std::ops::Bound::Unbounded);
 
 /// `act:Glass` and other known prefixes in full; an IRI as it is.
-fn full_iri(text: &str) -> Option<String> {
+pub(crate) fn full_iri(text: &str) -> Option<String> {
     if text.contains("://") {
         return Some(text.to_owned());
     }
@@ -250,10 +203,15 @@ fn read_shape(table: &mut Table) -> Option<Shape> {
             table.require(&["radius_m"]);
             Some(Shape::Sphere { radius: table.number("radius_m", POSITIVE)? })
         }
+        "capsule" => {
+            table.require(&["radius_m", "height_m"]);
+            let (radius, height) = (table.number("radius_m", POSITIVE), table.number("height_m", POSITIVE));
+            Some(Shape::Capsule { radius: radius?, height: height? })
+        }
         "tube" => read_tube(table),
         other => {
             let message = format!("unknown shape `{other}`");
-            let help = crate::base::did_you_mean(other, ["box", "cylinder", "sphere", "tube"]);
+            let help = crate::base::did_you_mean(other, ["box", "capsule", "cylinder", "sphere", "tube"]);
             table.fault("W001", kind.span, message, help);
             None
         }
@@ -283,15 +241,7 @@ fn read_surface(mut table: Table, found: &mut Diagnostics) -> Option<Surface> {
 
 /// The box around all parts must be the stated size, standing on the ground and centred over the origin.
 fn check_size(model: &ObjectModel, source: &Source) -> Diagnostics {
-    let mut low = Vector3::repeat(f64::INFINITY);
-    let mut high = Vector3::repeat(f64::NEG_INFINITY);
-    for part in &model.parts {
-        let turned = part.pose.to_isometry().rotation.to_rotation_matrix();
-        let reach = turned.matrix().abs() * Vector3::from(part.shape.half_extents());
-        let centre = Vector3::from(part.pose.position);
-        low = low.inf(&(centre - reach));
-        high = high.sup(&(centre + reach));
-    }
+    let (low, high) = bounds(&model.parts);
     let [x, y, z] = model.size_m;
     let expected = (Vector3::new(-x / 2.0, -y / 2.0, 0.0), Vector3::new(x / 2.0, y / 2.0, z));
     let miss = (low - expected.0).amax().max((high - expected.1).amax());

@@ -16,6 +16,7 @@ pub(crate) fn read_physics(root: &mut Table, found: &mut Diagnostics) -> Physics
     let mut physics = Physics {
         mass_scale: (0.9, 1.1),
         friction_scale: (0.8, 1.2),
+        size_scale: (1.0, 1.0),
         restitution: (0.0, 0.1),
         // 240 Hz with 4 iterations holds a friction grasp to 0.01 mm.
         steps_per_second: 240,
@@ -24,6 +25,8 @@ pub(crate) fn read_physics(root: &mut Table, found: &mut Diagnostics) -> Physics
     let Some(mut table) = root.table("physics") else { return physics };
     set(&mut physics.mass_scale, table.range("mass_scale", ABOVE_ZERO));
     set(&mut physics.friction_scale, table.range("friction_scale", 0.0..=100.0));
+    // Beyond that it would be another thing.
+    set(&mut physics.size_scale, table.range("size_scale", 0.5..=2.0));
     set(&mut physics.restitution, table.range("restitution", 0.0..=1.0));
     set(&mut physics.steps_per_second, read_steps(&mut table));
     set(&mut physics.iterations, table.integer("iterations", 1..=64).and_then(|n| u32::try_from(n).ok()));

@@ -1,9 +1,15 @@
 //! Which joints of a URDF do what.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Digest, Files, Source};
-use crate::config::{Located, Table};
+use crate::base::{Diagnostic, Diagnostics, Digest, Files, Source, digest_of};
+use crate::config::foreign::{self, Lookup};
+use crate::config::load::beside;
+use crate::config::{Located, Shape, Table};
+
+/// `package://` is looked for in so many folders above the URDF: `PACKAGE/robots/FILE.urdf` lies two below the packages.
+const PACKAGE_LEVELS: usize = 4;
 
 /// A robot: its URDF and the parts that the skills need to know. Read from a profile beside the URDF.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,30 +42,59 @@ pub struct RobotProfile {
     pub finger_friction: f64,
     /// Force with which one finger closes. Unit: newtons.
     pub grip_force_n: f64,
-    /// Digest of profile and URDF.
+    /// Collision meshes by the name that the URDF gives their file, in the file's own scale.
+    pub meshes: BTreeMap<String, Vec<Shape>>,
+    /// Digest of profile, URDF and meshes.
     pub digest: String,
 }
 
-/// Reads a profile and the URDF that it names (relative to the profile).
+/// Reads a profile with the meshes that lie around its URDF: [`read_with`] without further folders.
 ///
 /// # Errors
-/// Every fault of the text: the table reader's own (`C…`), a file that can't be read (W010), and a list of the
-/// wrong length (W011). Whether the URDF holds what the profile names is for [`crate::world`] to check.
+/// As [`read_with`].
 pub fn read(files: &Files, path: &Path) -> Result<RobotProfile, Diagnostics> {
+    read_with(files, path, &[])
+}
+
+/// Reads a profile, the URDF that it names (relative to the profile) and the meshes that this names: `package://NAME/…` is
+/// looked for in the folders of the profile's `package_dirs`, in `packages`, and around the URDF.
+///
+/// # Errors
+/// Every fault of the text: the table reader's own (`C…`), a file that can't be read (W010), a list of the
+/// wrong length (W011), xacro (W012), and meshes that are unusable (W037). Whether the URDF holds what the profile names is for [`crate::world`] to check.
+pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<RobotProfile, Diagnostics> {
     let source = files.read(path).map_err(|reason| {
         Diagnostic::error("W010", format!("cannot read the robot profile {}: {reason}", path.display()))
             .help("a profile is a TOML file that names a URDF and its joints")
     })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut urdf_path = PathBuf::new();
     let mut table = Table::parse(&source)?;
     let mut found = Diagnostics::new();
+    let mut folders: Vec<PathBuf> = values(table.strings("package_dirs").unwrap_or_default())
+        .into_iter()
+        .map(|written| beside(folder, &written))
+        .collect();
     let profile = read_table(&mut table, &source, &mut found, |urdf| {
-        let beside = path.parent().unwrap_or(Path::new("")).join(urdf);
-        files.read(&beside).map_err(|reason| format!("cannot read the URDF {}: {reason}", beside.display()))
+        urdf_path = beside(folder, urdf);
+        files.read(&urdf_path).map_err(|reason| format!("cannot read the URDF {}: {reason}", urdf_path.display()))
     });
     table.finish(&mut found);
+    folders.extend(packages.iter().cloned());
+    folders.extend(urdf_path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf));
+    let profile = profile.map(|profile| with_meshes(profile, &urdf_path, &Lookup { files, folders }, &mut found));
     found.or(())?;
     // Every missing or wrong key was noted above, so something is missing only beside a fault.
     profile.ok_or_else(|| Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into())
+}
+
+fn with_meshes(mut profile: RobotProfile, urdf: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotProfile {
+    let read = foreign::robot::read(&profile.urdf, urdf, lookup, found);
+    if !read.meshes.is_empty() {
+        profile.digest = digest_of(&format!("{}{}", profile.digest, read.digest));
+        profile.meshes = read.meshes;
+    }
+    profile
 }
 
 fn read_table(
@@ -72,6 +107,11 @@ fn read_table(
     table.require(&["max_opening_m", "finger_friction", "grip_force_n", "home"]);
     let name = table.string("name");
     let urdf = table.string("urdf").and_then(|written| match read_urdf(&written.value) {
+        Ok(_) if written.value.ends_with(".xacro") => {
+            let message = format!("{} is xacro, which has to be expanded first", written.value);
+            table.fault("W012", written.span, message, "run `xacro FILE.urdf.xacro > FILE.urdf`, and name that file");
+            None
+        }
         Ok(urdf) => Some(urdf),
         Err(reason) => {
             table.fault("W010", written.span, reason, "the path is relative to the profile");
@@ -114,6 +154,7 @@ fn read_table(
         postures,
         finger_friction: finger_friction?,
         grip_force_n: grip_force_n?,
+        meshes: BTreeMap::new(),
         digest: digest.finish(),
     })
 }

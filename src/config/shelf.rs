@@ -1,12 +1,13 @@
 //! What `model_dir` holds: objects and robots by name.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::base::{Diagnostics, Files, did_you_mean};
+use crate::base::{Diagnostic, Diagnostics, Files, Severity, did_you_mean};
+use crate::config::foreign::{self, Lookup};
 use crate::config::load::beside;
-use crate::config::{Located, ObjectModel, RobotProfile, Table, model, robot};
+use crate::config::{Furniture, Located, ObjectModel, Range, RobotProfile, Table, WorldMap, model, robot, world_map};
 
 /// Where models lie inside the program.
 const SHIPPED_MODELS: &str = "models";
@@ -21,15 +22,40 @@ pub(crate) struct Shelf {
     pub(crate) models: BTreeMap<String, Arc<ObjectModel>>,
     /// Names of object files, readable or not, so that a wrong model is not reported as a missing one too.
     names: Vec<String>,
+    /// What other people's models are found to be: it matters only where the configuration names them.
+    said: BTreeMap<String, Diagnostics>,
+    /// Models of which nobody says what they are.
+    pub(crate) uncategorised: BTreeSet<String>,
+    /// The worlds that the configuration names.
+    pub(crate) worlds: BTreeMap<String, Arc<WorldMap>>,
+    /// Ranges in which the robot's base starts.
+    pub(crate) start: Option<[Range; 3]>,
+    /// What is left out of the worlds.
+    warnings: Diagnostics,
 }
 
-/// Reads all models of `model_dir`, or of the shipped folder. A wrong one is reported with its own place.
+/// The world with nothing but a floor: it needs no file.
+const FLOOR_ALONE: &str = "empty";
+
+/// Reads all models of `model_dir`, or of the shipped folder. A wrong one of ours is reported with its own place at once;
+/// see [`Shelf::report`] for those of other people.
 pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Shelf {
-    let (files, dir) = match table.string("model_dir") {
-        Some(written) => (Files::Disk, checked_folder(table, folder, &written)),
+    let written = table.string("model_dir");
+    let (files, dir) = match &written {
+        Some(written) => (Files::Disk, beside(folder, &written.value)),
         None => (Files::Shipped, PathBuf::from(SHIPPED_MODELS)),
     };
-    let mut shelf = Shelf { files, folder: dir, models: BTreeMap::new(), names: Vec::new() };
+    let mut shelf = Shelf {
+        files,
+        folder: dir,
+        models: BTreeMap::new(),
+        names: Vec::new(),
+        said: BTreeMap::new(),
+        uncategorised: BTreeSet::new(),
+        worlds: BTreeMap::new(),
+        start: None,
+        warnings: Diagnostics::new(),
+    };
     for path in shelf.toml_files("objects") {
         shelf.names.push(stem(&path));
         match shelf.files.read(&path) {
@@ -43,32 +69,195 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
             }
         }
     }
+    shelf.read_foreign();
+    if let (Some(written), true) = (written, shelf.names.is_empty()) {
+        let message = format!("the model folder {} holds no models", shelf.folder.display());
+        let help = "it needs a folder `objects` with one TOML file for each model, or a folder with `model.config` and \
+            `model.sdf` for each; without `model_dir` the shipped models serve";
+        table.fault("C010", written.span, message, help);
+    }
+    shelf.read_categories(table, found);
     shelf
 }
 
-fn checked_folder(table: &mut Table, folder: &Path, written: &Located<String>) -> PathBuf {
-    let dir = beside(folder, &written.value);
-    if Files::Disk.list(&dir.join("objects")).is_empty() {
-        let message = format!("the model folder {} holds no models", dir.display());
-        let help = "it needs a folder `objects` with one TOML file for each model; without `model_dir` the shipped models serve";
-        table.fault("C010", written.span.clone(), message, help);
-    }
-    dir
-}
-
 impl Shelf {
+    /// Reads the models of other people: those in Gazebo's layout and those in URDF.
+    fn read_foreign(&mut self) {
+        let folders = [self.folder.clone(), self.folder.join("objects")];
+        let lookup = Lookup { files: &self.files, folders: folders.to_vec() };
+        for model in folders.iter().flat_map(|folder| foreign::find(&self.files, folder)) {
+            if self.names.contains(&model.name) {
+                let message = format!("there are two models `{0}`: {1} is left out", model.name, model.path.display());
+                let fault = Diagnostic::warning("W036", message).help("give one of them another name");
+                self.said.entry(model.name).or_default().push(fault);
+                continue;
+            }
+            match foreign::read(&model, &lookup) {
+                Ok((read, warnings)) => {
+                    self.models.insert(model.name.clone(), Arc::new(read));
+                    self.uncategorised.insert(model.name.clone());
+                    self.said.insert(model.name.clone(), warnings);
+                }
+                Err(faults) => _ = self.said.insert(model.name.clone(), faults),
+            }
+            self.names.push(model.name);
+        }
+    }
+
+    /// `[categories]`: what models are, by name, whatever their files say.
+    fn read_categories(&mut self, root: &mut Table, found: &mut Diagnostics) {
+        let Some(mut table) = root.table("categories") else { return };
+        for key in table.keys() {
+            let name = Located { value: key.clone(), span: table.key_span(&key).unwrap_or(0..0) };
+            self.check_name(&mut table, &name);
+            let Some(written) = table.string(&key) else { continue };
+            match model::full_iri(&written.value) {
+                Some(category) => {
+                    if let Some(model) = self.models.get_mut(&key) {
+                        Arc::make_mut(model).category = category;
+                        self.uncategorised.remove(&key);
+                    }
+                }
+                None => {
+                    let message = format!("the category `{}` is no IRI", written.value);
+                    table.fault("W003", written.span, message, format!("write it like `{key} = \"act:Glass\"`"));
+                }
+            }
+        }
+        table.finish(found);
+    }
+
+    /// What was found in other people's models: all of it where the configuration names the model, and of others no
+    /// more than that they are wrong.
+    pub(crate) fn report(&self, named: &BTreeSet<&str>) -> Diagnostics {
+        let mut report = self.warnings.clone();
+        for (name, said) in &self.said {
+            if named.contains(name.as_str()) {
+                report.extend(said.clone());
+            } else if said.has_errors() {
+                let errors = said.iter().filter(|fault| fault.severity == Severity::Error);
+                errors.for_each(|fault| {
+                    report.push(Diagnostic { severity: Severity::Warning, ..fault.clone() });
+                });
+            }
+        }
+        report
+    }
+
     /// Reports a name that no model has (C008).
     pub(crate) fn check_name(&self, table: &mut Table, name: &Located<String>) {
         // With an empty shelf, its absence has been reported already.
         if !self.names.is_empty() && !self.names.contains(&name.value) {
-            let message = format!("there is no model `{}` in {}", name.value, self.folder.join("objects").display());
+            let message = format!("there is no model `{}` in {}", name.value, self.objects_folder().display());
             table.fault("C008", name.span.clone(), message, choose(&name.value, &self.names));
         }
     }
 
+    /// Reads a world that the configuration names: from the model folder, or else from the shipped one.
+    pub(crate) fn read_world(&mut self, table: &mut Table, name: &Located<String>, found: &mut Diagnostics) {
+        if name.value == FLOOR_ALONE {
+            self.worlds.insert(name.value.clone(), Arc::new(WorldMap::nothing(FLOOR_ALONE)));
+            return;
+        }
+        let Some((files, path)) = self.world_files().into_iter().find(|(_, path)| stem(path) == name.value) else {
+            let known: Vec<String> = self.world_files().iter().map(|(_, path)| stem(path)).collect();
+            let message = format!("there is no world `{}`", name.value);
+            table.fault("C020", name.span.clone(), message, choose(&name.value, &known));
+            return;
+        };
+        if files != self.files {
+            self.add_shipped_models();
+        }
+        let source = match files.read(&path) {
+            Ok(source) => source,
+            Err(reason) => {
+                let message = format!("cannot read the world {}: {reason}", path.display());
+                table.fault(
+                    "C020",
+                    name.span.clone(),
+                    message,
+                    "worlds lie in the folder `worlds` of the model folder",
+                );
+                return;
+            }
+        };
+        let model = |name: &str| self.models.get(name).map(|model| &**model);
+        let known: Vec<String> = self.models.keys().cloned().collect();
+        let (world, said) = if is_toml(&path) {
+            match world_map::read(&name.value, &source, model, &known) {
+                Ok(world) => (Some(world), Diagnostics::new()),
+                Err(faults) => (None, faults),
+            }
+        } else {
+            foreign::world::read(&name.value, &source, model, &known)
+        };
+        let (errors, warnings): (Vec<Diagnostic>, Vec<Diagnostic>) =
+            said.into_iter().partition(|fault| fault.severity == Severity::Error);
+        found.extend(errors.into_iter().collect());
+        self.warnings.extend(warnings.into_iter().collect());
+        if let Some(world) = world {
+            self.worlds.insert(world.name.clone(), Arc::new(world));
+        }
+    }
+
+    /// The worlds of the model folder, then the shipped ones.
+    fn world_files(&self) -> Vec<(Files, PathBuf)> {
+        let is_world = |path: &PathBuf| is_toml(path) || path.extension().is_some_and(|e| e == "world" || e == "sdf");
+        let own = self.files.list(&self.folder.join("worlds")).into_iter().map(|path| (self.files.clone(), path));
+        let shipped = Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("worlds"));
+        own.chain(shipped.into_iter().map(|path| (Files::Shipped, path))).filter(|(_, path)| is_world(path)).collect()
+    }
+
+    /// What shipped worlds are furnished with.
+    fn add_shipped_models(&mut self) {
+        for path in Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("objects")) {
+            let model = Files::Shipped.read(&path).ok().and_then(|source| model::read(&source).ok());
+            if let Some(model) = model.filter(|model| !self.names.contains(&model.name)) {
+                self.models.entry(model.name.clone()).or_insert_with(|| Arc::new(model));
+            }
+        }
+    }
+
+    /// Reports a location that no named world has (C021). Where none has locations, they are what the robot makes of them.
+    pub(crate) fn check_location(&self, table: &mut Table, name: &Located<String>) {
+        let known: Vec<String> =
+            self.worlds.values().flat_map(|world| &world.locations).map(|location| location.name.clone()).collect();
+        let is_named = known.is_empty() || known.contains(&name.value);
+        if !is_named {
+            let message = format!("no world of the configuration has a location `{}`", name.value);
+            table.fault("C021", name.span.clone(), message, choose(&name.value, &known));
+        }
+    }
+
+    /// Reports a surface that is neither furniture of a named world (C021) nor, where a world has none, a model (C008).
+    pub(crate) fn check_surface(&self, table: &mut Table, name: &Located<String>) {
+        let surfaces = |world: &WorldMap| -> Vec<String> {
+            let carries =
+                |piece: &&Furniture| self.models.get(&piece.model).is_some_and(|model| model.surface.is_some());
+            world.furniture.iter().filter(carries).map(|piece| piece.name.clone()).collect()
+        };
+        let known: Vec<String> = self.worlds.values().flat_map(|world| surfaces(world)).collect();
+        let takes_models = known.is_empty() || self.worlds.values().any(|world| surfaces(world).is_empty());
+        if known.contains(&name.value) {
+            return;
+        }
+        if takes_models {
+            self.check_name(table, name);
+        } else {
+            let message = format!("no world of the configuration has a surface `{}`", name.value);
+            table.fault("C021", name.span.clone(), message, choose(&name.value, &known));
+        }
+    }
+
+    /// Where objects lie, for messages: the folder of our own models, where there is one.
+    fn objects_folder(&self) -> PathBuf {
+        let objects = self.folder.join("objects");
+        if self.files.list(&objects).is_empty() { self.folder.clone() } else { objects }
+    }
+
     /// The robot that `[robot] profile` names: a path to a TOML file, or a name from the model folder or the shipped one.
     pub(crate) fn read_robot(
-        &self,
+        &mut self,
         root: &mut Table,
         folder: &Path,
         found: &mut Diagnostics,
@@ -92,11 +281,15 @@ impl Shelf {
                 _ => root.fault("C011", 0..0, message, help),
             }
         }
-        if let Some(table) = table {
+        let mut packages = Vec::new();
+        if let Some(mut table) = table {
+            let written = table.strings("package_dirs").unwrap_or_default();
+            self.start = read_start(&mut table);
+            packages = written.iter().map(|written| beside(folder, &written.value)).collect();
             table.finish(found);
         }
         let (files, path) = place.ok()?;
-        robot::read(&files, &path).map(Arc::new).map_err(|faults| found.extend(faults)).ok()
+        robot::read_with(&files, &path, &packages).map(Arc::new).map_err(|faults| found.extend(faults)).ok()
     }
 
     /// A robot's profile by name, or what is wrong and what to do.
@@ -119,6 +312,18 @@ impl Shelf {
     fn toml_files(&self, kind: &str) -> Vec<PathBuf> {
         self.files.list(&self.folder.join(kind)).into_iter().filter(|path| is_toml(path)).collect()
     }
+}
+
+/// `start_x_m`, `start_y_m` and `start_heading_rad`: all of them or none.
+fn read_start(table: &mut Table) -> Option<[Range; 3]> {
+    let keys = ["start_x_m", "start_y_m", "start_heading_rad"];
+    if !keys.iter().any(|key| table.has(key)) {
+        return None;
+    }
+    table.require(&keys);
+    let (x, y) = (table.range(keys[0], -14.0..=14.0), table.range(keys[1], -14.0..=14.0));
+    let heading = table.range(keys[2], -std::f64::consts::TAU..=std::f64::consts::TAU);
+    Some([x?, y?, heading?])
 }
 
 fn is_toml(path: &Path) -> bool {

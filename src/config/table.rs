@@ -53,6 +53,11 @@ impl Table {
         self.entries.get(key).map(|entry| entry.key_span.clone())
     }
 
+    /// Keys that were not taken yet, sorted.
+    pub fn keys(&self) -> Vec<String> {
+        self.entries.keys().cloned().collect()
+    }
+
     /// Whether a key is there and was not taken yet.
     pub fn has(&self, key: &str) -> bool {
         self.entries.contains_key(key)

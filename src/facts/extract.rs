@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::actions::{ActionEnd, Trace};
+use crate::actions::{ActionEnd, SceneMap, Trace};
 use crate::base::{Term, TermId, names};
-use crate::facts::writer::{Writer, thing_iri};
-use crate::facts::{RunFacts, during, snapshot};
+use crate::facts::writer::Writer;
+use crate::facts::{RunFacts, during, places, snapshot};
 
 /// The facts of a run: one list for each snapshot, and one list of what happened and one of designators for each action.
 ///
@@ -16,6 +16,7 @@ pub fn extract(trace: &Trace) -> RunFacts {
     let mut facts = RunFacts::default();
     for state in &trace.snapshots {
         snapshot::write(state, &mut writer);
+        places::write(&trace.map, &mut writer);
         facts.snapshots.push(writer.take());
     }
     let bodies: BTreeSet<&str> = trace.snapshots.iter().flat_map(|s| s.bodies.iter().map(|b| b.id.as_str())).collect();
@@ -24,24 +25,32 @@ pub fn extract(trace: &Trace) -> RunFacts {
             during::write(action, &mut writer);
         }
         facts.during.push(writer.take());
-        facts.parameters.push(parameters(&action.parameters, &bodies, &mut writer));
+        facts.parameters.push(parameters(&action.parameters, &bodies, &trace.map, &mut writer));
     }
     facts.terms = writer.terms;
     facts
 }
 
-/// Designators by their IRIs: the value is an object where the scene has one of that name, otherwise a text.
+/// Designators by their IRIs: the value is an object where the scene has one of that name, a location where the map has one,
+/// otherwise a text.
 fn parameters(
     values: &BTreeMap<String, Vec<String>>,
     bodies: &BTreeSet<&str>,
+    map: &SceneMap,
     writer: &mut Writer,
 ) -> Vec<[TermId; 2]> {
     let mut pairs = Vec::new();
     for (designator, values) in values {
         let designator = writer.terms.intern(Term::iri(names::act(designator)));
         for value in values {
-            let term = if bodies.contains(value.as_str()) { Term::iri(thing_iri(value)) } else { Term::string(value) };
-            pairs.push([designator, writer.terms.intern(term)]);
+            let value = if bodies.contains(value.as_str()) {
+                writer.thing(value)
+            } else if map.locations.iter().any(|location| location.name == *value) {
+                writer.named("location", value)
+            } else {
+                writer.terms.intern(Term::string(value))
+            };
+            pairs.push([designator, value]);
         }
     }
     pairs.sort_unstable();

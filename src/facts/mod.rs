@@ -4,6 +4,7 @@
 
 mod during;
 mod extract;
+mod places;
 mod run_facts;
 mod snapshot;
 mod writer;

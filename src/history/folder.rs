@@ -1,7 +1,7 @@
 //! The folder of a history: its layout, its version, and that one process owns it.
 //!
 //! `VERSION` says what the rest is; `lock` is held while a process has it open; `store/` is the RDF store; `traces/` has one
-//! file for each run.
+//! file for each run; `hulls/` has the convex solids of meshes, which can be made again at any time.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -83,9 +83,9 @@ fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
     if version > FORMAT { Err(fault::newer(dir, version, FORMAT)) } else { Ok(true) }
 }
 
-/// Whether a folder without a version holds anything but what an interrupted beginning leaves.
+/// Whether a folder without a version holds anything but what checking a configuration or an interrupted beginning leaves.
 fn holds_other_things(dir: &Path) -> bool {
-    let ours = BTreeSet::from(["lock", "VERSION.tmp"]);
+    let ours = BTreeSet::from(["lock", "VERSION.tmp", "hulls"]);
     fs::read_dir(dir)
         .into_iter()
         .flatten()

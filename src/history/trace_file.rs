@@ -10,14 +10,15 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
 use crate::actions::Snapshot;
-use crate::actions::{ActionTrace, Frames, Trace};
+use crate::actions::{ActionTrace, Frames, SceneMap, Trace};
 use crate::base::Choice;
 use crate::history::frames;
 
 /// What each file begins with. The last letter is the format; it goes up whenever a type of the trace changes.
 const MAGIC: &[u8; 8] = b"actrace1";
 
-/// First part: decisions, states, actions, time between frames, names of tracks, hash.
+/// First part: decisions, states, actions, time between frames, names of tracks, hash. Behind it stands the map, where the
+/// world has one.
 type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
 
 /// A run's file as bytes.
@@ -27,7 +28,11 @@ type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, Str
 pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, String> {
     let frames = &trace.frames;
     let head = (choices, &trace.snapshots, &trace.actions, frames.period_secs, &frames.names, &trace.hash);
-    let head = compressed(&postcard::to_stdvec(&head).map_err(|error| error.to_string())?)?;
+    let mut head = postcard::to_stdvec(&head).map_err(|error| error.to_string())?;
+    if !trace.map.is_empty() {
+        head.extend(postcard::to_stdvec(&trace.map).map_err(|error| error.to_string())?);
+    }
+    let head = compressed(&head)?;
     let course = compressed(&frames::encode(&frames.rows))?;
     let length = u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
     Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
@@ -53,9 +58,12 @@ pub(super) fn decode_states(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String
 }
 
 fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
-    let head: Head = postcard::from_bytes(&expanded(head)?).map_err(|error| error.to_string().to_lowercase())?;
+    let head = expanded(head)?;
+    let read = |error: postcard::Error| error.to_string().to_lowercase();
+    let (head, rest): (Head, &[u8]) = postcard::take_from_bytes(&head).map_err(read)?;
+    let map = if rest.is_empty() { SceneMap::default() } else { postcard::from_bytes(rest).map_err(read)? };
     let (choices, snapshots, actions, period_secs, names, hash) = head;
-    Ok((choices, Trace { snapshots, actions, frames: Frames { period_secs, names, rows: Vec::new() }, hash }))
+    Ok((choices, Trace { snapshots, actions, frames: Frames { period_secs, names, rows: Vec::new() }, hash, map }))
 }
 
 fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {

@@ -3,6 +3,7 @@
 //! Never: parses a rule, knows what a configuration asks for, or goes to the network.
 
 mod assemble;
+mod by_name;
 mod check;
 mod file_iri;
 mod graph;

@@ -7,17 +7,14 @@ use std::sync::Arc;
 use crate::base::{Choices, Pose};
 use crate::config::{ObjectModel, Surface};
 use crate::scenario::overlap::Solid;
-use crate::scenario::{RobotStart, Role, Scene, SceneObject, Space, placement};
+use crate::scenario::surroundings::Surroundings;
+use crate::scenario::{RobotStart, Role, Scene, SceneMap, SceneObject, Space, placement};
 
 /// Places tried for one object before the scene is given up. On a table that is half full, about every second try finds
 /// a free place: fifty that fail mean that there is none worth looking for.
-const TRIES: u32 = 50;
-/// Gap between the surface's edge and the middle of the robot's base. Unit: metres. Shape: least, nominal, most.
-const BASE_GAP_M: [f64; 3] = [0.59, 0.69, 0.79];
-/// The base stands at most this far beside the surface's middle. Unit: metres.
-const BASE_SIDE_M: f64 = 0.05;
-/// The base heads at most this far beside the surface's middle. Unit: radians.
-const BASE_HEADING_RAD: f64 = 0.05;
+pub(super) const TRIES: u32 = 50;
+/// Gap between two platforms on an empty floor: a robot drives through. Unit: metres.
+const PLACE_GAP_M: f64 = 1.2;
 /// World of a configuration that names none.
 const DEFAULT_WORLD: &str = "empty";
 
@@ -35,8 +32,8 @@ pub struct Discard {
 
 /// One scene: a function of the choices alone.
 ///
-/// The platform's middle is the world's origin; the robot stands on its negative x side. All tests of a configuration
-/// draw from the same space.
+/// Where the world has no surfaces of its own, the platform's middle is its origin. The robot stands on the platform's
+/// negative x side. All tests of a configuration draw from the same space.
 ///
 /// # Errors
 /// An object found no free place.
@@ -48,19 +45,30 @@ pub fn draw(space: &Space, _test: usize, choices: &mut Choices) -> Result<Scene,
         solids: Vec::new(),
         left_out: Vec::new(),
         designators: BTreeMap::new(),
+        platform: None,
     };
+    let world = hand.choose_world();
     hand.choose_names();
-    let surface = hand.set_platform();
+    let surface = match world {
+        Some(world) if world.surfaces().next().is_some() => hand.take_platform(world),
+        _ => hand.set_platform(),
+    };
     if let Some(surface) = surface {
         if !space.targets.is_empty() {
             hand.set_target(&surface)?;
         }
         hand.set_others(&surface)?;
     }
-    let base = hand.start_robot(surface.as_ref());
-    let world = hand.designators.get("world").and_then(|names| names.first()).cloned();
+    hand.set_place(world);
+    if let Some(world) = world {
+        hand.surround(world);
+    }
+    let base = hand.start_robot(surface.as_ref())?;
+    hand.set_obstacles(base, world)?;
+    let name = hand.designators.get("world").and_then(|names| names.first()).cloned();
     Ok(Scene {
-        world: world.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),
+        world: name.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),
+        map: world.map(SceneMap::of).unwrap_or_default(),
         objects: hand.objects,
         robot: RobotStart { profile: Arc::clone(&space.robot), base },
         designators: hand.designators,
@@ -69,26 +77,124 @@ pub fn draw(space: &Space, _test: usize, choices: &mut Choices) -> Result<Scene,
     })
 }
 
-/// A scene in the making.
-struct Hand<'a> {
-    space: &'a Space,
-    choices: &'a mut Choices,
-    objects: Vec<SceneObject>,
-    /// Forms of the objects that stand on the surface.
-    solids: Vec<Solid>,
-    /// Models of the objects that a record leaves out.
-    left_out: Vec<String>,
-    designators: BTreeMap<String, Vec<String>>,
+/// A platform as its model is.
+fn platform(id: String, model: Arc<ObjectModel>, pose: Pose) -> SceneObject {
+    SceneObject {
+        id,
+        role: Role::Platform,
+        pose,
+        mass_kg: model.mass_kg,
+        friction: model.friction,
+        restitution: model.restitution,
+        model,
+    }
 }
 
-impl Hand<'_> {
+/// A scene in the making.
+pub(super) struct Hand<'a> {
+    pub(super) space: &'a Space,
+    pub(super) choices: &'a mut Choices,
+    pub(super) objects: Vec<SceneObject>,
+    /// Forms of the objects that stand on the surface.
+    pub(super) solids: Vec<Solid>,
+    /// Models of the objects that a record leaves out.
+    left_out: Vec<String>,
+    pub(super) designators: BTreeMap<String, Vec<String>>,
+    /// Where the platform stands; nothing where that is the origin.
+    pub(super) platform: Option<Pose>,
+}
+
+impl<'a> Hand<'a> {
     /// Designators whose values are names: nominal is the first candidate.
     fn choose_names(&mut self) {
         for (designator, values) in &self.space.names {
-            if !values.is_empty() {
+            // In a world, places follow from the surface.
+            let is_of_world =
+                !self.space.worlds.is_empty() && ["world", "objectLocation"].contains(&designator.as_str());
+            if !values.is_empty() && !is_of_world {
                 let value = values[self.choices.index(designator, values.len())].clone();
                 self.designators.insert(designator.clone(), vec![value]);
             }
+        }
+    }
+
+    /// The world, where the configuration names some: nominal is the first.
+    fn choose_world(&mut self) -> Option<&'a Surroundings> {
+        let worlds = &self.space.worlds;
+        if worlds.is_empty() {
+            return None;
+        }
+        let world = &worlds[self.choices.index("world", worlds.len())];
+        self.designators.insert("world".to_owned(), vec![world.map.name.clone()]);
+        Some(world)
+    }
+
+    /// A surface that the world has, and a location in front of it.
+    fn take_platform(&mut self, world: &'a Surroundings) -> Option<Surface> {
+        let there: Vec<&SceneObject> = self.space.surface_names.iter().filter_map(|name| world.surface(name)).collect();
+        if there.is_empty() {
+            return None;
+        }
+        let platform = there[self.choices.index("surface.name", there.len())];
+        self.designators.insert("objectSurface".to_owned(), vec![platform.id.clone()]);
+        self.choose_location(world, Some(&platform.id));
+        self.platform = Some(platform.pose);
+        self.objects.push(platform.clone());
+        platform.model.surface
+    }
+
+    /// One of the world's locations that the configuration names: in front of the surface, or of none.
+    fn choose_location(&mut self, world: &Surroundings, surface: Option<&str>) {
+        let named = self.space.names.get("objectLocation").into_iter().flatten();
+        let there = named.filter(|name| {
+            let location = world.map.locations.iter().find(|location| location.name == **name);
+            // Where the world has no locations, the names are the robot's own.
+            world.map.locations.is_empty()
+                || location.is_some_and(|location| location.surface.as_deref().is_none_or(|of| Some(of) == surface))
+        });
+        let there: Vec<&String> = there.collect();
+        if !there.is_empty() {
+            let chosen = there[self.choices.index("location.name", there.len())].clone();
+            self.designators.insert("objectLocation".to_owned(), vec![chosen]);
+        }
+    }
+
+    /// What the object is to be put on: another surface of the world where there is one, or a second platform beside the
+    /// first.
+    fn set_place(&mut self, world: Option<&'a Surroundings>) {
+        let first = self.designators.get("objectSurface").and_then(|ids| ids.first()).cloned();
+        let id = match world.filter(|world| world.surfaces().next().is_some()) {
+            Some(world) => {
+                let there: Vec<&String> =
+                    self.space.place_names.iter().filter(|name| world.surface(name).is_some()).collect();
+                let others: Vec<&String> =
+                    there.iter().filter(|name| Some(**name) != first.as_ref()).copied().collect();
+                let choice = if others.is_empty() { there } else { others };
+                if choice.is_empty() {
+                    return;
+                }
+                choice[self.choices.index("place.name", choice.len())].clone()
+            }
+            None => {
+                let Some(model) = self.choose("place.model", &self.space.places) else { return };
+                let beside = self.objects.first().map_or(0.0, |platform| platform.model.size_m[1] / 2.0);
+                let pose = Pose::upright([0.0, beside + PLACE_GAP_M + model.size_m[1] / 2.0, 0.0], 0.0);
+                let id = self.free_id(&model);
+                self.objects.insert(self.objects.len().min(1), platform(id.clone(), model, pose));
+                id
+            }
+        };
+        self.designators.insert("placeSurface".to_owned(), vec![id]);
+    }
+
+    /// Adds what else stands in the world, behind the platforms.
+    fn surround(&mut self, world: &Surroundings) {
+        let taken = self.objects.first().filter(|object| object.role == Role::Platform).map(|object| object.id.clone());
+        let at = self.objects.iter().take_while(|object| object.role == Role::Platform).count();
+        let rest: Vec<SceneObject> = world.others(taken.as_deref()).cloned().collect();
+        self.objects.splice(at..at, rest);
+        if self.platform.is_none() {
+            self.choose_location(world, None);
         }
     }
 
@@ -96,15 +202,7 @@ impl Hand<'_> {
         let model = self.choose("surface.model", &self.space.surfaces)?;
         let surface = model.surface;
         let id = self.free_id(&model);
-        self.objects.push(SceneObject {
-            id: id.clone(),
-            role: Role::Platform,
-            pose: Pose::IDENTITY,
-            mass_kg: model.mass_kg,
-            friction: model.friction,
-            restitution: model.restitution,
-            model,
-        });
+        self.objects.push(platform(id.clone(), model, Pose::IDENTITY));
         self.designators.insert("objectSurface".to_owned(), vec![id]);
         surface
     }
@@ -147,7 +245,7 @@ impl Hand<'_> {
     }
 
     /// One of some models: nominal is the first.
-    fn choose(&mut self, name: &str, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
+    pub(super) fn choose(&mut self, name: &str, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
         if models.is_empty() {
             return None;
         }
@@ -165,11 +263,13 @@ impl Hand<'_> {
         nominal: [f64; 2],
     ) -> Result<String, Discard> {
         let physics = &self.space.physics;
+        let model = self.sized(name, model);
         let mass_scale = self.between(&format!("{name}.mass_scale"), physics.mass_scale, 1.0);
         let friction_scale = self.between(&format!("{name}.friction_scale"), physics.friction_scale, 1.0);
         let restitution = self.between(&format!("{name}.restitution"), physics.restitution, model.restitution);
         for _ in 0..TRIES {
             let Some(pose) = self.try_place(name, &model, role, surface, nominal) else { continue };
+            let pose = self.on_platform(pose);
             let solid = Solid::new(&model, &pose);
             if self.solids.iter().any(|standing| standing.is_in_the_way_of(&solid)) {
                 continue;
@@ -199,22 +299,34 @@ impl Hand<'_> {
         surface: &Surface,
         nominal: [f64; 2],
     ) -> Option<Pose> {
+        let share = if role == Role::Target { self.space.lying.0 } else { self.space.lying.1 };
+        let lies = share > 0.0 && self.between(&format!("{name}.stands"), (0.0, 1.0), 1.0) < share;
+        let stance = if lies { placement::lying(model) } else { placement::standing(model) };
         let yaw = self.between(&format!("{name}.yaw"), (-PI, PI), 0.0);
-        let whole = placement::area(surface, model, yaw)?;
+        let whole = placement::area(surface, &stance, yaw)?;
         let area = if role == Role::Target { placement::reachable(whole, surface) } else { whole };
         let x = self.between(&format!("{name}.x"), area.x, nominal[0]);
         let y = self.between(&format!("{name}.y"), area.y, nominal[1]);
-        Some(Pose::upright([x, y, surface.height_m], yaw))
+        let foot = Pose::upright([x, y, surface.height_m], yaw);
+        Some(if lies { Pose::from_isometry(&(foot.to_isometry() * stance.foot_from_model)) } else { foot })
     }
 
-    /// Where the base stands, facing the surface: nominal is straight in front of its middle.
-    fn start_robot(&mut self, surface: Option<&Surface>) -> [f64; 3] {
-        let [least, nominal, most] = BASE_GAP_M;
-        let edge = surface.map_or(0.0, |surface| surface.size_m[0] / 2.0);
-        let gap = self.choices.real("robot.gap", least, most, nominal);
-        let side = self.choices.real("robot.side", -BASE_SIDE_M, BASE_SIDE_M, 0.0);
-        let heading = self.choices.real("robot.heading", -BASE_HEADING_RAD, BASE_HEADING_RAD, 0.0);
-        [-edge - gap, side, heading]
+    /// A pose from the frame of the platform.
+    fn on_platform(&self, pose: Pose) -> Pose {
+        match self.platform {
+            None => pose,
+            Some(platform) => Pose::from_isometry(&(platform.to_isometry() * pose.to_isometry())),
+        }
+    }
+
+    /// The model in the size that this one of its kind has.
+    fn sized(&mut self, name: &str, model: Arc<ObjectModel>) -> Arc<ObjectModel> {
+        let (low, high) = self.space.physics.size_scale;
+        if (low, high) == (1.0, 1.0) {
+            return model;
+        }
+        let scale = self.between(&format!("{name}.size_scale"), (low, high), 1.0);
+        Arc::new(model.scaled(scale))
     }
 
     fn between(&mut self, name: &str, (low, high): (f64, f64), nominal: f64) -> f64 {
@@ -222,9 +334,11 @@ impl Hand<'_> {
     }
 
     /// The model's name and the first number that is free.
-    fn free_id(&self, model: &ObjectModel) -> String {
+    pub(super) fn free_id(&self, model: &ObjectModel) -> String {
         let standing = self.objects.iter().map(|object| &object.model.name);
         let taken = standing.chain(&self.left_out).filter(|name| **name == model.name).count();
-        format!("{}_{}", model.name, taken + 1)
+        let ids = (taken + 1..).map(|number| format!("{}_{number}", model.name));
+        // Furniture of a world is called as it likes.
+        ids.into_iter().find(|id| !self.objects.iter().any(|object| object.id == *id)).unwrap_or_default()
     }
 }

@@ -8,17 +8,23 @@
 //! Never: simulates, knows a robot's reach or skill, or draws what a run's sensors get wrong.
 
 mod draw;
+mod floor;
 mod overlap;
 mod parameters;
 mod placement;
 mod scene;
+mod scene_map;
 mod space;
+mod surroundings;
 
 pub use draw::{Discard, draw};
 pub use overlap::{CLEARANCE_M, Solid};
 pub use parameters::{Parameter, ParameterKind};
 pub use scene::{RobotStart, Role, Scene, SceneObject};
+pub use scene_map::{NamedSurface, SceneMap};
 pub use space::Space;
 
 // What a scene is made of: its readers meet it here.
-pub use crate::config::{Budget, CONTROL_HZ, ObjectModel, Part, Physics, RobotProfile, Sensing, Shape, Surface};
+pub use crate::config::{
+    Budget, CONTROL_HZ, Inertia, Mesh, ObjectModel, Part, Physics, RobotProfile, Sensing, Shape, Surface,
+};

@@ -6,10 +6,10 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use parry3d::bounding_volume::{Aabb, BoundingVolume as _};
 use parry3d::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d::query;
-use parry3d::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
+use parry3d::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Cylinder, Shape as ParryShape};
 
 use crate::base::Pose;
-use crate::config::{ObjectModel, Shape};
+use crate::config::{ObjectModel, Part, Shape};
 
 /// Objects keep at least this distance. Twice what contact detection sees ahead, so that nothing touches at the start.
 pub const CLEARANCE_M: f64 = 0.004;
@@ -23,9 +23,13 @@ pub struct Solid {
 impl Solid {
     /// The form of a model whose origin has this pose. Frame: world.
     pub fn new(model: &ObjectModel, pose: &Pose) -> Self {
+        Self::of_parts(&model.solids(), pose)
+    }
+
+    /// The form of some convex parts whose frame has this pose. Frame: world.
+    pub(super) fn of_parts(parts: &[Part], pose: &Pose) -> Self {
         let world_from_model = pose.to_isometry();
-        let parts: Vec<(ParryPose, Arc<dyn ParryShape>, Aabb)> = model
-            .solids()
+        let parts: Vec<(ParryPose, Arc<dyn ParryShape>, Aabb)> = parts
             .iter()
             .filter_map(|part| {
                 let (shape, model_from_shape) = parry_shape(&part.shape)?;
@@ -59,19 +63,31 @@ impl Solid {
 /// The engine's shape, and its pose in our shape's frame (its cylinders stand along y). A tube is not one shape.
 fn parry_shape(shape: &Shape) -> Option<(Arc<dyn ParryShape>, Isometry3<f64>)> {
     let upright = Isometry3::identity();
-    Some(match *shape {
+    Some(match shape {
         Shape::Box { size: [x, y, z] } => {
             let half = Vector::new(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0));
             (Arc::new(Cuboid::new(half)), upright)
         }
         Shape::Cylinder { radius, height } => {
             let from_y = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
-            let cylinder = Cylinder::new(to_real(height / 2.0), to_real(radius));
+            let cylinder = Cylinder::new(to_real(height / 2.0), to_real(*radius));
             (Arc::new(cylinder), Isometry3::from_parts(upright.translation, from_y))
         }
-        Shape::Sphere { radius } => (Arc::new(Ball::new(to_real(radius))), upright),
+        Shape::Sphere { radius } => (Arc::new(Ball::new(to_real(*radius))), upright),
+        Shape::Capsule { radius, height } => {
+            (Arc::new(Capsule::new_z(to_real(height / 2.0), to_real(*radius))), upright)
+        }
+        Shape::Hull { points, .. } => (hull(points)?, upright),
+        Shape::Mesh { mesh } => (hull(&mesh.vertices)?, upright),
         Shape::Tube { .. } => return None,
     })
+}
+
+/// The convex hull of some points; nothing where they lie in a plane.
+fn hull(points: &[[f64; 3]]) -> Option<Arc<dyn ParryShape>> {
+    let points: Vec<Vector> =
+        points.iter().map(|[x, y, z]| Vector::new(to_real(*x), to_real(*y), to_real(*z))).collect();
+    Some(Arc::new(ConvexPolyhedron::from_convex_hull(&points)?))
 }
 
 fn to_parry(pose: &Isometry3<f64>) -> ParryPose {

@@ -5,12 +5,15 @@ use std::sync::Arc;
 
 use crate::base::Pose;
 use crate::config::{ObjectModel, Physics, RobotProfile, Sensing};
+use crate::scenario::SceneMap;
 
 /// A sampled scene. Frame of all poses: world; z up; the floor at 0.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// Name of the world that it lies in (`[world] worlds`).
     pub world: String,
+    /// The names of its places.
+    pub map: SceneMap,
     /// Platforms, the grasp target and the others; platforms first.
     pub objects: Vec<SceneObject>,
     /// The robot and where it starts.
@@ -40,6 +43,13 @@ pub struct SceneObject {
     pub friction: f64,
     /// Coefficient of restitution.
     pub restitution: f64,
+}
+
+impl SceneObject {
+    /// Whether nothing moves it: a platform, and what its model says is fixed.
+    pub fn is_fixed(&self) -> bool {
+        self.role == Role::Platform || self.model.fixed
+    }
 }
 
 /// What an object is there for.

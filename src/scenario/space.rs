@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::base::{Diagnostics, did_you_mean, names, nearest};
-use crate::config::{self, Campaign, ObjectModel, Physics, RobotProfile, Sensing};
+use crate::config::{self, Campaign, Location, ObjectModel, Physics, RobotProfile, Sensing, Surface, WorldMap};
 use crate::ontology::Ontology;
 use crate::scenario::placement;
+use crate::scenario::surroundings::Surroundings;
 
 /// Designators that scene generation gives a meaning, whether an ontology declares them or not.
 const SPECIAL: [&str; 6] = ["world", "objectLocation", "objectSurface", "placeSurface", "pickObject", "surfaceObjects"];
@@ -19,6 +20,20 @@ pub struct Space {
     pub(super) targets: Vec<Arc<ObjectModel>>,
     pub(super) others: Vec<Arc<ObjectModel>>,
     pub(super) other_count: (u32, u32),
+    /// Worlds; none where scenes lie on a floor with nothing else.
+    pub(super) worlds: Vec<Surroundings>,
+    /// Names of the surfaces of worlds on which the target may stand.
+    pub(super) surface_names: Vec<String>,
+    /// What the target may be put on: names of the worlds' surfaces, and models.
+    pub(super) place_names: Vec<String>,
+    pub(super) places: Vec<Arc<ObjectModel>>,
+    /// What may stand in the way of the base, and how many of them do.
+    pub(super) obstacles: Vec<Arc<ObjectModel>>,
+    pub(super) obstacle_count: u32,
+    /// Ranges of x, y and heading in which the base starts; nothing where it starts in front of the surface.
+    pub(super) start: Option<[(f64, f64); 3]>,
+    /// Shares of targets and of other objects that lie on their side.
+    pub(super) lying: (f64, f64),
     /// Candidates of designators that are names and not objects.
     pub(super) names: BTreeMap<String, Vec<String>>,
     pub(super) robot: Arc<RobotProfile>,
@@ -33,7 +48,7 @@ impl Space {
     /// Every fault at once, at its place in the configuration: a test names no action of the ontology (S001) or one
     /// without success properties (S002), a needed designator has no candidates (S003), a table is named after no
     /// designator (S004), a model's category is no class of the ontology (S005), a surface is none (S006), or an object
-    /// can't stand on a surface (S007, S008).
+    /// can't stand on a surface (S007, S008), or a world has none of the surfaces or locations (S009).
     pub fn new(campaign: &Campaign, ontology: &Ontology) -> Result<Self, Diagnostics> {
         let mut found = Diagnostics::new();
         check_tests(campaign, ontology, &mut found);
@@ -43,7 +58,9 @@ impl Space {
         let others = if campaign.other_count.1 > 0 { models(campaign, "surfaceObjects") } else { Vec::new() };
         check_categories(campaign, ontology, &mut found);
         check_surfaces(campaign, &mut found);
-        if surfaces.is_empty() && !(targets.is_empty() && others.is_empty()) {
+        let has_platform = !surfaces.is_empty() || !campaign.worlds.is_empty();
+        let has_objects = !targets.is_empty() || !others.is_empty();
+        if has_objects && !has_platform {
             let key = if targets.is_empty() { "surfaceObjects" } else { "pickObject" };
             let message = "there are objects, but no surface that they could stand on";
             found.push(
@@ -52,9 +69,15 @@ impl Space {
                     .help("add `[objectSurface]` with `object_surfaces = [\"coffee_table\"]`"),
             );
         }
+        let named_worlds = campaign.candidates.get("world").into_iter().flatten();
+        let worlds: Vec<Surroundings> = named_worlds
+            .filter_map(|name| campaign.worlds.get(name))
+            .map(|map| Surroundings::new(map, &campaign.models))
+            .collect();
         for key in ["pickObject", "surfaceObjects"] {
-            check_fit(campaign, key, &surfaces, &mut found);
+            check_fit(campaign, key, &tops(campaign, &surfaces, &worlds), &mut found);
         }
+        check_worlds(campaign, &worlds, &mut found);
         let names = campaign.candidates.iter().filter(|(name, _)| !is_of_objects(name));
         config::in_order_of_place(found).or(Self {
             tests: campaign.tests.len(),
@@ -62,6 +85,14 @@ impl Space {
             targets,
             others,
             other_count: campaign.other_count,
+            worlds,
+            surface_names: candidates(campaign, "objectSurface"),
+            place_names: candidates(campaign, "placeSurface"),
+            places: models(campaign, "placeSurface"),
+            obstacles: campaign.nav_obstacles.iter().filter_map(|name| campaign.models.get(name).cloned()).collect(),
+            obstacle_count: campaign.nav_obstacle_count,
+            start: campaign.start,
+            lying: campaign.lying,
             names: names.map(|(name, values)| (name.clone(), values.clone())).collect(),
             robot: Arc::clone(&campaign.robot),
             physics: campaign.physics.clone(),
@@ -83,6 +114,43 @@ fn is_of_objects(designator: &str) -> bool {
 fn models(campaign: &Campaign, designator: &str) -> Vec<Arc<ObjectModel>> {
     let names = campaign.candidates.get(designator).into_iter().flatten();
     names.filter_map(|name| campaign.models.get(name).cloned()).collect()
+}
+
+fn candidates(campaign: &Campaign, designator: &str) -> Vec<String> {
+    campaign.candidates.get(designator).cloned().unwrap_or_default()
+}
+
+/// Every world has a surface for the objects and a location in front of it, where the configuration names some (S009).
+fn check_worlds(campaign: &Campaign, worlds: &[Surroundings], found: &mut Diagnostics) {
+    let surfaces = candidates(campaign, "objectSurface");
+    for world in worlds.iter().filter(|world| world.surfaces().next().is_some()) {
+        let idx = candidates(campaign, "world").iter().position(|name| *name == world.map.name).unwrap_or(0);
+        let key = format!("world.{idx}");
+        let there: Vec<&str> = world.surfaces().map(|surface| surface.id.as_str()).collect();
+        let named: Vec<&String> = surfaces.iter().filter(|name| there.contains(&name.as_str())).collect();
+        if named.is_empty() && !surfaces.is_empty() {
+            let message =
+                format!("the world `{}` has none of the surfaces that the objects may stand on", world.map.name);
+            found.push(campaign.fault("S009", &key, message).help(format!("its surfaces are {}", there.join(", "))));
+        }
+        for surface in named {
+            check_location(campaign, &world.map, surface, found);
+        }
+    }
+}
+
+/// Where the configuration names locations, one of them is in front of the surface, or of none.
+fn check_location(campaign: &Campaign, world: &WorldMap, surface: &str, found: &mut Diagnostics) {
+    let named = candidates(campaign, "objectLocation");
+    let is_of = |location: &&Location| location.surface.as_deref() == Some(surface);
+    let serves = |location: &&Location| location.surface.is_none() || is_of(location);
+    if named.is_empty() || world.locations.iter().filter(serves).any(|location| named.contains(&location.name)) {
+        return;
+    }
+    let message = format!("none of the locations is in front of `{surface}` in the world `{}`", world.name);
+    let names: Vec<&str> = world.locations.iter().filter(is_of).map(|location| location.name.as_str()).collect();
+    let help = format!("name one in `location_list`: {}", names.join(", "));
+    found.push(campaign.fault("S009", "objectLocation", message).help(help));
 }
 
 /// Candidates of a designator with the keys of their places and their models.
@@ -140,7 +208,7 @@ fn example(designator: &str) -> String {
 /// Tables are named after designators.
 fn check_tables(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
     let known: BTreeSet<&str> = ontology.designators.iter().map(String::as_str).chain(SPECIAL).collect();
-    let tables = ["physics", "sensing", "robot", "budget", "history"];
+    let tables = ["physics", "sensing", "robot", "budget", "history", "categories", "scene"];
     for name in campaign.candidates.keys().filter(|name| !known.contains(name.as_str())) {
         let message = format!("unknown table `{name}`: the ontology has no designator of this name");
         let help = match nearest(name, known.iter().copied().chain(tables)) {
@@ -184,11 +252,18 @@ fn check_surfaces(campaign: &Campaign, found: &mut Diagnostics) {
     }
 }
 
-fn check_fit(campaign: &Campaign, designator: &str, surfaces: &[Arc<ObjectModel>], found: &mut Diagnostics) {
+/// Names and extents of everything that the objects may stand on.
+fn tops(campaign: &Campaign, models: &[Arc<ObjectModel>], worlds: &[Surroundings]) -> Vec<(String, Surface)> {
+    let named = candidates(campaign, "objectSurface");
+    let of_models = models.iter().filter_map(|model| Some((model.name.clone(), model.surface?)));
+    let of_worlds = worlds.iter().flat_map(Surroundings::surfaces).filter(|object| named.contains(&object.id));
+    of_models.chain(of_worlds.filter_map(|object| Some((object.id.clone(), object.model.surface?)))).collect()
+}
+
+fn check_fit(campaign: &Campaign, designator: &str, surfaces: &[(String, Surface)], found: &mut Diagnostics) {
     for (key, model) in placed_models(campaign, designator) {
-        let too_small = surfaces.iter().filter_map(|platform| Some((platform, platform.surface.as_ref()?)));
-        for (platform, surface) in too_small.filter(|(_, surface)| !placement::fits(surface, model)) {
-            let message = format!("the model `{}` can't stand on `{}`", model.name, platform.name);
+        for (platform, surface) in surfaces.iter().filter(|(_, surface)| !placement::fits(surface, model)) {
+            let message = format!("the model `{}` can't stand on `{platform}`", model.name);
             let [x, y] = surface.size_m;
             let help = format!("it is {} × {} m, and the surface is {x} × {y} m", model.size_m[0], model.size_m[1]);
             found.push(campaign.fault("S007", &key, message).help(help));

@@ -90,7 +90,7 @@ impl RobotModel {
         if robot.links.is_empty() {
             return Err(WorldError::Urdf { name, reason: "it has no links".to_owned() });
         }
-        Folding::new(&robot, name)?.fold()
+        Folding::new(&robot, name, &profile.meshes)?.fold()
     }
 
     /// Index of a joint by its name.
@@ -125,11 +125,17 @@ struct Folding<'a> {
     robot: &'a urdf_rs::Robot,
     links: BTreeMap<&'a str, &'a urdf_rs::Link>,
     children: BTreeMap<&'a str, Vec<&'a urdf_rs::Joint>>,
+    /// Solids of mesh files.
+    meshes: &'a BTreeMap<String, Vec<Shape>>,
     out: RobotModel,
 }
 
 impl<'a> Folding<'a> {
-    fn new(robot: &'a urdf_rs::Robot, name: String) -> Result<Self, WorldError> {
+    fn new(
+        robot: &'a urdf_rs::Robot,
+        name: String,
+        meshes: &'a BTreeMap<String, Vec<Shape>>,
+    ) -> Result<Self, WorldError> {
         let links = robot.links.iter().map(|link| (link.name.as_str(), link)).collect();
         let mut children: BTreeMap<&str, Vec<&urdf_rs::Joint>> = BTreeMap::new();
         let mut parents: BTreeMap<&str, &str> = BTreeMap::new();
@@ -141,7 +147,7 @@ impl<'a> Folding<'a> {
             children.entry(joint.parent.link.as_str()).or_default().push(joint);
         }
         let out = RobotModel { links: Vec::new(), joints: Vec::new(), frames: BTreeMap::new(), name };
-        Ok(Self { robot, links, children, out })
+        Ok(Self { robot, links, children, meshes, out })
     }
 
     fn fold(mut self) -> Result<RobotModel, WorldError> {
@@ -194,14 +200,12 @@ impl<'a> Folding<'a> {
                 turned.matrix() * matrix(&source.inertial.inertia) * turned.matrix().transpose()
             },
         };
-        let solids: Vec<Part> = source
-            .collision
-            .iter()
-            .map(|collision| {
-                let pose = Pose::from_isometry(&(at * isometry(&collision.origin)));
-                Ok(Part { pose, shape: self.shape(&collision.geometry, name)? })
-            })
-            .collect::<Result<_, WorldError>>()?;
+        let mut solids: Vec<Part> = Vec::new();
+        for collision in &source.collision {
+            let pose = Pose::from_isometry(&(at * isometry(&collision.origin)));
+            let shapes = self.shapes(&collision.geometry, name)?;
+            solids.extend(shapes.into_iter().map(|shape| Part { pose, shape }));
+        }
         let link = &mut self.out.links[into];
         let sum = Mass { mass: link.mass, com: link.com, inertia: link.inertia }.plus(&added);
         (link.mass, link.com, link.inertia) = (sum.mass, sum.com, sum.inertia);
@@ -209,16 +213,24 @@ impl<'a> Folding<'a> {
         Ok(())
     }
 
-    fn shape(&self, geometry: &urdf_rs::Geometry, link: &str) -> Result<Shape, WorldError> {
-        match *geometry {
-            urdf_rs::Geometry::Box { size } => Ok(Shape::Box { size: size.0 }),
-            urdf_rs::Geometry::Cylinder { radius, length } => Ok(Shape::Cylinder { radius, height: length }),
-            urdf_rs::Geometry::Sphere { radius } => Ok(Shape::Sphere { radius }),
-            urdf_rs::Geometry::Capsule { .. } | urdf_rs::Geometry::Mesh { .. } => Err(WorldError::Unsupported {
-                name: self.out.name.clone(),
-                what: format!("the collision shape of `{link}`"),
-            }),
-        }
+    /// The solids of a collision geometry: one, or the pieces of a mesh.
+    fn shapes(&self, geometry: &urdf_rs::Geometry, link: &str) -> Result<Vec<Shape>, WorldError> {
+        Ok(match geometry {
+            urdf_rs::Geometry::Box { size } => vec![Shape::Box { size: size.0 }],
+            urdf_rs::Geometry::Cylinder { radius, length } => {
+                vec![Shape::Cylinder { radius: *radius, height: *length }]
+            }
+            urdf_rs::Geometry::Sphere { radius } => vec![Shape::Sphere { radius: *radius }],
+            urdf_rs::Geometry::Capsule { radius, length } => vec![Shape::Capsule { radius: *radius, height: *length }],
+            urdf_rs::Geometry::Mesh { filename, scale } => {
+                let scale = scale.map_or([1.0; 3], |scale| scale.0);
+                let solids = self.meshes.get(filename).ok_or_else(|| WorldError::Unsupported {
+                    name: self.out.name.clone(),
+                    what: format!("the mesh {filename} of `{link}`, which was not read,"),
+                })?;
+                solids.iter().map(|solid| solid.scaled(scale)).collect()
+            }
+        })
     }
 
     fn movable(&self, joint: &urdf_rs::Joint, parent: usize, origin: Isometry3<f64>) -> Result<Joint, WorldError> {

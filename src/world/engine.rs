@@ -89,19 +89,23 @@ pub fn add_floor(engine: &mut PhysicsWorld) {
     engine.insert_collider(floor, None);
 }
 
-/// A convex solid as a collider in its body's frame; nothing for tubes, which have to be taken apart before.
+/// A convex solid as a collider in its body's frame; nothing for tubes, which have to be taken apart before, and for
+/// points that enclose nothing.
 ///
 /// Two surfaces share the geometric mean of their frictions: what the scene says holds against the same material.
 pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> Option<ColliderBuilder> {
     let mut pose = solid.pose.to_isometry();
-    let builder = match solid.shape {
+    let builder = match &solid.shape {
         Shape::Box { size: [x, y, z] } => ColliderBuilder::cuboid(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0)),
         Shape::Cylinder { radius, height } => {
             // The engine's cylinders stand along y.
             pose.rotation *= nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
-            ColliderBuilder::cylinder(to_real(height / 2.0), to_real(radius))
+            ColliderBuilder::cylinder(to_real(height / 2.0), to_real(*radius))
         }
-        Shape::Sphere { radius } => ColliderBuilder::ball(to_real(radius)),
+        Shape::Sphere { radius } => ColliderBuilder::ball(to_real(*radius)),
+        Shape::Capsule { radius, height } => ColliderBuilder::capsule_z(to_real(height / 2.0), to_real(*radius)),
+        Shape::Hull { points, .. } => hull(points)?,
+        Shape::Mesh { mesh } => hull(&mesh.vertices)?,
         Shape::Tube { .. } => return None,
     };
     Some(
@@ -112,6 +116,12 @@ pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> 
             .friction_combine_rule(CoefficientCombineRule::GeometricMean)
             .user_data(owner.to_tag()),
     )
+}
+
+/// The convex hull of some points; nothing where they lie in a plane.
+fn hull(points: &[[f64; 3]]) -> Option<ColliderBuilder> {
+    let points: Vec<_> = points.iter().map(|point| to_vector(&Vector3::from(*point))).collect();
+    ColliderBuilder::convex_hull(&points)
 }
 
 #[cfg(test)]

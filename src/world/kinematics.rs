@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::scenario::Shape;
+use crate::base::Pose;
+use crate::scenario::{Part, Shape};
 use crate::world::description::{Joint, JointKind, RobotModel};
 
 /// Earth's pull. Unit: m/s².
@@ -142,6 +143,18 @@ fn spread(shape: &Shape, spacing: f64) -> Vec<Point3<f64>> {
             ends.iter()
                 .flat_map(|r| [Point3::new(*r, 0.0, 0.0), Point3::new(0.0, *r, 0.0), Point3::new(0.0, 0.0, *r)])
                 .collect()
+        }
+        Shape::Capsule { radius, height } => {
+            // The cylinder around it.
+            spread(&Shape::Cylinder { radius, height: height + 2.0 * radius }, spacing)
+        }
+        Shape::Hull { .. } | Shape::Mesh { .. } => {
+            // The box around it.
+            let (low, high) = Part { pose: Pose::IDENTITY, shape: shape.clone() }.bounds();
+            let (low, high) = (Vector3::from(low), Vector3::from(high));
+            let middle = (low + high) / 2.0;
+            let grid = spread(&Shape::Box { size: (high - low).into() }, spacing);
+            grid.into_iter().map(|point| point + middle).collect()
         }
         Shape::Tube { .. } => Vec::new(),
     }

@@ -4,6 +4,7 @@
 
 mod contacts;
 mod convert;
+mod decompose;
 mod description;
 mod engine;
 mod error;
@@ -21,6 +22,7 @@ mod simulation;
 mod snapshot;
 
 pub use contacts::CONTACT_FLOOR_NEWTONS;
+pub use decompose::{decompose, decomposition_key};
 pub use description::{Joint, JointKind};
 pub use error::WorldError;
 pub use fault::{Fault, Mishap, Poison};

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use crate::base::Pose;
-use crate::scenario::Role;
 use crate::world::contacts::touches;
 use crate::world::convert::from_vector;
 use crate::world::engine::Owner;
@@ -56,7 +55,7 @@ impl World {
             id: object.id.clone(),
             model: object.model.name.clone(),
             category: object.model.category.clone(),
-            fixed: object.role == Role::Platform,
+            fixed: object.fixed,
             pose: Pose::from_isometry(&pose),
             linear_velocity,
             angular_velocity,

@@ -409,6 +409,7 @@ mod tests {
         let profile = Arc::new(crate::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right"));
         let one = (1.0, 1.0);
         let scene = Scene {
+            map: crate::scenario::SceneMap::default(),
             world: "empty".to_owned(),
             objects: Vec::new(),
             robot: RobotStart { profile, base: [-1.0, 0.3, 0.4] },
@@ -425,6 +426,7 @@ mod tests {
             physics: Physics {
                 mass_scale: one,
                 friction_scale: one,
+                size_scale: (1.0, 1.0),
                 restitution: (0.0, 0.0),
                 steps_per_second: 240,
                 iterations: 2,

@@ -5,7 +5,6 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::base::{Choices, Pose};
-use crate::scenario::Role;
 use crate::world::World;
 use crate::world::simulation::Object;
 
@@ -66,7 +65,7 @@ impl World {
             *size = (*size + noise).max(SMALLEST_M);
         }
         let pose = Pose::from_isometry(&(self.believed_from_true * seen));
-        Some(Sighting { id: id.to_owned(), pose, size_m, furniture: object.role == Role::Platform })
+        Some(Sighting { id: id.to_owned(), pose, size_m, furniture: object.fixed })
     }
 
     /// Gap between the fingers as a noisy sensor gives it. Unit: metres.

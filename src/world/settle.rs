@@ -1,6 +1,5 @@
 //! Letting a new scene come to rest.
 
-use crate::scenario::Role;
 use crate::world::World;
 use crate::world::convert::from_vector;
 
@@ -54,7 +53,7 @@ impl World {
                         || from_vector(body.angvel()).norm() > 10.0 * REST_SPEED)
             })
         };
-        self.objects.iter().filter(|o| o.role != Role::Platform).filter(moves).map(|o| o.id.clone()).collect()
+        self.objects.iter().filter(|o| !o.fixed).filter(moves).map(|o| o.id.clone()).collect()
     }
 
     fn left(&self) -> Vec<String> {

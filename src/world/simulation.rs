@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
-use rapier3d::prelude::{CoefficientCombineRule, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 
 use crate::base::Pose;
-use crate::scenario::{CONTROL_HZ, ObjectModel, RobotProfile, Role, Scene, SceneObject, Sensing};
+use crate::scenario::{CONTROL_HZ, Inertia, ObjectModel, RobotProfile, Scene, SceneObject, Sensing};
 use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
 use crate::world::engine::{Owner, add_floor, collider, engine};
 use crate::world::recorder::Recorder;
@@ -49,7 +49,8 @@ pub struct Observation {
 pub(super) struct Object {
     pub(super) id: String,
     pub(super) model: Arc<ObjectModel>,
-    pub(super) role: Role,
+    /// Whether nothing moves it.
+    pub(super) fixed: bool,
     pub(super) body: RigidBodyHandle,
     pub(super) mass_kg: f64,
     pub(super) friction: f64,
@@ -112,15 +113,21 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
 /// Adds one object with the shapes of its model.
 fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object {
     let placed = object.pose.to_isometry();
-    let fixed = object.role == Role::Platform;
+    let fixed = object.is_fixed();
     let builder = if fixed { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
+    let spread = object.model.inertia.map(|inertia| mass_properties(&inertia, object));
+    let builder = match spread {
+        Some(properties) => builder.additional_mass_properties(properties),
+        None => builder,
+    };
     let body = engine.insert_body(builder.pose(to_pose(&placed)));
     if let Some(body) = engine.bodies.get_mut(body) {
         let activation = body.activation_mut();
         activation.normalized_linear_threshold = SLEEP_SPEED;
         activation.time_until_sleep = SLEEP_AFTER_SECS;
     }
-    let density = object.mass_kg / object.model.volume().max(1e-9);
+    // Where the model says how its mass is spread, the shapes have none of their own.
+    let density = if spread.is_some() { 0.0 } else { object.mass_kg / object.model.volume().max(1e-9) };
     for solid in object.model.solids() {
         if let Some(collider) = collider(&solid, Owner::Object(idx), object.friction, object.restitution) {
             let collider = collider.density(to_real(density)).restitution_combine_rule(CoefficientCombineRule::Average);
@@ -130,7 +137,7 @@ fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object
     Object {
         id: object.id.clone(),
         model: object.model.clone(),
-        role: object.role,
+        fixed,
         body,
         mass_kg: object.mass_kg,
         friction: object.friction,
@@ -139,9 +146,18 @@ fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object
     }
 }
 
+/// The spread of mass that a model states, for the mass that the scene gives it.
+fn mass_properties(inertia: &Inertia, object: &SceneObject) -> MassProperties {
+    let scale = object.mass_kg / object.model.mass_kg;
+    // Columns, as the engine has them, are rows of what is symmetric.
+    let [x, y, z] = inertia.about_com.map(|row| to_vector(&(Vector3::from(row) * scale)));
+    let about_com = rapier3d::math::Matrix::from_cols(x, y, z);
+    MassProperties::with_inertia_matrix(to_vector(&Vector3::from(inertia.com_m)), to_real(object.mass_kg), about_com)
+}
+
 /// What moves, with its name in traces: objects, then links that can be seen.
 fn tracks(objects: &[Object], robot: &Robot) -> Vec<(String, RigidBodyHandle)> {
-    let objects = objects.iter().filter(|object| object.role != Role::Platform).map(|o| (o.id.clone(), o.body));
+    let objects = objects.iter().filter(|object| !object.fixed).map(|o| (o.id.clone(), o.body));
     let links = robot.model.links.iter().zip(&robot.bodies).skip(1).filter(|(link, _)| !link.solids.is_empty());
     objects.chain(links.map(|(link, body)| (format!("robot/{}", link.name), *body))).collect()
 }

@@ -1,0 +1,146 @@
+//! Meshes of models and of the robot taken apart before the first run, from files beside the history where it was done
+//! before.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::base::{Diagnostic, Diagnostics, Digest};
+use crate::config::{Campaign, Mesh, ObjectModel, Part, Shape};
+use crate::world;
+
+/// Folder of the files, in that of the history.
+const FOLDER: &str = "hulls";
+/// What each file begins with; another number means another format.
+const TITLE: &str = "actcheck hulls 1";
+
+/// Solids by the key of their mesh, kept in memory and on disk.
+struct Kept {
+    folder: PathBuf,
+    known: BTreeMap<String, Result<Vec<Shape>, String>>,
+}
+
+/// Replaces the meshes of everything that the campaign can put into a scene by convex solids.
+///
+/// Faults: a mesh of which nothing solid can be made (W037).
+pub(super) fn take_apart(campaign: &mut Campaign, faults: &mut Diagnostics) {
+    let mut kept = Kept { folder: campaign.history.join(FOLDER), known: BTreeMap::new() };
+    let used = campaign.used_models();
+    for (name, model) in &mut campaign.models {
+        let has_mesh = model.parts.iter().any(|part| matches!(part.shape, Shape::Mesh { .. }));
+        if has_mesh && used.contains(name) {
+            match solid_parts(model, &mut kept) {
+                Ok(parts) => Arc::make_mut(model).parts = parts,
+                Err(reason) => faults.push(unusable(&format!("a mesh of the model `{name}`"), &reason)),
+            }
+        }
+    }
+    let robot = Arc::make_mut(&mut campaign.robot);
+    for (file, shapes) in &mut robot.meshes {
+        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| kept.solids(shape)).collect();
+        match apart {
+            Ok(apart) => *shapes = apart.concat(),
+            Err(reason) => faults.push(unusable(&format!("the robot's mesh {file}"), &reason)),
+        }
+    }
+}
+
+fn unusable(what: &str, reason: &str) -> Diagnostic {
+    Diagnostic::error("W037", format!("{what} is unusable: {reason}"))
+        .help("a collision mesh is a closed surface around something solid")
+}
+
+fn solid_parts(model: &ObjectModel, kept: &mut Kept) -> Result<Vec<Part>, String> {
+    let mut parts = Vec::new();
+    for part in &model.parts {
+        parts.extend(kept.solids(&part.shape)?.into_iter().map(|shape| Part { pose: part.pose, shape }));
+    }
+    Ok(parts)
+}
+
+impl Kept {
+    /// The solids of a mesh; any other shape as it is.
+    fn solids(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
+        let Shape::Mesh { mesh } = shape else { return Ok(vec![shape.clone()]) };
+        let key = world::decomposition_key(mesh);
+        if let Some(known) = self.known.get(&key) {
+            return known.clone();
+        }
+        let solids = self.kept_or_anew(&key, mesh);
+        self.known.insert(key, solids.clone());
+        solids
+    }
+
+    fn kept_or_anew(&self, key: &str, mesh: &Mesh) -> Result<Vec<Shape>, String> {
+        let path = self.folder.join(format!("{key}.hulls"));
+        if let Some(solids) = read(&path) {
+            return Ok(solids);
+        }
+        let solids = world::decompose(mesh)?;
+        // A file that can't be written costs time the next time, and nothing else.
+        let _ = write(&path, &solids);
+        Ok(solids)
+    }
+}
+
+/// The solids of a file; nothing where it is not there, of another format, or not as it was written.
+fn read(path: &Path) -> Option<Vec<Shape>> {
+    let bytes = fs::read(path).ok()?;
+    let (head, body) = bytes.split_at_checked(bytes.iter().position(|byte| *byte == b'\n')? + 1)?;
+    let solids: Vec<Shape> =
+        if head == head_of(body).as_bytes() { postcard::from_bytes(body).ok()? } else { return None };
+    let is_solid = |shape: &Shape| matches!(shape, Shape::Hull { points, .. } if points.len() >= 4);
+    (!solids.is_empty() && solids.iter().all(is_solid)).then_some(solids)
+}
+
+/// Writes a file as a whole: a reader finds all of it or none.
+fn write(path: &Path, solids: &[Shape]) -> Result<(), String> {
+    let body = postcard::to_stdvec(solids).map_err(|error| error.to_string())?;
+    let unfinished = path.with_extension(format!("{}.tmp", std::process::id()));
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let written = fs::create_dir_all(folder)
+        .and_then(|()| fs::write(&unfinished, [head_of(&body).as_bytes(), &body].concat()))
+        .and_then(|()| fs::rename(&unfinished, path));
+    written.map_err(|error| error.to_string())
+}
+
+/// The first line: the format, and a digest of the rest.
+fn head_of(body: &[u8]) -> String {
+    let mut digest = Digest::new();
+    digest.update(body);
+    format!("{TITLE} {}\n", digest.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every bit comes back from disk, and a file that was tampered with does not count.
+    #[test]
+    fn solids_come_back_as_they_were_or_not_at_all() {
+        let folder = tempfile::tempdir().expect("it is right");
+        let path = folder.path().join("deep/key.hulls");
+        let third = 1.0 / 3.0;
+        let solids = vec![Shape::Hull {
+            points: vec![[third, -0.0, 1e-300], [1.0, 0.1, 0.2], [f64::MAX, 0.3, 5e-324], [0.7, third / 7.0, 9.9]],
+            volume: third,
+        }];
+        write(&path, &solids).expect("it is right");
+        let Some([Shape::Hull { points, volume }]) = read(&path).as_deref().map(|list| [list[0].clone()]) else {
+            panic!("it is there");
+        };
+        let Shape::Hull { points: expected, .. } = &solids[0] else { unreachable!() };
+        let bits = |list: &[[f64; 3]]| list.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
+        assert_eq!((bits(&points), volume.to_bits()), (bits(expected), third.to_bits()));
+        let bytes = fs::read(&path).expect("it is right");
+        for at in [0, bytes.len() / 2, bytes.len() - 1] {
+            let mut other = bytes.clone();
+            other[at] ^= 1;
+            fs::write(&path, other).expect("it is right");
+            assert!(read(&path).is_none(), "byte {at}");
+        }
+        fs::write(&path, &bytes[..bytes.len() / 2]).expect("it is right");
+        assert!(read(&path).is_none());
+    }
+}

@@ -1,0 +1,143 @@
+//! A rigid thing as a foreign file describes it, and the model that it makes.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
+
+use crate::base::{Pose, names};
+use crate::config::shape::bounds;
+use crate::config::{Inertia, ObjectModel, Part, Shape, Surface};
+
+/// Density of what has no mass. Unit: kg/m³. That of water, which is SDF's own default.
+const DENSITY: f64 = 1000.0;
+/// Friction where a file says nothing: SDF's default.
+const FRICTION: f64 = 1.0;
+/// A top may lie this much below the highest point. Unit: metres.
+const TOP_DEPTH_M: f64 = 0.003;
+/// Nothing smaller carries other things. Unit: metres.
+const SMALLEST_SURFACE_M: f64 = 0.15;
+/// Share of its rectangle that a top must fill.
+const FULL: f64 = 0.95;
+
+/// A rigid thing. Frame: the file's own.
+#[derive(Default)]
+pub(crate) struct Body {
+    pub(crate) parts: Vec<Part>,
+    /// One for each link that says what it weighs.
+    pub(crate) masses: Vec<Mass>,
+    /// Whether some link with shapes says nothing of its mass.
+    pub(crate) weighs_unknown: bool,
+    pub(crate) friction: Option<f64>,
+    pub(crate) restitution: Option<f64>,
+    pub(crate) fixed: bool,
+}
+
+/// Mass of one link. Frame: the file's own.
+pub(crate) struct Mass {
+    pub(crate) kg: f64,
+    pub(crate) com: Vector3<f64>,
+    /// Moments about its centre; nothing where they are to follow from the shapes.
+    pub(crate) about_com: Option<Matrix3<f64>>,
+}
+
+impl Body {
+    /// The model: as the thing stands with its origin at `pose`, moved so that its middle is above the origin and its
+    /// lowest point at 0. Its category is left to others.
+    pub(crate) fn into_model(self, name: &str, digest: String, pose: &Isometry3<f64>) -> ObjectModel {
+        let turned = self.placed(pose);
+        let (low, high) = bounds(&turned);
+        let foot = Vector3::new((low.x + high.x) / 2.0, (low.y + high.y) / 2.0, low.z);
+        let model_from_file = Translation3::from(-foot) * pose;
+        let parts = self.placed(&model_from_file);
+        let size = high - low;
+        let surface = surface(&parts, size.z);
+        let by_volume = DENSITY * parts.iter().map(|part| part.shape.volume()).sum::<f64>();
+        let stated: f64 = self.masses.iter().map(|mass| mass.kg).sum();
+        let is_stated = !self.weighs_unknown && stated > 0.0;
+        ObjectModel {
+            name: name.to_owned(),
+            category: names::act("Object"),
+            mass_kg: if is_stated { stated } else { by_volume },
+            friction: self.friction.unwrap_or(FRICTION),
+            restitution: self.restitution.unwrap_or(0.0),
+            origin_m: model_from_file.translation.vector.into(),
+            size_m: size.into(),
+            inertia: if is_stated { self.inertia(&model_from_file) } else { None },
+            parts,
+            fixed: self.fixed,
+            surface,
+            digest,
+        }
+    }
+
+    fn placed(&self, at: &Isometry3<f64>) -> Vec<Part> {
+        let moved = |part: &Part| Part {
+            pose: Pose::from_isometry(&(at * part.pose.to_isometry())),
+            shape: part.shape.clone(),
+        };
+        self.parts.iter().map(moved).collect()
+    }
+
+    /// All links' moments about their common centre, by the parallel axis theorem.
+    fn inertia(&self, model_from_file: &Isometry3<f64>) -> Option<Inertia> {
+        let total: f64 = self.masses.iter().map(|mass| mass.kg).sum();
+        let com = self.masses.iter().map(|mass| mass.com * mass.kg).sum::<Vector3<f64>>() / total;
+        let mut sum = Matrix3::zeros();
+        for mass in &self.masses {
+            let arm = mass.com - com;
+            sum += mass.about_com? + (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass.kg;
+        }
+        let turn = model_from_file.rotation.to_rotation_matrix();
+        let sum = turn.matrix() * sum * turn.matrix().transpose();
+        let com = (model_from_file * Point3::from(com)).coords;
+        Some(Inertia {
+            com_m: com.into(),
+            about_com: [0, 1, 2].map(|row| [sum[(row, 0)], sum[(row, 1)], sum[(row, 2)]]),
+        })
+    }
+}
+
+/// Whether moments can be those of any spread of mass: none negative, none larger than the two others together.
+pub(crate) fn is_possible(moments: &Matrix3<f64>) -> bool {
+    let principal = moments.symmetric_eigenvalues();
+    let (sum, most) = (principal.sum(), principal.max());
+    // A flat thing's largest moment is the sum of the others; figures are rounded to a few digits.
+    principal.min() > 0.0 && most <= 1.02 * (sum - most)
+}
+
+/// The largest level rectangle on top, centred on the origin, where there is one that other things could stand on.
+fn surface(parts: &[Part], top_m: f64) -> Option<Surface> {
+    let rectangles = parts.iter().filter_map(|part| top_rectangle(part, top_m));
+    let centred = rectangles.map(|(low, high)| [0, 1].map(|axis| 2.0 * high[axis].min(-low[axis])));
+    let wide = centred.filter(|size: &[f64; 2]| size.iter().all(|extent| *extent >= SMALLEST_SURFACE_M));
+    let largest = wide.max_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1])))?;
+    Some(Surface { height_m: top_m, size_m: largest })
+}
+
+/// The level top of one part along the axes: lowest and highest x and y.
+fn top_rectangle(part: &Part, top_m: f64) -> Option<([f64; 2], [f64; 2])> {
+    let at = part.pose.to_isometry();
+    let (low, high) = part.bounds();
+    if high[2] < top_m - TOP_DEPTH_M {
+        return None;
+    }
+    let whole = ([low[0], low[1]], [high[0], high[1]]);
+    let is_upright = |axis: Vector3<f64>| (at.rotation * axis).z.abs() > 0.999;
+    match &part.shape {
+        Shape::Box { .. } => {
+            // Turned by a right angle or not at all: each of its axes is one of the model's.
+            let is_straight = |axis: Vector3<f64>| (at.rotation * axis).abs().max() > 0.999;
+            [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().all(is_straight).then_some(whole)
+        }
+        Shape::Cylinder { radius, .. } if is_upright(Vector3::z()) => {
+            // The largest square in the disc.
+            let half = radius * std::f64::consts::FRAC_1_SQRT_2;
+            let [x, y, _] = part.pose.position;
+            Some(([x - half, y - half], [x + half, y + half]))
+        }
+        Shape::Mesh { mesh } => {
+            let top = mesh.top(top_m, TOP_DEPTH_M, |point| (at * Point3::from(*point)).coords);
+            let around = (top.high[0] - top.low[0]) * (top.high[1] - top.low[1]);
+            (top.area > 0.0 && top.area >= FULL * around).then_some((top.low, top.high))
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,91 @@
+//! Which models a folder holds in Gazebo's layout, and reading one.
+
+use std::path::{Path, PathBuf};
+
+use crate::base::{Diagnostic, Diagnostics, Files};
+use crate::config::ObjectModel;
+use crate::config::foreign::lookup::Lookup;
+use crate::config::foreign::xml::{self, Reader};
+use crate::config::foreign::{sdf, urdf};
+
+/// A model that a folder holds.
+#[derive(Debug, Clone)]
+pub(crate) struct Found {
+    /// Name by which configurations know it: the folder's, or the URDF's without its ending.
+    pub(crate) name: String,
+    /// Its `model.config`, its `model.sdf` or its URDF.
+    pub(crate) path: PathBuf,
+}
+
+/// The models of a folder: `NAME/model.config`, `NAME/model.sdf`, `NAME/model.urdf` and `NAME.urdf`, by name.
+pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
+    let mut found: Vec<Found> = Vec::new();
+    for model in files.folders(folder) {
+        let inside = files.list(&model);
+        let first = ["model.config", "model.sdf", "model.urdf"]
+            .iter()
+            .map(|file| model.join(file))
+            .find(|path| inside.contains(path));
+        if let (Some(path), Some(name)) = (first, model.file_name()) {
+            found.push(Found { name: name.to_string_lossy().into_owned(), path });
+        }
+    }
+    for path in files.list(folder) {
+        if let (Some("urdf"), Some(stem)) = (path.extension().and_then(|ending| ending.to_str()), path.file_stem()) {
+            found.push(Found { name: stem.to_string_lossy().into_owned(), path: path.clone() });
+        }
+    }
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    found
+}
+
+/// Reads a model, with warnings of what was left out.
+///
+/// # Errors
+/// Every fault of its files: they can't be read (W030), are not XML (W031) or no model (W032), lack something (W033), say
+/// something impossible (W034) or something that can't be simulated (W035), name no usable mesh (W037), or describe
+/// nothing solid (W038).
+pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<(ObjectModel, Diagnostics), Diagnostics> {
+    let path = match found.path.file_name().and_then(|name| name.to_str()) {
+        Some("model.config") => sdf_path(&found.path, lookup.files)?,
+        _ => found.path.clone(),
+    };
+    let source = lookup.files.read(&path).map_err(|reason| unreadable(&path, &reason))?;
+    let is_urdf = path.extension().is_some_and(|ending| ending == "urdf");
+    let (model, said) = if is_urdf { urdf::read(&source, &path, lookup) } else { sdf::read(&source, &path, lookup) };
+    match model {
+        Some(model) => Ok((model.body.into_model(&found.name, model.digest, &model.pose), said)),
+        None => Err(said),
+    }
+}
+
+fn unreadable(path: &Path, reason: &str) -> Diagnostic {
+    Diagnostic::error("W030", format!("cannot read the model {}: {reason}", path.display()))
+        .help("a model is a folder with `model.config` and the SDF file that it names, or a URDF file")
+}
+
+/// The SDF file that a `model.config` names: of several, that of the newest version.
+fn sdf_path(config: &Path, files: &Files) -> Result<PathBuf, Diagnostics> {
+    let source = files.read(config).map_err(|reason| unreadable(config, &reason))?;
+    let document = xml::parse(&source)?;
+    let mut reader = Reader::new(&source);
+    let root = document.root_element();
+    let newest = xml::children(root, "sdf").max_by_key(|sdf| {
+        let minor = sdf.attribute("version").and_then(|version| version.strip_prefix("1.")?.parse::<u32>().ok());
+        minor.unwrap_or(0)
+    });
+    let Some(named) = newest.filter(|sdf| !xml::text(*sdf).is_empty()) else {
+        let message = format!("`<{}>` names no SDF file", root.tag_name().name());
+        reader.error("W033", root, message, "add `<sdf version=\"1.6\">model.sdf</sdf>`");
+        return Err(reader.found);
+    };
+    let path = config.parent().unwrap_or(Path::new("")).join(xml::text(named));
+    match files.read_bytes(&path) {
+        Ok(_) => Ok(path),
+        Err(reason) => {
+            let message = format!("cannot read the model {}: {reason}", path.display());
+            reader.error("W030", named, message, "the path is relative to the folder of `model.config`");
+            Err(reader.found)
+        }
+    }
+}

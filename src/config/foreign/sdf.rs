@@ -1,0 +1,290 @@
+//! Models in Gazebo's format.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Matrix3};
+
+use crate::base::{Diagnostics, Digest, Pose, Source};
+use crate::config::foreign::body::{Body, Mass, is_possible};
+use crate::config::foreign::geometry::{Shapes, has_volume};
+use crate::config::foreign::lookup::Lookup;
+use crate::config::foreign::xml::{self, Bound, Node, Reader};
+use crate::config::{Part, Shape};
+
+/// Minor versions of SDF 1 that are read.
+const VERSIONS: std::ops::RangeInclusive<u32> = 4..=11;
+
+/// A model as its file describes it.
+pub(crate) struct SdfModel {
+    pub(crate) body: Body,
+    /// Where the file puts its origin when it stands by itself.
+    pub(crate) pose: Isometry3<f64>,
+    /// Digest of the file and of the meshes that it names.
+    pub(crate) digest: String,
+}
+
+/// The one model of an SDF file, with what was found in it; nothing where something is wrong.
+pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
+    let document = match xml::parse(source) {
+        Ok(document) => document,
+        Err(faults) => return (None, faults),
+    };
+    let mut reader = Reader::new(source);
+    let mut shapes = Shapes { lookup, path, digest: Digest::new() };
+    shapes.digest.update(source.text.as_bytes());
+    let model = root_model(document.root_element(), &mut reader);
+    let read = model.map(|model| {
+        let pose = pose(model, &mut reader).unwrap_or_default();
+        (read_model(model, &mut shapes, &mut reader), pose)
+    });
+    let found = reader.found;
+    let complete = read.filter(|_| !found.has_errors());
+    (complete.map(|(body, pose)| SdfModel { body, pose, digest: shapes.digest.finish() }), found)
+}
+
+/// The model of a document that holds one.
+fn root_model<'a>(root: Node<'a>, reader: &mut Reader) -> Option<Node<'a>> {
+    check_version(root, reader)?;
+    let models: Vec<Node> = xml::children(root, "model").collect();
+    match models.as_slice() {
+        [model] => Some(*model),
+        [] => {
+            let message = "the file holds no `<model>`".to_owned();
+            reader.error("W032", root, message, "a file with a `<world>` belongs into the folder `worlds`");
+            None
+        }
+        [_, second, ..] => {
+            let message = format!("the file holds {} models", models.len());
+            reader.error("W032", *second, message, "give each model a folder of its own");
+            None
+        }
+    }
+}
+
+/// Whether a root is SDF of a version that is read (W032).
+pub(crate) fn check_version(root: Node, reader: &mut Reader) -> Option<()> {
+    if root.tag_name().name() != "sdf" {
+        let message = format!("the root is `<{}>` and not `<sdf>`", root.tag_name().name());
+        reader.error("W032", root, message, "an SDF file begins with `<sdf version=\"1.6\">`");
+        return None;
+    }
+    let version = reader.attribute(root, "version")?;
+    let minor = version.strip_prefix("1.").and_then(|minor| minor.parse::<u32>().ok());
+    if minor.is_some_and(|minor| VERSIONS.contains(&minor)) {
+        return Some(());
+    }
+    let message = format!("SDF {version} is not read");
+    reader.error("W032", root, message, format!("versions 1.{} to 1.{} are", VERSIONS.start(), VERSIONS.end()));
+    None
+}
+
+/// The pose that an element says it has; the identity where it says none.
+///
+/// Only poses in the frame of the element around them are read (W035).
+pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
+    let Some(written) = xml::child(node, "pose") else { return Some(Isometry3::identity()) };
+    let relative_to = written.attribute("relative_to").or_else(|| written.attribute("frame")).unwrap_or("");
+    if !["", "__model__", "world"].contains(&relative_to) {
+        let message = format!("a pose relative to `{relative_to}` is not read");
+        reader.error("W035", written, message, "write the pose in the frame of the element around it");
+        return None;
+    }
+    let text = xml::text(written);
+    if text.is_empty() {
+        return Some(Isometry3::identity());
+    }
+    if written.attribute("rotation_format") == Some("quat_xyzw") {
+        let [x, y, z, qx, qy, qz, qw] = reader.numbers(written, text, Bound::Finite)?;
+        return xml::turned([x, y, z], [qx, qy, qz, qw]);
+    }
+    let [x, y, z, roll, pitch, yaw] = reader.numbers(written, text, Bound::Finite)?;
+    let unit = if written.attribute("degrees") == Some("true") { 1f64.to_radians() } else { 1.0 };
+    Some(xml::placed([x, y, z], [roll * unit, pitch * unit, yaw * unit]))
+}
+
+/// A model's links as one rigid body.
+pub(crate) fn read_model(model: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
+    const KNOWN: [&str; 13] = [
+        "link",
+        "joint",
+        "static",
+        "pose",
+        "frame",
+        "self_collide",
+        "allow_auto_disable",
+        "enable_wind",
+        "plugin",
+        "model",
+        "include",
+        "gripper",
+        "name",
+    ];
+    reader.leaves_out(model, &KNOWN);
+    let fixed = xml::child(model, "static").is_some_and(|node| reader.boolean(node).unwrap_or(false));
+    let mut body = Body { fixed, ..Body::default() };
+    for nested in model.children().filter(|child| ["model", "include", "gripper"].contains(&child.tag_name().name())) {
+        let message = format!("`<{}>` inside of a model is not read", nested.tag_name().name());
+        reader.error("W035", nested, message, "write its links into this model, or use it as a model of its own");
+    }
+    for plugin in xml::children(model, "plugin") {
+        reader.warning("W036", plugin, "the plugin is not run".to_owned(), "the model works without it");
+    }
+    let links: Vec<Node> = xml::children(model, "link").collect();
+    check_joints(model, &links, body.fixed, reader);
+    for link in links {
+        read_link(link, &mut body, shapes, reader);
+    }
+    if body.parts.is_empty() && !reader.found.has_errors() {
+        let message = "the model has nothing solid: none of its links has a `<collision>`".to_owned();
+        reader.error("W038", model, message, "give a link a `<collision>`; a `<visual>` is only looked at");
+    }
+    body
+}
+
+/// One body can't bend: links of what moves are joined by fixed joints (W035).
+fn check_joints(model: Node, links: &[Node], fixed: bool, reader: &mut Reader) {
+    let joints: Vec<Node> = xml::children(model, "joint").collect();
+    for joint in joints.iter().filter(|joint| joint.attribute("type") != Some("fixed")) {
+        let kind = joint.attribute("type").unwrap_or("unknown");
+        let name = joint.attribute("name").unwrap_or("");
+        let message = format!("the joint `{name}` is of the type {kind}, and objects can't bend");
+        reader.error("W035", *joint, message, "make the joint `fixed`; robots are read from URDF");
+    }
+    if let (Some(loose), false) = (links.get(joints.len() + 1), fixed) {
+        let name = loose.attribute("name").unwrap_or("");
+        let message = format!("nothing joins the link `{name}` to the others");
+        reader.error("W035", *loose, message, "add a `<joint type=\"fixed\">`, or write `<static>true</static>`");
+    }
+}
+
+fn read_link(link: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
+    const KNOWN: [&str; 10] = [
+        "pose",
+        "inertial",
+        "collision",
+        "visual",
+        "gravity",
+        "kinematic",
+        "velocity_decay",
+        "self_collide",
+        "enable_wind",
+        "must_be_base_link",
+    ];
+    reader.leaves_out(link, &KNOWN);
+    let Some(at) = pose(link, reader) else { return };
+    for (name, usual, message) in [
+        ("gravity", true, "a link that nothing pulls down can't be simulated"),
+        ("kinematic", false, "a link that others move can't be simulated"),
+    ] {
+        if let Some(node) = xml::child(link, name)
+            && reader.boolean(node).is_some_and(|value| value != usual)
+            && !body.fixed
+        {
+            reader.error("W035", node, message.to_owned(), "write `<static>true</static>` for what never moves");
+        }
+    }
+    if let Some(decay) = xml::child(link, "velocity_decay") {
+        let message = "`<velocity_decay>` is not read: air does not slow anything down".to_owned();
+        reader.warning("W036", decay, message, "the model works without it");
+    }
+    let before = body.parts.len();
+    for collision in xml::children(link, "collision") {
+        read_collision(collision, &at, body, shapes, reader);
+    }
+    match xml::child(link, "inertial") {
+        Some(inertial) => {
+            if let Some(mass) = read_inertial(inertial, &at, reader) {
+                body.masses.push(mass);
+            } else {
+                body.weighs_unknown = true;
+            }
+        }
+        None => body.weighs_unknown |= body.parts.len() > before,
+    }
+}
+
+fn read_collision(collision: Node, link: &Isometry3<f64>, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
+    reader.leaves_out(collision, &["pose", "geometry", "surface", "max_contacts", "laser_retro"]);
+    let at = pose(collision, reader);
+    let shape = reader.required(collision, "geometry").and_then(|geometry| shapes.sdf(geometry, reader));
+    if let Some(surface) = xml::child(collision, "surface") {
+        read_surface(surface, body, reader);
+    }
+    let (Some(at), Some(shape)) = (at, shape) else { return };
+    if let Shape::Mesh { mesh } = &shape
+        && !has_volume(mesh)
+    {
+        let message = "the mesh encloses nothing".to_owned();
+        reader.error("W037", collision, message, "a collision mesh is a closed surface; use a thin box for a sheet");
+    }
+    body.parts.push(Part { pose: Pose::from_isometry(&(link * at)), shape });
+}
+
+fn read_surface(surface: Node, body: &mut Body, reader: &mut Reader) {
+    reader.leaves_out(surface, &["friction", "bounce"]);
+    if let Some(friction) = xml::child(surface, "friction") {
+        reader.leaves_out(friction, &["ode"]);
+    }
+    if let Some(ode) = xml::child(surface, "friction").and_then(|friction| xml::child(friction, "ode")) {
+        reader.leaves_out(ode, &["mu", "mu2"]);
+        let mut coefficient = |name| xml::child(ode, name).and_then(|node| reader.number(node, Bound::NotNegative));
+        let (along, across) = (coefficient("mu"), coefficient("mu2"));
+        if let (Some(along), Some(across)) = (along, across)
+            && along != across
+        {
+            let message = format!("friction can't depend on the direction: {along} serves, and {across} does not");
+            reader.warning("W036", ode, message, "give `<mu>` and `<mu2>` the same value");
+        }
+        set("friction", &mut body.friction, along, ode, reader);
+    }
+    if let Some(bounce) = xml::child(surface, "bounce") {
+        reader.leaves_out(bounce, &["restitution_coefficient"]);
+        let coefficient = xml::child(bounce, "restitution_coefficient");
+        let value = coefficient.and_then(|node| reader.number(node, Bound::NotNegative));
+        set("restitution", &mut body.restitution, value.map(|value| value.min(1.0)), bounce, reader);
+    }
+}
+
+/// A body is of one material: the first value counts, and another one is told.
+fn set(what: &str, place: &mut Option<f64>, value: Option<f64>, node: Node, reader: &mut Reader) {
+    match (*place, value) {
+        (None, Some(_)) => *place = value,
+        (Some(known), Some(other)) if known != other => {
+            let message = format!("one body has one {what}: {known} serves, and {other} does not");
+            reader.warning("W036", node, message, "make two models of it, or give all its collisions the same value");
+        }
+        _ => {}
+    }
+}
+
+/// What a link weighs; nothing where it does not say how much.
+fn read_inertial(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<Mass> {
+    reader.leaves_out(inertial, &["mass", "pose", "inertia"]);
+    let at = link * pose(inertial, reader)?;
+    let kg = reader.number(xml::child(inertial, "mass")?, Bound::Positive)?;
+    let moments = xml::child(inertial, "inertia").and_then(|inertia| read_inertia(inertia, reader));
+    let turn = at.rotation.to_rotation_matrix();
+    let about_com = moments.map(|moments| turn.matrix() * moments * turn.matrix().transpose());
+    Some(Mass { kg, com: at.translation.vector, about_com })
+}
+
+fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
+    let mut entry = |name: &str, default| match xml::child(inertia, name) {
+        Some(node) => reader.number(node, Bound::Finite),
+        None => Some(default),
+    };
+    let (xx, yy, zz) = (entry("ixx", 1.0)?, entry("iyy", 1.0)?, entry("izz", 1.0)?);
+    let (xy, xz, yz) = (entry("ixy", 0.0)?, entry("ixz", 0.0)?, entry("iyz", 0.0)?);
+    let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    possible(moments, inertia, reader)
+}
+
+/// Moments that some spread of mass could have; others are told and follow from the shapes (W036).
+pub(crate) fn possible(moments: Matrix3<f64>, inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
+    if is_possible(&moments) {
+        return Some(moments);
+    }
+    let message = "no body has these moments of inertia: they are taken from its shapes instead".to_owned();
+    reader.warning("W036", inertia, message, "each must be above 0 and no larger than the two others together");
+    None
+}

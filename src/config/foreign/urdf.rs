@@ -1,0 +1,130 @@
+//! Objects that are written as URDF: rigid, whatever their links.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Matrix3};
+
+use crate::base::{Diagnostics, Digest, Pose, Source};
+use crate::config::foreign::body::{Body, Mass};
+use crate::config::foreign::geometry::{Shapes, has_volume};
+use crate::config::foreign::lookup::Lookup;
+use crate::config::foreign::sdf::{SdfModel, possible};
+use crate::config::foreign::xml::{self, Bound, Node, Reader};
+use crate::config::{Part, Shape};
+
+/// Links that are joined in a longer chain than this stand in a circle.
+const LONGEST_CHAIN: usize = 256;
+
+/// The object of a URDF file, with what was found in it; nothing where something is wrong.
+pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
+    let document = match xml::parse(source) {
+        Ok(document) => document,
+        Err(faults) => return (None, faults),
+    };
+    let mut reader = Reader::new(source);
+    let mut shapes = Shapes { lookup, path, digest: Digest::new() };
+    shapes.digest.update(source.text.as_bytes());
+    let root = document.root_element();
+    let mut body = Body::default();
+    if root.tag_name().name() == "robot" {
+        read_robot(root, &mut body, &mut shapes, &mut reader);
+    } else {
+        let message = format!("the root is `<{}>` and not `<robot>`", root.tag_name().name());
+        reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");
+    }
+    let found = reader.found;
+    if found.has_errors() {
+        return (None, found);
+    }
+    (Some(SdfModel { body, pose: Isometry3::identity(), digest: shapes.digest.finish() }), found)
+}
+
+fn read_robot(root: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
+    reader.leaves_out(root, &["link", "joint", "material"]);
+    let joints: Vec<Node> = xml::children(root, "joint").collect();
+    for joint in joints.iter().filter(|joint| joint.attribute("type") != Some("fixed")) {
+        let (name, kind) = (joint.attribute("name").unwrap_or(""), joint.attribute("type").unwrap_or("unknown"));
+        let message = format!("the joint `{name}` is of the type {kind}, and objects can't bend");
+        reader.error("W035", *joint, message, "make the joint `fixed`; robots are read through `[robot] profile`");
+    }
+    for link in xml::children(root, "link") {
+        let Some(at) = place(link, &joints, reader) else { continue };
+        read_link(link, &at, body, shapes, reader);
+    }
+    if body.parts.is_empty() && !reader.found.has_errors() {
+        let message = "the object has nothing solid: none of its links has a `<collision>`".to_owned();
+        reader.error("W038", root, message, "give a link a `<collision>`; a `<visual>` is only looked at");
+    }
+}
+
+/// Where a link is: through the fixed joints up to the root.
+fn place(link: Node, joints: &[Node], reader: &mut Reader) -> Option<Isometry3<f64>> {
+    let named =
+        |joint: &Node, end: &str| xml::child(*joint, end).and_then(|node| node.attribute("link")).map(str::to_owned);
+    let mut at = Isometry3::identity();
+    let mut name = link.attribute("name").unwrap_or_default().to_owned();
+    for _ in 0..LONGEST_CHAIN {
+        let Some(joint) = joints.iter().find(|joint| named(joint, "child").as_ref() == Some(&name)) else {
+            return Some(at);
+        };
+        at = origin(*joint, reader)? * at;
+        name = named(joint, "parent").unwrap_or_default();
+    }
+    reader.error("W035", link, "the link's joints lead in a circle".to_owned(), "links form one tree");
+    None
+}
+
+/// The `<origin>` of an element; the identity where it has none.
+fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
+    let Some(written) = xml::child(node, "origin") else { return Some(Isometry3::identity()) };
+    let mut three = |name: &str| match written.attribute(name) {
+        Some(text) => reader.numbers(written, text, Bound::Finite),
+        None => Some([0.0; 3]),
+    };
+    Some(xml::placed(three("xyz")?, three("rpy")?))
+}
+
+fn read_link(link: Node, at: &Isometry3<f64>, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
+    reader.leaves_out(link, &["inertial", "collision", "visual"]);
+    let before = body.parts.len();
+    for collision in xml::children(link, "collision") {
+        let placed = origin(collision, reader);
+        let shape = reader.required(collision, "geometry").and_then(|geometry| shapes.urdf(geometry, reader));
+        let (Some(placed), Some(shape)) = (placed, shape) else { continue };
+        if let Shape::Mesh { mesh } = &shape
+            && !has_volume(mesh)
+        {
+            let message = "the mesh encloses nothing".to_owned();
+            reader.error(
+                "W037",
+                collision,
+                message,
+                "a collision mesh is a closed surface; use a thin box for a sheet",
+            );
+        }
+        body.parts.push(Part { pose: Pose::from_isometry(&(at * placed)), shape });
+    }
+    match xml::child(link, "inertial").and_then(|inertial| read_inertial(inertial, at, reader)) {
+        Some(mass) => body.masses.push(mass),
+        None => body.weighs_unknown |= body.parts.len() > before,
+    }
+}
+
+fn read_inertial(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<Mass> {
+    let at = link * origin(inertial, reader)?;
+    let mass = reader.required(inertial, "mass")?;
+    let written = reader.attribute(mass, "value")?;
+    let [kg] = reader.numbers::<1>(mass, written, Bound::Positive)?;
+    let moments = xml::child(inertial, "inertia").and_then(|inertia| {
+        let mut entry = |name: &str| {
+            let written = reader.attribute(inertia, name)?;
+            reader.numbers::<1>(inertia, written, Bound::Finite).map(|[number]| number)
+        };
+        let (xx, xy, xz) = (entry("ixx")?, entry("ixy")?, entry("ixz")?);
+        let (yy, yz, zz) = (entry("iyy")?, entry("iyz")?, entry("izz")?);
+        possible(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz), inertia, reader)
+    });
+    let turn = at.rotation.to_rotation_matrix();
+    let about_com = moments.map(|moments| turn.matrix() * moments * turn.matrix().transpose());
+    Some(Mass { kg, com: at.translation.vector, about_com })
+}

@@ -1,0 +1,254 @@
+//! Worlds: what stands in them whatever a scene adds, and the names of their places.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use crate::base::{Diagnostics, Pose, Source, Span, did_you_mean, digest_of, names};
+use crate::config::{Located, ObjectModel, Part, Shape, Table};
+
+/// A world that scenes can lie in. Frame of everything: world; the floor at 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorldMap {
+    /// Name by which configurations know it; the file's name without its ending.
+    pub name: String,
+    /// Walls, which nobody names.
+    pub walls: Vec<Wall>,
+    /// What stands in it and never moves.
+    pub furniture: Vec<Furniture>,
+    /// Places where a robot can be sent.
+    pub locations: Vec<Location>,
+    /// Rectangles of the floor that have a name.
+    pub rooms: Vec<Room>,
+    /// Digest of the file it was read from.
+    pub digest: String,
+}
+
+/// A wall as the thing that it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wall {
+    /// Form and class.
+    pub model: ObjectModel,
+    /// Where its middle stands.
+    pub pose: Pose,
+}
+
+/// A piece of furniture. Robots come to its negative x side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Furniture {
+    /// Unique in the world; where its model has a surface, also the surface's name.
+    pub name: String,
+    /// Name of its model.
+    pub model: String,
+    /// Where its model's origin is.
+    pub pose: Pose,
+}
+
+/// A place with a name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Location {
+    /// Unique among the world's locations.
+    pub name: String,
+    /// Units: metres, metres, radians. Shape: x, y, heading.
+    pub at: [f64; 3],
+    /// Name of the surface that it is in front of.
+    pub surface: Option<String>,
+}
+
+/// A room.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Room {
+    /// Unique among the world's rooms.
+    pub name: String,
+    /// Lowest x and y. Unit: metres.
+    pub low_m: [f64; 2],
+    /// Highest x and y. Unit: metres.
+    pub high_m: [f64; 2],
+}
+
+/// A wall's height where it says none: that of a low room. Unit: metres.
+const WALL_HEIGHT_M: f64 = 2.4;
+/// A wall's thickness where it says none. Unit: metres.
+const WALL_THICKNESS_M: f64 = 0.1;
+/// Worlds end there: what is farther away has left the simulation. Unit: metres.
+const FARTHEST_M: f64 = 12.0;
+
+impl WorldMap {
+    /// A floor and nothing else.
+    pub(crate) fn nothing(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            walls: Vec::new(),
+            furniture: Vec::new(),
+            locations: Vec::new(),
+            rooms: Vec::new(),
+            digest: String::new(),
+        }
+    }
+}
+
+/// Reads a world of ours. Models are looked up by `model`: nothing where there is none of that name, which names there are.
+///
+/// # Errors
+/// Every fault of the text: the table reader's own (`C…`), furniture of no known model (W040), two things of one name
+/// (W041), a location in front of what is no surface (W042), a location inside of furniture (W043), a wall or room
+/// without extent (W044).
+pub(crate) fn read<'a>(
+    name: &str,
+    source: &Source,
+    model: impl Fn(&str) -> Option<&'a ObjectModel>,
+    known: &[String],
+) -> Result<WorldMap, Diagnostics> {
+    let mut table = Table::parse(source)?;
+    let mut found = Diagnostics::new();
+    let rooms = table.tables("rooms").into_iter().filter_map(|room| read_room(room, &mut found)).collect();
+    let walls: Vec<Wall> = table.tables("walls").into_iter().filter_map(|wall| read_wall(wall, &mut found)).collect();
+    let mut taken = BTreeSet::new();
+    let mut furniture = Vec::new();
+    for piece in table.tables("furniture") {
+        furniture.extend(read_furniture(piece, &model, known, &mut taken, &mut found));
+    }
+    let mut taken = BTreeSet::new();
+    let mut locations = Vec::new();
+    for location in table.tables("locations") {
+        locations.extend(read_location(location, &furniture, &model, &mut taken, &mut found));
+    }
+    table.finish(&mut found);
+    found.or(WorldMap { name: name.to_owned(), walls, furniture, locations, rooms, digest: digest_of(&source.text) })
+}
+
+/// A name that nothing else of its kind has (W041).
+fn new_name(table: &mut Table, taken: &mut BTreeSet<String>) -> Option<String> {
+    let Located { value, span } = table.string("name")?;
+    if taken.insert(value.clone()) {
+        return Some(value);
+    }
+    table.fault("W041", span, format!("there are two `{value}`"), "give one of them another name");
+    None
+}
+
+fn read_room(mut table: Table, found: &mut Diagnostics) -> Option<Room> {
+    table.require(&["name", "low_m", "high_m"]);
+    let span = table.span();
+    let name = table.string("name").map(|name| name.value);
+    let (low_m, high_m) = (corner(&mut table, "low_m"), corner(&mut table, "high_m"));
+    if let (Some(low), Some(high)) = (low_m, high_m)
+        && (low[0] >= high[0] || low[1] >= high[1])
+    {
+        table.fault(
+            "W044",
+            span,
+            "the room has no extent",
+            "`low_m` has the smaller x and the smaller y, `high_m` the larger ones",
+        );
+    }
+    table.finish(found);
+    Some(Room { name: name?, low_m: low_m?, high_m: high_m? })
+}
+
+fn corner(table: &mut Table, key: &str) -> Option<[f64; 2]> {
+    table.numbers(key, -FARTHEST_M..=FARTHEST_M)
+}
+
+fn read_wall(mut table: Table, found: &mut Diagnostics) -> Option<Wall> {
+    table.require(&["from_m", "to_m"]);
+    let span = table.span();
+    let (from, to) = (corner(&mut table, "from_m"), corner(&mut table, "to_m"));
+    let height = table.number("height_m", 0.05..=10.0).unwrap_or(WALL_HEIGHT_M);
+    let thickness = table.number("thickness_m", 0.01..=2.0).unwrap_or(WALL_THICKNESS_M);
+    let length = |from: [f64; 2], to: [f64; 2]| libm::hypot(to[0] - from[0], to[1] - from[1]);
+    if let (Some(from), Some(to)) = (from, to)
+        && length(from, to) < thickness
+    {
+        table.fault("W044", span, "the wall has no length", "`from_m` and `to_m` are its two ends, x and y");
+    }
+    table.finish(found);
+    let (from, to) = (from?, to?);
+    let heading = libm::atan2(to[1] - from[1], to[0] - from[0]);
+    let middle = [(from[0] + to[0]) / 2.0, (from[1] + to[1]) / 2.0, 0.0];
+    // Walls that meet overlap at the corner.
+    let model = wall_model([length(from, to) + thickness, thickness, height]);
+    Some(Wall { model, pose: Pose::upright(middle, heading) })
+}
+
+/// A wall of painted plaster.
+fn wall_model(size_m: [f64; 3]) -> ObjectModel {
+    let part = Part { pose: Pose::upright([0.0, 0.0, size_m[2] / 2.0], 0.0), shape: Shape::Box { size: size_m } };
+    ObjectModel {
+        name: "wall".to_owned(),
+        category: names::act("Wall"),
+        // Of aerated concrete.
+        mass_kg: 600.0 * part.shape.volume(),
+        friction: 0.6,
+        restitution: 0.0,
+        origin_m: [0.0; 3],
+        size_m,
+        parts: vec![part],
+        fixed: true,
+        inertia: None,
+        surface: None,
+        digest: String::new(),
+    }
+}
+
+fn read_furniture<'a>(
+    mut table: Table,
+    model: &impl Fn(&str) -> Option<&'a ObjectModel>,
+    known: &[String],
+    taken: &mut BTreeSet<String>,
+    found: &mut Diagnostics,
+) -> Option<Furniture> {
+    table.require(&["name", "model", "at_m"]);
+    let name = new_name(&mut table, taken);
+    let named = table.string("model");
+    if let Some(named) = &named
+        && model(&named.value).is_none()
+    {
+        let message = format!("there is no usable model `{}`", named.value);
+        table.fault("W040", named.span.clone(), message, did_you_mean(&named.value, known.iter().map(String::as_str)));
+    }
+    let at = corner(&mut table, "at_m");
+    let heading = table.number("heading_rad", ..).unwrap_or(0.0);
+    table.finish(found);
+    let [x, y] = at?;
+    Some(Furniture { name: name?, model: named?.value, pose: Pose::upright([x, y, 0.0], heading) })
+}
+
+fn read_location<'a>(
+    mut table: Table,
+    furniture: &[Furniture],
+    model: &impl Fn(&str) -> Option<&'a ObjectModel>,
+    taken: &mut BTreeSet<String>,
+    found: &mut Diagnostics,
+) -> Option<Location> {
+    table.require(&["name", "at_m"]);
+    let span: Span = table.key_span("at_m").unwrap_or(table.span());
+    let name = new_name(&mut table, taken);
+    let at = corner(&mut table, "at_m");
+    let heading = table.number("heading_rad", ..).unwrap_or(0.0);
+    let surface = table.string("surface");
+    let carries = |piece: &&Furniture| model(&piece.model).is_some_and(|model| model.surface.is_some());
+    if let Some(surface) = &surface
+        && !furniture.iter().filter(carries).any(|piece| piece.name == surface.value)
+    {
+        let message = format!("the world has no surface `{}`", surface.value);
+        let surfaces: Vec<&str> = furniture.iter().filter(carries).map(|piece| piece.name.as_str()).collect();
+        table.fault("W042", surface.span.clone(), message, did_you_mean(&surface.value, surfaces));
+    }
+    if let Some(at) = at {
+        let inside =
+            furniture.iter().find(|piece| model(&piece.model).is_some_and(|model| is_inside(at, piece, model)));
+        if let Some(piece) = inside {
+            let message = format!("the location lies inside of `{}`", piece.name);
+            table.fault("W043", span, message, "a robot stands on a location: leave room for it");
+        }
+    }
+    table.finish(found);
+    let [x, y] = at?;
+    Some(Location { name: name?, at: [x, y, heading], surface: surface.map(|surface| surface.value) })
+}
+
+fn is_inside([x, y]: [f64; 2], piece: &Furniture, model: &ObjectModel) -> bool {
+    let local = piece.pose.to_isometry().inverse() * nalgebra::Point3::new(x, y, 0.0);
+    local.x.abs() < model.size_m[0] / 2.0 && local.y.abs() < model.size_m[1] / 2.0
+}

@@ -1,0 +1,66 @@
+//! A world as scenes are drawn in it: what stands there already.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::config::{ObjectModel, WorldMap};
+use crate::scenario::{Role, SceneObject};
+
+/// A world with its furniture and walls as objects of a scene.
+#[derive(Debug, Clone)]
+pub(super) struct Surroundings {
+    pub(super) map: Arc<WorldMap>,
+    /// Furniture, then walls.
+    standing: Vec<SceneObject>,
+}
+
+impl Surroundings {
+    pub(super) fn new(map: &Arc<WorldMap>, models: &BTreeMap<String, Arc<ObjectModel>>) -> Self {
+        let furniture = map.furniture.iter().filter_map(|piece| {
+            let model = models.get(&piece.model)?;
+            Some(standing(piece.name.clone(), Arc::clone(model), piece.pose))
+        });
+        let walls = map
+            .walls
+            .iter()
+            .enumerate()
+            .map(|(idx, wall)| standing(format!("wall_{}", idx + 1), Arc::new(wall.model.clone()), wall.pose));
+        Self { map: Arc::clone(map), standing: furniture.chain(walls).collect() }
+    }
+
+    /// Furniture on which things can stand.
+    pub(super) fn surfaces(&self) -> impl Iterator<Item = &SceneObject> {
+        self.standing.iter().filter(|object| object.model.surface.is_some())
+    }
+
+    /// The piece of furniture of a name that things can stand on.
+    pub(super) fn surface(&self, name: &str) -> Option<&SceneObject> {
+        self.surfaces().find(|object| object.id == name)
+    }
+
+    /// Everything but one thing.
+    pub(super) fn others(&self, but: Option<&str>) -> impl Iterator<Item = &SceneObject> {
+        self.standing.iter().filter(move |object| Some(object.id.as_str()) != but)
+    }
+
+    /// The rectangle around everything: lowest and highest x and y. Unit: metres.
+    pub(super) fn extent(&self) -> ([f64; 2], [f64; 2]) {
+        let corners = self.map.rooms.iter().flat_map(|room| [room.low_m, room.high_m]);
+        let middles = self.standing.iter().map(|object| [object.pose.position[0], object.pose.position[1]]);
+        corners.chain(middles).fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), at| {
+            ([low[0].min(at[0]), low[1].min(at[1])], [high[0].max(at[0]), high[1].max(at[1])])
+        })
+    }
+}
+
+fn standing(id: String, model: Arc<ObjectModel>, pose: crate::base::Pose) -> SceneObject {
+    SceneObject {
+        id,
+        role: Role::Platform,
+        pose,
+        mass_kg: model.mass_kg,
+        friction: model.friction,
+        restitution: model.restitution,
+        model,
+    }
+}

@@ -1,0 +1,138 @@
+//! Meshes taken apart into convex solids, which is all that contacts can be found between.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use parry3d::math::Vector;
+use parry3d::transformation::try_convex_hull;
+use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
+
+use crate::base::Digest;
+use crate::scenario::{Mesh, Shape};
+use crate::world::convert::to_real;
+
+/// Counts up whenever the same mesh and parameters would give other solids.
+const ALGORITHM: u32 = 1;
+/// Cells along the longest side of the box around a mesh. At 64 a cell of a mug is 1.5 mm.
+const RESOLUTION: u32 = 64;
+/// How much of its hull's volume a piece may lack, as a share of the whole mesh's hull. 0.01 keeps a mug open.
+const CONCAVITY: f32 = 0.01;
+/// At most this many pieces: each costs time in every step of every run.
+const MOST_HULLS: u32 = 32;
+/// A mesh that fills its hull so far is convex but for rounding.
+const CONVEX: f64 = 0.97;
+
+/// What the solids of a mesh are a function of: the mesh and how it is taken apart.
+pub fn decomposition_key(mesh: &Mesh) -> String {
+    let mut digest = Digest::new();
+    digest.update(mesh.digest().as_bytes());
+    for number in [ALGORITHM, RESOLUTION, CONCAVITY.to_bits(), MOST_HULLS] {
+        digest.update(&number.to_le_bytes());
+    }
+    digest.finish()
+}
+
+/// Convex solids that fill a mesh: hulls, in the mesh's own frame. The same mesh gives the same bits.
+///
+/// # Errors
+/// A lower-case sentence where nothing solid can be made of it: its points lie in a plane, or it defeats the library.
+pub fn decompose(mesh: &Mesh) -> Result<Vec<Shape>, String> {
+    let frame = Frame::around(mesh);
+    let points: Vec<Vector> = mesh.vertices.iter().map(|vertex| frame.inside(vertex)).collect();
+    let whole = frame.hull(&points).ok_or("its points lie in a plane")?;
+    if mesh.volume() >= CONVEX * whole.volume() {
+        return Ok(vec![whole]);
+    }
+    let pieces = catch_unwind(AssertUnwindSafe(|| pieces(&points, &mesh.triangles)))
+        .map_err(|_| "it can't be taken apart into convex solids")?;
+    // Slivers without a hull have no volume that could be missed.
+    let hulls: Vec<Shape> = pieces.iter().filter_map(|piece| frame.hull(piece)).collect();
+    Ok(if hulls.is_empty() { vec![whole] } else { hulls })
+}
+
+/// Points of the surface inside of each piece.
+fn pieces(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<Vec<Vector>> {
+    let parameters = VHACDParameters {
+        resolution: RESOLUTION,
+        concavity: CONCAVITY,
+        max_convex_hulls: MOST_HULLS,
+        ..VHACDParameters::default()
+    };
+    VHACD::decompose(&parameters, points, triangles, true).compute_primitive_intersections(points, triangles)
+}
+
+/// A box of side 1 about the origin, in which the library's tolerances mean the same for things of all sizes.
+struct Frame {
+    middle: [f64; 3],
+    side: f64,
+}
+
+impl Frame {
+    fn around(mesh: &Mesh) -> Self {
+        let extreme = |pick: fn(f64, f64) -> f64, start: f64| {
+            mesh.vertices.iter().fold([start; 3], |best, v| [0, 1, 2].map(|axis| pick(best[axis], v[axis])))
+        };
+        let (low, high) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
+        let side = [0, 1, 2].map(|axis| high[axis] - low[axis]).into_iter().fold(f64::MIN_POSITIVE, f64::max);
+        Self { middle: [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0), side }
+    }
+
+    fn inside(&self, point: &[f64; 3]) -> Vector {
+        let [x, y, z] = [0, 1, 2].map(|axis| to_real((point[axis] - self.middle[axis]) / self.side));
+        Vector::new(x, y, z)
+    }
+
+    fn outside(&self, point: &Vector) -> [f64; 3] {
+        let point = [point.x, point.y, point.z].map(f64::from);
+        [0, 1, 2].map(|axis| point[axis] * self.side + self.middle[axis])
+    }
+
+    /// The hull of some points; nothing where they lie in a plane.
+    fn hull(&self, points: &[Vector]) -> Option<Shape> {
+        let (corners, triangles) = catch_unwind(AssertUnwindSafe(|| try_convex_hull(points).ok())).ok().flatten()?;
+        let corners: Vec<[f64; 3]> = corners.iter().map(|corner| self.outside(corner)).collect();
+        let volume = Mesh::new(corners, triangles).ok().map(|mesh| (mesh.volume(), mesh.welded().vertices));
+        let (volume, points) = volume?;
+        // A millionth of the box: thinner than any sheet that could be felt.
+        (volume > 1e-6 * self.side.powi(3)).then_some(Shape::Hull { points, volume })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An L: two boxes of 1 × 1 × 1 and 1 × 1 × 2, side by side, as one surface.
+    fn angle() -> Mesh {
+        let profile = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        let at = |y: f64| profile.map(|[x, z]| [x, y, z]);
+        let vertices: Vec<[f64; 3]> = at(0.0).into_iter().chain(at(1.0)).collect();
+        let cap = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+        let mut triangles: Vec<[u32; 3]> = cap.to_vec();
+        triangles.extend(cap.map(|[a, b, c]| [a + 6, c + 6, b + 6]));
+        for side in 0..6 {
+            let next = (side + 1) % 6;
+            triangles.extend([[side, side + 6, next + 6], [side, next + 6, next]]);
+        }
+        Mesh::new(vertices, triangles).expect("it is right")
+    }
+
+    #[test]
+    fn an_angle_becomes_two_solids_and_the_same_bits_each_time() {
+        let solids = decompose(&angle()).expect("it is right");
+        assert!((2..=8).contains(&solids.len()), "{}", solids.len());
+        let volume: f64 = solids.iter().map(Shape::volume).sum();
+        assert!((volume - 3.0).abs() < 0.1, "{volume}");
+        assert_eq!(solids, decompose(&angle()).expect("it is right"));
+        assert_eq!(decomposition_key(&angle()), decomposition_key(&angle()));
+    }
+
+    #[test]
+    fn what_is_convex_is_one_solid_and_what_is_flat_is_none() {
+        let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let tetrahedron = Mesh::new(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).expect("it is right");
+        assert_eq!(decompose(&tetrahedron).expect("it is right").len(), 1);
+        let flat =
+            Mesh::new(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]).expect("it is right");
+        assert!(decompose(&flat).is_err());
+    }
+}

@@ -1,0 +1,155 @@
+//! Other people's models: a folder in Gazebo's layout works as it is, and what is wrong with one is told with its place.
+//!
+//! A wrong model is a folder below `tests/diagnostics/models/` that holds the model `thing`, with what is said about it in
+//! `expected`. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write what is missing, and read it.
+
+use std::path::{Path, PathBuf};
+
+use actcheck::base::{Diagnostics, Files, Source};
+use actcheck::campaign::Env;
+use actcheck::config::{self, Campaign, Overrides, Shape};
+use actcheck::rules::Budget;
+
+use crate::support::{actcheck, copy, root, stderr, stdout};
+
+const WRONG: &str = "tests/diagnostics/models";
+
+fn campaign(folder: &Path, text: &str) -> Result<Campaign, Diagnostics> {
+    let text = format!("tests = [[\"Pick\"]]\ntest_count = 1\n{text}");
+    config::load_text(Source::new(folder.join("c.toml").display().to_string(), text), folder, &Overrides::default())
+}
+
+/// A folder with the models of `tests/models/gazebo` and a configuration that uses them.
+fn project(text: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&root().join("tests/models/gazebo"), &folder.path().join("models"));
+    let path = folder.path().join("c.toml");
+    std::fs::write(&path, format!("tests = [[\"Pick\"]]\ntest_count = 2\nmodel_dir = \"models\"\n{text}")).unwrap();
+    (folder, path)
+}
+
+const USED: &str = "[objectSurface]\nobject_surfaces = [\"cafe_table\"]\n[pickObject]\nmodel_list = [\"paper_cup\"]\n\
+    [surfaceObjects]\nmodel_list = [\"cheese\", \"pill_box\"]\ncount = 2\n";
+
+#[test]
+fn every_wrong_model_is_told_with_its_place() {
+    let bless = std::env::var_os("ACTCHECK_BLESS").is_some();
+    let cases = Files::Disk.folders(Path::new(WRONG));
+    assert!(cases.len() >= 40, "only {} cases", cases.len());
+    let mut wrong = Vec::new();
+    for case in cases {
+        let name = case.file_name().unwrap().to_str().unwrap();
+        let said =
+            campaign(Path::new(WRONG), &format!("model_dir = \"{name}\"\n[pickObject]\nmodel_list = [\"thing\"]\n"))
+                .map_or_else(|found| found.to_string(), |_| String::new());
+        let expected_path = case.join("expected");
+        if bless {
+            std::fs::write(&expected_path, &said).unwrap();
+        }
+        let expected = std::fs::read_to_string(&expected_path).unwrap_or_default();
+        if said.is_empty() || said != expected {
+            wrong.push(format!("== {}\n-- expected\n{expected}-- said\n{said}", case.display()));
+        }
+        assert_eq!(said.matches("  help: ").count(), said.lines().count() / 2, "each fault has its help:\n{said}");
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Sizes, masses and centres as they follow from the files by hand.
+#[test]
+fn models_of_all_formats_are_what_their_files_say() {
+    let (folder, _) = project("");
+    let campaign = campaign(folder.path(), "model_dir = \"models\"\n").unwrap();
+    let names: Vec<&str> = campaign.models.keys().map(String::as_str).collect();
+    assert_eq!(names, ["cafe_table", "cheese", "paper_cup", "pill_box"]);
+    let near = |found: [f64; 3], expected: [f64; 3]| {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?} is not {expected:?}");
+    };
+    let cup = &campaign.models["paper_cup"];
+    near(cup.size_m, [0.076, 0.076, 0.09]);
+    assert_eq!((cup.mass_kg, cup.friction, cup.restitution, cup.fixed), (0.12, 0.6, 0.05, false));
+    // The link's pose lifts it, and a model stands on the ground: its centre of mass moves with it.
+    near(cup.inertia.unwrap().com_m, [0.0, 0.0, 0.04]);
+    near(cup.inertia.unwrap().about_com[2], [0.0, 0.0, 0.000_125]);
+    let cheese = &campaign.models["cheese"];
+    // 10 × 6 × 4 cm, turned by a right angle; half a box of water.
+    near(cheese.size_m, [0.06, 0.1, 0.04]);
+    assert!((cheese.mass_kg - 0.12).abs() < 1e-6 && cheese.friction == 1.0, "{}", cheese.mass_kg);
+    let table = &campaign.models["cafe_table"];
+    near(table.size_m, [0.8, 0.5, 0.69]);
+    assert!(table.fixed);
+    let surface = table.surface.unwrap();
+    near([surface.size_m[0], surface.size_m[1], surface.height_m], [0.8, 0.5, 0.69]);
+    let pill_box = &campaign.models["pill_box"];
+    near(pill_box.size_m, [0.06, 0.05, 0.09]);
+    assert!((pill_box.mass_kg - 0.25).abs() < 1e-9);
+    near(pill_box.inertia.unwrap().com_m, [0.0, 0.0, (0.2 * 0.03 + 0.05 * 0.075) / 0.25]);
+    assert!(matches!(pill_box.parts[1].shape, Shape::Capsule { .. }));
+}
+
+/// The broken one is named with all that is wrong with it; the others work.
+#[test]
+fn a_broken_model_is_named_and_the_others_work() {
+    let (folder, _) = project(USED);
+    let campaign = campaign(folder.path(), &format!("model_dir = \"models\"\n{USED}")).unwrap();
+    let said = campaign.warnings.to_string();
+    for part in
+        ["broken_lamp/model.sdf:6:25", "there is no `broken_lamp/meshes/foot.stl`", "`hinge` is of the type revolute"]
+    {
+        assert!(said.contains(part), "{said}");
+    }
+    assert!(!said.contains("paper_cup/"), "{said}");
+    // Asked for by name, it is refused.
+    let asked = USED.replace("paper_cup", "broken_lamp");
+    let refused = self::campaign(folder.path(), &format!("model_dir = \"models\"\n{asked}")).unwrap_err();
+    assert!(refused.has_errors() && !refused.to_string().contains("C008"), "{refused}");
+}
+
+/// Meshes are taken apart once; what is kept is the same as what is made anew, and what is damaged is made anew.
+#[test]
+fn meshes_are_taken_apart_and_kept_beside_the_history() {
+    let (folder, path) = project(USED);
+    let solids = || {
+        let env = Env::prepare_within(&path, &Overrides::default(), Budget::default()).unwrap();
+        format!("{:?}", env.campaign.models["paper_cup"].parts)
+    };
+    let made = solids();
+    assert!(made.matches("Hull").count() >= 8, "a cup is hollow: {made}");
+    let kept = Files::Disk.list(&folder.path().join(".actcheck/hulls"));
+    // The cup, the cheese and the top of the table.
+    assert_eq!(kept.len(), 3, "{kept:?}");
+    assert_eq!(solids(), made);
+    for file in &kept {
+        std::fs::write(file, "not what it was").unwrap();
+    }
+    assert_eq!(solids(), made);
+    assert!(kept.iter().all(|file| std::fs::read(file).unwrap().len() > 100));
+}
+
+/// A name tells what a thing is, `[categories]` tells otherwise, and what nobody tells is an object.
+#[test]
+fn names_and_the_configuration_say_what_models_are() {
+    let category = |text: &str| {
+        let (_folder, path) = project(&format!("{USED}{text}"));
+        let env = Env::prepare_within(&path, &Overrides::default(), Budget::default()).unwrap();
+        let all = ["paper_cup", "cafe_table", "cheese"]
+            .map(|name| env.campaign.models[name].category.replace("http://actions#", ""));
+        (all.join(" "), env.campaign.warnings.to_string())
+    };
+    let (categories, said) = category("");
+    assert_eq!(categories, "Cup Table Object");
+    assert!(said.contains("W039: nothing says what `cheese` is"), "{said}");
+    let (categories, said) = category("[categories]\ncheese = \"act:Tableware\"\npaper_cup = \"act:Glass\"\n");
+    assert_eq!(categories, "Glass Table Tableware");
+    assert!(!said.contains("W039"), "{said}");
+}
+
+#[test]
+fn a_campaign_runs_with_a_folder_of_gazebo_models() {
+    let (folder, _) = project(USED);
+    let output = actcheck(folder.path(), &["run", "c.toml", "--jobs", "1", "--format", "json"]);
+    assert!(output.status.code().is_some_and(|code| code <= 1), "{}", stderr(&output));
+    assert!(stderr(&output).contains("broken_lamp"), "{}", stderr(&output));
+    let json = stdout(&output);
+    assert!(json.contains("\"runs\"") && !json.contains("\"broken\": 1"), "{json}");
+}

@@ -1,0 +1,379 @@
+//! Worlds: the shipped ones hold what they promise, scenes lie in them, rules see their maps, and wrong ones are told.
+//!
+//! A wrong world is a case of `WRONG` below: a text, and what is said about it.
+
+use std::path::Path;
+
+use actcheck::base::{Choices, Diagnostics, Source, Term, names};
+use actcheck::campaign::Env;
+use actcheck::config::{self, Campaign, Overrides};
+use actcheck::rules::Budget;
+use actcheck::scenario::{Role, Scene, Solid, draw};
+
+use crate::support::{actcheck, root, stderr};
+
+const TABLES: &str = "[pickObject]\nmodel_list = [\"glass\", \"mug\"]\n[surfaceObjects]\nmodel_list = [\"can\", \"bowl\"]\ncount = [1, 3]\n";
+
+fn campaign(folder: &Path, text: &str) -> Result<Campaign, Diagnostics> {
+    let text = format!("tests = [[\"Pick\"]]\ntest_count = 1\n{text}");
+    config::load_text(Source::new("c.toml", text), folder, &Overrides::default())
+}
+
+fn env(text: &str) -> (tempfile::TempDir, Env) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("c.toml");
+    std::fs::write(&path, format!("tests = [[\"Pick\"]]\ntest_count = 2\n{text}")).unwrap();
+    let env =
+        Env::prepare_within(&path, &Overrides::default(), Budget::default()).unwrap_or_else(|found| panic!("{found}"));
+    (folder, env)
+}
+
+fn scenes(env: &Env, n: u64) -> Vec<Scene> {
+    let drawn: Vec<Scene> =
+        (0..n).filter_map(|index| draw(&env.space, 0, &mut Choices::random(7, index)).ok()).collect();
+    assert!(drawn.len() as u64 > n / 2, "more than half of the scenes are discarded: {} of {n} are left", drawn.len());
+    drawn
+}
+
+const EVERYWHERE: &str = "[world]\nworlds = [\"apartment\", \"lab\"]\n[objectSurface]\nobject_surfaces = [\"dining_table\", \
+    \"coffee_table\", \"side_table\", \"kitchen_cabinet\", \"left_bench\", \"right_bench\", \"assembly_table\"]\n";
+
+/// Furniture and walls do not stand in each other, and a robot fits on every location.
+#[test]
+fn shipped_worlds_leave_room() {
+    for (name, surface) in [("apartment", "dining_table"), ("lab", "left_bench"), ("empty_room", "table")] {
+        let (_folder, env) = env(&format!(
+            "[world]\nworlds = [\"{name}\"]\n[objectSurface]\nobject_surfaces = [\"{surface}\"]\n{TABLES}"
+        ));
+        let mut scene = draw(&env.space, 0, &mut Choices::recorded(&[])).unwrap();
+        scene.objects.retain(|object| object.role == Role::Platform);
+        let walls = |object: &&actcheck::scenario::SceneObject| object.model.name == "wall";
+        let solids: Vec<(String, Solid)> =
+            scene.objects.iter().filter(|o| !walls(o)).map(|o| (o.id.clone(), Solid::new(&o.model, &o.pose))).collect();
+        for (idx, (id, solid)) in solids.iter().enumerate() {
+            for (other_id, other) in &solids[idx + 1..] {
+                assert!(!solid.is_in_the_way_of(other), "{name}: {id} stands in {other_id}");
+            }
+            for wall in scene.objects.iter().filter(walls) {
+                assert!(
+                    !solid.is_in_the_way_of(&Solid::new(&wall.model, &wall.pose)),
+                    "{name}: {id} stands in {}",
+                    wall.id
+                );
+            }
+        }
+        for location in &env.campaign.worlds[name].locations {
+            for object in &scene.objects {
+                let local =
+                    object.pose.to_isometry().inverse() * nalgebra::Point3::new(location.at[0], location.at[1], 0.0);
+                let gap =
+                    (local.x.abs() - object.model.size_m[0] / 2.0).max(local.y.abs() - object.model.size_m[1] / 2.0);
+                assert!(gap > 0.35, "{name}: {} is {gap} m from {}", location.name, object.id);
+            }
+        }
+    }
+    let campaign = campaign(Path::new(""), "[world]\nworlds = [\"apartment\"]\n").unwrap();
+    let kinds: Vec<&str> = campaign.worlds["apartment"].furniture.iter().map(|piece| piece.model.as_str()).collect();
+    for kind in ["table", "shelf", "sofa", "cabinet", "coffee_table", "mini_coffee_table"] {
+        assert!(kinds.contains(&kind), "{kinds:?}");
+    }
+}
+
+/// Objects stand on the surface that was drawn, wherever in the world it is, and the robot faces it.
+#[test]
+fn scenes_lie_where_their_world_says() {
+    let (_folder, env) = env(&format!("{EVERYWHERE}{TABLES}"));
+    let scenes = scenes(&env, 60);
+    let mut surfaces = std::collections::BTreeSet::new();
+    for scene in &scenes {
+        let platform = &scene.objects[0];
+        assert_eq!(scene.designators["objectSurface"], std::slice::from_ref(&platform.id));
+        surfaces.insert(platform.id.clone());
+        let surface = platform.model.surface.unwrap();
+        for object in scene.objects.iter().filter(|object| matches!(object.role, Role::Target | Role::Other)) {
+            let local = platform.pose.to_isometry().inverse() * nalgebra::Point3::from(object.pose.position);
+            assert!(
+                local.x.abs() < surface.size_m[0] / 2.0 && local.y.abs() < surface.size_m[1] / 2.0,
+                "{}",
+                object.id
+            );
+            assert!((local.z - surface.height_m).abs() < 1e-9);
+        }
+        let [x, y, heading] = scene.robot.base;
+        let local = platform.pose.to_isometry().inverse() * nalgebra::Point3::new(x, y, 0.0);
+        assert!(local.x < -surface.size_m[0] / 2.0 - 0.5 && local.y.abs() < 0.06, "{local}");
+        assert!((heading - platform.pose.yaw()).abs() < 0.06);
+        assert!(!scene.map.is_empty());
+    }
+    assert!(surfaces.len() >= 6, "{surfaces:?}");
+}
+
+#[test]
+fn obstacles_stand_on_the_floor_and_in_nobodys_way() {
+    for text in [
+        format!("nav_obstacle_list = [\"box\", \"bottle\"]\nnav_obstacle_count = 4\n{EVERYWHERE}{TABLES}"),
+        format!(
+            "nav_obstacle_list = [\"box\"]\nnav_obstacle_count = 3\n[objectSurface]\nobject_surfaces = [\"table\"]\n{TABLES}"
+        ),
+    ] {
+        let (_folder, env) = env(&text);
+        for scene in scenes(&env, 20) {
+            let obstacles: Vec<_> = scene.objects.iter().filter(|object| object.role == Role::Obstacle).collect();
+            assert!(obstacles.len() >= 3);
+            for obstacle in obstacles {
+                assert_eq!(obstacle.pose.position[2], 0.0);
+                let solid = Solid::new(&obstacle.model, &obstacle.pose);
+                for other in scene.objects.iter().filter(|other| other.id != obstacle.id) {
+                    assert!(
+                        !solid.is_in_the_way_of(&Solid::new(&other.model, &other.pose)),
+                        "{} and {}",
+                        obstacle.id,
+                        other.id
+                    );
+                }
+                let [x, y, _] = scene.robot.base;
+                assert!((x - obstacle.pose.position[0]).hypot(y - obstacle.pose.position[1]) > 0.4);
+            }
+        }
+    }
+}
+
+/// Sizes, lying objects and the start of the base are drawn where the configuration asks for it.
+#[test]
+fn scenes_use_every_parameter() {
+    let text = format!(
+        "[objectSurface]\nobject_surfaces = [\"table\"]\n[placeSurface]\nplace_object_surfaces = [\"coffee_table\"]\n{}\
+         lying = 0.5\n[physics]\nsize_scale = [0.95, 1.05]\n[robot]\nstart_x_m = [-2.5, -2.0]\nstart_y_m = [-1, 1]\nstart_heading_rad = [0, 1]\n",
+        TABLES.replace("\"bowl\"", "\"bottle\"")
+    );
+    let (_folder, env) = env(&text);
+    let scenes = scenes(&env, 40);
+    let others: Vec<_> =
+        scenes.iter().flat_map(|scene| &scene.objects).filter(|object| object.role == Role::Other).collect();
+    let lying = others.iter().filter(|object| object.pose.tilt() > 1.5).count();
+    assert!(lying > others.len() / 5 && lying < others.len() * 4 / 5, "{lying} of {}", others.len());
+    for scene in &scenes {
+        let [x, y, heading] = scene.robot.base;
+        assert!((-2.5..=-2.0).contains(&x) && (-1.0..=1.0).contains(&y) && (0.0..=1.0).contains(&heading));
+        let target = scene.objects.iter().find(|object| object.role == Role::Target).unwrap();
+        let scale = target.model.size_m[2] / env.campaign.models[&target.model.name].size_m[2];
+        assert!((0.95..=1.05).contains(&scale) && scale != 1.0, "{scale}");
+        assert_eq!(scene.designators["placeSurface"], ["coffee_table_1"]);
+    }
+    // What lies stays where it was put: its lowest point is on the table.
+    let bottle = others.iter().find(|object| object.model.name == "bottle" && object.pose.tilt() > 1.5).unwrap();
+    let low = bottle.model.parts.iter().map(|part| {
+        let at = bottle.pose.to_isometry() * part.pose.to_isometry();
+        actcheck::config::Part { pose: actcheck::base::Pose::from_isometry(&at), shape: part.shape.clone() }.bounds().0
+            [2]
+    });
+    let lowest = low.fold(f64::INFINITY, f64::min);
+    assert!((lowest - 0.74).abs() < 0.005, "{lowest}");
+}
+
+/// A rule can ask where things are: the map is part of every state.
+#[test]
+fn the_map_is_facts() {
+    let text = "[world]\nworlds = [\"apartment\"]\n[objectLocation]\nlocation_list = [\"dining_table_front\"]\n[objectSurface]\n\
+        object_surfaces = [\"dining_table\"]\n";
+    let (_folder, env) = env(&format!("{text}{TABLES}"));
+    let scene = scenes(&env, 1).remove(0);
+    let trace = actcheck::actions::Trace {
+        snapshots: vec![actcheck::world::build(&scene).unwrap().snapshot()],
+        actions: Vec::new(),
+        frames: actcheck::actions::Frames::default(),
+        hash: String::new(),
+        map: scene.map.clone(),
+    };
+    let facts = actcheck::facts::extract(&trace);
+    let holds = |subject: &str, property: &str, object: Term| {
+        facts.snapshots[0].iter().any(|[s, p, o]| {
+            *facts.terms.term(*s) == Term::iri(names::w(subject))
+                && *facts.terms.term(*p) == Term::iri(names::w(property))
+                && *facts.terms.term(*o) == object
+        })
+    };
+    assert!(holds("location/dining_table_front", "ofSurface", Term::iri(names::obj("dining_table"))));
+    assert!(holds("location/dining_table_front", "inRoom", Term::iri(names::w("room/kitchen"))));
+    assert!(holds("room/kitchen", "highX", Term::Double(4.0)));
+    for [_, property, _] in &facts.snapshots[0] {
+        let Term::Iri(property) = facts.terms.term(*property) else { panic!("properties are IRIs") };
+        let known = env.ontology.vocabulary.terms.contains_key(&**property) || !property.starts_with(names::W);
+        assert!(known, "{property} is not in ontology/world.ttl");
+    }
+}
+
+/// What is wrong with a world, as a text for `models/worlds/wrong.toml` and the beginnings of all that is said.
+const WRONG: [(&str, &[&str]); 12] = [
+    ("rooms = 3", &["C004 m/worlds/wrong.toml:1:9: `rooms` must be a list of tables"]),
+    ("[[wals]]\nfrom_m = [0, 0]", &["C003 m/worlds/wrong.toml:1:3: unknown key `wals`"]),
+    ("[[walls]]\nfrom_m = [0, 0]", &["C005 m/worlds/wrong.toml:1:1: `walls[1].to_m` is missing"]),
+    ("[[walls]]\nfrom_m = [1, 1]\nto_m = [1, 1]", &["W044 m/worlds/wrong.toml:1:1: the wall has no length"]),
+    ("[[walls]]\nfrom_m = [1, 1]\nto_m = [1, 99]", &["C006 m/worlds/wrong.toml:3:12: `walls[1].to_m` is 99"]),
+    (
+        "[[rooms]]\nname = \"r\"\nlow_m = [1, 1]\nhigh_m = [0, 2]",
+        &["W044 m/worlds/wrong.toml:1:1: the room has no extent"],
+    ),
+    (
+        "[[furniture]]\nname = \"t\"\nmodel = \"tabel\"\nat_m = [0, 0]",
+        &["W040 m/worlds/wrong.toml:3:9: there is no usable model `tabel`"],
+    ),
+    (
+        "[[furniture]]\nname = \"t\"\nmodel = \"table\"\nat_m = [0, 0, 0]",
+        &["C004 m/worlds/wrong.toml:4:8: `furniture[1].at_m` must be a list of 2 numbers"],
+    ),
+    (
+        "[[furniture]]\nname = \"t\"\nmodel = \"table\"\nat_m = [0, 0]\n[[furniture]]\nname = \"t\"\nmodel = \"table\"\nat_m = [3, 0]",
+        &["W041 m/worlds/wrong.toml:6:8: there are two `t`"],
+    ),
+    (
+        "[[locations]]\nname = \"l\"\nat_m = [0, 0]\nsurface = \"t\"",
+        &["W042 m/worlds/wrong.toml:4:11: the world has no surface `t`"],
+    ),
+    (
+        "[[furniture]]\nname = \"t\"\nmodel = \"table\"\nat_m = [0, 0]\n[[locations]]\nname = \"l\"\nat_m = [0.5, 0]\nsurface = \"t\"",
+        &["W043 m/worlds/wrong.toml:7:1: the location lies inside of `t`"],
+    ),
+    ("name = [", &["C002 m/worlds/wrong.toml:1:9: this is not TOML"]),
+];
+
+#[test]
+fn wrong_worlds_are_told_with_their_places() {
+    for (text, expected) in WRONG {
+        let folder = tempfile::tempdir().unwrap();
+        let models = folder.path().join("m");
+        std::fs::create_dir_all(models.join("worlds")).unwrap();
+        crate::support::copy(&root().join("models/objects"), &models.join("objects"));
+        std::fs::write(models.join("worlds/wrong.toml"), text).unwrap();
+        let found = campaign(folder.path(), "model_dir = \"m\"\n[world]\nworlds = [\"wrong\"]\n").unwrap_err();
+        let said = found.to_string().replace(&format!("{}/", folder.path().display()), "");
+        for part in expected {
+            assert!(said.contains(part), "{text}\n-- expected\n{part}\n-- said\n{said}");
+        }
+        assert_eq!(said.matches("  help: ").count(), said.lines().count() / 2, "each fault has its help:\n{said}");
+    }
+}
+
+/// Configurations that speak of places that are not there.
+#[test]
+fn names_of_places_that_are_not_there_are_told() {
+    let said = |text: &str| match campaign(Path::new(""), text) {
+        Err(found) => found.to_string(),
+        Ok(campaign) => {
+            let ontology = actcheck::ontology::load(&campaign.ontology.0, &campaign.ontology.1).unwrap();
+            actcheck::scenario::Space::new(&campaign, &ontology)
+                .map_or_else(|found| found.to_string(), |_| String::new())
+        }
+    };
+    for (text, expected) in [
+        (
+            "[world]\nworlds = [\"apartement\"]\n",
+            "C020 c.toml:4:11: there is no world `apartement`\n  help: did you mean `apartment`?",
+        ),
+        (
+            "[world]\nworlds = [\"lab\"]\n[objectSurface]\nobject_surfaces = [\"left_bank\"]\n",
+            "C021 c.toml:6:20: no world of the configuration has a surface `left_bank`\n  help: did you mean `left_bench`?",
+        ),
+        (
+            "[world]\nworlds = [\"lab\"]\n[objectLocation]\nlocation_list = [\"dor\"]\n",
+            "C021 c.toml:6:18: no world of the configuration has a location `dor`",
+        ),
+        (
+            "[world]\nworlds = [\"lab\", \"apartment\"]\n[objectSurface]\nobject_surfaces = [\"left_bench\"]\n[pickObject]\nmodel_list = [\"glass\"]\n",
+            "S009 c.toml:4:18: the world `apartment` has none of the surfaces",
+        ),
+        (
+            "[world]\nworlds = [\"lab\"]\n[objectLocation]\nlocation_list = [\"right_bench_front\"]\n[objectSurface]\nobject_surfaces = [\"left_bench\"]\n[pickObject]\nmodel_list = [\"glass\"]\n",
+            "S009 c.toml:5:2: none of the locations is in front of `left_bench`",
+        ),
+        ("[robot]\nstart_x_m = [0, 1]\n", "C005 c.toml:3:2: `robot.start_y_m` is missing"),
+        ("[physics]\nsize_scale = [0, 1]\n", "C006 c.toml:4:15: `physics.size_scale` is 0"),
+        ("[pickObject]\nmodel_list = [\"glass\"]\nlying = 2\n", "C006 c.toml:5:9: `pickObject.lying` is 2"),
+    ] {
+        let said = said(text);
+        assert!(said.contains(expected), "{text}\n-- expected\n{expected}\n-- said\n{said}");
+    }
+}
+
+/// A Gazebo world with included models works as it is; what it says and we lack is told.
+#[test]
+fn a_gazebo_world_is_furnished_with_its_models() {
+    let folder = tempfile::tempdir().unwrap();
+    let models = folder.path().join("m");
+    crate::support::copy(&root().join("tests/models/gazebo"), &models);
+    std::fs::create_dir_all(models.join("worlds")).unwrap();
+    let include = |name: &str, pose: &str| {
+        format!("<include><uri>model://cafe_table</uri><name>{name}</name><pose>{pose}</pose></include>")
+    };
+    let world = |inside: &str| {
+        format!(
+            "<sdf version=\"1.6\"><world name=\"cafe\"><include><uri>model://sun</uri></include>\
+             <include><uri>model://ground_plane</uri></include><physics type=\"ode\"/>{inside}</world></sdf>"
+        )
+    };
+    let read = |inside: &str| {
+        std::fs::write(models.join("worlds/cafe.world"), world(inside)).unwrap();
+        campaign(folder.path(), "model_dir = \"m\"\n[world]\nworlds = [\"cafe\"]\n")
+    };
+    let campaign =
+        read(&format!("{}{}", include("near", "1 0 0 0 0 0"), include("far", "3 1 0 0 0 1.5707963"))).unwrap();
+    let map = &campaign.worlds["cafe"];
+    let names: Vec<&str> = map.furniture.iter().map(|piece| piece.name.as_str()).collect();
+    assert_eq!(names, ["near", "far"]);
+    let front = map.locations.iter().find(|location| location.name == "far_front").unwrap();
+    assert!((front.at[0] - 3.0).abs() < 1e-3 && (front.at[1] - (1.0 - 0.4 - 0.69)).abs() < 1e-3, "{front:?}");
+    for (inside, expected) in [
+        ("<include><uri>model://sofa_bed</uri></include>".to_owned(), "W040"),
+        (format!("{}{}", include("a", "0 0 0 0 0 0"), include("a", "3 0 0 0 0 0")), "W041"),
+        (include("a", "0 0 0 1 0 0"), "a model that leans"),
+        ("<model name=\"inline\"/>".to_owned(), "W035"),
+    ] {
+        let said = read(&inside).unwrap_err().to_string();
+        assert!(said.contains(expected), "{inside}: {said}");
+    }
+}
+
+#[test]
+fn a_campaign_runs_in_the_apartment_and_replays() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("tests = [[\"Pick\"]]\ntest_count = 2\n{EVERYWHERE}{TABLES}");
+    std::fs::write(folder.path().join("c.toml"), text).unwrap();
+    let output = actcheck(folder.path(), &["run", "c.toml", "--jobs", "1", "--format", "csv"]);
+    assert!(output.status.code().is_some_and(|code| code <= 1), "{}", stderr(&output));
+    let listed = actcheck(folder.path(), &["list", "--format", "csv"]);
+    let listed = crate::support::stdout(&listed);
+    let run = listed.lines().nth(1).and_then(|line| line.split(',').next()).unwrap();
+    let replay = actcheck(folder.path(), &["replay", run]);
+    assert_eq!(replay.status.code(), Some(0), "{}{}", crate::support::stdout(&replay), stderr(&replay));
+}
+
+/// A scene that does not satisfy the configuration's rules is discarded and counted.
+#[test]
+fn scenes_can_be_asked_for_by_rules() {
+    let folder = crate::support::project();
+    let config = |rule: &str| {
+        let text = format!(
+            "tests = [[\"Pick\"]]\ntest_count = 2\n[objectSurface]\nobject_surfaces = [\"table\"]\n{TABLES}[scene]\nrequire = \"{rule}\"\n"
+        );
+        std::fs::write(folder.path().join("c.toml"), text).unwrap();
+        actcheck(folder.path(), &["run", "c.toml", "--jobs", "1", "--format", "json"])
+    };
+    std::fs::write(
+        folder.path().join("mug.rls"),
+        "@prefix act: <http://actions#> .\n@prefix w: <https://w3id.org/actcheck/world#> .\n\
+         success(?o) :- parameter(act:pickObject, ?o), before(?o, w:mass, ?m), ?m > 0.33 .\n",
+    )
+    .unwrap();
+    let output = config("mug.rls");
+    assert!(output.status.code().is_some_and(|code| code <= 1), "{}", stderr(&output));
+    let ids = actcheck(
+        folder.path(),
+        &["query", "--format", "csv", "SELECT ?o WHERE { ?n act:object ?o ; act:role \"target\" }"],
+    );
+    let targets = crate::support::stdout(&ids);
+    assert_eq!(targets.matches("mug_1").count(), 2, "{targets}");
+    assert!(config("rules/scene/reachable.rls").status.code().is_some_and(|code| code <= 1));
+    let output = config("rules/scene/none.rls");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("there is no such file"), "{}", stderr(&output));
+}
