@@ -42,6 +42,7 @@ fn robot() -> Arc<RobotProfile> {
         finger_joints: [String::new(), String::new()],
         head_joints: Vec::new(),
         grasp_link: String::new(),
+        grasp_turned_rad: [0.0; 3],
         finger_links: [String::new(), String::new()],
         camera_link: String::new(),
         max_opening_m: 0.135,

@@ -28,6 +28,9 @@ pub struct RobotProfile {
     pub head_joints: Vec<String>,
     /// Link between the fingertips; its x axis points where the fingers point, its y axis across them.
     pub grasp_link: String,
+    /// How the frame of a grasp is turned on that link, where the link's own axes are others: about its fixed x, y, z in this
+    /// order. Unit: radians.
+    pub grasp_turned_rad: [f64; 3],
     /// Links that are the fingers, left then right.
     pub finger_links: [String; 2],
     /// Link of the camera.
@@ -124,6 +127,7 @@ fn read_table(
     let finger_links = names(table, "finger_links");
     let head_joints = table.strings("head_joints").unwrap_or_default();
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
+    let grasp_turned_rad = table.numbers("grasp_turned_rad", ..).unwrap_or([0.0; 3]);
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
     let finger_friction = table.number("finger_friction", 0.0..=2.0);
     let grip_force_n = table.number("grip_force_n", 0.1..=1000.0);
@@ -147,6 +151,7 @@ fn read_table(
         finger_joints: finger_joints?,
         head_joints: values(head_joints),
         grasp_link: grasp_link?.value,
+        grasp_turned_rad,
         finger_links: finger_links?,
         camera_link: camera_link?.value,
         max_opening_m: max_opening_m?,

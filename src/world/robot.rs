@@ -101,10 +101,12 @@ impl Named {
             head: joints(&profile.head_joints)?,
             fingers: [model.joint(left)?, model.joint(right)?],
         };
+        let [roll, pitch, yaw] = profile.grasp_turned_rad;
+        let (grasp_link, grasp_at) = model.frame(&profile.grasp_link)?;
         Ok(Self {
             layout,
             finger_links: [model.frame(left_link)?.0, model.frame(right_link)?.0],
-            grasp: model.frame(&profile.grasp_link)?,
+            grasp: (grasp_link, grasp_at * UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
         })
     }
 }

@@ -23,89 +23,42 @@ const KINDS: &str = "use a box, cylinder, sphere, capsule or mesh";
 impl Shapes<'_> {
     /// The shape of an SDF `<geometry>`; nothing where it is empty or wrong, which has then been noted.
     pub(crate) fn sdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
-        let Some(kind) = geometry.children().find(Node::is_element) else {
-            reader.error("W033", geometry, "`<geometry>` is empty".to_owned(), KINDS);
-            return None;
-        };
-        let number = |reader: &mut Reader, name: &str| {
-            let node = reader.required(kind, name)?;
-            reader.number(node, Bound::Positive)
-        };
-        match kind.tag_name().name() {
-            "box" => {
-                let size = reader.required(kind, "size")?;
-                Some(Shape::Box { size: reader.numbers(size, xml::text(size), Bound::Positive)? })
-            }
-            "cylinder" => {
-                let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-                Some(Shape::Cylinder { radius: radius?, height: length? })
-            }
-            "capsule" => {
-                let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-                Some(Shape::Capsule { radius: radius?, height: length? })
-            }
-            "sphere" => Some(Shape::Sphere { radius: number(reader, "radius")? }),
-            "mesh" => {
-                reader.leaves_out(kind, &["uri", "scale", "submesh", "convex_decomposition"]);
-                if let Some(submesh) = xml::child(kind, "submesh") {
-                    reader.error(
-                        "W035",
-                        submesh,
-                        "a part of a mesh file can't be taken alone".to_owned(),
-                        "export that part to a file of its own",
-                    );
-                }
-                let uri = reader.required(kind, "uri")?;
-                let scale = match xml::child(kind, "scale") {
-                    Some(scale) => reader.numbers(scale, xml::text(scale), Bound::Finite)?,
-                    None => [1.0; 3],
-                };
-                self.mesh(uri, xml::text(uri), scale, reader)
-            }
-            other => {
-                reader.error("W035", kind, format!("the geometry `<{other}>` can't be simulated"), KINDS);
-                None
-            }
+        let kind = kind_of(geometry, reader)?;
+        if kind.tag_name().name() == "mesh" {
+            return self.sdf_mesh(kind, reader);
         }
+        primitive(kind, reader, |name, reader| {
+            let node = reader.required(kind, name)?;
+            Some((node, xml::text(node)))
+        })
+    }
+
+    fn sdf_mesh(&mut self, mesh: Node, reader: &mut Reader) -> Option<Shape> {
+        reader.leaves_out(mesh, &["uri", "scale", "submesh", "convex_decomposition"]);
+        if let Some(submesh) = xml::child(mesh, "submesh") {
+            let message = "a part of a mesh file can't be taken alone".to_owned();
+            reader.error("W035", submesh, message, "export that part to a file of its own");
+        }
+        let uri = reader.required(mesh, "uri")?;
+        let scale = match xml::child(mesh, "scale") {
+            Some(scale) => reader.numbers(scale, xml::text(scale), Bound::Finite)?,
+            None => [1.0; 3],
+        };
+        self.mesh(uri, xml::text(uri), scale, reader)
     }
 
     /// The shape of a URDF `<geometry>`.
     pub(crate) fn urdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
-        let Some(kind) = geometry.children().find(Node::is_element) else {
-            reader.error("W033", geometry, "`<geometry>` is empty".to_owned(), KINDS);
-            return None;
-        };
-        let number = |reader: &mut Reader, name: &str| {
-            let written = reader.attribute(kind, name)?;
-            reader.numbers::<1>(kind, written, Bound::Positive).map(|[number]| number)
-        };
-        match kind.tag_name().name() {
-            "box" => {
-                let size = reader.attribute(kind, "size")?;
-                Some(Shape::Box { size: reader.numbers(kind, size, Bound::Positive)? })
-            }
-            "cylinder" => {
-                let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-                Some(Shape::Cylinder { radius: radius?, height: length? })
-            }
-            "capsule" => {
-                let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-                Some(Shape::Capsule { radius: radius?, height: length? })
-            }
-            "sphere" => Some(Shape::Sphere { radius: number(reader, "radius")? }),
-            "mesh" => {
-                let uri = reader.attribute(kind, "filename")?;
-                let scale = match kind.attribute("scale") {
-                    Some(scale) => reader.numbers(kind, scale, Bound::Finite)?,
-                    None => [1.0; 3],
-                };
-                self.mesh(kind, uri, scale, reader)
-            }
-            other => {
-                reader.error("W035", kind, format!("the geometry `<{other}>` can't be simulated"), KINDS);
-                None
-            }
+        let kind = kind_of(geometry, reader)?;
+        if kind.tag_name().name() != "mesh" {
+            return primitive(kind, reader, |name, reader| Some((kind, reader.attribute(kind, name)?)));
         }
+        let uri = reader.attribute(kind, "filename")?;
+        let scale = match kind.attribute("scale") {
+            Some(scale) => reader.numbers(kind, scale, Bound::Finite)?,
+            None => [1.0; 3],
+        };
+        self.mesh(kind, uri, scale, reader)
     }
 
     pub(crate) fn mesh(&mut self, node: Node, uri: &str, scale: [f64; 3], reader: &mut Reader) -> Option<Shape> {
@@ -142,6 +95,46 @@ impl Shapes<'_> {
             Diagnostic::error("W037", format!("cannot find the mesh `{uri}`: {reason}")).help(mesh_file::HOW_TO_NAME)
         })?;
         mesh_file::read(self.lookup.files, &path)
+    }
+}
+
+/// The element that says of what kind a geometry is.
+fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Node<'n>> {
+    let kind = geometry.children().find(Node::is_element);
+    if kind.is_none() {
+        reader.error("W033", geometry, "`<geometry>` is empty".to_owned(), KINDS);
+    }
+    kind
+}
+
+/// A shape by its numbers, whose texts `written` finds by name: as elements in SDF, as attributes in URDF.
+fn primitive<'n>(
+    kind: Node<'n>,
+    reader: &mut Reader,
+    written: impl Fn(&str, &mut Reader) -> Option<(Node<'n>, &'n str)>,
+) -> Option<Shape> {
+    let number = |reader: &mut Reader, name: &str| {
+        let (node, text) = written(name, reader)?;
+        reader.numbers::<1>(node, text, Bound::Positive).map(|[number]| number)
+    };
+    match kind.tag_name().name() {
+        "box" => {
+            let (node, text) = written("size", reader)?;
+            Some(Shape::Box { size: reader.numbers(node, text, Bound::Positive)? })
+        }
+        "cylinder" => {
+            let (radius, length) = (number(reader, "radius"), number(reader, "length"));
+            Some(Shape::Cylinder { radius: radius?, height: length? })
+        }
+        "capsule" => {
+            let (radius, length) = (number(reader, "radius"), number(reader, "length"));
+            Some(Shape::Capsule { radius: radius?, height: length? })
+        }
+        "sphere" => Some(Shape::Sphere { radius: number(reader, "radius")? }),
+        other => {
+            reader.error("W035", kind, format!("the geometry `<{other}>` can't be simulated"), KINDS);
+            None
+        }
     }
 }
 
