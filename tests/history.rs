@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use actcheck::actions::{ActionEnd, Quality};
 use actcheck::base::{Choice, ChoiceKind, Diagnostics, Pose, Source, Term, digest_of, names};
-use actcheck::config::{ObjectModel, Physics, RobotProfile, Sensing};
+use actcheck::config::{Camera, ObjectModel, Physics, RobotProfile, Sensing};
 use actcheck::facts::{RunFacts, extract};
 use actcheck::history::{CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus};
 use actcheck::scenario::{RobotStart, Role, Scene, SceneObject};
@@ -70,7 +70,7 @@ fn scene() -> Scene {
         map: actcheck::scenario::SceneMap::default(),
         world: "living room".to_owned(),
         objects: BODIES.iter().enumerate().map(object).collect(),
-        robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1] },
+        robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1], knows: Arc::new([]) },
         designators: sample_trace(0).actions[0].parameters.clone(),
         sensing: Sensing {
             position_noise_m: 0.005,
@@ -80,6 +80,7 @@ fn scene() -> Scene {
             localisation_noise_m: 0.01,
             heading_noise_rad: 0.01,
             gripper_noise_m: 0.001,
+            camera: Camera::IDEAL,
         },
         physics: Physics {
             mass_scale: (1.0, 1.0),

@@ -1,4 +1,4 @@
-//! What every stage speaks: sources and diagnostics, terms, poses, recorded choices, shipped files.
+//! What every stage speaks: sources and diagnostics, terms, poses, recorded choices, random streams, shipped files.
 //!
 //! Never: reads a configuration, knows an action, a rule or a robot, or prints.
 
@@ -10,6 +10,7 @@ mod geometry;
 pub mod names;
 mod shard;
 mod source;
+mod stream;
 mod suggest;
 mod term;
 
@@ -20,5 +21,6 @@ pub use files::Files;
 pub use geometry::Pose;
 pub use shard::{NoShard, Shard};
 pub use source::{Source, Span};
+pub use stream::Stream;
 pub use suggest::{did_you_mean, nearest};
 pub use term::{Term, TermId, Terms};

@@ -54,7 +54,7 @@ pub struct Campaign {
     pub start: Option<[Range; 3]>,
     /// Ranges of what physics draws (`[physics]`).
     pub physics: Physics,
-    /// What the sensors get wrong (`[sensing]`).
+    /// What the sensors get wrong (`[sensing]`, `[camera]`).
     pub sensing: Sensing,
     /// Budgets of one action (`[budget]`).
     pub budget: Budget,
@@ -160,6 +160,43 @@ pub struct Sensing {
     pub heading_noise_rad: f64,
     /// Of a measured finger opening. Unit: metres.
     pub gripper_noise_m: f64,
+    /// The depth camera (`[camera]`).
+    pub camera: Camera,
+}
+
+/// The depth camera on the robot's camera link: what its pictures are like, and what they get wrong.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Angle between the outermost columns. Unit: radians. Pixels are square, which gives the other angle.
+    pub field_of_view_rad: f64,
+    /// Nothing nearer is seen. Unit: metres from the camera.
+    pub min_range_m: f64,
+    /// Nothing farther is seen. Unit: metres from the camera.
+    pub max_range_m: f64,
+    /// Standard deviation of the range at a distance of 1 m; it grows with the square of the distance. Unit: metres.
+    pub range_noise_m: f64,
+    /// Share of pixels without a value, anywhere.
+    pub dropout: f64,
+    /// Angle between ray and surface below which pixels are lost: all of them at 0, none at this angle. Unit: radians.
+    pub grazing_rad: f64,
+}
+
+impl Camera {
+    /// 320 × 240 pixels, 57 degrees wide, from 0.3 to 5 m like the depth cameras of service robots, and without faults.
+    pub const IDEAL: Self = Self {
+        width: 320,
+        height: 240,
+        field_of_view_rad: 1.0,
+        min_range_m: 0.3,
+        max_range_m: 5.0,
+        range_noise_m: 0.0,
+        dropout: 0.0,
+        grazing_rad: 0.0,
+    };
 }
 
 /// Limits on one action. Beyond them it ends as `timeout`.

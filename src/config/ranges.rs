@@ -1,9 +1,9 @@
-//! The tables of numbers: physics, sensing, budget.
+//! The tables of numbers: physics, sensing, camera, budget.
 
 use std::ops::Bound;
 
 use crate::base::Diagnostics;
-use crate::config::{Budget, Limits, Physics, Sensing, Table, duration_secs};
+use crate::config::{Budget, Camera, Limits, Physics, Sensing, Table, duration_secs};
 
 const ABOVE_ZERO: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(100.0));
 
@@ -59,6 +59,7 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
         localisation_noise_m: 0.0,
         heading_noise_rad: 0.0,
         gripper_noise_m: 0.0,
+        camera: read_camera(root, found),
     };
     let Some(mut table) = root.table("sensing") else { return sensing };
     // Half a metre or half a turn (3.2 rad) of noise already makes sensing worthless.
@@ -75,6 +76,32 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
     }
     table.finish(found);
     sensing
+}
+
+/// `[camera]`: the depth camera. Without a key of noise it has none.
+fn read_camera(root: &mut Table, found: &mut Diagnostics) -> Camera {
+    let mut camera = Camera::IDEAL;
+    let Some(mut table) = root.table("camera") else { return camera };
+    // More pixels than a million are nobody's depth camera, and take seconds a picture.
+    for (key, value) in [("width", &mut camera.width), ("height", &mut camera.height)] {
+        set(value, table.integer(key, 16..=1024).and_then(|count| u32::try_from(count).ok()));
+    }
+    // Flat pictures end before half a turn.
+    set(&mut camera.field_of_view_rad, table.number("field_of_view_rad", 0.1..=2.6));
+    let place = table.key_span("min_range_m").or_else(|| table.key_span("max_range_m"));
+    set(&mut camera.min_range_m, table.number("min_range_m", 0.0..=100.0));
+    set(&mut camera.max_range_m, table.number("max_range_m", ABOVE_ZERO));
+    if camera.min_range_m >= camera.max_range_m
+        && let Some(place) = place
+    {
+        let message = format!("the camera sees from {} m to {} m: nothing", camera.min_range_m, camera.max_range_m);
+        table.fault("C009", place, message, "`min_range_m` must be less than `max_range_m`");
+    }
+    set(&mut camera.range_noise_m, table.number("range_noise_m", 0.0..=0.5));
+    set(&mut camera.dropout, table.number("dropout", 0.0..=1.0));
+    set(&mut camera.grazing_rad, table.number("grazing_rad", 0.0..=1.5));
+    table.finish(found);
+    camera
 }
 
 /// `[budget]`: limits on one action, on one run, and on the campaign.

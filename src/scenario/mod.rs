@@ -20,11 +20,11 @@ mod surroundings;
 pub use draw::{Discard, draw};
 pub use overlap::{CLEARANCE_M, Solid};
 pub use parameters::{Parameter, ParameterKind};
-pub use scene::{RobotStart, Role, Scene, SceneObject};
+pub use scene::{KnownKind, RobotStart, Role, Scene, SceneObject};
 pub use scene_map::{NamedSurface, SceneMap};
 pub use space::Space;
 
 // What a scene is made of: its readers meet it here.
 pub use crate::config::{
-    Budget, CONTROL_HZ, Inertia, Mesh, ObjectModel, Part, Physics, RobotProfile, Sensing, Shape, Surface,
+    Budget, CONTROL_HZ, Camera, Inertia, Mesh, ObjectModel, Part, Physics, RobotProfile, Sensing, Shape, Surface,
 };

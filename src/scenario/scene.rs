@@ -72,4 +72,17 @@ pub struct RobotStart {
     pub profile: Arc<RobotProfile>,
     /// Where its base stands. Units: metres, metres, radians. Shape: x, y, heading.
     pub base: [f64; 3],
+    /// The kinds of things that it can tell apart: all that there are models of, whatever stands in the scene.
+    pub knows: Arc<[KnownKind]>,
+}
+
+/// A kind of thing that can be handled, as a robot knows it: by its size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownKind {
+    /// Name of the model.
+    pub name: String,
+    /// Its class in the ontology: an IRI.
+    pub category: String,
+    /// Outer dimensions as it stands. Unit: metres. Shape: x, y, z.
+    pub size_m: [f64; 3],
 }

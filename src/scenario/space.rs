@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::base::{Diagnostics, did_you_mean, names, nearest};
 use crate::config::{self, Campaign, Location, ObjectModel, Physics, RobotProfile, Sensing, Surface, WorldMap};
 use crate::ontology::Ontology;
-use crate::scenario::placement;
 use crate::scenario::surroundings::Surroundings;
+use crate::scenario::{KnownKind, placement};
 
 /// Designators that scene generation gives a meaning, whether an ontology declares them or not.
 const SPECIAL: [&str; 6] = ["world", "objectLocation", "objectSurface", "placeSurface", "pickObject", "surfaceObjects"];
@@ -37,6 +37,7 @@ pub struct Space {
     /// Candidates of designators that are names and not objects.
     pub(super) names: BTreeMap<String, Vec<String>>,
     pub(super) robot: Arc<RobotProfile>,
+    pub(super) knows: Arc<[KnownKind]>,
     pub(super) physics: Physics,
     pub(super) sensing: Sensing,
 }
@@ -95,6 +96,7 @@ impl Space {
             lying: campaign.lying,
             names: names.map(|(name, values)| (name.clone(), values.clone())).collect(),
             robot: Arc::clone(&campaign.robot),
+            knows: known_kinds(campaign),
             physics: campaign.physics.clone(),
             sensing: campaign.sensing.clone(),
         })
@@ -104,6 +106,17 @@ impl Space {
     pub fn tests(&self) -> usize {
         self.tests
     }
+}
+
+/// All models but platforms, sorted by name.
+fn known_kinds(campaign: &Campaign) -> Arc<[KnownKind]> {
+    let models = campaign.models.values().filter(|model| model.surface.is_none());
+    let kinds = models.map(|model| KnownKind {
+        name: model.name.clone(),
+        category: model.category.clone(),
+        size_m: model.size_m,
+    });
+    kinds.collect()
 }
 
 fn is_of_objects(designator: &str) -> bool {
@@ -208,7 +221,7 @@ fn example(designator: &str) -> String {
 /// Tables are named after designators.
 fn check_tables(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
     let known: BTreeSet<&str> = ontology.designators.iter().map(String::as_str).chain(SPECIAL).collect();
-    let tables = ["physics", "sensing", "robot", "budget", "history", "categories", "scene"];
+    let tables = ["physics", "sensing", "camera", "robot", "budget", "history", "categories", "scene"];
     for name in campaign.candidates.keys().filter(|name| !known.contains(name.as_str())) {
         let message = format!("unknown table `{name}`: the ontology has no designator of this name");
         let help = match nearest(name, known.iter().copied().chain(tables)) {

@@ -55,4 +55,6 @@ pub enum Poison {
     Teleport([f64; 3]),
     /// The body gets a velocity, without turning. Unit: m/s.
     Velocity([f64; 3]),
+    /// Sensors see the body here from now on, wherever it is.
+    Decoy(Pose),
 }

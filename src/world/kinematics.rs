@@ -18,12 +18,19 @@ pub struct Kinematics {
     /// Pose of the root. Frame: world.
     root: Isometry3<f64>,
     grasp: (usize, Isometry3<f64>),
+    camera: (usize, Isometry3<f64>),
 }
 
 impl Kinematics {
-    /// The geometry of a robot whose root stands at `root`; `grasp` is the grasp link and where it was folded to.
-    pub(crate) fn new(model: Arc<RobotModel>, root: Isometry3<f64>, grasp: (usize, Isometry3<f64>)) -> Self {
-        Self { model, root, grasp }
+    /// The geometry of a robot whose root stands at `root`; `grasp` and `camera` are the links of these names and where
+    /// they were folded to.
+    pub(crate) fn new(
+        model: Arc<RobotModel>,
+        root: Isometry3<f64>,
+        grasp: (usize, Isometry3<f64>),
+        camera: (usize, Isometry3<f64>),
+    ) -> Self {
+        Self { model, root, grasp, camera }
     }
 
     /// The joints, in the order of positions.
@@ -57,6 +64,21 @@ impl Kinematics {
     /// Pose of the grasp link.
     pub fn grasp(&self, positions: &[f64]) -> Isometry3<f64> {
         self.links(positions)[self.grasp.0] * self.grasp.1
+    }
+
+    /// Pose of the camera: x looks forwards, z is up in its pictures.
+    pub fn camera(&self, positions: &[f64]) -> Isometry3<f64> {
+        self.links(positions)[self.camera.0] * self.camera.1
+    }
+
+    /// Poses of all collision shapes, with the shapes.
+    pub(crate) fn solids(&self, positions: &[f64]) -> Vec<(Isometry3<f64>, Shape)> {
+        let links = self.model.links.iter().zip(self.links(positions));
+        links
+            .flat_map(|(link, pose)| {
+                link.solids.iter().map(move |solid| (pose * solid.pose.to_isometry(), solid.shape.clone()))
+            })
+            .collect()
     }
 
     /// Pose of the grasp link, and how it moves with each joint. Shape: 6 × joints, linear above angular.

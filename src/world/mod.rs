@@ -2,6 +2,8 @@
 //!
 //! Never: decides what the robot does, calls anything a success, or attaches a thing to the hand by a constraint.
 
+mod body;
+mod camera;
 mod contacts;
 mod convert;
 mod decompose;
@@ -21,6 +23,8 @@ mod settle;
 mod simulation;
 mod snapshot;
 
+pub use body::OwnBody;
+pub use camera::DepthImage;
 pub use contacts::CONTACT_FLOOR_NEWTONS;
 pub use decompose::{decompose, decomposition_key};
 pub use description::{Joint, JointKind};

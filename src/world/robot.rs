@@ -83,6 +83,7 @@ struct Named {
     layout: Layout,
     finger_links: [usize; 2],
     grasp: (usize, Isometry3<f64>),
+    camera: (usize, Isometry3<f64>),
 }
 
 impl Named {
@@ -94,7 +95,6 @@ impl Named {
         };
         let [left, right] = &profile.finger_joints;
         let [left_link, right_link] = &profile.finger_links;
-        model.frame(&profile.camera_link)?;
         let layout = Layout {
             base,
             arm: joints(&profile.arm_joints)?,
@@ -107,6 +107,7 @@ impl Named {
             layout,
             finger_links: [model.frame(left_link)?.0, model.frame(right_link)?.0],
             grasp: (grasp_link, grasp_at * UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
+            camera: model.frame(&profile.camera_link)?,
         })
     }
 }
@@ -135,7 +136,7 @@ impl Robot {
             Some(_) => Isometry3::identity(),
             None => Pose::upright([start.base[0], start.base[1], 0.0], start.base[2]).to_isometry(),
         };
-        let kinematics = Kinematics::new(model.clone(), root, named.grasp);
+        let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera);
         let bodies =
             insert_links(engine, &model, &kinematics.links(&positions), named.finger_links, profile.finger_friction);
         let motors = insert_joints(engine, &model, &bodies, &named, &profile)?;
@@ -401,7 +402,7 @@ mod tests {
 
     use super::*;
     use crate::base::{Choices, Files};
-    use crate::config::{Physics, Sensing};
+    use crate::config::{Camera, Physics, Sensing};
     use crate::scenario::Scene;
     use crate::world::convert::from_pose;
     use crate::world::{World, build, ik};
@@ -414,7 +415,7 @@ mod tests {
             map: crate::scenario::SceneMap::default(),
             world: "empty".to_owned(),
             objects: Vec::new(),
-            robot: RobotStart { profile, base: [-1.0, 0.3, 0.4] },
+            robot: RobotStart { profile, base: [-1.0, 0.3, 0.4], knows: Arc::new([]) },
             designators: BTreeMap::new(),
             sensing: Sensing {
                 position_noise_m: 0.0,
@@ -424,6 +425,7 @@ mod tests {
                 localisation_noise_m: 0.0,
                 heading_noise_rad: 0.0,
                 gripper_noise_m: 0.0,
+                camera: Camera::IDEAL,
             },
             physics: Physics {
                 mass_scale: one,

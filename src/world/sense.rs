@@ -45,8 +45,9 @@ impl World {
 
     /// Looks at one object; nothing if there is none of that id.
     pub fn perceive(&self, id: &str, choices: &mut Choices) -> Option<Sighting> {
-        let object = self.objects.iter().find(|object| object.id == id)?;
-        let (true_pose, true_size) = self.foot(object);
+        let idx = self.objects.iter().position(|object| object.id == id)?;
+        let object = &self.objects[idx];
+        let (true_pose, true_size) = self.foot(object, &self.shown(idx));
         let mut draw = |what: &str, sigma: f64| choices.normal(&format!("sense.{id}.{what}"), sigma);
         let sensing = &self.sensing;
         let shift = Vector3::new(
@@ -74,9 +75,8 @@ impl World {
     }
 
     /// Upright pose of an object's foot and its size along the axes of that pose.
-    fn foot(&self, object: &Object) -> (Isometry3<f64>, [f64; 3]) {
-        let pose = self.pose_of(object);
-        let plain = Pose::from_isometry(&pose);
+    fn foot(&self, object: &Object, pose: &Isometry3<f64>) -> (Isometry3<f64>, [f64; 3]) {
+        let plain = Pose::from_isometry(pose);
         if plain.tilt() <= LYING_RAD {
             return (Pose::upright(plain.position, plain.yaw()).to_isometry(), object.model.size_m);
         }

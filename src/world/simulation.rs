@@ -1,12 +1,13 @@
 //! A scene that steps: the robot acts by commands, physics does the rest.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 
 use crate::base::Pose;
-use crate::scenario::{CONTROL_HZ, Inertia, ObjectModel, RobotProfile, Scene, SceneObject, Sensing};
+use crate::scenario::{CONTROL_HZ, Inertia, KnownKind, ObjectModel, RobotProfile, Scene, SceneObject, Sensing};
 use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
 use crate::world::engine::{Owner, add_floor, collider, engine};
 use crate::world::recorder::Recorder;
@@ -69,6 +70,9 @@ pub struct World {
     pub(super) believed_from_true: Isometry3<f64>,
     pub(super) recorder: Recorder,
     pub(super) fault: Option<Fault>,
+    /// Where sensors see an object, by its index, if not where it is.
+    pub(super) decoys: BTreeMap<usize, Isometry3<f64>>,
+    knows: Arc<[KnownKind]>,
     n_steps: u64,
     steps_per_tick: u32,
     steps_per_second: u32,
@@ -103,6 +107,8 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         sensing: scene.sensing.clone(),
         believed_from_true: Isometry3::identity(),
         fault: None,
+        decoys: BTreeMap::new(),
+        knows: Arc::clone(&scene.robot.knows),
         n_steps: 0,
         steps_per_tick,
         steps_per_second,
@@ -193,6 +199,17 @@ impl World {
         &self.robot.profile
     }
 
+    /// The kinds of things that the robot can tell apart.
+    pub fn known_kinds(&self) -> &Arc<[KnownKind]> {
+        &self.knows
+    }
+
+    /// The kind of thing that an id of the scene stands for: what a robot is told with its task, and nothing of where it is.
+    pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
+        let model = &self.objects.iter().find(|object| object.id == id)?.model;
+        Some(KnownKind { name: model.name.clone(), category: model.category.clone(), size_m: model.size_m })
+    }
+
     /// One control tick: the controllers take the command, physics takes its steps, the recorder looks.
     ///
     /// After a fault nothing moves any more.
@@ -269,11 +286,13 @@ impl World {
 
     /// Disturbs the state of an object, for tests. False if there is no such object.
     pub fn poison(&mut self, id: &str, poison: Poison) -> bool {
-        let Some(object) = self.objects.iter().find(|object| object.id == id) else { return false };
+        let Some(idx) = self.objects.iter().position(|object| object.id == id) else { return false };
+        let object = &self.objects[idx];
         let Some(body) = self.engine.bodies.get_mut(object.body) else { return false };
         match poison {
             Poison::NotFinite => body.set_linvel(to_vector(&Vector3::repeat(f64::NAN)), true),
             Poison::Velocity(velocity) => body.set_linvel(to_vector(&Vector3::from(velocity)), true),
+            Poison::Decoy(pose) => _ = self.decoys.insert(idx, pose.to_isometry()),
             Poison::Teleport(position) => body.set_translation(to_vector(&Vector3::from(position)), true),
         }
         true
@@ -343,6 +362,11 @@ impl World {
             }
         }
         None
+    }
+
+    /// Where sensors see an object: where it is, unless a decoy says otherwise.
+    pub(super) fn shown(&self, idx: usize) -> Isometry3<f64> {
+        self.decoys.get(&idx).copied().unwrap_or_else(|| self.pose_of(&self.objects[idx]))
     }
 
     /// True pose of an object.

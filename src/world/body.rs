@@ -1,0 +1,56 @@
+//! The space that the robot itself takes up, so that it can tell itself from what it sees.
+
+use nalgebra::{Isometry3, Point3};
+
+use crate::scenario::Shape;
+use crate::world::Kinematics;
+
+/// The robot's collision shapes in one posture.
+#[derive(Debug, Clone)]
+pub struct OwnBody {
+    /// From the world to each shape, and the shape.
+    solids: Vec<(Isometry3<f64>, Shape)>,
+}
+
+impl OwnBody {
+    /// The shapes for given joint positions.
+    pub fn new(kinematics: &Kinematics, positions: &[f64]) -> Self {
+        let solids = kinematics.solids(positions).into_iter().map(|(pose, shape)| (pose.inverse(), shape));
+        Self { solids: solids.collect() }
+    }
+
+    /// Whether a point is in one of the shapes or at most so far from it (at edges a little farther). Unit: metres.
+    pub fn is_near(&self, point: &Point3<f64>, margin: f64) -> bool {
+        self.solids.iter().any(|(from_world, shape)| is_within(&(from_world * point), shape, margin))
+    }
+}
+
+/// Frame: the shape's.
+fn is_within(point: &Point3<f64>, shape: &Shape, margin: f64) -> bool {
+    match *shape {
+        Shape::Box { size } => point.iter().zip(size).all(|(along, extent)| along.abs() <= extent / 2.0 + margin),
+        Shape::Cylinder { radius, height } => {
+            let reach = radius + margin;
+            point.z.abs() <= height / 2.0 + margin && point.x * point.x + point.y * point.y <= reach * reach
+        }
+        Shape::Sphere { radius } => point.coords.norm() <= radius + margin,
+        // Robots are not made of tubes.
+        Shape::Tube { .. } => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_near_within_the_margin() {
+        let near = |shape: Shape, x: f64, z: f64| is_within(&Point3::new(x, 0.0, z), &shape, 0.02);
+        let cylinder = Shape::Cylinder { radius: 0.1, height: 0.4 };
+        assert!(near(cylinder.clone(), 0.119, 0.219) && !near(cylinder.clone(), 0.121, 0.0));
+        assert!(!near(cylinder, 0.0, 0.221));
+        let block = Shape::Box { size: [0.2, 0.1, 0.4] };
+        assert!(near(block.clone(), 0.119, 0.219) && !near(block, 0.121, 0.0));
+        assert!(near(Shape::Sphere { radius: 0.1 }, 0.0, 0.119) && !near(Shape::Sphere { radius: 0.1 }, 0.0, 0.121));
+    }
+}
