@@ -155,6 +155,7 @@ pub fn sample_trace(seed: u64) -> Trace {
             pose: Pose::upright([0.1, 0.2, 0.7], 0.3),
             size_m: [0.09, 0.09, 0.15],
         }],
+        perceived: None,
         phases: vec![Phase { name: "approach".to_owned(), start_secs: 2.0 }],
     };
     let hash = format!("{seed:032x}");

@@ -5,19 +5,26 @@
 mod call;
 mod cut;
 mod grasp;
+mod memory;
 mod operator;
+mod perceive;
 mod perform;
 mod pick;
 mod plan;
 mod route;
 mod sabotage;
+mod skills;
 mod trace;
 
-pub use call::{ActionCall, UnknownSkill, known_skill, reference_skills};
+pub use call::ActionCall;
 pub use cut::Cut;
 pub use perform::{Interference, perform, perform_with};
 pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
-pub use trace::{ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, Trace};
+pub use skills::{UnknownSkill, known_skill, reference_skills};
+pub use trace::{
+    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Perceived, PerceivedPlane, PerceivedThing,
+    Percept, Phase, Trace,
+};
 
 // States and the map are part of a trace: its readers meet them here.
 pub use crate::scenario::SceneMap;

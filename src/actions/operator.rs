@@ -1,10 +1,13 @@
 //! What a skill has in hand: joint commands, measurements and noisy sight. The world's truth stays behind it.
 
+use nalgebra::Isometry3;
+
+use crate::actions::memory::Memory;
 use crate::actions::sabotage::IDLE_SECS;
-use crate::actions::{ActionReport, Cut, Interference, Percept, Phase, Saboteur};
+use crate::actions::{ActionReport, Cut, Interference, Perceived, Percept, Phase, Saboteur};
 use crate::base::Choices;
-use crate::scenario::RobotProfile;
-use crate::world::{Command, Kinematics, Layout, Observation, Sighting, World};
+use crate::scenario::{KnownKind, RobotProfile};
+use crate::world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
 
 /// Why a skill has to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +29,7 @@ const PEAK_OVER_MEAN: f64 = 1.5;
 pub struct Operator<'a> {
     world: &'a mut World,
     choices: &'a mut Choices,
+    memory: &'a mut Memory,
     command: Command,
     start_secs: f64,
     budget_secs: f64,
@@ -36,6 +40,8 @@ pub struct Operator<'a> {
     pub phases: Vec<Phase>,
     /// What was seen so far.
     pub percepts: Vec<Percept>,
+    /// What was made of pictures so far.
+    pub perceived: Option<Perceived>,
 }
 
 impl<'a> Operator<'a> {
@@ -43,13 +49,26 @@ impl<'a> Operator<'a> {
     pub fn new(
         world: &'a mut World,
         choices: &'a mut Choices,
+        memory: &'a mut Memory,
         budget_secs: f64,
         interference: Interference<'a>,
     ) -> Self {
         let (command, start_secs) = (world.hold(), world.time_secs());
         let Interference { cut, saboteur } = interference;
         let (phases, percepts) = (Vec::new(), Vec::new());
-        Self { world, choices, command, start_secs, budget_secs, cut, saboteur, phases, percepts }
+        Self {
+            world,
+            choices,
+            memory,
+            command,
+            start_secs,
+            budget_secs,
+            cut,
+            saboteur,
+            phases,
+            percepts,
+            perceived: None,
+        }
     }
 
     /// Lets a skill act, unless the robot is sabotaged into doing nothing. What is reported can be sabotaged too.
@@ -111,13 +130,44 @@ impl<'a> Operator<'a> {
         &self.command.positions
     }
 
-    /// Looks at one object.
+    /// The kinds of things that the robot can tell apart.
+    pub fn known_kinds(&self) -> &[KnownKind] {
+        self.world.known_kinds()
+    }
+
+    /// The kind of thing that a designator's value stands for.
+    pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
+        self.world.kind_of(id)
+    }
+
+    /// Takes a picture with the camera.
+    pub fn look(&mut self) -> DepthImage {
+        self.world.look(self.choices)
+    }
+
+    /// What earlier actions of the run left to know.
+    pub fn memory(&self) -> &Memory {
+        self.memory
+    }
+
+    /// Keeps what was made of pictures, for later actions and for the trace.
+    pub fn remember(&mut self, perceived: Perceived) {
+        self.memory.perceived = Some(perceived.clone());
+        self.perceived = Some(perceived);
+    }
+
+    /// Notes what the robot takes for an object.
+    pub fn take_for(&mut self, seen: &Sighting) {
+        self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
+    }
+
+    /// Looks at one object, by an abstract detector: the truth with noise, and never a miss.
     pub fn see(&mut self, id: &str) -> Option<Sighting> {
         let mut seen = self.world.perceive(id, self.choices)?;
         if let Some(saboteur) = &mut self.saboteur {
             seen = saboteur.sighting(seen);
         }
-        self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
+        self.take_for(&seen);
         Some(seen)
     }
 

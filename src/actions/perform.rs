@@ -1,10 +1,11 @@
 //! Performs a list of actions and keeps what happened.
 
 use crate::actions::cut::{self, Cut};
+use crate::actions::memory::Memory;
 use crate::actions::operator::{Interrupt, Operator};
+use crate::actions::skills::skill;
 use crate::actions::{
-    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Saboteur, Trace, known_skill,
-    pick,
+    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Saboteur, Trace,
 };
 use crate::base::Choices;
 use crate::scenario::{Budget, SceneMap};
@@ -46,6 +47,7 @@ pub fn perform_with(
 ) -> Trace {
     world.localise(choices);
     let mut snapshots = vec![world.snapshot()];
+    let mut memory = Memory::default();
     let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
     for call in calls {
         let stopped = actions.last().is_some_and(|last| last.end != ActionEnd::Completed);
@@ -53,7 +55,7 @@ pub fn perform_with(
             actions.push(unreached(call));
             continue;
         }
-        actions.push(perform_one(call, world, choices, budget, interference.lent()));
+        actions.push(perform_one(call, world, choices, &mut memory, budget, interference.lent()));
         snapshots.push(world.snapshot());
     }
     let tracks = world.tracks();
@@ -65,6 +67,7 @@ fn perform_one(
     call: &ActionCall,
     world: &mut World,
     choices: &mut Choices,
+    memory: &mut Memory,
     budget: &Budget,
     mut interference: Interference<'_>,
 ) -> ActionTrace {
@@ -72,14 +75,14 @@ fn perform_one(
     world.begin_record();
     let misled = interference.saboteur.as_deref_mut().map(|saboteur| saboteur.begin(call, world));
     let understood = misled.as_ref().unwrap_or(call);
-    let mut operator = Operator::new(world, choices, budget.action_secs, interference);
-    let outcome = match known_skill(&call.action) {
-        Ok(()) => operator.act(|operator| pick::pick(understood, operator)),
+    let mut operator = Operator::new(world, choices, memory, budget.action_secs, interference);
+    let outcome = match skill(&call.action) {
+        Ok(skill) => operator.act(|operator| skill(understood, operator)),
         Err(unknown) => {
             return ActionTrace { end: ActionEnd::Broken(unknown.to_string()), ..unreached(call) };
         }
     };
-    let (phases, percepts) = (operator.phases, operator.percepts);
+    let (phases, percepts, perceived) = (operator.phases, operator.percepts, operator.perceived);
     let (end, report) = ended(outcome, world, budget);
     let record = world.end_record();
     let contacts = record.contacts.into_iter().map(|contact| ContactEpisode {
@@ -103,6 +106,7 @@ fn perform_one(
         duration_secs: world.time_secs() - began,
         contacts: contacts.collect(),
         percepts,
+        perceived,
         extremes: extremes.collect(),
         phases,
     }
@@ -133,6 +137,7 @@ fn unreached(call: &ActionCall) -> ActionTrace {
         duration_secs: 0.0,
         contacts: Vec::new(),
         percepts: Vec::new(),
+        perceived: None,
         extremes: Vec::new(),
         phases: Vec::new(),
     }

@@ -1,7 +1,8 @@
-//! The pick skill: see, drive, reach, close, lift, take away.
+//! The pick skill: see (or remember what was perceived), drive, reach, close, lift, take away.
 
 use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::{ActionCall, ActionReport, grasp, plan};
+use crate::actions::{ActionCall, ActionReport, grasp, memory, plan};
+use crate::world::Sighting;
 
 /// Designator of the thing to pick.
 const TARGET: &str = "pickObject";
@@ -30,10 +31,10 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     };
     robot.begin("perceive");
     robot.wait(LOOK_SECS)?;
-    let Some(seen) = robot.see(target) else {
-        return Ok(failed(format!("{target} was not seen")));
+    let (seen, others) = match find(target, robot) {
+        Ok(found) => found,
+        Err(reason) => return Ok(failed(reason)),
     };
-    let others = robot.see_others(target);
     let grasps = grasp::grasps(&seen, robot.profile().max_opening_m);
     if grasps.is_empty() {
         return Ok(failed(format!("{target} is too wide for the gripper")));
@@ -58,6 +59,20 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.follow(&way.retreat, 0.0)?;
     robot.wait(LOOK_SECS)?;
     Ok(report(robot, target, held))
+}
+
+/// The target and everything else: as an earlier action of the run perceived it, otherwise by the abstract detector.
+fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), String> {
+    if let Some(perceived) = &robot.memory().perceived {
+        let kind = robot.kind_of(target).ok_or_else(|| format!("{target} is of no known kind"))?;
+        let base = robot.kinematics().links(&robot.observe().positions)[0];
+        let found = memory::recall(perceived, target, &kind, &base.translation.vector)?;
+        robot.take_for(&found.0);
+        return Ok(found);
+    }
+    let seen = robot.see(target).ok_or_else(|| format!("{target} was not seen"))?;
+    let others = robot.see_others(target);
+    Ok((seen, others))
 }
 
 /// Closes the fingers until they stall. True if they stalled on something.

@@ -43,6 +43,8 @@ pub struct ActionTrace {
     pub contacts: Vec<ContactEpisode>,
     /// What perception returned, in order.
     pub percepts: Vec<Percept>,
+    /// What was made of the camera's pictures, if any were taken.
+    pub perceived: Option<Perceived>,
     /// Extremes along the way, one for each body of the scene, in scene order.
     pub extremes: Vec<Extremes>,
     /// Phases of the action with their start times, for the timeline.
@@ -94,6 +96,35 @@ pub struct Percept {
     /// Seen pose of the object's foot.
     pub pose: Pose,
     /// Seen dimensions. Unit: metres.
+    pub size_m: [f64; 3],
+}
+
+/// What the robot made of its pictures. Frame: world, by the base's belief.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Perceived {
+    /// The surface, if one was found.
+    pub plane: Option<PerceivedPlane>,
+    /// What seems to stand on it, in no order that means anything.
+    pub things: Vec<PerceivedThing>,
+}
+
+/// A level surface as it was perceived.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PerceivedPlane {
+    /// Pose of its middle: z is its upper side's direction, x goes along its first side.
+    pub pose: Pose,
+    /// Lengths of its sides. Unit: metres.
+    pub size_m: [f64; 2],
+}
+
+/// Something on a surface as it was perceived.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PerceivedThing {
+    /// What it seems to be: a class of the ontology, an IRI. Nothing where no known kind is of its size.
+    pub category: Option<String>,
+    /// Upright pose of its foot's middle.
+    pub pose: Pose,
+    /// Dimensions along the axes of that pose; hidden sides as long as those of its kind. Unit: metres.
     pub size_m: [f64; 3],
 }
 

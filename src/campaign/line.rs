@@ -214,6 +214,7 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
             duration_secs: 0.0,
             contacts: Vec::new(),
             percepts: Vec::new(),
+            perceived: None,
             extremes: Vec::new(),
             phases: Vec::new(),
         })

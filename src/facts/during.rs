@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::actions::{ActionTrace, ContactEpisode, Extremes, Percept};
+use crate::actions::{ActionTrace, ContactEpisode, Extremes, Perceived, Percept};
 use crate::base::names;
 use crate::facts::writer::Writer;
 
@@ -12,7 +12,7 @@ use crate::facts::writer::Writer;
 /// force and the largest force are what rules ask for; all episodes stay in the trace.
 const EPISODES_OF_A_PAIR: usize = 3;
 
-/// Writes the report, contacts, extremes and percepts of one action.
+/// Writes the report, contacts, extremes and percepts of one action, and what it made of its pictures.
 pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
     let subject = writer.w("action");
     if let Some(report) = &action.report {
@@ -28,6 +28,9 @@ pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
     }
     for (idx, percept) in action.percepts.iter().enumerate() {
         write_percept(idx + 1, percept, writer);
+    }
+    if let Some(perceived) = &action.perceived {
+        write_perceived(perceived, writer);
     }
 }
 
@@ -74,4 +77,24 @@ fn write_percept(number: usize, percept: &Percept, writer: &mut Writer) {
     writer.numbers(subject, ["x", "y", "z"], percept.pose.position);
     writer.number(subject, "yaw", percept.pose.yaw());
     writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], percept.size_m);
+}
+
+fn write_perceived(perceived: &Perceived, writer: &mut Writer) {
+    if let Some(plane) = &perceived.plane {
+        let subject = writer.w("perceivedPlane");
+        writer.class(subject, &names::w("PerceivedPlane"));
+        writer.numbers(subject, ["x", "y", "z"], plane.pose.position);
+        writer.numbers(subject, ["yaw", "tilt"], [plane.pose.yaw(), plane.pose.tilt()]);
+        writer.numbers(subject, ["extentX", "extentY"], plane.size_m);
+    }
+    for (idx, thing) in perceived.things.iter().enumerate() {
+        let subject = writer.named("perceivedObject", &(idx + 1).to_string());
+        writer.class(subject, &names::w("PerceivedObject"));
+        writer.numbers(subject, ["x", "y", "z"], thing.pose.position);
+        writer.number(subject, "yaw", thing.pose.yaw());
+        writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], thing.size_m);
+        if let Some(category) = &thing.category {
+            writer.iri(subject, "seenAs", category);
+        }
+    }
 }

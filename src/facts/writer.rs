@@ -137,6 +137,12 @@ impl Writer {
         self.state(subject, property, value);
     }
 
+    /// States a relation to something that has an IRI of its own.
+    pub(super) fn iri(&mut self, subject: TermId, property: &str, iri: &str) {
+        let value = self.terms.intern(Term::iri(iri));
+        self.state(subject, property, value);
+    }
+
     /// States a relation to each of some things.
     pub(super) fn things(&mut self, subject: TermId, property: &str, ids: &[String]) {
         for id in ids {

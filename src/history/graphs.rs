@@ -33,7 +33,7 @@ pub(super) const LEFT_OUT: [&str; 13] = [
 ];
 
 /// Classes that the properties of their members give away.
-pub(super) const UNTYPED: [&str; 3] = ["Joint", "Contact", "Percept"];
+pub(super) const UNTYPED: [&str; 5] = ["Joint", "Contact", "Percept", "PerceivedPlane", "PerceivedObject"];
 
 /// A node below another.
 pub(super) fn below(node: &NamedNode, part: &str) -> NamedNode {

@@ -16,6 +16,7 @@ mod kinematics;
 mod mishap;
 mod observe;
 mod quality;
+mod rays;
 mod recorder;
 mod robot;
 mod sense;

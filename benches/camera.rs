@@ -1,0 +1,123 @@
+//! How many depth pictures of 320 × 240 does one core take in a second, and what is that beside a plain loop of ray casts?
+//!
+//! The picture is of a table with five things on it, as the robot sees it. At least 60 pictures a second are the aim. The
+//! plain loop casts the same rays against each solid of the scene with parry, and keeps the nearest; the robot's own links
+//! and the floor, which the pictures have besides, are left out of it.
+
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+
+use actcheck::base::{Choice, ChoiceKind, Choices};
+use actcheck::campaign::Env;
+use actcheck::config::Overrides;
+use actcheck::scenario::{Scene, Shape};
+use actcheck::world::{DepthImage, World};
+use actcheck::{scenario, world};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use parry3d::query::Ray;
+use parry3d::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
+
+const PICTURES: u32 = 100;
+/// The plain loop is slow.
+const PLAIN_PICTURES: u32 = 5;
+/// Where the head looks: at the table.
+const TILT_RAD: f64 = -0.5;
+
+fn main() {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/five_others.toml");
+    let env = Env::prepare(&config, &Overrides::default()).expect("the benchmark's configuration is sound");
+    let mut choices = Choices::random(env.campaign.seed, 0);
+    let mut scene = scenario::draw(&env.space, 0, &mut choices).expect("there is room on the table");
+    let camera = &mut scene.sensing.camera;
+    (camera.range_noise_m, camera.dropout, camera.grazing_rad) = (0.0015, 0.01, 0.1);
+    let mut built = world::build(&scene).expect("the shipped models are sound");
+    built.settle();
+    look_down(&mut built);
+    let exact = per_second(PICTURES, || built.look(&mut frame(0)));
+    let noisy = per_second(PICTURES, || built.look(&mut frame(7)));
+    let solids = solids(&scene);
+    let image = built.look(&mut frame(0));
+    let eye = built.kinematics().camera(&built.observe().positions);
+    let plain = per_second(PLAIN_PICTURES, || plain_picture(&solids, &image, &eye));
+    let seen = image.depths.iter().filter(|depth| **depth > 0.0).count();
+    println!("depth pictures of {} × {}, {} solids of objects, one core", image.width, image.height, solids.len());
+    println!("pixels that see something   {:6.1} %", seen as f64 / image.depths.len() as f64 * 100.0);
+    println!("without noise               {exact:6.1} pictures a second (at least 60)");
+    println!("with noise                  {noisy:6.1} pictures a second (at least 60)");
+    println!("plain loop of ray casts     {plain:6.1} pictures a second");
+    println!("with noise over plain loop  {:6.1}", noisy / plain);
+}
+
+/// Choices of one picture, whose noise has this number.
+fn frame(number: u32) -> Choices {
+    let kind = ChoiceKind::Index { of: 1 << 32 };
+    Choices::recorded(&[Choice { name: "sense.camera.frame".to_owned(), kind, value: f64::from(number) }])
+}
+
+fn per_second<T>(pictures: u32, mut take: impl FnMut() -> T) -> f64 {
+    let start = Instant::now();
+    for _ in 0..pictures {
+        black_box(take());
+    }
+    f64::from(pictures) / start.elapsed().as_secs_f64()
+}
+
+fn look_down(world: &mut World) {
+    let mut command = world.hold();
+    let tilt = world.layout().head[1];
+    command.positions[tilt] = TILT_RAD;
+    while world.time_secs() < 3.0 {
+        world.step(&command);
+    }
+}
+
+/// Every solid of the scene's objects, placed as parry wants it.
+fn solids(scene: &Scene) -> Vec<(parry3d::math::Pose, Box<dyn ParryShape>)> {
+    let mut solids: Vec<(parry3d::math::Pose, Box<dyn ParryShape>)> = Vec::new();
+    for object in &scene.objects {
+        for solid in object.model.solids() {
+            let mut pose = object.pose.to_isometry() * solid.pose.to_isometry();
+            let shape: Box<dyn ParryShape> = match solid.shape {
+                Shape::Box { size: [x, y, z] } => Box::new(Cuboid::new(vector(x / 2.0, y / 2.0, z / 2.0))),
+                Shape::Sphere { radius } => Box::new(Ball::new(radius as f32)),
+                Shape::Cylinder { radius, height } => {
+                    pose.rotation *= UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
+                    Box::new(Cylinder::new((height / 2.0) as f32, radius as f32))
+                }
+                _ => continue,
+            };
+            solids.push((placed(&pose), shape));
+        }
+    }
+    solids
+}
+
+fn plain_picture(
+    solids: &[(parry3d::math::Pose, Box<dyn ParryShape>)],
+    image: &DepthImage,
+    eye: &Isometry3<f64>,
+) -> Vec<f32> {
+    let origin = vector(eye.translation.x, eye.translation.y, eye.translation.z);
+    let mut depths = Vec::with_capacity(image.depths.len());
+    for row in 0..image.height {
+        for column in 0..image.width {
+            let off = |idx: usize, count: usize| (count as f64 / 2.0 - idx as f64 - 0.5) / image.focal_px;
+            let dir = eye.rotation * Vector3::new(1.0, off(column, image.width), off(row, image.height));
+            let ray = Ray::new(origin, vector(dir.x, dir.y, dir.z));
+            let casts = solids.iter().filter_map(|(pose, shape)| shape.cast_ray(pose, &ray, 5.0, true));
+            depths.push(casts.fold(f32::INFINITY, f32::min));
+        }
+    }
+    depths
+}
+
+fn vector(x: f64, y: f64, z: f64) -> parry3d::math::Vector {
+    parry3d::math::Vector::new(x as f32, y as f32, z as f32)
+}
+
+fn placed(pose: &Isometry3<f64>) -> parry3d::math::Pose {
+    let q = pose.rotation.quaternion();
+    let rotation = parry3d::math::Rotation::from_xyzw(q.i as f32, q.j as f32, q.k as f32, q.w as f32).normalize();
+    parry3d::math::Pose::from_parts(vector(pose.translation.x, pose.translation.y, pose.translation.z), rotation)
+}
