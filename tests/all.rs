@@ -20,6 +20,7 @@ mod models;
 mod no_panic;
 mod ontology;
 mod oracle;
+mod perceive;
 mod physics;
 mod proofs;
 mod readme;

@@ -191,6 +191,8 @@ fn call(name: &str, args: &[Value]) -> Value {
     };
     match name {
         "ABS" => Value::Number(numbers[0].abs()),
+        "COS" => Value::Number(numbers[0].cos()),
+        "SIN" => Value::Number(numbers[0].sin()),
         "SQRT" => Value::Number(numbers[0].sqrt()),
         "MIN" => Value::Number(numbers.iter().copied().fold(f64::INFINITY, f64::min)),
         "MAX" => Value::Number(numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max)),

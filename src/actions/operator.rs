@@ -125,6 +125,14 @@ impl<'a> Operator<'a> {
         }
     }
 
+    /// Where the base stands. Frame: world, by its own belief.
+    pub fn base(&self) -> Isometry3<f64> {
+        let links = self.kinematics().links(&self.observe().positions);
+        // The link with this number is moved by the joint before it.
+        let link = self.layout().base.map_or(0, |[.., heading]| heading + 1);
+        links.get(link).copied().unwrap_or_else(Isometry3::identity)
+    }
+
     /// Joint positions that the controllers were last told.
     pub fn commanded(&self) -> &[f64] {
         &self.command.positions

@@ -65,8 +65,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
 fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), String> {
     if let Some(perceived) = &robot.memory().perceived {
         let kind = robot.kind_of(target).ok_or_else(|| format!("{target} is of no known kind"))?;
-        let base = robot.kinematics().links(&robot.observe().positions)[0];
-        let found = memory::recall(perceived, target, &kind, &base.translation.vector)?;
+        let found = memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
         robot.take_for(&found.0);
         return Ok(found);
     }

@@ -24,7 +24,7 @@ pub(super) fn role_of(word: &str) -> Option<Role> {
 }
 
 /// Standard deviations of sensing by local name of their terms.
-pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 7] {
+pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 8] {
     let sensing = &scene.sensing;
     [
         ("positionNoise", sensing.position_noise_m),
@@ -34,6 +34,7 @@ pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 7] {
         ("localisationNoise", sensing.localisation_noise_m),
         ("headingNoise", sensing.heading_noise_rad),
         ("gripperNoise", sensing.gripper_noise_m),
+        ("rangeNoise", sensing.camera.range_noise_m),
     ]
 }
 

@@ -1,8 +1,10 @@
 //! Points to a surface and the things on it.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 
-use crate::actions::perceive::cloud::thinned;
+use crate::actions::perceive::cloud::{cube_of, thinned};
 use crate::actions::perceive::cluster::clusters;
 use crate::actions::perceive::kinds::recognise;
 use crate::actions::perceive::plane::{Plane, Prior, find};
@@ -50,10 +52,10 @@ impl Surface {
         let inliers: Vec<Point3<f64>> = inliers.into_iter().map(|idx| points[idx]).collect();
         let coarse = thinned(&inliers, SURFACE_GRID_M);
         let piece = clusters(&coarse, SURFACE_GAP_M).into_iter().max_by_key(Vec::len)?;
-        let on_piece: Vec<Point3<f64>> = piece.into_iter().map(|idx| coarse[idx]).collect();
-        // The coarse points end up to half a step before the edge: the fine ones near them say where it is.
-        let near = |point: &Point3<f64>| on_piece.iter().any(|other| (point - other).norm() <= SURFACE_GRID_M);
-        let outline: Vec<Point2<f64>> = inliers.iter().filter(|point| near(point)).map(Point3::xy).collect();
+        let cubes: BTreeSet<[i64; 3]> = piece.into_iter().map(|idx| cube_of(&coarse[idx], SURFACE_GRID_M)).collect();
+        // The coarse points end up to half a step before the edge: the fine ones in their cubes say where it is.
+        let of_piece = inliers.iter().filter(|point| cubes.contains(&cube_of(point, SURFACE_GRID_M)));
+        let outline: Vec<Point2<f64>> = of_piece.map(Point3::xy).collect();
         let outline = smallest_around(&outline)?;
         let large = outline.size_m.iter().all(|side| *side >= LEAST_SIDE_M);
         large.then_some(Self { plane, outline })

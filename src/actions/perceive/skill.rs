@@ -68,12 +68,7 @@ pub fn perceive_plane(_: &ActionCall, robot: &mut Operator<'_>) -> Result<Action
 
 /// A point so far in front of the base, so high. Frame: world, by the base's belief.
 fn in_front(robot: &Operator<'_>, [distance, height]: [f64; 2]) -> Point3<f64> {
-    let positions = robot.observe().positions;
-    let base = match robot.layout().base {
-        Some([_, _, heading]) => robot.kinematics().links(&positions)[heading + 1],
-        None => robot.kinematics().links(&positions)[0],
-    };
-    let mut point = base * Point3::new(distance, 0.0, 0.0);
+    let mut point = robot.base() * Point3::new(distance, 0.0, 0.0);
     point.z = height;
     point
 }

@@ -1,0 +1,146 @@
+//! What the robot makes of its depth camera, from scenes to verdicts, and that it acts on that and nothing else.
+
+use std::collections::BTreeMap;
+
+use actcheck::actions::{ActionReport, PerceivedThing};
+use actcheck::base::{Choice, Choices, Pose, names};
+use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
+use actcheck::config::Overrides;
+use actcheck::history::RunRecord;
+use actcheck::verdict::Outcome;
+use actcheck::world::{Poison, World};
+
+/// A table with a glass on it and what a test adds.
+fn env(actions: &str, more: &str) -> Env {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("config.toml");
+    let text = format!(
+        "tests = [{actions}]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
+        [pickObject]\nmodel_list = [\"glass\"]\n{more}"
+    );
+    std::fs::write(&config, text).unwrap();
+    Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
+    let clock = Clock { now: String::new, secs: || 0.0 };
+    run_line(env, "test", 0, choices, &Manner { clock, disturb }).unwrap()
+}
+
+/// The scene with nothing special and senses without noise.
+fn nominal(env: &Env, disturb: Option<Disturbance>) -> RunRecord {
+    run(env, Choices::recorded(&[]), disturb)
+}
+
+fn things(run: &RunRecord) -> &[PerceivedThing] {
+    &run.trace.actions[0].perceived.as_ref().expect("it looked").things
+}
+
+fn report(run: &RunRecord, step: usize) -> &ActionReport {
+    run.trace.actions[step].report.as_ref().expect("it came to its end")
+}
+
+fn outcomes(run: &RunRecord, step: usize) -> BTreeMap<&str, Outcome> {
+    run.judgements[step].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
+}
+
+fn off(seen: &Pose, x: f64, y: f64) -> f64 {
+    (seen.position[0] - x).hypot(seen.position[1] - y)
+}
+
+const OTHERS: &str = "[surfaceObjects]\nmodel_list = [\"mug\", \"can\", \"box\"]\ncount = 3\n";
+
+#[test]
+fn without_noise_a_table_and_what_is_on_it_are_seen_as_they_are() {
+    let env = env("[\"PerceivePlane\"]", OTHERS);
+    let run = nominal(&env, None);
+    let perceived = run.trace.actions[0].perceived.as_ref().unwrap();
+    let plane = perceived.plane.unwrap();
+    assert!(off(&plane.pose, 0.0, 0.0) < 0.01 && (plane.pose.position[2] - 0.705).abs() < 0.002, "{plane:?}");
+    assert!(plane.pose.tilt() < 0.01 && plane.size_m.iter().all(|side| (side - 0.62).abs() < 0.01), "{plane:?}");
+    // Nominally all others are mugs, on a ring around the glass.
+    for object in run.scene.objects.iter().skip(1) {
+        let [x, y, _] = object.pose.position;
+        let seen = things(&run).iter().find(|thing| off(&thing.pose, x, y) < 0.02);
+        let seen = seen.unwrap_or_else(|| panic!("{} was not seen: {:?}", object.id, things(&run)));
+        assert_eq!(seen.category.as_ref(), Some(&object.model.category), "{} seen as {seen:?}", object.id);
+        for (seen, known) in seen.size_m.iter().zip(object.model.size_m) {
+            assert!((seen - known).abs() < 0.01, "{}: {seen} for {known}", object.id);
+        }
+    }
+    assert_eq!(things(&run).len(), 4);
+    assert!(outcomes(&run, 0).values().all(|outcome| *outcome == Outcome::Passed), "{:?}", run.judgements);
+    assert!(report(&run, 0).message.ends_with("and on it 1 Glass, 3 Mug"), "{}", report(&run, 0).message);
+}
+
+#[test]
+fn what_was_perceived_is_picked() {
+    let env = env("[\"PerceivePlane\", \"Pick\"]", "");
+    let run = nominal(&env, None);
+    assert_eq!(outcomes(&run, 1).len(), 5);
+    assert!(outcomes(&run, 1).values().all(|outcome| *outcome == Outcome::Passed), "{:?}", run.judgements);
+    let [percept] = run.trace.actions[1].percepts.as_slice() else { panic!("one thing is what is asked for") };
+    assert_eq!((percept.id.as_str(), percept.pose), ("glass_1", things(&run)[0].pose));
+}
+
+/// Sensors see the glass elsewhere than it is.
+fn deceive(_: u64, world: &mut World) {
+    assert!(world.poison("glass_1", Poison::Decoy(Pose::upright([-0.1, 0.15, 0.705], 0.0))));
+}
+
+#[test]
+fn skills_act_on_what_they_perceive_and_not_on_what_is() {
+    let env = env("[\"PerceivePlane\", \"Pick\"], [\"Pick\"]", "");
+    let run = nominal(&env, Some(deceive));
+    let [seen] = things(&run) else { panic!("one glass is to be seen: {:?}", things(&run)) };
+    assert!(off(&seen.pose, -0.1, 0.15) < 0.01, "{seen:?}");
+    assert_eq!(outcomes(&run, 0)["ObjectsDetected"], Outcome::Failed);
+    assert_eq!(outcomes(&run, 0)["PlaneFound"], Outcome::Passed);
+    // The hand closes where the glass seems to be; there is nothing, and the glass stands where it stood.
+    assert!(!report(&run, 1).succeeded, "{}", report(&run, 1).message);
+    assert!(report(&run, 1).message.contains("fingers"), "{}", report(&run, 1).message);
+    let glass = run.trace.snapshots[2].bodies.iter().find(|body| body.id == "glass_1").unwrap();
+    assert!(off(&glass.pose, 0.0, 0.0) < 0.005, "{:?}", glass.pose);
+    let reached = run.trace.frames.names.iter().position(|name| name == "robot/wrist_roll_link").unwrap();
+    let nearest = run.trace.frames.rows.iter().map(|row| {
+        let at = &row[7 * reached..];
+        (f64::from(at[0]) + 0.1).hypot(f64::from(at[1]) - 0.15)
+    });
+    assert!(nearest.fold(f64::INFINITY, f64::min) < 0.25, "the hand never went to where the glass seems to be");
+}
+
+#[test]
+fn without_a_look_around_the_abstract_detector_is_deceived_as_well() {
+    let env = env("[\"Pick\"]", "");
+    let run = nominal(&env, Some(deceive));
+    assert_eq!(off(&run.trace.actions[0].percepts[0].pose, -0.1, 0.15), 0.0);
+    assert!(!report(&run, 0).succeeded);
+}
+
+#[test]
+fn what_is_not_perceived_is_not_picked() {
+    // Every pixel is lost but in the nominal picture.
+    let env = env("[\"PerceivePlane\", \"Pick\"]", "[camera]\ndropout = 1\n");
+    let run = run(&env, Choices::random(1, 0), None);
+    assert_eq!(report(&run, 0).message, "no level surface was found");
+    assert_eq!(report(&run, 1).message, "nothing that was perceived is like glass_1");
+    assert!(outcomes(&run, 0).values().all(|outcome| *outcome == Outcome::Failed), "{:?}", run.judgements);
+    assert_eq!(outcomes(&run, 1)["MovedObject"], Outcome::Failed);
+}
+
+#[test]
+fn the_same_choices_give_the_same_pictures_and_the_same_percepts() {
+    let noise = "[camera]\nrange_noise_m = 0.003\ndropout = 0.05\ngrazing_rad = 0.15\n";
+    let env = env("[\"PerceivePlane\"]", &format!("{OTHERS}{noise}"));
+    let first = run(&env, Choices::random(3, 0), None);
+    let again = run(&env, Choices::recorded(&first.choices), None);
+    assert_eq!(first.trace, again.trace);
+    // One choice a picture, and without it the picture has no noise.
+    let frames: Vec<&Choice> = first.choices.iter().filter(|choice| choice.name == "sense.camera.frame").collect();
+    let looks = first.trace.actions[0].phases.iter().filter(|phase| phase.name.starts_with("look")).count();
+    assert_eq!(frames.len(), looks);
+    let rest: Vec<Choice> =
+        first.choices.iter().filter(|choice| choice.name != "sense.camera.frame").cloned().collect();
+    let clean = run(&env, Choices::recorded(&rest), None);
+    assert_ne!(first.trace.actions[0].perceived, clean.trace.actions[0].perceived);
+}
