@@ -57,7 +57,8 @@ fn without_noise_a_table_and_what_is_on_it_are_seen_as_they_are() {
     let perceived = run.trace.actions[0].perceived.as_ref().unwrap();
     let plane = perceived.plane.unwrap();
     assert!(off(&plane.pose, 0.0, 0.0) < 0.01 && (plane.pose.position[2] - 0.705).abs() < 0.002, "{plane:?}");
-    assert!(plane.pose.tilt() < 0.01 && plane.size_m.iter().all(|side| (side - 0.62).abs() < 0.01), "{plane:?}");
+    // At the far edge, pixels lie 1.5 cm apart.
+    assert!(plane.pose.tilt() < 0.01 && plane.size_m.iter().all(|side| (side - 0.62).abs() < 0.015), "{plane:?}");
     // Nominally all others are mugs, on a ring around the glass.
     for object in run.scene.objects.iter().skip(1) {
         let [x, y, _] = object.pose.position;
