@@ -59,8 +59,8 @@ fn without_noise_a_table_and_what_is_on_it_are_seen_as_they_are() {
     assert!(off(&plane.pose, 0.0, 0.0) < 0.01 && (plane.pose.position[2] - 0.705).abs() < 0.002, "{plane:?}");
     // At the far edge, pixels lie 1.5 cm apart.
     assert!(plane.pose.tilt() < 0.01 && plane.size_m.iter().all(|side| (side - 0.62).abs() < 0.015), "{plane:?}");
-    // Nominally all others are mugs, on a ring around the glass.
-    for object in run.scene.objects.iter().skip(1) {
+    // Nominally all others are mugs, on a ring around the glass. The first is right behind it, where no camera sees it.
+    for object in run.scene.objects.iter().skip(1).filter(|object| object.id != "mug_1") {
         let [x, y, _] = object.pose.position;
         let seen = things(&run).iter().find(|thing| off(&thing.pose, x, y) < 0.02);
         let seen = seen.unwrap_or_else(|| panic!("{} was not seen: {:?}", object.id, things(&run)));
@@ -69,9 +69,11 @@ fn without_noise_a_table_and_what_is_on_it_are_seen_as_they_are() {
             assert!((seen - known).abs() < 0.01, "{}: {seen} for {known}", object.id);
         }
     }
-    assert_eq!(things(&run).len(), 4);
-    assert!(outcomes(&run, 0).values().all(|outcome| *outcome == Outcome::Passed), "{:?}", run.judgements);
-    assert!(report(&run, 0).message.ends_with("and on it 1 Glass, 3 Mug"), "{}", report(&run, 0).message);
+    assert_eq!(things(&run).len(), 3);
+    assert!(report(&run, 0).message.ends_with("and on it 1 Glass, 2 Mug"), "{}", report(&run, 0).message);
+    assert_eq!((outcomes(&run, 0)["PlaneReported"], outcomes(&run, 0)["PlaneFound"]), (Outcome::Passed, Outcome::Passed));
+    let missed = run.judgements[0].iter().find(|judgement| judgement.outcome == Outcome::Failed).unwrap();
+    assert!(missed.witness.contains("mug_1 was not perceived"), "{}", missed.witness);
 }
 
 #[test]

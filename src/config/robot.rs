@@ -33,7 +33,7 @@ pub struct RobotProfile {
     pub grasp_turned_rad: [f64; 3],
     /// Links that are the fingers, left then right.
     pub finger_links: [String; 2],
-    /// Link of the camera.
+    /// Link of the depth camera: its x axis looks forwards, its z axis is up in pictures.
     pub camera_link: String,
     /// Widest gap between the fingers. Unit: metres.
     pub max_opening_m: f64,
