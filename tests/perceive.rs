@@ -71,7 +71,10 @@ fn without_noise_a_table_and_what_is_on_it_are_seen_as_they_are() {
     }
     assert_eq!(things(&run).len(), 3);
     assert!(report(&run, 0).message.ends_with("and on it 1 Glass, 2 Mug"), "{}", report(&run, 0).message);
-    assert_eq!((outcomes(&run, 0)["PlaneReported"], outcomes(&run, 0)["PlaneFound"]), (Outcome::Passed, Outcome::Passed));
+    assert_eq!(
+        (outcomes(&run, 0)["PlaneReported"], outcomes(&run, 0)["PlaneFound"]),
+        (Outcome::Passed, Outcome::Passed)
+    );
     let missed = run.judgements[0].iter().find(|judgement| judgement.outcome == Outcome::Failed).unwrap();
     assert!(missed.witness.contains("mug_1 was not perceived"), "{}", missed.witness);
 }

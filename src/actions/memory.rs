@@ -86,6 +86,9 @@ mod tests {
 
     #[test]
     fn what_was_not_perceived_can_not_be_taken() {
-        assert_eq!(recalled(vec![thing(None, 0.5, 0.146)]), Err("nothing that was perceived is like glass_1".to_owned()));
+        assert_eq!(
+            recalled(vec![thing(None, 0.5, 0.146)]),
+            Err("nothing that was perceived is like glass_1".to_owned())
+        );
     }
 }

@@ -126,10 +126,17 @@ struct Solid<'a> {
 
 /// Forms that rays meet in closed form. Unit: metres.
 enum Form {
-    Box { half: Vector3<f64> },
+    Box {
+        half: Vector3<f64>,
+    },
     /// About y, as the library has it.
-    Cylinder { radius: f64, half_height: f64 },
-    Ball { radius: f64 },
+    Cylinder {
+        radius: f64,
+        half_height: f64,
+    },
+    Ball {
+        radius: f64,
+    },
     Other,
 }
 
@@ -197,7 +204,9 @@ impl<'a> Solid<'a> {
         let span = match self.form {
             Form::Box { half } => box_span(&self.eye, &ray, &half),
             Form::Cylinder { radius, half_height } => cylinder_span(&self.eye, &ray, radius, half_height),
-            Form::Ball { radius } => round_span(self.eye.coords.dot(&ray), ray.norm_squared(), &self.eye.coords, radius),
+            Form::Ball { radius } => {
+                round_span(self.eye.coords.dot(&ray), ray.norm_squared(), &self.eye.coords, radius)
+            }
             Form::Other => {
                 let ray = Ray::new(to_vector(&self.eye.coords), to_vector(&ray));
                 let met = self.shape.cast_local_ray(&ray, to_real(most), true);

@@ -27,7 +27,8 @@ pub fn towards(kinematics: &Kinematics, layout: &Layout, positions: &[f64], poin
                 (off(kinematics, &probed, point) - miss) / PROBE_RAD
             })
             .collect();
-        let squared = effects.iter().fold(Matrix2::identity() * DAMPING, |sum, effect| sum + effect * effect.transpose());
+        let squared =
+            effects.iter().fold(Matrix2::identity() * DAMPING, |sum, effect| sum + effect * effect.transpose());
         let Some(inverse) = squared.try_inverse() else { break };
         for (joint, effect) in layout.head.iter().zip(&effects) {
             let change = -effect.dot(&(inverse * miss));
