@@ -1,8 +1,9 @@
 //! The space that the robot itself takes up, so that it can tell itself from what it sees.
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use crate::scenario::Shape;
+use crate::base::Pose;
+use crate::scenario::{Part, Shape};
 use crate::world::Kinematics;
 
 /// The robot's collision shapes in one posture.
@@ -15,13 +16,26 @@ pub struct OwnBody {
 impl OwnBody {
     /// The shapes for given joint positions.
     pub fn new(kinematics: &Kinematics, positions: &[f64]) -> Self {
-        let solids = kinematics.solids(positions).into_iter().map(|(pose, shape)| (pose.inverse(), shape));
+        let solids = kinematics.solids(positions).into_iter().map(|(pose, shape)| bounded(pose, shape));
         Self { solids: solids.collect() }
     }
 
     /// Whether a point is in one of the shapes or at most so far from it (at edges a little farther). Unit: metres.
     pub fn is_near(&self, point: &Point3<f64>, margin: f64) -> bool {
         self.solids.iter().any(|(from_world, shape)| is_within(&(from_world * point), shape, margin))
+    }
+}
+
+/// From the world to a shape, and the shape; the box around it where its own form is not simple.
+fn bounded(pose: Isometry3<f64>, shape: Shape) -> (Isometry3<f64>, Shape) {
+    match shape {
+        Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Sphere { .. } => (pose.inverse(), shape),
+        other => {
+            let (low, high) = Part { pose: Pose::IDENTITY, shape: other }.bounds();
+            let (low, high) = (Vector3::from(low), Vector3::from(high));
+            let middle = pose * Translation3::from((low + high) / 2.0);
+            (middle.inverse(), Shape::Box { size: (high - low).into() })
+        }
     }
 }
 
@@ -34,8 +48,8 @@ fn is_within(point: &Point3<f64>, shape: &Shape, margin: f64) -> bool {
             point.z.abs() <= height / 2.0 + margin && point.x * point.x + point.y * point.y <= reach * reach
         }
         Shape::Sphere { radius } => point.coords.norm() <= radius + margin,
-        // Robots are not made of tubes.
-        Shape::Tube { .. } => false,
+        // The others have become boxes.
+        _ => false,
     }
 }
 
@@ -51,6 +65,9 @@ mod tests {
         assert!(!near(cylinder, 0.0, 0.221));
         let block = Shape::Box { size: [0.2, 0.1, 0.4] };
         assert!(near(block.clone(), 0.119, 0.219) && !near(block, 0.121, 0.0));
+        let (from_world, capsule) = bounded(Isometry3::identity(), Shape::Capsule { radius: 0.1, height: 0.2 });
+        assert!(is_within(&(from_world * Point3::new(0.0, 0.0, 0.219)), &capsule, 0.02));
+        assert!(!is_within(&(from_world * Point3::new(0.0, 0.0, 0.221)), &capsule, 0.02));
         assert!(near(Shape::Sphere { radius: 0.1 }, 0.0, 0.119) && !near(Shape::Sphere { radius: 0.1 }, 0.0, 0.121));
     }
 }
