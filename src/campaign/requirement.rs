@@ -93,6 +93,7 @@ fn nothing_done(scene: &Scene) -> ActionTrace {
         duration_secs: 0.0,
         contacts: Vec::new(),
         percepts: Vec::new(),
+        perceived: None,
         extremes: Vec::new(),
         phases: Vec::new(),
     }
