@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -168,6 +170,26 @@ fn a_guided_campaign_is_the_same_at_any_number_of_workers() {
     assert_eq!(of(&one, "weight"), of(&two, "weight"));
     assert_eq!(of(&one, "weight").iter().map(Value::to_string).collect::<BTreeSet<_>>().len(), 22);
 
+    // Killed on the way, and gone on with: what was told before is told again.
+    let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args([&run[..], &["--jobs", "1", "--history", "three"]].concat())
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while std::fs::read_dir(folder.join("three/traces")).map_or(0, Iterator::count) < 8 {
+        assert!(child.try_wait().unwrap().is_none(), "it must not end before it is killed");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let resumed = json(folder, &["run", "--resume", "--history", "three"]);
+    let three = list("three");
+    assert_eq!(of(&one, "trace_hash"), of(&three, "trace_hash"));
+    assert_eq!(of(&one, "weight"), of(&three, "weight"));
+    assert_eq!(resumed["search"], told["search"]);
+
     assert!(text.contains("are no rates") && text.contains("weighted, 22 scenes"), "{text}");
     assert_eq!((&told["search"]["strategy"], &told["search"]["counts_are_rates"]), (&"boundary".into(), &false.into()));
     let rates = told["search"]["weighted_failure_rates"].as_array().unwrap();
@@ -199,4 +221,21 @@ fn a_strategy_that_is_none_is_refused_with_the_names() {
     let refused = actcheck(Path::new("."), &["run", "configs/pick.toml", "--strategy", "boundry"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("did you mean `boundary`"), "{}", stderr(&refused));
+}
+
+/// Parts don't hear of each other, and the width of an interval of counted runs says nothing here.
+#[test]
+fn what_a_search_for_failures_can_not_be_is_refused() {
+    let project = project();
+    for other in [["--shard", "1/2"], ["--until-width", "0.2"]] {
+        let refused =
+            actcheck(project.path(), &[&["run", "configs/pick.toml", "--strategy", "bandit"], &other[..]].concat());
+        assert_eq!(refused.status.code(), Some(2), "{other:?}");
+        assert!(stderr(&refused).contains("S024"), "{}", stderr(&refused));
+    }
+    let allowed =
+        ["run", "configs/pick.toml", "--runs", "2", "--strategy", "halton", "--shard", "1/2", "--history", "h"];
+    assert_ne!(actcheck(project.path(), &allowed).status.code(), Some(2));
+    let refused = actcheck(project.path(), &["run", "--resume", "--strategy", "bandit", "--history", "h"]);
+    assert_eq!(refused.status.code(), Some(2), "a campaign goes on as it was begun");
 }
