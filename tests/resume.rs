@@ -122,11 +122,29 @@ fn twenty_kills_change_nothing() {
 #[test]
 fn an_interrupted_campaign_goes_on_with_its_budgets() {
     let project = project();
-    let folder = project.path();
     let budgets = ["--runs", "60", "--max-failures", "6", "--seed", "11"];
-    let whole = json(folder, &[&["run", "configs/pick.toml", "--history", "whole"][..], &budgets].concat());
-    assert_eq!((&whole["ended_by"], &whole["interrupted"]), (&Value::from("failures"), &Value::from(false)));
-    let begin = [&["run", "configs/pick.toml", "--history", "h", "--jobs", "1"][..], &budgets].concat();
+    assert_eq!(interrupted_and_resumed(project.path(), &budgets)["ended_by"], "failures");
+    // A configuration is found by its path, and another one has no campaign here.
+    let other = actcheck(project.path(), &["run", "configs/clutter.toml", "--resume", "--history", "h"]);
+    assert_eq!(other.status.code(), Some(2));
+    assert!(stderr(&other).contains("X050") && stderr(&other).contains("clutter.toml"), "{}", stderr(&other));
+}
+
+/// A guided search decides by what came of earlier scenes; those of before the interruption count as if there had been none.
+#[test]
+fn an_interrupted_search_goes_on_to_the_same_scenes() {
+    let project = project();
+    let search = ["--runs", "30", "--strategy", "cross-entropy", "--seed", "5"];
+    let whole = interrupted_and_resumed(project.path(), &search);
+    assert_eq!((&whole["finished_runs"], &whole["ended_by"]), (&Value::from(30), &Value::Null));
+}
+
+/// Runs a campaign as a whole, and once more with a Ctrl-C in between and another number of workers. Both must come out the
+/// same. Returns the summary.
+fn interrupted_and_resumed(folder: &Path, options: &[&str]) -> Value {
+    let whole = json(folder, &[&["run", "configs/pick.toml", "--history", "whole"][..], options].concat());
+    assert_eq!(whole["interrupted"], false);
+    let begin = [&["run", "configs/pick.toml", "--history", "h", "--jobs", "1"][..], options].concat();
     let mut child = start(folder, &begin);
     let started = Instant::now();
     while traces(folder, "h") < 2 {
@@ -137,13 +155,10 @@ fn an_interrupted_campaign_goes_on_with_its_budgets() {
     assert_eq!(child.wait().unwrap().code(), Some(130));
     let there = listed(folder, "h").lines().count();
     assert!(there > 1 && there < listed(folder, "whole").lines().count(), "{there}");
-    // A configuration is found by its path, and another one has no campaign here.
-    let other = actcheck(folder, &["run", "configs/clutter.toml", "--resume", "--history", "h"]);
-    assert_eq!(other.status.code(), Some(2));
-    assert!(stderr(&other).contains("X050") && stderr(&other).contains("clutter.toml"), "{}", stderr(&other));
     let resumed = json(folder, &["run", "configs/pick.toml", "--resume", "--history", "h", "--jobs", "2"]);
-    assert_eq!(without_place(resumed), without_place(whole));
+    assert_eq!(without_place(resumed), without_place(whole.clone()));
     assert_eq!(listed(folder, "h"), listed(folder, "whole"));
+    whole
 }
 
 #[test]
