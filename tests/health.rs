@@ -1,4 +1,4 @@
-//! The health of campaigns: warnings come of campaigns that have the fault.
+//! The health of campaigns: the shipped ones are healthy, and each warning comes of a campaign that has the fault.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -9,7 +9,7 @@ use actcheck::campaign::{Clock, Ending, Env, Manner, Options, run_all};
 use actcheck::config::Overrides;
 use actcheck::history::{History, RunFilter};
 use actcheck::scenario;
-use actcheck::world::World;
+use actcheck::world::{Mishap, World};
 use serde_json::Value;
 
 use crate::support::{actcheck, edit, project, root, stderr, stdout};
@@ -30,6 +30,18 @@ fn health(config: &Path, runs: Option<u32>, manner: Manner) -> Health {
     let mut meter = HealthMeter::default();
     history.each_vitals("k", |run| meter.add(run)).unwrap();
     meter.finish(&history.outcomes(&RunFilter::default()).unwrap())
+}
+
+#[test]
+fn the_shipped_campaigns_are_healthy() {
+    for config in ["pick", "lone_glass", "clutter"] {
+        let path = root().join(format!("configs/{config}.toml"));
+        let health = health(&path, None, Manner { clock: STILL, disturb: None });
+        assert_eq!(health.ailments, [], "{config}");
+        assert!(health.runs >= 15 && !health.parameters.is_empty(), "{config}: {health:?}");
+        let depth = health.deepest.unwrap().0;
+        assert!(depth > 0.0, "{config}: things that push each other do go into each other a little");
+    }
 }
 
 /// Twelve things find no place on a coffee table, and a property that speaks of what is not there never applies.
@@ -106,4 +118,23 @@ fn a_run_that_takes_far_longer_than_the_others_is_told() {
     let config = root().join("configs/lone_glass.toml");
     let health = health(&config, Some(6), Manner { clock, disturb: Some(disturb) });
     assert_eq!(health.ailments, [Ailment::Slow("k-4".into(), 500.0, 2.0)]);
+}
+
+/// One thing is put into another: physics pushes them apart, with energy that nothing gave them.
+#[test]
+fn bad_simulation_is_told() {
+    let disturb = |index: u64, world: &mut World| {
+        let bodies = world.snapshot().bodies;
+        let movable: Vec<_> = bodies.iter().filter(|body| !body.fixed).collect();
+        if index == 1 {
+            assert!(world.befall(&movable[1].id, Mishap::Pose(movable[0].pose)));
+        }
+    };
+    let config = root().join("configs/pick.toml");
+    let health = health(&config, Some(2), Manner { clock: STILL, disturb: Some(disturb) });
+    let [Ailment::Penetration(deep, metres), Ailment::Energy(hot, joules)] = health.ailments.as_slice() else {
+        panic!("{:?}", health.ailments)
+    };
+    assert_eq!((deep.as_str(), hot.as_str()), ("k-2", "k-2"));
+    assert!(*metres > 0.02 && *joules > 0.2, "{metres} m, {joules} J");
 }
