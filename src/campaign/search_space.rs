@@ -16,14 +16,16 @@ impl SearchSpace {
     /// The scene's parameters, and where the target seems to stand. Where scenes are repeated noise is left alone: it is
     /// what the repetitions differ in.
     pub fn new(env: &Env) -> Self {
+        let parameters = env.space.parameters();
+        let index_of = |name: &str| parameters.iter().position(|parameter| parameter.name == name);
         let of = |kind| match kind {
             ParameterKind::Range => Dimension::Continuous,
+            ParameterKind::Beside(name) => index_of(name).map_or(Dimension::Continuous, Dimension::Beside),
             ParameterKind::OneOf(count) => Dimension::Categorical(count),
             ParameterKind::Count(count) => Dimension::Rising(count),
         };
-        let parameters = env.space.parameters().into_iter();
         let mut axes: Vec<(Vec<String>, Dimension)> =
-            parameters.map(|parameter| (vec![parameter.name], of(parameter.kind))).collect();
+            parameters.iter().map(|parameter| (vec![parameter.name.clone()], of(parameter.kind))).collect();
         let (targets, sensing) = (env.space.target_ids(), &env.campaign.sensing);
         if env.campaign.repeat == 1 && !targets.is_empty() {
             let noises =

@@ -19,6 +19,9 @@ pub struct Parameter {
 pub enum ParameterKind {
     /// A range of numbers.
     Range,
+    /// The range of where another object stands along one side of the surface; the target's place along the same side has
+    /// this name.
+    Beside(&'static str),
     /// So many things, none nearer to another.
     OneOf(usize),
     /// So many counts, smallest first.
@@ -63,8 +66,8 @@ impl Space {
         }
         for number in 1..=most {
             add(format!("other.{number}.model"), ParameterKind::OneOf(self.others.len()));
-            add(format!("other.{number}.x"), ParameterKind::Range);
-            add(format!("other.{number}.y"), ParameterKind::Range);
+            add(format!("other.{number}.x"), ParameterKind::Beside("target.x"));
+            add(format!("other.{number}.y"), ParameterKind::Beside("target.y"));
         }
         found
     }

@@ -16,7 +16,7 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
     }
     let axes = space.dimensions().iter().enumerate().map(|(axis, dimension)| {
         let arms = match dimension {
-            Dimension::Continuous | Dimension::Normal => SLICES,
+            Dimension::Continuous | Dimension::Normal | Dimension::Beside(_) => SLICES,
             Dimension::Categorical(count) | Dimension::Rising(count) => *count,
         };
         play(&open, axis, arms)

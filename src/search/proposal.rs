@@ -24,6 +24,13 @@ pub enum Marginal {
     },
     /// The quantile of a number whose spread is multiplied, brought back to four of its own standard deviations.
     Spread(f64),
+    /// Normal about the value of an earlier axis, cut off at 0 and 1.
+    Beside {
+        /// Index of that axis.
+        axis: usize,
+        /// Standard deviation before the cut, positive.
+        sigma: f64,
+    },
     /// Constant in each of as many equal intervals as there are shares; the shares sum to 1.
     Steps(Vec<f64>),
 }
@@ -39,9 +46,10 @@ impl Marginal {
         }
     }
 
-    /// Against the uniform density.
-    fn density(&self, value: f64) -> f64 {
+    /// Against the uniform density, where the earlier axes have these values.
+    fn density(&self, value: f64, earlier: &[f64]) -> f64 {
         match self {
+            Self::Beside { axis, sigma } => beside(*axis, *sigma, earlier).density(value, earlier),
             Self::Normal { mean, sigma } => {
                 let distance = (value - mean) / sigma;
                 let (low, high) = cut(*mean, *sigma);
@@ -61,13 +69,18 @@ impl Marginal {
         }
     }
 
-    fn draw(&self, generator: &mut ChaCha8Rng) -> f64 {
+    fn draw(&self, generator: &mut ChaCha8Rng, earlier: &[f64]) -> f64 {
+        if let Self::Beside { axis, sigma } = self {
+            return beside(*axis, *sigma, earlier).draw(generator, earlier);
+        }
         let share = unit(generator);
         let value = match self {
             Self::Normal { mean, sigma } => {
                 let (low, high) = cut(*mean, *sigma);
                 mean + sigma * quantile(low + (high - low) * share)
             }
+            // Drawn above, by what it is.
+            Self::Beside { .. } => share,
             Self::Spread(factor) => {
                 let (low, high) = spread_cut(*factor);
                 below((factor * quantile(low + (high - low) * share)).clamp(-FARTHEST, FARTHEST))
@@ -85,6 +98,11 @@ impl Marginal {
         };
         value.clamp(0.0, BELOW_ONE)
     }
+}
+
+/// The distribution that lies beside an earlier axis; about the middle where there is none.
+fn beside(axis: usize, sigma: f64, earlier: &[f64]) -> Marginal {
+    Marginal::Normal { mean: earlier.get(axis).copied().unwrap_or(0.5), sigma }
 }
 
 /// The distribution function of a normal distribution at 0 and 1.
@@ -107,17 +125,22 @@ fn quantile(share: f64) -> f64 {
     std::f64::consts::SQRT_2 * erf_inv(2.0 * share - 1.0)
 }
 
-/// Independent axes.
+/// Axes that know of each other only what lies beside what.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Component(pub Vec<Marginal>);
 
 impl Component {
     fn density(&self, point: &[f64]) -> f64 {
-        self.0.iter().zip(point).map(|(marginal, value)| marginal.density(*value)).product()
+        self.0.iter().zip(point).map(|(marginal, value)| marginal.density(*value, point)).product()
     }
 
     fn draw(&self, generator: &mut ChaCha8Rng) -> Vec<f64> {
-        self.0.iter().map(|marginal| marginal.draw(generator)).collect()
+        let mut point = Vec::with_capacity(self.0.len());
+        for marginal in &self.0 {
+            let value = marginal.draw(generator, &point);
+            point.push(value);
+        }
+        point
     }
 }
 

@@ -12,6 +12,9 @@ pub enum Dimension {
     Normal,
     /// One of so many values in order, the last of which is the hardest: intervals as those of [`Dimension::Categorical`].
     Rising(usize),
+    /// A quantile in [0, 1) that says where something is along the same side as the axis with this earlier index says it of
+    /// another thing: equal values put the two next to each other, which is unusual.
+    Beside(usize),
 }
 
 impl Dimension {
@@ -19,7 +22,7 @@ impl Dimension {
     pub(crate) fn categories(self) -> Option<usize> {
         match self {
             Self::Categorical(count) => Some(count),
-            Self::Continuous | Self::Normal | Self::Rising(_) => None,
+            Self::Continuous | Self::Normal | Self::Rising(_) | Self::Beside(_) => None,
         }
     }
 }
@@ -31,14 +34,15 @@ pub struct Space {
 }
 
 impl Space {
-    /// The cube with these axes. An axis of no value counts as one of a single value.
+    /// The cube with these axes. An axis of no value counts as one of a single value, one beside no earlier axis as continuous.
     pub fn new(dimensions: impl IntoIterator<Item = Dimension>) -> Self {
-        let whole = |dimension| match dimension {
+        let whole = |(index, dimension)| match dimension {
+            Dimension::Beside(other) if other >= index => Dimension::Continuous,
             Dimension::Categorical(count) => Dimension::Categorical(count.max(1)),
             Dimension::Rising(count) => Dimension::Rising(count.max(1)),
-            Dimension::Continuous | Dimension::Normal => dimension,
+            Dimension::Continuous | Dimension::Normal | Dimension::Beside(_) => dimension,
         };
-        Self { dimensions: dimensions.into_iter().map(whole).collect() }
+        Self { dimensions: dimensions.into_iter().enumerate().map(whole).collect() }
     }
 
     /// The axes, in order.
