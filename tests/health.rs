@@ -44,11 +44,11 @@ fn the_shipped_campaigns_are_healthy() {
     }
 }
 
-/// Twelve things find no place on a coffee table, and a property that speaks of what is not there never applies.
+/// So many things find no place on a coffee table, and a property that speaks of what is not there never applies.
 #[test]
 fn a_crowded_table_and_an_idle_property_are_told() {
     let project = project();
-    edit(&project.path().join("configs/pick.toml"), "count = [1, 5]", "count = [1, 14]");
+    edit(&project.path().join("configs/pick.toml"), "count = [1, 5]", "count = [16, 20]");
     std::fs::write(
         project.path().join("rules/idle.rls"),
         "applicable(?o) :- after(?o, w:knockedOver, true), after(?o, w:z, ?z), ?z > 1000.0 .\n\
@@ -76,7 +76,7 @@ fn a_crowded_table_and_an_idle_property_are_told() {
     assert!(stderr(&output).contains("larger surface"), "what to do:\n{}", stderr(&output));
     let table = stdout(&actcheck(project.path(), &["health", "--history", "h", "--format", "csv"]));
     assert!(table.starts_with("parameter,draws,bins,hit,expected_hit,least,most\n"), "{table}");
-    assert!(table.contains("\nother.count,10,14,"), "{table}");
+    assert!(table.contains("\nother.count,10,5,"), "{table}");
     let text = stdout(&actcheck(project.path(), &["health", "--history", "h"]));
     assert!(text.contains("deepest penetration: ") && text.contains("warnings"), "{text}");
     let missing = actcheck(project.path(), &["health", "zzzz", "--history", "h"]);
@@ -120,21 +120,20 @@ fn a_run_that_takes_far_longer_than_the_others_is_told() {
     assert_eq!(health.ailments, [Ailment::Slow("k-4".into(), 500.0, 2.0)]);
 }
 
-/// One thing is put into another: physics pushes them apart, with energy that nothing gave them.
+/// One solid thing is put into another, after everything came to rest.
 #[test]
 fn bad_simulation_is_told() {
     let disturb = |index: u64, world: &mut World| {
         let bodies = world.snapshot().bodies;
-        let movable: Vec<_> = bodies.iter().filter(|body| !body.fixed).collect();
+        let solid = |id: &str| ["box_", "can_", "bottle_", "salt_shaker_"].iter().any(|name| id.starts_with(name));
+        let solids: Vec<_> = bodies.iter().filter(|body| solid(&body.id)).collect();
         if index == 1 {
-            assert!(world.befall(&movable[1].id, Mishap::Pose(movable[0].pose)));
+            assert!(world.befall(&solids[1].id, Mishap::Pose(solids[0].pose)));
         }
     };
-    let config = root().join("configs/pick.toml");
+    let config = root().join("configs/clutter.toml");
     let health = health(&config, Some(2), Manner { clock: STILL, disturb: Some(disturb) });
-    let [Ailment::Penetration(deep, metres), Ailment::Energy(hot, joules)] = health.ailments.as_slice() else {
-        panic!("{:?}", health.ailments)
-    };
-    assert_eq!((deep.as_str(), hot.as_str()), ("k-2", "k-2"));
-    assert!(*metres > 0.02 && *joules > 0.2, "{metres} m, {joules} J");
+    let Some(Ailment::Penetration(deep, metres)) = health.ailments.first() else { panic!("{:?}", health.ailments) };
+    assert_eq!(deep, "k-2");
+    assert!(*metres > 0.02, "{metres} m");
 }
