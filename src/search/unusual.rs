@@ -14,7 +14,8 @@ const BESIDE: f64 = 0.15;
 ///
 /// Source: scaled-sigma sampling of Sun, Li and others (2015), which finds rare failures of circuits.
 pub(crate) fn propose(space: &Space) -> Proposal {
-    let known = |dimension: &Dimension| matches!(dimension, Dimension::Normal | Dimension::Rising(2..) | Dimension::Beside(_));
+    let known =
+        |dimension: &Dimension| matches!(dimension, Dimension::Normal | Dimension::Rising(2..) | Dimension::Beside(_));
     if !space.dimensions().iter().any(known) {
         return Proposal::default();
     }
