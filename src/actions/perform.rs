@@ -52,7 +52,7 @@ pub fn perform_with(
     for call in calls {
         let stopped = actions.last().is_some_and(|last| last.end != ActionEnd::Completed);
         if stopped {
-            actions.push(unreached(call));
+            actions.push(ActionTrace::not_reached(&call.action, &call.parameters));
             continue;
         }
         actions.push(perform_one(call, world, choices, &mut memory, budget, interference.lent()));
@@ -79,7 +79,8 @@ fn perform_one(
     let outcome = match skill(&call.action) {
         Ok(skill) => operator.act(|operator| skill(understood, operator)),
         Err(unknown) => {
-            return ActionTrace { end: ActionEnd::Broken(unknown.to_string()), ..unreached(call) };
+            let nothing = ActionTrace::not_reached(&call.action, &call.parameters);
+            return ActionTrace { end: ActionEnd::Broken(unknown.to_string()), ..nothing };
         }
     };
     let (phases, percepts, perceived) = (operator.phases, operator.percepts, operator.perceived);
@@ -125,20 +126,5 @@ fn ended(
             let reason = format!("the action took longer than its budget of {} s", budget.action_secs);
             (ActionEnd::Timeout(reason), None)
         }
-    }
-}
-
-fn unreached(call: &ActionCall) -> ActionTrace {
-    ActionTrace {
-        action: call.action.clone(),
-        parameters: call.parameters.clone(),
-        end: ActionEnd::NotReached,
-        report: None,
-        duration_secs: 0.0,
-        contacts: Vec::new(),
-        percepts: Vec::new(),
-        perceived: None,
-        extremes: Vec::new(),
-        phases: Vec::new(),
     }
 }

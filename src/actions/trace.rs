@@ -51,6 +51,24 @@ pub struct ActionTrace {
     pub phases: Vec<Phase>,
 }
 
+impl ActionTrace {
+    /// An action of which nothing happened.
+    pub fn not_reached(action: &str, parameters: &BTreeMap<String, Vec<String>>) -> Self {
+        Self {
+            action: action.to_owned(),
+            parameters: parameters.clone(),
+            end: ActionEnd::NotReached,
+            report: None,
+            duration_secs: 0.0,
+            contacts: Vec::new(),
+            percepts: Vec::new(),
+            perceived: None,
+            extremes: Vec::new(),
+            phases: Vec::new(),
+        }
+    }
+}
+
 /// How an action ended.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ActionEnd {

@@ -1,6 +1,6 @@
 //! What a scene has to satisfy before anything happens in it: a rule file of the configuration.
 
-use crate::actions::{ActionEnd, ActionTrace, Frames, Trace};
+use crate::actions::{ActionTrace, Frames, Trace};
 use crate::base::{Diagnostics, digest_of, names};
 use crate::campaign::Failure;
 use crate::config::Campaign;
@@ -60,7 +60,8 @@ impl Requirement {
     pub(super) fn check(&self, scene: &Scene, world: &World, budget: &Budget) -> Result<(), Failure> {
         let trace = Trace {
             snapshots: vec![world.snapshot()],
-            actions: vec![nothing_done(scene)],
+            // It only says what the designators stand for.
+            actions: vec![ActionTrace::not_reached("", &scene.designators)],
             frames: Frames::default(),
             hash: String::new(),
             map: scene.map.clone(),
@@ -80,21 +81,5 @@ impl Requirement {
             Some(Err(fault)) => Err(Failure::Discard(format!("{} can't be asked: {fault}", self.path))),
             _ => Err(Failure::Discard(format!("does not satisfy {}", self.path))),
         }
-    }
-}
-
-/// An action that only says what the designators stand for.
-fn nothing_done(scene: &Scene) -> ActionTrace {
-    ActionTrace {
-        action: String::new(),
-        parameters: scene.designators.clone(),
-        end: ActionEnd::NotReached,
-        report: None,
-        duration_secs: 0.0,
-        contacts: Vec::new(),
-        percepts: Vec::new(),
-        perceived: None,
-        extremes: Vec::new(),
-        phases: Vec::new(),
     }
 }

@@ -78,7 +78,7 @@ pub fn draw(space: &Space, _test: usize, choices: &mut Choices) -> Result<Scene,
 }
 
 /// A platform as its model is.
-fn platform(id: String, model: Arc<ObjectModel>, pose: Pose) -> SceneObject {
+pub(super) fn platform(id: String, model: Arc<ObjectModel>, pose: Pose) -> SceneObject {
     SceneObject {
         id,
         role: Role::Platform,

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::config::{ObjectModel, WorldMap};
-use crate::scenario::{Role, SceneObject};
+use crate::scenario::SceneObject;
+use crate::scenario::draw::platform;
 
 /// A world with its furniture and walls as objects of a scene.
 #[derive(Debug, Clone)]
@@ -18,13 +19,13 @@ impl Surroundings {
     pub(super) fn new(map: &Arc<WorldMap>, models: &BTreeMap<String, Arc<ObjectModel>>) -> Self {
         let furniture = map.furniture.iter().filter_map(|piece| {
             let model = models.get(&piece.model)?;
-            Some(standing(piece.name.clone(), Arc::clone(model), piece.pose))
+            Some(platform(piece.name.clone(), Arc::clone(model), piece.pose))
         });
         let walls = map
             .walls
             .iter()
             .enumerate()
-            .map(|(idx, wall)| standing(format!("wall_{}", idx + 1), Arc::new(wall.model.clone()), wall.pose));
+            .map(|(idx, wall)| platform(format!("wall_{}", idx + 1), Arc::new(wall.model.clone()), wall.pose));
         Self { map: Arc::clone(map), standing: furniture.chain(walls).collect() }
     }
 
@@ -50,17 +51,5 @@ impl Surroundings {
         corners.chain(middles).fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), at| {
             ([low[0].min(at[0]), low[1].min(at[1])], [high[0].max(at[0]), high[1].max(at[1])])
         })
-    }
-}
-
-fn standing(id: String, model: Arc<ObjectModel>, pose: crate::base::Pose) -> SceneObject {
-    SceneObject {
-        id,
-        role: Role::Platform,
-        pose,
-        mass_kg: model.mass_kg,
-        friction: model.friction,
-        restitution: model.restitution,
-        model,
     }
 }
