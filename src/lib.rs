@@ -29,7 +29,7 @@
 //! | [`verdict`] | findings to outcomes with witness and margin; the scores | |
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store) |
 //! | [`campaign`] | the conductor; the only module that calls many stages | rayon |
-//! | [`analysis`] | history to tables: rates with intervals, failure modes, campaigns side by side | polars, statrs |
+//! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, campaigns side by side, when it fails | polars, statrs |
 //! | [`report`] | verdicts and tables as text and JSON | |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap |
 //!

@@ -6,22 +6,28 @@ mod compare;
 mod consistency;
 mod coverage;
 mod failure_modes;
+mod false_discovery;
+mod fisher;
 mod frame;
 mod health;
 mod holm;
 mod oracles;
 mod paired;
+mod patterns;
 mod property_rates;
 
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, Flaky, PassPower, Repeated, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
 pub use failure_modes::{FailureMode, failure_modes};
+pub use false_discovery::benjamini_hochberg;
+pub use fisher::{FisherTest, TwoByTwo};
 pub use frame::AnalysisError;
 pub use health::{Ailment, Health, HealthMeter};
 pub use holm::holm;
 pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
 pub use paired::{Difference, PairedTable, PairedTest};
+pub use patterns::{Condition, Parameter, Pattern, PatternOptions, Patterns, Subject, Values, mine, simplest_between};
 pub use property_rates::{PropertyRate, property_rates};
 
 // Rates of outcomes and their intervals are part of a verdict; readers of tables meet them here.

@@ -1,5 +1,7 @@
 //! What several tests need: the built program, and folders of their own.
 
+pub mod planted;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

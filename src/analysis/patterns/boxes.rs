@@ -1,0 +1,205 @@
+//! The box of cells with the highest score, among all of them.
+
+use crate::analysis::patterns::Condition;
+use crate::analysis::patterns::cells::{Axis, Choices};
+use crate::analysis::patterns::likelihood::{Count, Likelihood, one};
+
+/// Adding up the boxes of three parameters costs as much as counting so many runs. (Measured with eight cells each.)
+const BOXES_IN_RUNS: u64 = 50_000;
+
+/// What was found, and how much was looked at.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Best {
+    /// Conditions on different parameters; none where nothing scores above 0.
+    pub conditions: Vec<Condition>,
+    /// Its score.
+    pub score: f64,
+    /// How many boxes there were.
+    pub tried: u64,
+    /// Parameters of which three were combined.
+    pub combined: usize,
+}
+
+/// The runs that take part, in the cells of every parameter.
+pub(super) struct Runs<'a> {
+    axes: &'a [Axis],
+    /// Of each axis the cells of the runs.
+    cells: Vec<Vec<u8>>,
+    ones: Vec<Count>,
+    likelihood: &'a Likelihood,
+}
+
+impl<'a> Runs<'a> {
+    /// The runs that are open.
+    pub fn new(axes: &'a [Axis], failed: &[bool], open: &[bool], likelihood: &'a Likelihood) -> Self {
+        let part: Vec<usize> = (0..open.len()).filter(|run| open[*run]).collect();
+        let of = |axis: &Axis| part.iter().map(|run| axis.of_run[*run]).collect();
+        Self {
+            axes,
+            cells: axes.iter().map(of).collect(),
+            ones: part.iter().map(|run| one(failed[*run])).collect(),
+            likelihood,
+        }
+    }
+
+    /// The box of at most so many conditions (three at most) with the highest score; of several the one with fewer conditions, then that
+    /// of earlier parameters.
+    ///
+    /// Every box is looked at, but for those whose failures alone could not make the score. Only where three of all parameters at a time
+    /// would take more than `work` steps, those parameters that make the best pairs are combined, as many as that allows.
+    pub fn best(&self, most_conditions: usize, work: u64) -> Best {
+        let mut best = Best::default();
+        for axis in 0..self.axes.len() {
+            self.lines(axis, &mut best);
+        }
+        if most_conditions < 2 {
+            return best;
+        }
+        let mut promise = vec![0.0f64; self.axes.len()];
+        for first in 0..self.axes.len() {
+            for second in first + 1..self.axes.len() {
+                let score = self.rectangles([first, second], &mut best);
+                promise[first] = promise[first].max(score);
+                promise[second] = promise[second].max(score);
+            }
+        }
+        if most_conditions < 3 {
+            return best;
+        }
+        let combined = self.promising(&promise, work);
+        best.combined = combined.len();
+        for (at, first) in combined.iter().enumerate() {
+            for (behind, second) in combined[at + 1..].iter().enumerate() {
+                let pair = self.places([*first, *second]);
+                for third in &combined[at + 1 + behind + 1..] {
+                    self.boxes([*first, *second, *third], &pair, &mut best);
+                }
+            }
+        }
+        best
+    }
+
+    /// The parameters to combine three at a time: the most promising ones, in their own order.
+    fn promising(&self, promise: &[f64], work: u64) -> Vec<usize> {
+        let runs = self.ones.len() as u64;
+        let triples = |count: u64| count * count.saturating_sub(1) * count.saturating_sub(2) / 6;
+        let cost = |count: u64| triples(count) * (runs + BOXES_IN_RUNS);
+        let affordable = (3..=self.axes.len() as u64).take_while(|count| cost(*count) <= work).last().unwrap_or(3);
+        let mut order: Vec<usize> = (0..self.axes.len()).collect();
+        order.sort_by(|a, b| promise[*b].total_cmp(&promise[*a]).then(a.cmp(b)));
+        order.truncate(usize::try_from(affordable).unwrap_or(usize::MAX));
+        order.sort_unstable();
+        order
+    }
+
+    fn lines(&self, axis: usize, best: &mut Best) {
+        let along = &self.axes[axis];
+        let mut sums = vec![0; along.cells];
+        for (cell, one) in self.cells[axis].iter().zip(&self.ones) {
+            sums[usize::from(*cell)] += one;
+        }
+        best.tried += along.len() as u64;
+        let (score, place) = along.highest(&sums, self.likelihood);
+        best.take(score, || vec![along.condition(place)]);
+    }
+
+    /// Looks at all pairs of conditions; the score of the best pair.
+    fn rectangles(&self, [first, second]: [usize; 2], best: &mut Best) -> f64 {
+        let (across, along) = (&self.axes[first], &self.axes[second]);
+        let mut sums = vec![0; across.cells * along.cells];
+        for (place, one) in self.places([first, second]).iter().zip(&self.ones) {
+            sums[*place as usize] += one;
+        }
+        best.tried += across.len() as u64 * along.len() as u64;
+        let mut rows = Vec::new();
+        across.expand(&sums, along.cells, &mut rows);
+        let mut highest = 0.0f64;
+        for (of_first, row) in rows.chunks_exact(along.cells).enumerate() {
+            if self.limit(row) <= highest {
+                continue;
+            }
+            let (score, of_second) = along.highest(row, self.likelihood);
+            highest = highest.max(score);
+            best.take(score, || vec![across.condition(of_first), along.condition(of_second)]);
+        }
+        highest
+    }
+
+    fn boxes(&self, [first, second, third]: [usize; 3], pair: &[u32], best: &mut Best) {
+        let [a, b, c] = [first, second, third].map(|axis| &self.axes[axis]);
+        let mut sums = vec![0; a.cells * b.cells * c.cells];
+        for ((place, cell), one) in pair.iter().zip(&self.cells[third]).zip(&self.ones) {
+            let sum: &mut Count = &mut sums[*place as usize * c.cells + usize::from(*cell)];
+            *sum = sum.wrapping_add(*one);
+        }
+        best.tried += a.len() as u64 * b.len() as u64 * c.len() as u64;
+        let (mut planes, mut rows) = (Vec::new(), Vec::new());
+        a.expand(&sums, b.cells * c.cells, &mut planes);
+        for (of_first, plane) in planes.chunks_exact(b.cells * c.cells).enumerate() {
+            if self.limit(plane) <= best.score {
+                continue;
+            }
+            b.expand(plane, c.cells, &mut rows);
+            for (of_second, row) in rows.chunks_exact(c.cells).enumerate() {
+                if self.limit(row) <= best.score {
+                    continue;
+                }
+                let (score, of_third) = c.highest(row, self.likelihood);
+                best.take(score, || vec![a.condition(of_first), b.condition(of_second), c.condition(of_third)]);
+            }
+        }
+    }
+
+    /// What no box within some cells can exceed.
+    fn limit(&self, cells: &[Count]) -> f64 {
+        self.likelihood.most(cells.iter().fold(0, |sum, count| sum.wrapping_add(*count)))
+    }
+
+    /// Where each run lies in the cells of two parameters.
+    fn places(&self, [first, second]: [usize; 2]) -> Vec<u32> {
+        let width = self.axes[second].cells as u32;
+        let cells = self.cells[first].iter().zip(&self.cells[second]);
+        cells.map(|(first, second)| u32::from(*first) * width + u32::from(*second)).collect()
+    }
+}
+
+impl Best {
+    fn take(&mut self, score: f64, conditions: impl FnOnce() -> Vec<Condition>) {
+        if score > self.score {
+            self.score = score;
+            self.conditions = conditions();
+        }
+    }
+}
+
+impl Axis {
+    /// The condition with the highest score, and its place; 0 where none scores more.
+    fn highest(&self, row: &[Count], likelihood: &Likelihood) -> (f64, usize) {
+        let mut highest = (0.0, 0);
+        let mut place = 0;
+        let mut look = |count: Count| {
+            let score = likelihood.gain(count);
+            if score > highest.0 {
+                highest = (score, place);
+            }
+            place += 1;
+        };
+        match &self.choices {
+            Choices::Ranges(_) => {
+                for first in 1..self.cells {
+                    let mut sum: Count = 0;
+                    for count in &row[first..self.cells] {
+                        sum = sum.wrapping_add(*count);
+                        look(sum);
+                    }
+                }
+            }
+            Choices::Kinds(kinds) => {
+                for (_, members) in kinds {
+                    look(members.iter().fold(0, |sum, cell| sum.wrapping_add(row[*cell])));
+                }
+            }
+        }
+        highest
+    }
+}

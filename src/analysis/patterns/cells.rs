@@ -1,0 +1,228 @@
+//! Each parameter in cells, and the conditions that are unions of cells.
+
+use crate::analysis::patterns::likelihood::Count;
+use crate::analysis::patterns::{Condition, Parameter, Subject, Values, simplest_between};
+
+/// More kinds than this are not looked at: a name for each scene makes no pattern.
+const MOST_KINDS: usize = 64;
+
+/// One parameter in cells. Cell 0 is that of the runs in which it has no value.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    /// Place of the parameter.
+    pub parameter: usize,
+    /// How many cells there are.
+    pub cells: usize,
+    /// The cell of each run.
+    pub of_run: Vec<u8>,
+    /// What may be asked for.
+    pub choices: Choices,
+}
+
+/// Conditions on one parameter.
+#[derive(Debug, Clone)]
+pub(super) enum Choices {
+    /// All ranges of neighbouring cells: the bounds between cells 1, 2, …, each with the value before it.
+    Ranges(Vec<Cut>),
+    /// Kinds with their cells.
+    Kinds(Vec<(String, Vec<usize>)>),
+}
+
+/// A place to cut numbers in two.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cut {
+    /// The first value above.
+    pub at: f64,
+    /// A number that parts the values below from those above.
+    pub bound: f64,
+}
+
+impl Axis {
+    /// How many conditions there are.
+    pub fn len(&self) -> usize {
+        match &self.choices {
+            Choices::Ranges(_) => (self.cells - 1) * self.cells / 2,
+            Choices::Kinds(kinds) => kinds.len(),
+        }
+    }
+
+    /// Sums over the cells of every condition, from rows of counts (one row a cell, one after the other) to rows (one a condition).
+    pub fn expand(&self, cells: &[Count], width: usize, out: &mut Vec<Count>) {
+        out.clear();
+        let row = |cell: usize| &cells[cell * width..(cell + 1) * width];
+        let mut sum = vec![0; width];
+        // There are not 2^32 runs.
+        let add = |sum: &mut [Count], row: &[Count]| {
+            sum.iter_mut().zip(row).for_each(|(sum, count)| *sum = sum.wrapping_add(*count));
+        };
+        match &self.choices {
+            Choices::Ranges(_) => {
+                for first in 1..self.cells {
+                    sum.fill(0);
+                    for last in first..self.cells {
+                        add(&mut sum, row(last));
+                        out.extend_from_slice(&sum);
+                    }
+                }
+            }
+            Choices::Kinds(kinds) => {
+                for (_, members) in kinds {
+                    sum.fill(0);
+                    members.iter().for_each(|cell| add(&mut sum, row(*cell)));
+                    out.extend_from_slice(&sum);
+                }
+            }
+        }
+    }
+
+    /// The condition at a place of what [`Axis::expand`] gives.
+    pub fn condition(&self, place: usize) -> Condition {
+        match &self.choices {
+            Choices::Kinds(kinds) => Condition::Kind { parameter: self.parameter, kind: kinds[place].0.clone() },
+            Choices::Ranges(cuts) => {
+                let (first, last) = self.range(place);
+                let bound = |cut: usize| cuts.get(cut).map(|cut| cut.bound);
+                Condition::Range {
+                    parameter: self.parameter,
+                    low: first.checked_sub(2).and_then(bound),
+                    high: bound(last - 1),
+                }
+            }
+        }
+    }
+
+    /// First and last cell of a range.
+    fn range(&self, place: usize) -> (usize, usize) {
+        let mut left = place;
+        for first in 1..self.cells {
+            let ranges = self.cells - first;
+            if left < ranges {
+                return (first, first + left);
+            }
+            left -= ranges;
+        }
+        (1, self.cells - 1)
+    }
+}
+
+/// Cells of every parameter that takes more than one value among the runs that take part, and of no other.
+///
+/// Numbers are cut so that every cell has about as many runs; where there are few different ones, each has a cell.
+pub(super) fn axes(subject: &Subject, takes_part: &[bool], cells: usize) -> Vec<Axis> {
+    let parameters = subject.parameters.iter().enumerate();
+    parameters.filter_map(|(place, parameter)| axis(place, parameter, takes_part, cells)).collect()
+}
+
+fn axis(place: usize, parameter: &Parameter, takes_part: &[bool], cells: usize) -> Option<Axis> {
+    let axis = match &parameter.values {
+        Values::Numbers(numbers) => {
+            let cuts = cuts(numbers, takes_part, cells);
+            let cell = |value: &f64| {
+                if value.is_nan() { 0 } else { 1 + cuts.partition_point(|cut| cut.at <= *value) as u8 }
+            };
+            Axis {
+                parameter: place,
+                cells: cuts.len() + 2,
+                of_run: numbers.iter().map(cell).collect(),
+                choices: Choices::Ranges(cuts),
+            }
+        }
+        Values::Kinds { of_run, names, above } => {
+            let kinds = (names.len() <= MOST_KINDS).then(|| kinds(names, above))?;
+            let of_run = of_run.iter().map(|of| of.map_or(0, |of| of as u8 + 1)).collect();
+            Axis { parameter: place, cells: names.len() + 1, of_run, choices: Choices::Kinds(kinds) }
+        }
+    };
+    let mut met = axis.of_run.iter().zip(takes_part).filter(|(_, part)| **part).map(|(cell, _)| *cell);
+    let first = met.next()?;
+    met.any(|cell| cell != first).then_some(axis)
+}
+
+/// Cuts between cells of about as many values each.
+fn cuts(numbers: &[f64], takes_part: &[bool], cells: usize) -> Vec<Cut> {
+    let mut sorted: Vec<f64> =
+        numbers.iter().zip(takes_part).filter(|(value, part)| **part && !value.is_nan()).map(|(v, _)| *v).collect();
+    sorted.sort_by(f64::total_cmp);
+    let mut distinct = sorted.clone();
+    distinct.dedup();
+    let cut = |above: usize| Cut { at: distinct[above], bound: simplest_between(distinct[above - 1], distinct[above]) };
+    if distinct.len() <= cells {
+        return (1..distinct.len()).map(cut).collect();
+    }
+    let mut places: Vec<usize> = (1..cells)
+        .map(|share| distinct.partition_point(|value| *value < sorted[share * sorted.len() / cells]))
+        .filter(|place| *place > 0)
+        .collect();
+    places.dedup();
+    places.into_iter().map(cut).collect()
+}
+
+/// Every kind and every kind above, each set of members once, by the name that is nearest to its members.
+///
+/// A kind that has runs of its own and kinds below it is meant with all of them; one that everything belongs to is no condition.
+fn kinds(names: &[String], above: &[Vec<String>]) -> Vec<(String, Vec<usize>)> {
+    let mut higher: Vec<&String> = above.iter().flatten().filter(|name| !names.contains(name)).collect();
+    let nearness = |name: &String| above.iter().filter_map(|list| list.iter().position(|known| known == name)).min();
+    higher.sort_by_key(|name| (nearness(name), *name));
+    higher.dedup();
+    let mut kinds: Vec<(String, Vec<usize>)> = Vec::new();
+    for name in names.iter().chain(higher) {
+        let belongs = |place: &usize| names[*place] == *name || above[*place].contains(name);
+        let members: Vec<usize> = (0..names.len()).filter(belongs).map(|place| place + 1).collect();
+        if members.len() < names.len() && !kinds.iter().any(|(_, known)| *known == members) {
+            kinds.push((name.clone(), members));
+        }
+    }
+    kinds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn strings(names: &[&str]) -> Vec<String> {
+        names.iter().map(|name| (*name).to_owned()).collect()
+    }
+
+    #[test]
+    fn a_kind_above_stands_for_all_below_it_and_is_named_by_the_nearest() {
+        let names = strings(&["Bottle", "Fork", "Glass", "Mug"]);
+        let above = [
+            strings(&["Container", "Graspable"]),
+            strings(&["Cutlery", "Graspable"]),
+            strings(&["Cup", "Container", "Graspable"]),
+            strings(&["Cup", "Container", "Graspable"]),
+        ];
+        let found = kinds(&names, &above);
+        let told: Vec<(&str, &[usize])> = found.iter().map(|(name, of)| (name.as_str(), of.as_slice())).collect();
+        let expected: [(&str, &[usize]); 6] = [
+            ("Bottle", &[1]),
+            ("Fork", &[2]),
+            ("Glass", &[3]),
+            ("Mug", &[4]),
+            ("Container", &[1, 3, 4]),
+            ("Cup", &[3, 4]),
+        ];
+        assert_eq!(told, expected, "Cutlery is Fork here, and Graspable everything");
+    }
+
+    #[test]
+    fn cells_have_as_many_values_each_and_ranges_come_back() {
+        let numbers: Vec<f64> = (0..80).map(|i| f64::from(i) / 80.0).chain([f64::NAN]).collect();
+        let parameter = Parameter { name: "x".into(), unit: None, values: Values::Numbers(numbers) };
+        let axis = axis(0, &parameter, &[true; 81], 4).expect("it varies");
+        assert_eq!((axis.cells, axis.len()), (5, 10));
+        assert_eq!(
+            (0..5).map(|cell| axis.of_run.iter().filter(|of| **of == cell).count()).collect::<Vec<_>>(),
+            [1, 20, 20, 20, 20]
+        );
+        let mut out = Vec::new();
+        axis.expand(&[100, 1, 2, 4, 8], 1, &mut out);
+        assert_eq!(out, [1, 3, 7, 15, 2, 6, 14, 4, 12, 8]);
+        let range = |low, high| Condition::Range { parameter: 0, low, high };
+        assert_eq!(axis.condition(0), range(None, Some(0.25)));
+        assert_eq!(axis.condition(3), range(None, None));
+        assert_eq!(axis.condition(5), range(Some(0.25), Some(0.75)));
+        assert_eq!(axis.condition(9), range(Some(0.75), None));
+    }
+}

@@ -1,0 +1,103 @@
+//! A condition on one parameter.
+
+use crate::analysis::patterns::{Subject, Values};
+
+/// A condition on one parameter of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Condition {
+    /// It is of this kind, or of one below it.
+    Kind {
+        /// Place of the parameter.
+        parameter: usize,
+        /// Name of the kind.
+        kind: String,
+    },
+    /// It lies in a range; without both ends: it has a value at all.
+    Range {
+        /// Place of the parameter.
+        parameter: usize,
+        /// It is at least this.
+        low: Option<f64>,
+        /// It is less than this.
+        high: Option<f64>,
+    },
+}
+
+impl Condition {
+    /// Place of its parameter.
+    pub fn parameter(&self) -> usize {
+        match self {
+            Self::Kind { parameter, .. } | Self::Range { parameter, .. } => *parameter,
+        }
+    }
+
+    /// For each run whether it holds. A run whose parameter has no value satisfies no condition on it.
+    pub fn holds(&self, subject: &Subject) -> Vec<bool> {
+        match (self, &subject.parameters[self.parameter()].values) {
+            (Self::Range { low, high, .. }, Values::Numbers(numbers)) => numbers
+                .iter()
+                .map(|value| {
+                    !value.is_nan() && low.is_none_or(|low| *value >= low) && high.is_none_or(|high| *value < high)
+                })
+                .collect(),
+            (Self::Kind { kind, .. }, Values::Kinds { of_run, names, above }) => {
+                let belongs: Vec<bool> =
+                    names.iter().zip(above).map(|(name, above)| name == kind || above.contains(kind)).collect();
+                of_run.iter().map(|of| of.is_some_and(|of| belongs[of as usize])).collect()
+            }
+            // A condition of the other sort says nothing about this parameter.
+            _ => vec![false; subject.len()],
+        }
+    }
+
+    /// The same condition with less to it: without its lower end, without its upper end, or gone.
+    pub(super) fn weaker(&self) -> Vec<Option<Self>> {
+        match self {
+            Self::Range { parameter, low: low @ Some(_), high: high @ Some(_) } => vec![
+                Some(Self::Range { parameter: *parameter, low: None, high: *high }),
+                Some(Self::Range { parameter: *parameter, low: *low, high: None }),
+            ],
+            _ => vec![None],
+        }
+    }
+}
+
+/// Whether all conditions hold, for each run.
+pub(super) fn all_hold(conditions: &[Condition], subject: &Subject) -> Vec<bool> {
+    let mut holds = vec![true; subject.len()];
+    for condition in conditions {
+        for (all, one) in holds.iter_mut().zip(condition.holds(subject)) {
+            *all &= one;
+        }
+    }
+    holds
+}
+
+/// The number with the fewest digits behind the point that is above `low` and not above `high`: a bound between two values that
+/// people can read.
+pub fn simplest_between(low: f64, high: f64) -> f64 {
+    for digits in 0..16 {
+        let scale = libm::exp10(f64::from(digits));
+        // Dividing by a power of ten gives the number nearest to the decimal.
+        let candidate = (high * scale).floor() / scale;
+        if candidate > low && candidate <= high {
+            return candidate;
+        }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_the_simplest_numbers() {
+        assert_eq!(simplest_between(0.3487, 0.3512), 0.35);
+        assert_eq!(simplest_between(2.0, 3.0), 3.0);
+        assert_eq!(simplest_between(-0.27, -0.13), -0.2);
+        assert_eq!(simplest_between(-1.5, 1.5), 1.0);
+        let (low, high) = (1.0, 1.0 + f64::EPSILON);
+        assert_eq!(simplest_between(low, high), high);
+    }
+}

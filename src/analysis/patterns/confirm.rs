@@ -1,0 +1,29 @@
+//! Patterns on runs that took no part in finding them.
+
+use crate::analysis::patterns::condition::all_hold;
+use crate::analysis::patterns::{Condition, Subject};
+use crate::analysis::{TwoByTwo, holm};
+
+/// Counts failures within and outside of a pattern, among some runs.
+pub(super) fn count(subject: &Subject, within: &[bool], among: impl Fn(usize) -> bool) -> TwoByTwo {
+    let mut table = TwoByTwo::default();
+    (0..subject.len()).filter(|run| among(*run)).for_each(|run| table.add(within[run], subject.failed[run]));
+    table
+}
+
+/// Each pattern among the runs kept aside that no pattern before it has, with Holm's adjusted probability that at least so many of
+/// its runs would fail if they failed as often as the rest.
+pub(super) fn confirm(patterns: &[Vec<Condition>], subject: &Subject) -> Vec<(TwoByTwo, f64)> {
+    let mut explained = vec![false; subject.len()];
+    let tables: Vec<TwoByTwo> = patterns
+        .iter()
+        .map(|conditions| {
+            let within = all_hold(conditions, subject);
+            let table = count(subject, &within, |run| subject.held_out[run] && !explained[run]);
+            explained.iter_mut().zip(&within).for_each(|(explained, within)| *explained |= within);
+            table
+        })
+        .collect();
+    let adjusted = holm(&tables.iter().map(|table| table.fisher().greater).collect::<Vec<f64>>());
+    tables.into_iter().zip(adjusted).collect()
+}

@@ -1,0 +1,53 @@
+//! A pattern folded into the simplest that says as much.
+
+use crate::analysis::TwoByTwo;
+use crate::analysis::patterns::Condition;
+use crate::analysis::patterns::cells::Axis;
+use crate::analysis::patterns::condition::all_hold;
+use crate::analysis::patterns::confirm::count;
+use crate::analysis::patterns::refine::{Field, refine};
+
+/// Takes away, one after the other, conditions and ends of ranges that the runs do not ask for: where the runs that one shuts out do not
+/// fail less, beyond what the best of so many conditions shows by chance. Bounds are refined again each time.
+///
+/// Returns how many places of bounds were tried on the way.
+pub(super) fn fold(conditions: &mut Vec<Condition>, field: &Field<'_>, level: f64) -> u64 {
+    let mut tried = 0;
+    // Any of these could have stood there.
+    let rivals = field.axes.iter().map(Axis::len).sum::<usize>().max(1) as f64;
+    loop {
+        let within = all_hold(conditions, field.subject);
+        let mut least: Option<(f64, Vec<Condition>)> = None;
+        for simpler in simpler(conditions) {
+            let p = shut_out(&within, &all_hold(&simpler, field.subject), field).fisher().greater;
+            if p * rivals > level && least.as_ref().is_none_or(|(known, _)| p > *known) {
+                least = Some((p, simpler));
+            }
+        }
+        let Some((_, simpler)) = least else { return tried };
+        *conditions = simpler;
+        tried += refine(conditions, field);
+    }
+}
+
+/// All patterns with one condition, or one end of a range, less; none is empty.
+fn simpler(conditions: &[Condition]) -> Vec<Vec<Condition>> {
+    let mut found = Vec::new();
+    for (at, condition) in conditions.iter().enumerate() {
+        for weaker in condition.weaker() {
+            let mut simpler = conditions.to_vec();
+            match weaker {
+                Some(weaker) => simpler[at] = weaker,
+                None => drop(simpler.remove(at)),
+            }
+            found.push(simpler);
+        }
+    }
+    found.retain(|simpler| !simpler.is_empty());
+    found
+}
+
+/// The runs within, beside those that only the simpler pattern has.
+fn shut_out(within: &[bool], simpler: &[bool], field: &Field<'_>) -> TwoByTwo {
+    count(field.subject, within, |run| field.open[run] && simpler[run])
+}

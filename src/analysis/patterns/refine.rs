@@ -1,0 +1,127 @@
+//! The bounds of ranges, moved to where they part failures from passes best.
+
+use std::ops::RangeInclusive;
+
+use crate::analysis::patterns::cells::{Axis, Choices, Cut};
+use crate::analysis::patterns::condition::all_hold;
+use crate::analysis::patterns::likelihood::{Count, Likelihood, one};
+use crate::analysis::patterns::{Condition, Subject, Values, simplest_between};
+
+/// Bounds depend on each other, but settle soon.
+const MOST_PASSES: usize = 4;
+
+/// The open runs, and how patterns among them are scored.
+pub(super) struct Field<'a> {
+    pub subject: &'a Subject,
+    pub open: &'a [bool],
+    pub axes: &'a [Axis],
+    pub likelihood: &'a Likelihood,
+}
+
+/// Moves each bound, one after the other while the rest stays, between the cuts on either side of it to where the score is highest.
+/// Returns how many places were tried.
+pub(super) fn refine(conditions: &mut [Condition], field: &Field<'_>) -> u64 {
+    let mut tried = 0;
+    for _ in 0..MOST_PASSES {
+        let before = conditions.to_vec();
+        for at in 0..conditions.len() {
+            let mut others = conditions.to_vec();
+            let condition = others.remove(at);
+            if let Some((better, count)) = refined(&condition, &others, field) {
+                conditions[at] = better;
+                tried += count;
+            }
+        }
+        if *conditions == *before {
+            break;
+        }
+    }
+    tried
+}
+
+/// Different values in order, and before each (and behind the last) the runs below.
+struct Scale {
+    values: Vec<f64>,
+    below: Vec<Count>,
+}
+
+impl Scale {
+    fn new(numbers: &[f64], part: &[bool], field: &Field<'_>) -> Self {
+        let mut pairs: Vec<(f64, Count)> = (0..numbers.len())
+            .filter(|run| part[*run] && field.open[*run] && !numbers[*run].is_nan())
+            .map(|run| (numbers[run], one(field.subject.failed[run])))
+            .collect();
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut scale = Self { values: Vec::new(), below: vec![0] };
+        let mut sum = 0;
+        for (value, one) in pairs {
+            sum += one;
+            if scale.values.last() == Some(&value) {
+                scale.below.pop();
+            } else {
+                scale.values.push(value);
+            }
+            scale.below.push(sum);
+        }
+        scale
+    }
+
+    /// How many values are below a bound.
+    fn place(&self, bound: f64) -> usize {
+        self.values.partition_point(|value| *value < bound)
+    }
+
+    /// A bound with so many values below; nothing where that is all or none.
+    fn bound(&self, place: usize) -> Option<f64> {
+        (place > 0 && place < self.values.len()).then(|| simplest_between(self.values[place - 1], self.values[place]))
+    }
+}
+
+fn refined(condition: &Condition, others: &[Condition], field: &Field<'_>) -> Option<(Condition, u64)> {
+    let Condition::Range { parameter, low, high } = condition else { return None };
+    let Values::Numbers(numbers) = &field.subject.parameters[*parameter].values else { return None };
+    let Choices::Ranges(cuts) = &field.axes.iter().find(|axis| axis.parameter == *parameter)?.choices else {
+        return None;
+    };
+    let scale = Scale::new(numbers, &all_hold(others, field.subject), field);
+    let score = |first: usize, last: usize| field.likelihood.gain(scale.below[last] - scale.below[first]);
+    let end = scale.values.len();
+    let (mut first, last) = (low.map_or(0, |low| scale.place(low)), high.map_or(end, |high| scale.place(high)));
+    let mut tried = 0;
+    let (mut low, mut high) = (*low, *high);
+    if let Some(bound) = low {
+        let window = window(bound, cuts, &scale).filter(|place| *place <= last);
+        let best = best(first, window, |place| score(place, last), &mut tried);
+        if best != first {
+            (first, low) = (best, scale.bound(best));
+        }
+    }
+    if let Some(bound) = high {
+        let window = window(bound, cuts, &scale).filter(|place| *place >= first);
+        let best = best(last, window, |place| score(first, place), &mut tried);
+        if best != last {
+            high = scale.bound(best);
+        }
+    }
+    Some((Condition::Range { parameter: *parameter, low, high }, tried))
+}
+
+/// The place with the highest score; the one that is taken now where no other has a higher one.
+fn best(now: usize, places: impl Iterator<Item = usize>, score: impl Fn(usize) -> f64, tried: &mut u64) -> usize {
+    let mut best = (score(now), now);
+    for place in places {
+        *tried += 1;
+        let score = score(place);
+        if score > best.0 {
+            best = (score, place);
+        }
+    }
+    best.1
+}
+
+/// The places between the cut before a bound and the cut behind it.
+fn window(bound: f64, cuts: &[Cut], scale: &Scale) -> RangeInclusive<usize> {
+    let before = cuts.iter().rev().map(|cut| cut.bound).find(|cut| *cut < bound);
+    let behind = cuts.iter().map(|cut| cut.bound).find(|cut| *cut > bound);
+    before.map_or(0, |cut| scale.place(cut))..=behind.map_or(scale.values.len(), |cut| scale.place(cut))
+}

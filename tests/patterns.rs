@@ -1,0 +1,93 @@
+//! Patterns: what is planted is found, and where nothing is planted nothing is.
+
+use actcheck::analysis::{Condition, Pattern, PatternOptions, Patterns, Subject, mine};
+
+use crate::support::planted::{kind, plantings, range, shuffled, subject};
+
+/// A seventh of a bound's range is one step of the cuts; the bound itself has to lie much nearer.
+const NEAR: f64 = 0.02;
+
+fn same(found: &Condition, planted: &Condition) -> bool {
+    let near = |found: Option<f64>, planted: Option<f64>| match (found, planted) {
+        (Some(found), Some(planted)) => (found - planted).abs() <= NEAR,
+        (found, planted) => found == planted,
+    };
+    match (found, planted) {
+        (
+            Condition::Range { parameter: a, low: low_a, high: high_a },
+            Condition::Range { parameter: b, low: low_b, high: high_b },
+        ) => a == b && near(*low_a, *low_b) && near(*high_a, *high_b),
+        _ => found == planted,
+    }
+}
+
+fn is(found: &Pattern, planted: &[Condition]) -> bool {
+    found.conditions.len() == planted.len()
+        && planted.iter().all(|wanted| found.conditions.iter().any(|condition| same(condition, wanted)))
+}
+
+fn told(found: &Patterns) -> Vec<&Vec<Condition>> {
+    found.patterns.iter().map(|pattern| &pattern.conditions).collect()
+}
+
+#[test]
+fn what_is_planted_in_ten_thousand_runs_is_found_and_nothing_else() {
+    for (name, planted) in plantings() {
+        for seed in 1..=3 {
+            let found = mine(&subject(10_000, seed, &planted), &PatternOptions::default());
+            for wanted in &planted {
+                let confirmed = found.confirmed().any(|pattern| is(pattern, wanted));
+                assert!(confirmed, "{name}, seed {seed}: {wanted:?} is not in {:#?}", told(&found));
+            }
+            assert_eq!(found.patterns.len(), planted.len(), "{name}, seed {seed}: {:#?}", told(&found));
+        }
+    }
+}
+
+#[test]
+fn what_is_told_of_a_pattern_is_what_the_runs_say() {
+    let planted = vec![vec![kind(0, "Bottle"), range(4, None, Some(0.35))]];
+    let subject = subject(10_000, 5, &planted);
+    let found = mine(&subject, &PatternOptions::default());
+    let pattern = &found.patterns[0];
+    let holds: Vec<Vec<bool>> = pattern.conditions.iter().map(|condition| condition.holds(&subject)).collect();
+    let runs: Vec<usize> = (0..subject.len()).filter(|run| holds.iter().all(|holds| holds[*run])).collect();
+    assert_eq!(pattern.runs, runs);
+    let failed = runs.iter().filter(|run| subject.failed[**run]).count() as u64;
+    assert_eq!((pattern.all.failed_in, pattern.all.passed_in), (failed, runs.len() as u64 - failed));
+    assert_eq!(pattern.all.failed_in + pattern.all.failed_out, found.failed);
+    let overall = found.failed as f64 / 10_000.0;
+    assert!((pattern.lift - pattern.rate.rate / overall).abs() < 1e-12);
+    assert!((pattern.wracc - runs.len() as f64 / 10_000.0 * (pattern.rate.rate - overall)).abs() < 1e-12);
+    assert!(pattern.p < pattern.q && pattern.q < 1e-30 && pattern.p_held_out < 1e-10, "{pattern:?}");
+    let split = pattern.searched.failed_in + pattern.held_out.failed_in;
+    assert_eq!(split, failed, "the first pattern's runs were all looked at");
+    assert!((3_200..3_500).contains(&found.held_out), "{}", found.held_out);
+}
+
+#[test]
+fn drawn_by_lot_nothing_is_a_pattern() {
+    let planted = plantings().pop().unwrap().1;
+    for runs in [300, 1_000] {
+        let subject = subject(runs, 9, &planted);
+        let alarms = (0..100)
+            .filter(|seed| !mine(&shuffled(&subject, *seed), &PatternOptions::default()).patterns.is_empty())
+            .count();
+        assert!(alarms <= 5, "{alarms} of 100 with {runs} runs");
+    }
+}
+
+#[test]
+fn too_little_to_learn_from_is_no_fault() {
+    let empty = mine(&Subject::default(), &PatternOptions::default());
+    assert_eq!((empty.runs, empty.patterns.len(), empty.tried), (0, 0, 0));
+    for runs in [1, 2, 7, 30] {
+        let mut subject = subject(runs, 1, &[]);
+        for failed in [true, false] {
+            subject.failed.fill(failed);
+            assert!(mine(&subject, &PatternOptions::default()).patterns.is_empty());
+        }
+        subject.parameters.clear();
+        assert!(mine(&subject, &PatternOptions::default()).patterns.is_empty());
+    }
+}
