@@ -1,8 +1,8 @@
 //! What the robot knows from earlier actions of a run.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
-use crate::actions::{Perceived, PerceivedThing};
+use crate::actions::{Perceived, PerceivedPlane, PerceivedThing};
 use crate::base::Pose;
 use crate::scenario::KnownKind;
 use crate::world::Sighting;
@@ -12,6 +12,25 @@ use crate::world::Sighting;
 pub struct Memory {
     /// What the last look around found; nothing where there was none.
     pub perceived: Option<Perceived>,
+    /// What the hand holds; nothing where it is believed to be empty.
+    pub held: Option<Held>,
+}
+
+/// What was taken, by what was perceived of it and felt when the hand closed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Held {
+    /// What was asked for.
+    pub id: String,
+    /// Its dimensions along the axes of its foot. Unit: metres.
+    pub size_m: [f64; 3],
+    /// Its upright foot when it was taken. Frame: world, by the base's belief.
+    pub foot: Isometry3<f64>,
+    /// The grasp link at that moment. Frame: that of the foot.
+    pub grasp_from_foot: Isometry3<f64>,
+    /// Heading of the base at that moment. Unit: radians.
+    pub heading: f64,
+    /// Gap between the fingers that hold it. Unit: metres.
+    pub opening_m: f64,
 }
 
 /// How much a thing may be farther away for a centimetre that it fits better. No unit: both are metres.
@@ -41,24 +60,27 @@ pub fn recall(
         .min_by(|(_, a), (_, b)| miss(a).total_cmp(&miss(b)))
         .ok_or_else(|| format!("nothing that was perceived is like {id}"))?;
     let others = perceived.things.iter().enumerate().filter(|(idx, _)| *idx != chosen);
-    let surface = perceived.plane.map(|plane| {
-        let [x, y, height] = plane.pose.position;
-        let [width, depth] = plane.size_m;
-        let pose = Pose::upright([x, y, 0.0], plane.pose.yaw());
-        Sighting { id: "surface".to_owned(), pose, size_m: [width, depth, height], furniture: true }
-    });
+    let surface = perceived.plane.map(|plane| furniture("surface", &plane));
     let others = others.map(|(idx, thing)| sighting(format!("thing_{}", idx + 1), thing)).chain(surface);
     Ok((sighting(id.to_owned(), target), others.collect()))
 }
 
-fn sighting(id: String, thing: &PerceivedThing) -> Sighting {
+/// What carries a surface: a box down to the floor.
+pub fn furniture(id: &str, plane: &PerceivedPlane) -> Sighting {
+    let [x, y, height] = plane.pose.position;
+    let [width, depth] = plane.size_m;
+    let pose = Pose::upright([x, y, 0.0], plane.pose.yaw());
+    Sighting { id: id.to_owned(), pose, size_m: [width, depth, height], furniture: true }
+}
+
+/// A thing as the abstract detector would give it.
+pub fn sighting(id: String, thing: &PerceivedThing) -> Sighting {
     Sighting { id, pose: thing.pose, size_m: thing.size_m, furniture: false }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::actions::PerceivedPlane;
 
     const GLASS: &str = "http://actions#Glass";
 

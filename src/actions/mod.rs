@@ -5,11 +5,13 @@
 mod call;
 mod cut;
 mod grasp;
+mod grip;
 mod memory;
 mod operator;
 mod perceive;
 mod perform;
 mod pick;
+mod place;
 mod plan;
 mod route;
 mod sabotage;

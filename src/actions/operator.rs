@@ -2,7 +2,8 @@
 
 use nalgebra::Isometry3;
 
-use crate::actions::memory::Memory;
+use crate::actions::grip::GripWatch;
+use crate::actions::memory::{Held, Memory};
 use crate::actions::sabotage::IDLE_SECS;
 use crate::actions::{ActionReport, Cut, Interference, Perceived, Percept, Phase, Saboteur};
 use crate::base::Choices;
@@ -36,6 +37,8 @@ pub struct Operator<'a> {
     cut: Cut,
     /// Who makes things go wrong on purpose; nobody as a rule.
     saboteur: Option<&'a mut Saboteur>,
+    /// Who feels whether the hand still holds what it took, while it does.
+    grip: Option<GripWatch>,
     /// Phases begun so far.
     pub phases: Vec<Phase>,
     /// What was seen so far.
@@ -53,7 +56,11 @@ impl<'a> Operator<'a> {
         budget_secs: f64,
         interference: Interference<'a>,
     ) -> Self {
-        let (command, start_secs) = (world.hold(), world.time_secs());
+        let (mut command, start_secs) = (world.hold(), world.time_secs());
+        if memory.held.is_some() {
+            // A hand that holds something goes on pressing.
+            command.gripper_opening_m = 0.0;
+        }
         let Interference { cut, saboteur } = interference;
         let (phases, percepts) = (Vec::new(), Vec::new());
         Self {
@@ -65,6 +72,7 @@ impl<'a> Operator<'a> {
             budget_secs,
             cut,
             saboteur,
+            grip: None,
             phases,
             percepts,
             perceived: None,
@@ -164,6 +172,29 @@ impl<'a> Operator<'a> {
         self.perceived = Some(perceived);
     }
 
+    /// Keeps what the hand holds now, for later actions: nothing once it is empty.
+    pub fn hold(&mut self, held: Option<Held>) {
+        if held.is_none() {
+            self.grip = None;
+        }
+        self.memory.held = held;
+    }
+
+    /// From now on the robot feels whether what it holds stays in its hand.
+    pub fn watch_grip(&mut self) {
+        self.grip = Some(GripWatch::new(&self.observe(), self.profile().grip_force_n));
+    }
+
+    /// Whether it has felt something slip since it watches.
+    pub fn felt_slip(&self) -> bool {
+        self.grip.as_ref().is_some_and(GripWatch::slipped)
+    }
+
+    /// What stands in the world for good, by the robot's map; nothing where it has none.
+    pub fn map_of_furniture(&self) -> Option<Vec<Sighting>> {
+        self.world.map_of_furniture()
+    }
+
     /// Notes what the robot takes for an object.
     pub fn take_for(&mut self, seen: &Sighting) {
         self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
@@ -181,8 +212,13 @@ impl<'a> Operator<'a> {
 
     /// Looks at everything but one object.
     pub fn see_others(&mut self, but: &str) -> Vec<Sighting> {
+        self.see_if(|id| id != but)
+    }
+
+    /// Looks at everything whose id is asked for.
+    pub fn see_if(&mut self, wanted: impl Fn(&str) -> bool) -> Vec<Sighting> {
         let ids = self.world.visible();
-        ids.iter().filter(|id| id.as_str() != but).filter_map(|id| self.see(id)).collect()
+        ids.iter().filter(|id| wanted(id)).filter_map(|id| self.see(id)).collect()
     }
 
     /// Feels the gap between the fingers. Unit: metres.
@@ -200,6 +236,19 @@ impl<'a> Operator<'a> {
     /// # Errors
     /// [`Interrupt`] if the action has to end.
     pub fn follow(&mut self, path: &[Vec<f64>], least_secs: f64) -> Result<(), Interrupt> {
+        self.follow_until(path, least_secs, |_| false).map(|_| ())
+    }
+
+    /// The same, but that the robot stops where it is as soon as `enough` says so. True if it did.
+    ///
+    /// # Errors
+    /// [`Interrupt`] if the action has to end.
+    pub fn follow_until(
+        &mut self,
+        path: &[Vec<f64>],
+        least_secs: f64,
+        mut enough: impl FnMut(&Self) -> bool,
+    ) -> Result<bool, Interrupt> {
         let mut course = vec![self.command.positions.clone()];
         course.extend_from_slice(path);
         let legs: Vec<f64> = course.windows(2).map(|pair| self.leg_secs(&pair[0], &pair[1])).collect();
@@ -212,8 +261,11 @@ impl<'a> Operator<'a> {
             let s = (time / secs).min(1.0);
             self.command.positions = along(&course, &legs, shortest * s * s * (3.0 - 2.0 * s));
             self.tick()?;
+            if enough(self) {
+                return Ok(true);
+            }
         }
-        Ok(())
+        Ok(false)
     }
 
     /// Sets the finger gap that the fingers go to from now on, with the profile's grip force.
@@ -241,6 +293,10 @@ impl<'a> Operator<'a> {
         }
         if self.world.fault().is_some() {
             return Err(Interrupt::Fault);
+        }
+        if let Some(mut watch) = self.grip.take() {
+            watch.look(&self.observe());
+            self.grip = Some(watch);
         }
         if self.elapsed_secs() > self.budget_secs {
             return Err(Interrupt::Budget);

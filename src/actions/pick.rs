@@ -1,25 +1,20 @@
 //! The pick skill: see (or remember what was perceived), drive, reach, close, lift, take away.
 
+use crate::actions::grip::{EMPTY_M, close, feels};
+use crate::actions::memory::Held;
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::{ActionCall, ActionReport, grasp, memory, plan};
+use crate::base::Pose;
 use crate::world::Sighting;
 
 /// Designator of the thing to pick.
 const TARGET: &str = "pickObject";
-/// A gap under this means that the fingers met: nothing is between them. Unit: metres. Three times the usual noise.
-const EMPTY_M: f64 = 0.006;
 /// Time for looking. Unit: seconds.
 const LOOK_SECS: f64 = 0.5;
 /// Shortest time of the last part of the way, about 6 cm/s. Unit: seconds.
 const APPROACH_SECS: f64 = 2.5;
 /// Shortest time of the lift. Unit: seconds.
 const LIFT_SECS: f64 = 2.0;
-/// Longest time that fingers get to close. Unit: seconds.
-const CLOSE_SECS: f64 = 2.5;
-/// Fingers that close slower than this have stalled. Unit: m/s.
-const STALLED: f64 = 0.003;
-/// Share of the grip force that stalled fingers have to feel.
-const FELT_SHARE: f64 = 0.7;
 
 /// Picks the designated thing up and reports whether it believes to have it.
 ///
@@ -52,13 +47,21 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.follow(&way.near, 0.0)?;
     robot.follow(&way.approach, APPROACH_SECS)?;
     robot.begin("close");
+    robot.hold(None);
     let held = close(robot)?;
+    if held {
+        remember(robot, &seen);
+    }
     robot.begin("lift");
     robot.follow(&way.lift, LIFT_SECS)?;
     robot.begin("retract");
     robot.follow(&way.retreat, 0.0)?;
     robot.wait(LOOK_SECS)?;
-    Ok(report(robot, target, held))
+    let report = report(robot, target, held);
+    if !report.succeeded {
+        robot.hold(None);
+    }
+    Ok(report)
 }
 
 /// The target and everything else: as an earlier action of the run perceived it, otherwise by the abstract detector.
@@ -74,29 +77,30 @@ fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sightin
     Ok((seen, others))
 }
 
-/// Closes the fingers until they stall. True if they stalled on something.
-fn close(robot: &mut Operator<'_>) -> Result<bool, Interrupt> {
-    robot.set_opening(0.0);
-    let until = robot.elapsed_secs() + CLOSE_SECS;
-    let mut still_ticks = 0;
-    while robot.elapsed_secs() < until && still_ticks < 10 {
-        robot.wait(1e-3)?;
-        let speed = robot.layout().fingers.map(|idx| robot.observe().velocities[idx].abs());
-        still_ticks = if speed[0].max(speed[1]) < STALLED && feels(robot) { still_ticks + 1 } else { 0 };
-    }
-    Ok(feels(robot))
-}
-
-/// Whether both fingers push with about the force that they were told.
-fn feels(robot: &Operator<'_>) -> bool {
-    let enough = FELT_SHARE * robot.profile().grip_force_n;
-    robot.observe().finger_efforts_n.iter().all(|effort| *effort > enough)
+/// Keeps what the hand closed on, for later actions.
+fn remember(robot: &mut Operator<'_>, seen: &Sighting) {
+    let observed = robot.observe();
+    let foot = seen.pose.to_isometry();
+    let grasp = robot.kinematics().grasp(&observed.positions);
+    let held = Held {
+        id: seen.id.clone(),
+        size_m: seen.size_m,
+        foot,
+        grasp_from_foot: foot.inverse() * grasp,
+        heading: Pose::from_isometry(&robot.base()).yaw(),
+        opening_m: observed.gripper_opening_m,
+    };
+    robot.hold(Some(held));
+    robot.watch_grip();
 }
 
 fn report(robot: &mut Operator<'_>, target: &str, stalled: bool) -> ActionReport {
     let gap = robot.feel_opening();
     if !stalled {
         return failed(format!("the fingers did not close on {target}"));
+    }
+    if robot.felt_slip() {
+        return failed(format!("{target} slipped out of the hand: its fingers are {:.1} mm apart", gap * 1e3));
     }
     if gap < EMPTY_M {
         return failed(format!("the hand is empty: its fingers are {:.1} mm apart", gap * 1e3));
@@ -108,6 +112,7 @@ fn report(robot: &mut Operator<'_>, target: &str, stalled: bool) -> ActionReport
     ActionReport { succeeded: true, message }
 }
 
-fn failed(message: impl Into<String>) -> ActionReport {
+/// A report of failure.
+pub(super) fn failed(message: impl Into<String>) -> ActionReport {
     ActionReport { succeeded: false, message: message.into() }
 }

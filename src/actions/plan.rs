@@ -72,6 +72,16 @@ pub fn plan(operator: &Operator<'_>, grasps: &[Grasp], others: &[Sighting]) -> R
     best.ok_or_else(|| "no reachable and free way to it was found".to_owned())
 }
 
+/// A way of the base to a place (x, y, heading), with the arm as it is; nothing if there is none.
+pub fn drive(operator: &Operator<'_>, to: [f64; 3], others: &[Sighting]) -> Option<Vec<Vec<f64>>> {
+    let planner = Planner::new(operator, others);
+    let mut posture = planner.start.clone();
+    let [x, y, heading] = planner.layout.base?;
+    (posture[x], posture[y]) = (to[0], to[1]);
+    posture[heading] += wrapped(to[2] - posture[heading]);
+    planner.drive(&posture)
+}
+
 struct Planner<'a> {
     kinematics: &'a Kinematics,
     layout: &'a Layout,

@@ -3,6 +3,7 @@
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::perceive::perceive_plane;
 use crate::actions::pick::pick;
+use crate::actions::place::place;
 use crate::actions::{ActionCall, ActionReport};
 use crate::base::{Diagnostic, did_you_mean};
 
@@ -10,7 +11,7 @@ use crate::base::{Diagnostic, did_you_mean};
 pub(super) type Skill = fn(&ActionCall, &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
 
 /// The skills by the names of their actions, sorted.
-const SKILLS: [(&str, Skill); 2] = [("PerceivePlane", perceive_plane), ("Pick", pick)];
+const SKILLS: [(&str, Skill); 3] = [("PerceivePlane", perceive_plane), ("Pick", pick), ("Place", place)];
 
 /// An action that no reference skill performs.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -11,6 +11,8 @@ use crate::base::{Choice, ChoiceKind};
 
 /// Bins of a parameter that is a number. Fifths show a gap in the middle and at both ends, and fill in a hundred draws.
 const BINS: usize = 5;
+/// A decision between more things than this is a number: no campaign tries them all.
+const MOST_BINS: usize = 1000;
 /// Probability that any bin of a whole campaign without a fault is called neglected.
 const LEVEL: f64 = 1e-3;
 /// Decisions whose name begins so belong to what robot and senses get wrong, each in its own right: no pairs of them.
@@ -166,6 +168,7 @@ fn occupied(cells: usize, draws: u64) -> (f64, f64) {
 fn binned(choice: &Choice) -> Option<Binned> {
     let share = |share: f64| (BINS, ((share * BINS as f64).max(0.0) as usize).min(BINS - 1));
     let (bins, bin) = match choice.kind {
+        ChoiceKind::Index { of } if of > MOST_BINS => share(choice.value / of as f64),
         ChoiceKind::Index { of } if of > 1 => (of, (choice.value.max(0.0) as usize).min(of - 1)),
         ChoiceKind::Real { low, high, .. } if high > low => share((choice.value - low) / (high - low)),
         ChoiceKind::Normal { sigma } if sigma > 0.0 => {
@@ -214,6 +217,16 @@ mod tests {
         choices.real("fixed", 1.0, 1.0, 1.0);
         choices.normal("sense.mug_1.x", 0.1);
         choices.into_made()
+    }
+
+    /// Which of four billion noises a picture has is no table of four billion counts: once, it was one of 34 gigabytes.
+    #[test]
+    fn one_of_very_many_things_is_a_number() {
+        let mut choices = Choices::random(5, 0);
+        choices.index("sense.camera.frame", 1 << 32);
+        let mut coverage = Coverage::default();
+        coverage.add(&choices.into_made());
+        assert_eq!(coverage.parameters()[0].counts.len(), BINS);
     }
 
     fn coverage(runs: u64, lean: u32) -> Coverage {

@@ -140,12 +140,17 @@ fn check_worlds(campaign: &Campaign, worlds: &[Surroundings], found: &mut Diagno
         let idx = candidates(campaign, "world").iter().position(|name| *name == world.map.name).unwrap_or(0);
         let key = format!("world.{idx}");
         let there: Vec<&str> = world.surfaces().map(|surface| surface.id.as_str()).collect();
-        let named: Vec<&String> = surfaces.iter().filter(|name| there.contains(&name.as_str())).collect();
-        if named.is_empty() && !surfaces.is_empty() {
-            let message =
-                format!("the world `{}` has none of the surfaces that the objects may stand on", world.map.name);
-            found.push(campaign.fault("S009", &key, message).help(format!("its surfaces are {}", there.join(", "))));
+        for (designator, what) in
+            [("objectSurface", "the objects may stand on"), ("placeSurface", "the object may be placed on")]
+        {
+            let wanted = candidates(campaign, designator);
+            if !wanted.is_empty() && !wanted.iter().any(|name| there.contains(&name.as_str())) {
+                let message = format!("the world `{}` has none of the surfaces that {what}", world.map.name);
+                let help = format!("its surfaces are {}", there.join(", "));
+                found.push(campaign.fault("S009", &key, message).help(help));
+            }
         }
+        let named: Vec<&String> = surfaces.iter().filter(|name| there.contains(&name.as_str())).collect();
         for surface in named {
             check_location(campaign, &world.map, surface, found);
         }

@@ -188,6 +188,16 @@ impl Robot {
         })
     }
 
+    /// Effort of each joint's motor beyond what holds the robot's own weight, from its control law: what is held, pushed and
+    /// braked. Units: newtons or newton metres.
+    pub fn loads(&self, positions: &[f64], velocities: &[f64]) -> Vec<f64> {
+        let joints = self.motors.iter().zip(positions.iter().zip(velocities));
+        let load = |(motor, (position, velocity)): (&Motor, (&f64, &f64))| {
+            motor.stiffness * (motor.setpoint - position) + motor.damping * (motor.setpoint_velocity - velocity)
+        };
+        joints.map(load).collect()
+    }
+
     /// Tells one joint's controller where to go. Positions beyond the limits are brought back to them.
     pub fn aim(&mut self, joint: usize, target: f64) {
         let Joint { lower, upper, .. } = self.model.joints[joint];

@@ -43,6 +43,17 @@ impl World {
         self.objects.iter().map(|object| object.id.clone()).collect()
     }
 
+    /// Everything that stands for good as a map has it, where the robot has one: without noise, and off by as much as the
+    /// robot is wrong about where it stands itself. Nothing without a map.
+    pub fn map_of_furniture(&self) -> Option<Vec<Sighting>> {
+        let fixed = self.objects.iter().filter(|object| object.fixed);
+        let as_built = fixed.map(|object| {
+            let (foot, size_m) = self.foot(object, &object.placed);
+            Sighting { id: object.id.clone(), pose: Pose::from_isometry(&foot), size_m, furniture: true }
+        });
+        self.has_map.then(|| as_built.collect())
+    }
+
     /// Looks at one object; nothing if there is none of that id.
     pub fn perceive(&self, id: &str, choices: &mut Choices) -> Option<Sighting> {
         let idx = self.objects.iter().position(|object| object.id == id)?;

@@ -44,6 +44,8 @@ pub struct Observation {
     pub gripper_opening_m: f64,
     /// Force that each finger's motor gives, left and right. Unit: newtons, positive closes.
     pub finger_efforts_n: [f64; 2],
+    /// Effort of each joint's motor beyond what holds the robot's own weight. Units: newtons or newton metres.
+    pub loads: Vec<f64>,
 }
 
 /// One object of the scene in the engine.
@@ -73,6 +75,8 @@ pub struct World {
     /// Where sensors see an object, by its index, if not where it is.
     pub(super) decoys: BTreeMap<usize, Isometry3<f64>>,
     knows: Arc<[KnownKind]>,
+    /// Whether the robot has a map of what stands in the world for good.
+    pub(super) has_map: bool,
     n_steps: u64,
     steps_per_tick: u32,
     steps_per_second: u32,
@@ -109,6 +113,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         fault: None,
         decoys: BTreeMap::new(),
         knows: Arc::clone(&scene.robot.knows),
+        has_map: !scene.map.is_empty(),
         n_steps: 0,
         steps_per_tick,
         steps_per_second,
@@ -259,6 +264,7 @@ impl World {
     pub fn observe(&self) -> Observation {
         let (mut positions, velocities) = self.robot.state(&self.engine);
         let gripper_opening_m = self.robot.layout.fingers.iter().map(|idx| positions[*idx]).sum();
+        let loads = self.robot.loads(&positions, &velocities);
         if let Some(base) = self.robot.layout.base {
             let believed = self.believed(base.map(|idx| positions[idx]));
             for (idx, value) in base.into_iter().zip(believed) {
@@ -271,6 +277,7 @@ impl World {
             velocities,
             gripper_opening_m,
             finger_efforts_n: self.robot.finger_efforts(&self.engine),
+            loads,
         }
     }
 

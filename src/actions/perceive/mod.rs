@@ -2,7 +2,8 @@
 //!
 //! Each step is a function over points: [`cloud`] places pixels in the world, [`plane`] finds the surface, [`rectangle`] its
 //! outline, [`cluster`] what stands out of it, [`kinds`] what that may be, [`interpret`] puts them together. [`gaze`] says
-//! how the head has to stand, and only [`skill`] moves it.
+//! how the head has to stand, and only [`sight`] moves it: for [`skill`], which looks for any surface, and for [`survey`], which
+//! looks again at one that is known.
 //!
 //! Never: sees anything but pictures and joint positions, or knows what is in the scene.
 
@@ -13,6 +14,9 @@ mod interpret;
 mod kinds;
 mod plane;
 mod rectangle;
+mod sight;
 mod skill;
+mod survey;
 
 pub use skill::perceive_plane;
+pub use survey::{Survey, survey};

@@ -1,0 +1,101 @@
+//! What fingers feel: whether they hold something, and whether it stays.
+
+use crate::actions::operator::{Interrupt, Operator};
+use crate::world::Observation;
+
+/// A gap under this means that the fingers met: nothing is between them. Unit: metres. Three times the usual noise.
+pub const EMPTY_M: f64 = 0.006;
+/// Longest time that fingers get to close. Unit: seconds.
+const CLOSE_SECS: f64 = 2.5;
+/// Fingers that close slower than this have stalled. Unit: m/s.
+const STALLED: f64 = 0.003;
+/// Share of the grip force that stalled fingers have to feel.
+const FELT_SHARE: f64 = 0.7;
+/// Fingers that close further by this have lost their hold: what they press on gives way by less. Unit: metres.
+const GAVE_WAY_M: f64 = 0.004;
+/// Share of the grip force below which there is nothing that resists. Half of what stalled fingers have to feel.
+const WEAK_SHARE: f64 = 0.35;
+/// Control ticks for which a hold may be weak: braking shakes it for less. A tenth of a second.
+const WEAK_TICKS: u32 = 6;
+
+/// Closes the fingers until they stall. True if they stalled on something.
+///
+/// # Errors
+/// [`Interrupt`] if the action has to end.
+pub fn close(robot: &mut Operator<'_>) -> Result<bool, Interrupt> {
+    robot.set_opening(0.0);
+    let until = robot.elapsed_secs() + CLOSE_SECS;
+    let mut still_ticks = 0;
+    while robot.elapsed_secs() < until && still_ticks < 10 {
+        robot.wait(1e-3)?;
+        let speed = robot.layout().fingers.map(|idx| robot.observe().velocities[idx].abs());
+        still_ticks = if speed[0].max(speed[1]) < STALLED && feels(robot) { still_ticks + 1 } else { 0 };
+    }
+    Ok(feels(robot))
+}
+
+/// Whether both fingers push with about the force that they were told.
+pub fn feels(robot: &Operator<'_>) -> bool {
+    let enough = FELT_SHARE * robot.profile().grip_force_n;
+    robot.observe().finger_efforts_n.iter().all(|effort| *effort > enough)
+}
+
+/// Feels, tick by tick, whether a hand still holds what it closed on.
+#[derive(Debug, Clone)]
+pub struct GripWatch {
+    opening_m: f64,
+    weak_n: f64,
+    weak_ticks: u32,
+    slipped: bool,
+}
+
+impl GripWatch {
+    /// Begins with what is felt now, of fingers that were told to press with this force.
+    pub fn new(observed: &Observation, grip_force_n: f64) -> Self {
+        let weak_n = WEAK_SHARE * grip_force_n;
+        Self { opening_m: observed.gripper_opening_m, weak_n, weak_ticks: 0, slipped: false }
+    }
+
+    /// One control tick later.
+    pub fn look(&mut self, observed: &Observation) {
+        let weak = observed.finger_efforts_n.iter().any(|effort| *effort < self.weak_n);
+        self.weak_ticks = if weak { self.weak_ticks + 1 } else { 0 };
+        let gave_way = observed.gripper_opening_m < self.opening_m - GAVE_WAY_M;
+        self.slipped = self.slipped || gave_way || self.weak_ticks >= WEAK_TICKS;
+    }
+
+    /// Whether the hold was lost at any moment.
+    pub fn slipped(&self) -> bool {
+        self.slipped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn felt(gripper_opening_m: f64, effort: f64) -> Observation {
+        let (positions, velocities, loads) = (Vec::new(), Vec::new(), Vec::new());
+        Observation { time_secs: 0.0, positions, velocities, gripper_opening_m, finger_efforts_n: [effort, 7.0], loads }
+    }
+
+    #[test]
+    fn a_hold_is_lost_when_fingers_go_on_closing_or_feel_nothing() {
+        let held = GripWatch::new(&felt(0.08, 7.0), 7.0);
+        let mut shaken = held.clone();
+        for effort in [7.0, 1.0, 1.0, 7.0, 6.0] {
+            shaken.look(&felt(0.078, effort));
+        }
+        assert!(!shaken.slipped(), "a moment's shaking is no slip");
+        let mut closing = held.clone();
+        closing.look(&felt(0.07, 7.0));
+        closing.look(&felt(0.08, 7.0));
+        assert!(closing.slipped(), "what was lost once stays lost");
+        let mut weak = held;
+        for _ in 0..WEAK_TICKS {
+            assert!(!weak.slipped());
+            weak.look(&felt(0.08, 0.5));
+        }
+        assert!(weak.slipped());
+    }
+}

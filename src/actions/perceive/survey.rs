@@ -1,0 +1,79 @@
+//! A second look at a surface that the robot knows about: where exactly it is, and what stands on it.
+
+use nalgebra::Point3;
+
+use crate::actions::PerceivedPlane;
+use crate::actions::memory::sighting;
+use crate::actions::operator::{Interrupt, Operator};
+use crate::actions::perceive::interpret::Surface;
+use crate::actions::perceive::sight::Sight;
+use crate::base::Pose;
+use crate::world::Sighting;
+
+/// Pictures that are taken at most.
+const MOST_VIEWS: usize = 5;
+/// How far beyond where it is expected the surface may reach, and how much higher or lower it may be. Unit: metres. What a
+/// map is off by the error of a heading, and a detector by three times its noise.
+const OFF_M: f64 = 0.15;
+
+/// A surface as it was looked at, and what stands on it.
+pub struct Survey {
+    /// The surface.
+    pub plane: PerceivedPlane,
+    /// What stands on it.
+    pub things: Vec<Sighting>,
+}
+
+impl Survey {
+    /// The same of a piece of furniture that was seen as a whole: its top, and what stands anywhere.
+    pub fn of(furniture: &Sighting, things: Vec<Sighting>) -> Self {
+        let [x, y, z] = furniture.pose.position;
+        let [width, depth, height] = furniture.size_m;
+        let pose = Pose::upright([x, y, z + height], furniture.pose.yaw());
+        Self { plane: PerceivedPlane { pose, size_m: [width, depth] }, things }
+    }
+}
+
+/// Looks at a surface that is expected to be the top of a piece of furniture; nothing if there is none.
+///
+/// # Errors
+/// [`Interrupt`] if the action has to end.
+pub fn survey(expected: &Sighting, robot: &mut Operator<'_>) -> Result<Option<Survey>, Interrupt> {
+    let [x, y, z] = expected.pose.position;
+    let mut sight = Sight::default();
+    sight.add_look_at(&Point3::new(x, y, z + expected.size_m[2]), robot)?;
+    let find = |points: &[Point3<f64>]| Surface::find(&near(points, expected));
+    let Some(surface) = find(&sight.points) else { return Ok(None) };
+    let surface = sight.take_in(surface, MOST_VIEWS, find, robot)?;
+    let things = surface.things(&sight.points, &sight.eye(), robot.known_kinds());
+    let things = things.iter().enumerate().map(|(idx, thing)| sighting(format!("thing_{}", idx + 1), thing));
+    Ok(Some(Survey { plane: surface.perceived(), things: things.collect() }))
+}
+
+/// The points that may belong to the top of a piece of furniture.
+fn near(points: &[Point3<f64>], expected: &Sighting) -> Vec<Point3<f64>> {
+    let [width, depth, height] = expected.size_m;
+    let from_world = expected.pose.to_isometry().inverse();
+    let belongs = |point: &&Point3<f64>| {
+        let local = from_world * **point;
+        local.x.abs() <= width / 2.0 + OFF_M
+            && local.y.abs() <= depth / 2.0 + OFF_M
+            && (local.z - height).abs() <= OFF_M
+    };
+    points.iter().filter(belongs).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_beside_a_table_or_far_below_its_top_is_no_part_of_it() {
+        let pose = Pose::upright([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
+        let table = Sighting { id: "t".to_owned(), pose, size_m: [1.2, 0.8, 0.74], furniture: true };
+        // Turned a quarter, it is 0.8 m long along x and 1.2 m along y.
+        let points = [[1.5, 0.7, 0.7], [1.0, 0.0, 0.88], [1.6, 0.0, 0.74], [1.0, 0.8, 0.74], [1.0, 0.0, 0.5]];
+        let kept = near(&points.map(Point3::from), &table);
+        assert_eq!(kept, points[..2].iter().copied().map(Point3::from).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,98 @@
+//! How a thing is carried: the hand near the base and low, the base around what stands on the floor.
+
+use nalgebra::Vector3;
+
+use crate::actions::operator::Operator;
+use crate::actions::plan;
+use crate::base::Pose;
+use crate::world::{Sighting, ik};
+
+/// Distance between postures on a straight way of the hand. Unit: metres.
+const STEP_M: f64 = 0.02;
+/// How far in front of the base's middle the hand is while it carries. Unit: metres. A base is about 0.2 m in radius, and a
+/// hand that holds a bowl reaches 0.1 m back.
+const NEAR_M: f64 = 0.38;
+/// How high the hand is meanwhile, if the arm reaches so low. Unit: metres. Below what the head looks over, above the base.
+const LOW_M: f64 = 0.68;
+/// Distance of the base's middle from the edge of a surface that it looks at. Unit: metres. A head a metre high sees a table's
+/// near edge from there, and what the hand holds in front of the base is clear of it.
+const GAP_M: f64 = 0.69;
+
+/// Postures that bring the hand near the base and down, as it is turned; none for a robot without a base to drive.
+pub fn fold(robot: &Operator<'_>) -> Vec<Vec<f64>> {
+    if robot.layout().base.is_none() {
+        return Vec::new();
+    }
+    let start = robot.commanded().to_vec();
+    let base = robot.base();
+    let grasp = robot.kinematics().grasp(&start).translation.vector;
+    let ahead = (base.inverse() * nalgebra::Point3::from(grasp)).x;
+    let back = base.rotation * Vector3::new(-(ahead - NEAR_M).max(0.0), 0.0, 0.0);
+    let mut path = straight(robot, &start, &back);
+    let near = path.last().cloned().unwrap_or(start);
+    let height = robot.kinematics().grasp(&near).translation.vector.z;
+    path.extend(straight(robot, &near, &Vector3::new(0.0, 0.0, -(height - LOW_M).max(0.0))));
+    path
+}
+
+/// Postures on a straight way of the hand, which stays as it is turned, with the base where it is: as far as the arm reaches.
+pub fn straight(robot: &Operator<'_>, from: &[f64], by: &Vector3<f64>) -> Vec<Vec<f64>> {
+    let (kinematics, layout) = (robot.kinematics(), robot.layout());
+    let mut mobility = vec![0.0; from.len()];
+    for idx in &layout.arm {
+        mobility[*idx] = 1.0;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen steps")]
+    let n_steps = (by.norm() / STEP_M).ceil().clamp(0.0, 100.0) as usize;
+    let start = kinematics.grasp(from);
+    let mut path: Vec<Vec<f64>> = Vec::with_capacity(n_steps);
+    for step in 1..=n_steps {
+        let mut target = start;
+        target.translation.vector += by * (step as f64 / n_steps as f64);
+        let seed = path.last().map_or(from, Vec::as_slice);
+        let Some(posture) = ik::solve(kinematics, seed, &ik::Reach { target, mobility: mobility.clone() }) else {
+            break;
+        };
+        path.push(posture);
+    }
+    path
+}
+
+/// A way to in front of a piece of furniture, to its front if there is one to it, otherwise to another side. Nothing if there
+/// is no way to any; an empty way for a robot that stands where it stands.
+pub fn drive_to(robot: &Operator<'_>, furniture: &Sighting, others: &[Sighting]) -> Option<Vec<Vec<f64>>> {
+    if robot.layout().base.is_none() {
+        return Some(Vec::new());
+    }
+    stands(furniture).into_iter().find_map(|stand| plan::drive(robot, stand, others))
+}
+
+/// Base poses in front of the four sides of a piece of furniture, facing it: the front, left and right, the back.
+fn stands(furniture: &Sighting) -> [[f64; 3]; 4] {
+    let [x, y, _] = furniture.pose.position;
+    let [width, depth, _] = furniture.size_m;
+    [(0.0, width), (1.0, depth), (3.0, depth), (2.0, width)].map(|(quarters, across)| {
+        let heading = Pose::yaw(&furniture.pose) + quarters * std::f64::consts::FRAC_PI_2;
+        let away = across / 2.0 + GAP_M;
+        [x - libm::cos(heading) * away, y - libm::sin(heading) * away, heading]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_base_stands_before_each_side_and_faces_it() {
+        let pose = Pose::upright([2.0, 1.0, 0.0], std::f64::consts::FRAC_PI_2);
+        let shelf = Sighting { id: "s".to_owned(), pose, size_m: [0.4, 1.0, 0.8], furniture: true };
+        for ([x, y, heading], across) in stands(&shelf).into_iter().zip([0.4, 1.0, 1.0, 0.4]) {
+            let (dx, dy) = (2.0 - x, 1.0 - y);
+            assert!((dx.hypot(dy) - across / 2.0 - GAP_M).abs() < 1e-9);
+            let gaze = [libm::cos(heading), libm::sin(heading)];
+            assert!((gaze[0] * dx + gaze[1] * dy - dx.hypot(dy)).abs() < 1e-9, "it looks past the middle");
+        }
+        // The front of furniture is on its negative x side.
+        assert!((stands(&shelf)[0][1] - (1.0 - 0.2 - GAP_M)).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,236 @@
+//! The place skill: fold, drive, look, lower until it stands, open, withdraw.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::actions::grip::{EMPTY_M, feels};
+use crate::actions::memory::{Held, furniture};
+use crate::actions::operator::{Interrupt, Operator};
+use crate::actions::perceive::{Survey, survey};
+use crate::actions::pick::failed;
+use crate::actions::place::touch::Touch;
+use crate::actions::place::{carry, spot};
+use crate::actions::plan::{self, Plan};
+use crate::actions::{ActionCall, ActionReport, memory};
+use crate::world::Sighting;
+
+/// Designators of the thing to place and of what it shall stand on.
+const TARGET: &str = "pickObject";
+const SURFACE: &str = "placeSurface";
+/// Time for looking and for coming to rest. Unit: seconds.
+const LOOK_SECS: f64 = 0.5;
+/// Shortest time of folding the arm with something in the hand. Unit: seconds.
+const FOLD_SECS: f64 = 2.0;
+/// Shortest time of going down to a few centimetres above the surface. Unit: seconds.
+const DOWN_SECS: f64 = 3.0;
+/// How far below the place where the surface is expected the hand goes on. Unit: metres. What sight is off by, three times.
+const DEEPER_M: f64 = 0.03;
+/// Shortest time of the last part of the way down, about 2 cm/s. Unit: seconds.
+const SETTLE_SECS: f64 = 3.0;
+/// Time for fingers to open. Unit: seconds.
+const OPEN_SECS: f64 = 0.8;
+/// Shortest time of leaving what was set down. Unit: seconds.
+const LEAVE_SECS: f64 = 2.0;
+/// How far a hand goes back from what it let go, where no base takes it there. Unit: metres.
+const LEAVE_M: f64 = 0.12;
+/// Things whose foot is below this stand on the floor. Unit: metres.
+const ON_FLOOR_M: f64 = 0.2;
+
+/// Why the skill ends before its end.
+enum Halt {
+    /// It has failed; a sentence for the report.
+    Failed(String),
+    /// The action has to end.
+    Interrupted(Interrupt),
+}
+
+impl From<Interrupt> for Halt {
+    fn from(interrupt: Interrupt) -> Self {
+        Self::Interrupted(interrupt)
+    }
+}
+
+/// Sets what the hand holds down on the designated surface and reports whether it believes that it stands there.
+///
+/// # Errors
+/// [`Interrupt`] if simulation broke or time ran out.
+pub fn place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
+    match try_to_place(call, robot) {
+        Ok(message) => Ok(ActionReport { succeeded: true, message }),
+        Err(Halt::Failed(reason)) => Ok(failed(reason)),
+        Err(Halt::Interrupted(interrupt)) => Err(interrupt),
+    }
+}
+
+fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, Halt> {
+    let target = call.value(TARGET).ok_or_else(|| Halt::Failed("no object was named to be placed".to_owned()))?;
+    let surface = call.value(SURFACE).ok_or_else(|| Halt::Failed("no surface was named to place it on".to_owned()))?;
+    robot.begin("feel");
+    let held = in_hand(target, robot)?;
+    robot.watch_grip();
+    robot.begin("fold");
+    robot.follow(&carry::fold(robot), FOLD_SECS)?;
+    robot.begin("look out");
+    robot.wait(LOOK_SECS)?;
+    let (seen, others) = look_out(surface, &held, robot)?;
+    still_in_hand(&held, robot)?;
+    robot.begin("drive");
+    let around: Vec<Sighting> = others.iter().cloned().chain([seen.clone()]).collect();
+    let way = carry::drive_to(robot, &seen, &around);
+    let way = way.ok_or_else(|| Halt::Failed(format!("no free way to {surface} was found")))?;
+    robot.follow(&way, 0.0)?;
+    robot.begin("look");
+    let survey = look_at(surface, &seen, &others, robot)?;
+    still_in_hand(&held, robot)?;
+    let (plan, spot) = choose(surface, &held, &survey, &others, robot)?;
+    set_down(surface, &held, &plan, &spot, robot)
+}
+
+/// What the robot believes to hold, if its fingers feel anything.
+fn in_hand(target: &str, robot: &mut Operator<'_>) -> Result<Held, Halt> {
+    let nothing = || Halt::Failed(format!("nothing is in the hand: {target} can't be placed"));
+    let held = robot.memory().held.clone().ok_or_else(nothing)?;
+    robot.wait(LOOK_SECS)?;
+    if !feels(robot) || robot.feel_opening() < EMPTY_M {
+        robot.hold(None);
+        return Err(nothing());
+    }
+    Ok(held)
+}
+
+/// That nothing slipped on the way.
+fn still_in_hand(held: &Held, robot: &mut Operator<'_>) -> Result<(), Halt> {
+    if !robot.felt_slip() {
+        return Ok(());
+    }
+    robot.hold(None);
+    Err(Halt::Failed(format!("{} slipped out of the hand on the way", held.id)))
+}
+
+/// Where the surface is, roughly, and everything else: furniture by the map where there is one, and things on tables as an
+/// earlier action perceived them where one did; the rest by the abstract detector.
+fn look_out(surface: &str, held: &Held, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), Halt> {
+    let map = robot.map_of_furniture();
+    let perceived = robot.memory().perceived.clone();
+    let on_map = |id: &str| map.iter().flatten().any(|piece| piece.id == id);
+    let mut seen: Vec<Sighting> = robot.see_if(|id| id != held.id && !on_map(id));
+    if let Some(perceived) = perceived {
+        seen.retain(|thing| thing.furniture || thing.pose.position[2] < ON_FLOOR_M);
+        let standing = perceived.things.iter().enumerate();
+        seen.extend(standing.map(|(idx, thing)| memory::sighting(format!("thing_{}", idx + 1), thing)));
+    }
+    seen.extend(map.into_iter().flatten());
+    let at = seen.iter().position(|thing| thing.id == surface && thing.furniture);
+    let at = at.ok_or_else(|| Halt::Failed(format!("{surface} was not seen")))?;
+    let place = seen.remove(at);
+    // Where the thing stood, there may still be a percept of it.
+    let taken = held.foot.translation.vector;
+    seen.retain(|thing| {
+        thing.furniture || (Vector3::from(thing.pose.position) - taken).norm() > spot::radius(held.size_m)
+    });
+    Ok((place, seen))
+}
+
+/// The surface as it is seen from before it: in pictures where the robot looked around earlier, otherwise by the abstract
+/// detector.
+fn look_at(surface: &str, seen: &Sighting, others: &[Sighting], robot: &mut Operator<'_>) -> Result<Survey, Halt> {
+    robot.wait(LOOK_SECS)?;
+    let missing = || Halt::Failed(format!("{surface} was not found where it should be"));
+    if robot.memory().perceived.is_some() {
+        return survey(seen, robot)?.ok_or_else(missing);
+    }
+    let again = robot.see(surface).ok_or_else(missing)?;
+    let things = others.iter().filter(|thing| !thing.furniture).cloned().collect();
+    Ok(Survey::of(&again, things))
+}
+
+/// A free spot, and the way of the hand to it.
+fn choose(
+    surface: &str,
+    held: &Held,
+    survey: &Survey,
+    others: &[Sighting],
+    robot: &Operator<'_>,
+) -> Result<(Plan, Point3<f64>), Halt> {
+    let base = Point3::from(robot.base().translation.vector);
+    let spots = spot::spots(&survey.plane, &survey.things, spot::radius(held.size_m), &base);
+    if spots.is_empty() {
+        return Err(Halt::Failed(format!("there is no free place on {surface}")));
+    }
+    let mut around: Vec<Sighting> = others.iter().chain(&survey.things).cloned().collect();
+    around.push(furniture(surface, &survey.plane));
+    let ways = spot::ways(held, &spots, robot.profile().max_opening_m);
+    let plan = plan::plan(robot, &ways, &spot::heightened(&around, held));
+    let plan = plan.map_err(|reason| Halt::Failed(format!("{surface}: {reason}")))?;
+    let lowest = plan.approach.last().map(|posture| robot.kinematics().grasp(posture).translation.vector.xy().into());
+    let spot = lowest.and_then(|at| spot::nearest(&spots, &at));
+    spot.map(|spot| (plan, spot)).ok_or_else(|| Halt::Failed(format!("{surface}: there is no way down to it")))
+}
+
+/// Carries the thing over its spot, lowers it, lets it go and leaves.
+fn set_down(
+    surface: &str,
+    held: &Held,
+    plan: &Plan,
+    spot: &Point3<f64>,
+    robot: &mut Operator<'_>,
+) -> Result<String, Halt> {
+    robot.begin("approach");
+    robot.follow(&plan.drive, 0.0)?;
+    robot.follow(std::slice::from_ref(&plan.reach), FOLD_SECS)?;
+    robot.follow(&plan.near, 0.0)?;
+    still_in_hand(held, robot)?;
+    robot.begin("lower");
+    let stands = lower(plan, robot)?;
+    still_in_hand(held, robot)?;
+    robot.begin("open");
+    let opening_m = (held.opening_m + spot::RELEASE_M).min(robot.profile().max_opening_m);
+    robot.hold(None);
+    robot.set_opening(opening_m);
+    robot.wait(OPEN_SECS)?;
+    robot.begin("withdraw");
+    withdraw(held, plan, robot)?;
+    robot.wait(LOOK_SECS)?;
+    let gap = robot.feel_opening();
+    if gap < held.opening_m + spot::RELEASE_M / 2.0 {
+        return Err(Halt::Failed(format!("the hand did not open: its fingers are {:.1} cm apart", gap * 100.0)));
+    }
+    if !stands {
+        return Err(Halt::Failed(format!("{} was let go, but {surface} was not felt below it", held.id)));
+    }
+    Ok(format!("set {} down on {surface} at x = {:.2}, y = {:.2}", held.id, spot.x, spot.y))
+}
+
+/// Lowers the hand until something else carries what it holds. True if that was felt.
+fn lower(plan: &Plan, robot: &mut Operator<'_>) -> Result<bool, Halt> {
+    robot.wait(LOOK_SECS)?;
+    let Some((lowest, down)) = plan.approach.split_last() else { return Ok(false) };
+    let mut touch = Touch::new(robot);
+    if robot.follow_until(down, DOWN_SECS, |robot| touch.felt(robot))? {
+        return Ok(true);
+    }
+    let mut deeper = vec![lowest.clone()];
+    deeper.extend(carry::straight(robot, lowest, &Vector3::new(0.0, 0.0, -DEEPER_M)));
+    Ok(robot.follow_until(&deeper, SETTLE_SECS, |robot| touch.felt(robot))?)
+}
+
+/// Takes the open hand away: level, by the way that it faces, from what it held from the side; otherwise up first.
+fn withdraw(held: &Held, plan: &Plan, robot: &mut Operator<'_>) -> Result<(), Halt> {
+    if !spot::is_level(held) {
+        robot.follow(&plan.lift, LEAVE_SECS)?;
+        robot.follow(&plan.retreat, 0.0)?;
+        return Ok(());
+    }
+    let mut back = robot.commanded().to_vec();
+    let path = match (robot.layout().base, plan.near.last()) {
+        (Some([x, y, _]), Some(above)) => {
+            back[x] += plan.reach[x] - above[x];
+            back[y] += plan.reach[y] - above[y];
+            vec![back]
+        }
+        _ => {
+            let forward = robot.kinematics().grasp(&back).rotation * Vector3::x();
+            carry::straight(robot, &back, &(-forward * LEAVE_M))
+        }
+    };
+    Ok(robot.follow(&path, LEAVE_SECS)?)
+}

@@ -1,0 +1,130 @@
+//! Placing what was picked, from scenes to verdicts: by what the robot sees and feels, and by nothing else.
+
+use std::collections::BTreeMap;
+
+use actcheck::actions::ActionReport;
+use actcheck::base::{Choices, Pose, names};
+use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
+use actcheck::config::Overrides;
+use actcheck::history::RunRecord;
+use actcheck::verdict::Outcome;
+use actcheck::world::{Poison, World};
+
+/// Two tables, a glass on the first, and what a test adds.
+fn env(actions: &str, more: &str) -> Env {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("config.toml");
+    let text = format!(
+        "tests = [{actions}]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
+        [placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"glass\", \"mug\"]\n{more}"
+    );
+    std::fs::write(&config, text).unwrap();
+    Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
+    let clock = Clock { now: String::new, secs: || 0.0 };
+    run_line(env, "test", 0, choices, &Manner { clock, disturb }).unwrap()
+}
+
+/// The scene with nothing special and senses without noise.
+fn nominal(env: &Env, disturb: Option<Disturbance>) -> RunRecord {
+    run(env, Choices::recorded(&[]), disturb)
+}
+
+/// The same with the target of a model, by its number.
+fn with_target(env: &Env, model: usize) -> RunRecord {
+    let mut choices = Choices::recorded(&[]);
+    choices.index("target.model", 2);
+    let mut made = choices.into_made();
+    made[0].value = model as f64;
+    run(env, Choices::recorded(&made), None)
+}
+
+fn report(run: &RunRecord, step: usize) -> &ActionReport {
+    run.trace.actions[step].report.as_ref().expect("it came to its end")
+}
+
+fn outcomes(run: &RunRecord, step: usize) -> BTreeMap<&str, Outcome> {
+    run.judgements[step].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
+}
+
+fn all_passed(run: &RunRecord, step: usize) {
+    assert_eq!(outcomes(run, step).len(), if step + 1 == run.judgements.len() { 4 } else { 5 });
+    let told = format!("{}: {:?}", report(run, step).message, run.judgements[step]);
+    assert!(outcomes(run, step).values().all(|outcome| *outcome == Outcome::Passed), "{told}");
+}
+
+/// Where a body is at the end.
+fn at_end(run: &RunRecord, id: &str) -> Pose {
+    let last = run.trace.snapshots.last().unwrap();
+    last.bodies.iter().find(|body| body.id == id).unwrap().pose
+}
+
+#[test]
+fn what_was_picked_from_the_side_or_from_above_is_placed_on_the_other_table() {
+    let env = env("[\"Pick\", \"Place\"]", "");
+    for (model, id) in ["glass_1", "mug_1"].into_iter().enumerate() {
+        let run = with_target(&env, model);
+        all_passed(&run, 0);
+        all_passed(&run, 1);
+        let end = at_end(&run, id);
+        assert!((end.position[2] - 0.74).abs() < 0.003, "{end:?}");
+        assert!(
+            report(&run, 1).message.starts_with(&format!("set {id} down on table_1")),
+            "{}",
+            report(&run, 1).message
+        );
+    }
+}
+
+#[test]
+fn after_a_look_around_the_place_is_found_in_pictures() {
+    let env = env("[\"PerceivePlane\", \"Pick\", \"Place\"]", "");
+    let run = nominal(&env, None);
+    all_passed(&run, 2);
+    let looks = run.trace.actions[2].phases.iter().filter(|phase| phase.name.starts_with("look")).count();
+    assert!(looks >= 2, "{:?}", run.trace.actions[2].phases);
+}
+
+#[test]
+fn an_empty_hand_reports_failure_at_once() {
+    let env = env("[\"Place\"]", "");
+    let run = nominal(&env, None);
+    assert_eq!(report(&run, 0).message, "nothing is in the hand: glass_1 can't be placed");
+    assert!(run.trace.actions[0].duration_secs < 1.0);
+    let outcomes = outcomes(&run, 0);
+    assert_eq!((outcomes["PlaceReported"], outcomes["ObjectOnSurface"]), (Outcome::Failed, Outcome::Failed));
+    assert_eq!((outcomes["ObjectReleased"], outcomes["NoPlaceCollisions"]), (Outcome::Passed, Outcome::Passed));
+}
+
+/// Sensors see the table where the glass shall go half a metre farther to the side and 20 cm higher than it is.
+fn deceive(_: u64, world: &mut World) {
+    let decoy = Pose::upright([0.0, 2.41, 0.2], 0.0);
+    assert!(world.poison("table_1", Poison::Decoy(decoy)));
+}
+
+#[test]
+fn it_acts_on_what_it_perceives_and_not_on_what_is() {
+    for actions in ["[\"Pick\", \"Place\"]", "[\"PerceivePlane\", \"Pick\", \"Place\"]"] {
+        let env = env(actions, "");
+        let run = nominal(&env, Some(deceive));
+        let last = run.trace.actions.len() - 1;
+        // The hand opens where the table seems to be: the glass falls, and nothing was felt below it.
+        assert!(!report(&run, last).succeeded, "{}", report(&run, last).message);
+        assert!(report(&run, last).message.contains("was not felt"), "{}", report(&run, last).message);
+        assert_eq!(outcomes(&run, last)["PlaceReported"], Outcome::Failed);
+        let seen = run.trace.actions[last].percepts.iter().find(|percept| percept.id == "table_1").unwrap();
+        assert_eq!((seen.pose.position[1], seen.pose.position[2]), (2.41, 0.2));
+    }
+}
+
+#[test]
+fn the_same_choices_give_the_same_placement() {
+    let noise = "[sensing]\nposition_noise_m = 0.02\nheight_noise_m = 0.01\nyaw_noise_rad = 0.05\n\
+        localisation_noise_m = 0.01\ngripper_noise_m = 0.001\n";
+    let env = env("[\"Pick\", \"Place\"]", noise);
+    let first = run(&env, Choices::random(3, 0), None);
+    let again = run(&env, Choices::recorded(&first.choices), None);
+    assert_eq!(first.trace, again.trace);
+}
