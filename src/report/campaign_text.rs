@@ -8,7 +8,7 @@ use crate::base::names;
 use crate::report::repeated_text::repeated_text;
 use crate::report::table::ruled;
 use crate::report::weighted::weighted_text;
-use crate::report::{CampaignSummary, RunSummary, Share, regressions_text};
+use crate::report::{CampaignSummary, PropertyLine, RunSummary, Share, by_action, regressions_text};
 use crate::verdict::Outcome;
 
 /// Rows of the table of runs, and failed runs told in words; the rest are a command away.
@@ -38,23 +38,11 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
     if summary.runs.is_empty() {
         return;
     }
-    let mut table = ruled();
-    if colour {
-        table.enforce_styling();
-    } else {
-        table.force_no_tty();
-    }
-    let labels = summary.properties.iter().map(|(_, label, _)| label.clone());
-    table.set_header(["run".to_owned(), "test".to_owned()].into_iter().chain(labels).chain(["S".to_owned()]));
     // Every run while they fit; then those that did not pass, which are the ones to look at.
     let fit = summary.runs.len() <= RUNS_SHOWN;
     let shown: Vec<&RunSummary> = summary.runs.iter().filter(|run| fit || !run.passed()).take(RUNS_SHOWN).collect();
-    for run in &shown {
-        let mut row = vec![Cell::new(&run.id), Cell::new(&run.test)];
-        row.extend(summary.properties.iter().map(|(iri, ..)| outcomes_cell(run, iri)));
-        row.push(Cell::new(format!("{:.2}", run.score)));
-        table.add_row(row);
-    }
+    let several = by_action::has_several_actions(summary);
+    let table = if several { by_action::scores_table } else { outcomes_table }(summary, &shown, colour);
     let _ = writeln!(out, "{table}");
     let left_out = summary.runs.len() - shown.len();
     if left_out > 0 {
@@ -65,6 +53,25 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
             summary.program, summary.history
         );
     }
+}
+
+/// The outcomes of some runs of one action each.
+fn outcomes_table(summary: &CampaignSummary, shown: &[&RunSummary], colour: bool) -> comfy_table::Table {
+    let mut table = ruled();
+    if colour {
+        table.enforce_styling();
+    } else {
+        table.force_no_tty();
+    }
+    let labels = summary.properties.iter().map(|(_, label, _)| label.clone());
+    table.set_header(["run".to_owned(), "test".to_owned()].into_iter().chain(labels).chain(["S".to_owned()]));
+    for run in shown {
+        let mut row = vec![Cell::new(&run.id), Cell::new(&run.test)];
+        row.extend(summary.properties.iter().map(|(iri, ..)| outcomes_cell(run, iri)));
+        row.push(Cell::new(format!("{:.2}", run.score)));
+        table.add_row(row);
+    }
+    table
 }
 
 /// Outcomes of a property in a run: one for each action that has it.
@@ -92,16 +99,24 @@ fn outcomes_cell(run: &RunSummary, property: &str) -> Cell {
 }
 
 fn properties_table(out: &mut String, summary: &CampaignSummary) {
+    if by_action::has_several_actions(summary) {
+        let _ = writeln!(out, "{}", by_action::properties_table(summary, pass_rate));
+        return;
+    }
     let mut table = ruled();
     table.force_no_tty();
     let counted = Outcome::ALL.map(|outcome| outcome.word().to_owned());
     table.set_header(["property".to_owned(), "pass rate [95 % interval]".to_owned()].into_iter().chain(counted));
     for line in summary.property_lines() {
-        let rate = line.rate.as_ref().map_or_else(|| "nothing decided".to_owned(), Share::to_string);
+        let rate = pass_rate(&line);
         let counts = Outcome::ALL.map(|outcome| line.counts.get(outcome).to_string());
         table.add_row([line.label, rate].into_iter().chain(counts));
     }
     let _ = writeln!(out, "{table}");
+}
+
+fn pass_rate(line: &PropertyLine) -> String {
+    line.rate.as_ref().map_or_else(|| "nothing decided".to_owned(), Share::to_string)
 }
 
 fn scores(out: &mut String, summary: &CampaignSummary) {

@@ -3,6 +3,7 @@
 //! Never: decides an outcome, computes a statistic of its own, or writes to a stream.
 
 mod answer;
+mod by_action;
 mod campaign_json;
 mod campaign_table;
 mod campaign_text;

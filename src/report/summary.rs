@@ -223,18 +223,39 @@ impl CampaignSummary {
 
     /// One line for each property.
     pub fn property_lines(&self) -> Vec<PropertyLine> {
-        self.properties
-            .iter()
-            .map(|(iri, label, _)| {
-                let judgements = self.runs.iter().flat_map(|run| &run.actions).flat_map(|action| &action.judgements);
-                let own: Vec<&Judgement> = judgements.filter(|judgement| judgement.property == *iri).collect();
-                let counts = Counts::of(own.iter().map(|judgement| judgement.outcome));
-                let rate = Share::new(counts.passed, counts.decided());
-                let rate = rate.map(|rate| rate.knowing(self.interval_of_repeated(Some(iri))));
-                let held_before = own.iter().filter(|judgement| judgement.held_before == Some(true)).count() as u64;
-                PropertyLine { property: iri.clone(), label: label.clone(), counts, rate, held_before }
-            })
-            .collect()
+        self.lines_of(|_| true)
+    }
+
+    /// Every action that was to be performed, in the order in which tests list them, with one line for each of its
+    /// properties.
+    pub fn lines_by_action(&self) -> Vec<(String, Vec<PropertyLine>)> {
+        let mut names: Vec<&String> = Vec::new();
+        for action in self.runs.iter().flat_map(|run| &run.actions) {
+            if !names.contains(&&action.name) {
+                names.push(&action.name);
+            }
+        }
+        let lines = |name: &String| {
+            let all = self.lines_of(|action| action.name == *name);
+            all.into_iter().filter(|line| line.counts.total() > 0).collect()
+        };
+        names.into_iter().map(|name| (name.clone(), lines(name))).collect()
+    }
+
+    /// One line for each property, over some of the actions.
+    fn lines_of(&self, counts: impl Fn(&ActionSummary) -> bool) -> Vec<PropertyLine> {
+        let actions: Vec<&ActionSummary> =
+            self.runs.iter().flat_map(|run| &run.actions).filter(|action| counts(action)).collect();
+        let line = |iri: &String, label: &String| {
+            let judgements = actions.iter().flat_map(|action| &action.judgements);
+            let own: Vec<&Judgement> = judgements.filter(|judgement| judgement.property == *iri).collect();
+            let counts = Counts::of(own.iter().map(|judgement| judgement.outcome));
+            let rate = Share::new(counts.passed, counts.decided());
+            let rate = rate.map(|rate| rate.knowing(self.interval_of_repeated(Some(iri))));
+            let held_before = own.iter().filter(|judgement| judgement.held_before == Some(true)).count() as u64;
+            PropertyLine { property: iri.clone(), label: label.clone(), counts, rate, held_before }
+        };
+        self.properties.iter().map(|(iri, label, _)| line(iri, label)).collect()
     }
 
     /// 0: everything passed. 1: a property failed, in a run or a regression. 2: something could not be tested and nothing
