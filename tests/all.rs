@@ -23,6 +23,7 @@ mod oracle;
 mod patterns;
 mod perceive;
 mod physics;
+mod pictures;
 mod place;
 mod proofs;
 mod readme;

@@ -24,8 +24,8 @@ pub use perform::{Interference, perform, perform_with};
 pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
 pub use skills::{UnknownSkill, known_skill, reference_skills};
 pub use trace::{
-    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Perceived, PerceivedPlane, PerceivedThing,
-    Percept, Phase, Trace,
+    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Perceived, PerceivedPlane,
+    PerceivedThing, Percept, Phase, Trace,
 };
 
 // States and the map are part of a trace: its readers meet them here.

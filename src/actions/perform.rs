@@ -5,7 +5,7 @@ use crate::actions::memory::Memory;
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::skills::skill;
 use crate::actions::{
-    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Saboteur, Trace,
+    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Saboteur, Trace,
 };
 use crate::base::Choices;
 use crate::scenario::{Budget, SceneMap};
@@ -60,7 +60,8 @@ pub fn perform_with(
     }
     let tracks = world.tracks();
     let frames = Frames { period_secs: tracks.period_secs, names: tracks.names, rows: tracks.rows };
-    Trace { snapshots, actions, frames, hash: world.state_digest(), map: SceneMap::default() }
+    let forms = world.forms().into_iter().map(|(name, parts)| Form { name, parts }).collect();
+    Trace { snapshots, actions, frames, hash: world.state_digest(), map: SceneMap::default(), forms }
 }
 
 fn perform_one(

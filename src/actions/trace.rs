@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::base::Pose;
-use crate::scenario::SceneMap;
+use crate::scenario::{Part, SceneMap};
 use crate::world::Snapshot;
 
 /// A whole run as it was observed by simulation.
@@ -24,6 +24,17 @@ pub struct Trace {
     pub hash: String,
     /// The names of the world's places.
     pub map: SceneMap,
+    /// What objects and links look like, for pictures. Empty in traces of earlier versions.
+    pub forms: Vec<Form>,
+}
+
+/// What a body looks like: enough for an outline. Pieces of meshes are reduced to their outermost points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Form {
+    /// Id of the object, or `robot/LINK`.
+    pub name: String,
+    /// Convex solids and tubes. Frame: the body's.
+    pub parts: Vec<Part>,
 }
 
 /// One action as it was performed.

@@ -316,6 +316,7 @@ mod tests {
             frames,
             hash: "a".into(),
             map: Default::default(),
+            forms: vec![],
         }
     }
 

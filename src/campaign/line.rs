@@ -225,6 +225,7 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
         frames: actions::Frames::default(),
         hash: String::new(),
         map: scene.map.clone(),
+        forms: Vec::new(),
     }
 }
 

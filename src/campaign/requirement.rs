@@ -65,6 +65,7 @@ impl Requirement {
             frames: Frames::default(),
             hash: String::new(),
             map: scene.map.clone(),
+            forms: Vec::new(),
         };
         let facts = facts::extract(&trace);
         let state = &facts.snapshots[0];

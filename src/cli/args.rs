@@ -258,8 +258,8 @@ pub struct ShowArgs {
     /// Where the history lies.
     #[command(flatten)]
     pub history: HistoryArgs,
-    /// Draw the scene before and after into this file (SVG)
-    #[arg(long, value_name = "FILE.svg")]
+    /// Draw the scene before and after into this file, as pixels (.png) or lines (.svg)
+    #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
     /// How it is printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]

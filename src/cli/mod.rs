@@ -20,6 +20,7 @@ mod list;
 mod merge;
 mod new;
 mod output;
+mod picture;
 mod progress;
 mod query;
 mod recheck;

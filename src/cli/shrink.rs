@@ -9,8 +9,9 @@ use crate::base::{Choice, Diagnostic, Diagnostics};
 use crate::campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk, unit_of};
 use crate::campaign::{Env, Manner};
 use crate::cli::args::HistoryArgs;
+use crate::cli::picture::Picture;
 use crate::cli::run::{all_cores, quietly};
-use crate::cli::{clock, history_dir, output, show, stop};
+use crate::cli::{clock, history_dir, output, stop};
 use crate::history::{History, RunRecord};
 use crate::report::{ShrunkChoice, ShrunkSummary, shrunk_json, shrunk_text};
 use crate::rules::Budget;
@@ -41,8 +42,8 @@ pub struct ShrinkArgs {
     /// Where the history lies.
     #[command(flatten)]
     pub history: HistoryArgs,
-    /// Draw the small scene before and after into this file (SVG)
-    #[arg(long, value_name = "FILE.svg")]
+    /// Draw the small scene before and after into this file, as pixels (.png) or lines (.svg)
+    #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
     /// How it is printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
@@ -64,6 +65,7 @@ pub enum ShrinkFormat {
 
 /// Finds the smallest scene that fails as a run did, keeps it and prints it. Returns the exit code.
 pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
+    let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open(&args.history)?;
     let run = history.run(&args.run)?;
     let (env, _) = Env::recall(&history, &run.row.campaign, args.config.as_deref())?;
@@ -86,8 +88,8 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
         ShrinkFormat::Text => shrunk_text(&shrunk),
         ShrinkFormat::Json => format!("{:#}\n", shrunk_json(&shrunk)),
     });
-    if let Some(file) = &args.picture {
-        show::draw(&history, &shrunk.run, file)?;
+    if let Some(picture) = picture {
+        picture.draw(&history, &shrunk.run)?;
     }
     Ok(if asked.load(Ordering::Relaxed) { stop::INTERRUPTED } else { 0 })
 }

@@ -38,5 +38,5 @@ pub use store::History;
 pub use vitals::RunVitals;
 
 // What the readers of a history meet in its products.
-pub use crate::actions::{BodyState, Snapshot, Trace};
-pub use crate::scenario::Role;
+pub use crate::actions::{BodyState, Form, Snapshot, Trace};
+pub use crate::scenario::{Part, Role, Shape};

@@ -11,6 +11,7 @@ mod description;
 mod engine;
 mod error;
 mod fault;
+mod forms;
 pub mod ik;
 mod kinematics;
 mod mishap;

@@ -1,0 +1,51 @@
+//! `--picture FILE`: a run drawn into a file whose ending says how.
+
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::history::{History, RunDetail};
+use crate::report::{Drawing, run_picture};
+
+/// A file that a picture shall be drawn into, of an ending that we can write.
+pub(super) struct Picture<'a> {
+    file: &'a Path,
+    render: fn(&Drawing) -> std::io::Result<Vec<u8>>,
+}
+
+impl<'a> Picture<'a> {
+    /// Looks at the ending, before anything is done that takes long.
+    ///
+    /// # Errors
+    /// X012: it is neither `.png` nor `.svg`.
+    pub(super) fn new(file: &'a Path) -> Result<Self, Diagnostics> {
+        let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        match ending.as_str() {
+            "png" => Ok(Self { file, render: Drawing::to_png }),
+            "svg" => Ok(Self { file, render: |drawing| Ok(drawing.to_svg().into_bytes()) }),
+            _ => {
+                let message = format!("a picture can't be written as {}", file.display());
+                let help =
+                    format!("end the file's name in .png or .svg, such as {}", file.with_extension("png").display());
+                Err(Diagnostic::error("X012", message).help(help).into())
+            }
+        }
+    }
+
+    /// Draws a run.
+    ///
+    /// # Errors
+    /// X006: the run has no state to draw; X007: the file can't be written.
+    pub(super) fn draw(&self, history: &History, run: &RunDetail) -> Result<(), Diagnostics> {
+        let trace = history.trace(&run.row.run)?;
+        let drawing = run_picture(run, &trace).ok_or_else(|| {
+            Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
+                .help("it was broken before its first action; `actcheck show` says why")
+        })?;
+        let written = (self.render)(&drawing).and_then(|bytes| std::fs::write(self.file, bytes));
+        written.map_err(|error| {
+            Diagnostic::error("X007", format!("{} can't be written: {error}", self.file.display()))
+                .help("name a file in a folder that exists and may be written")
+                .into()
+        })
+    }
+}

@@ -1,0 +1,183 @@
+//! A picture as a list of shapes and words, before anything is written or filled.
+
+/// A rectangle. Unit: pixels, y down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rect {
+    pub(super) left: f64,
+    pub(super) top: f64,
+    pub(super) width: f64,
+    pub(super) height: f64,
+}
+
+impl Rect {
+    pub(super) fn right(&self) -> f64 {
+        self.left + self.width
+    }
+
+    pub(super) fn bottom(&self) -> f64 {
+        self.top + self.height
+    }
+
+    pub(super) fn middle(&self) -> [f64; 2] {
+        [self.left + self.width / 2.0, self.top + self.height / 2.0]
+    }
+
+    /// Corners in order.
+    pub(super) fn corners(&self) -> Vec<[f64; 2]> {
+        vec![[self.left, self.top], [self.right(), self.top], [self.right(), self.bottom()], [self.left, self.bottom()]]
+    }
+
+    pub(super) fn grown(&self, by: f64) -> Self {
+        Self { left: self.left - by, top: self.top - by, width: self.width + 2.0 * by, height: self.height + 2.0 * by }
+    }
+
+    /// Area that two rectangles share.
+    pub(super) fn shared(&self, other: &Self) -> f64 {
+        let across = self.right().min(other.right()) - self.left.max(other.left);
+        let down = self.bottom().min(other.bottom()) - self.top.max(other.top);
+        across.max(0.0) * down.max(0.0)
+    }
+
+    pub(super) fn holds(&self, other: &Self) -> bool {
+        self.left <= other.left
+            && self.top <= other.top
+            && self.right() >= other.right()
+            && self.bottom() >= other.bottom()
+    }
+}
+
+/// A colour (0xRRGGBB) and how much of what is below it hides, from 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Paint {
+    pub(super) rgb: u32,
+    pub(super) opacity: f64,
+}
+
+impl Paint {
+    pub(super) const fn new(rgb: u32, opacity: f64) -> Self {
+        Self { rgb, opacity }
+    }
+
+    pub(super) const fn solid(rgb: u32) -> Self {
+        Self::new(rgb, 1.0)
+    }
+}
+
+/// How a line is drawn. Unit: pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Line {
+    pub(super) paint: Paint,
+    pub(super) width: f64,
+    /// Lengths of dash and gap.
+    pub(super) dash: Option<[f64; 2]>,
+}
+
+impl Line {
+    pub(super) const fn new(paint: Paint, width: f64) -> Self {
+        Self { paint, width, dash: None }
+    }
+
+    pub(super) const fn dashed(paint: Paint, width: f64, dash: [f64; 2]) -> Self {
+        Self { paint, width, dash: Some(dash) }
+    }
+}
+
+/// How a shape is drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Style {
+    pub(super) fill: Option<Paint>,
+    pub(super) line: Option<Line>,
+}
+
+impl Style {
+    pub(super) const fn line(line: Line) -> Self {
+        Self { fill: None, line: Some(line) }
+    }
+
+    pub(super) const fn fill(paint: Paint) -> Self {
+        Self { fill: Some(paint), line: None }
+    }
+
+    pub(super) const fn both(fill: Paint, line: Line) -> Self {
+        Self { fill: Some(fill), line: Some(line) }
+    }
+}
+
+/// Words in one line. Unit: pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Words {
+    pub(super) text: String,
+    /// Left end of the line that the letters stand on.
+    pub(super) at: [f64; 2],
+    pub(super) size: f64,
+    pub(super) bold: bool,
+    pub(super) paint: Paint,
+    /// Whether a light rim sets them off from what is below.
+    pub(super) rim: bool,
+}
+
+/// One thing that is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Mark {
+    /// Polygons (where closed) or lines through points, drawn as one shape.
+    Shape {
+        lines: Vec<Vec<[f64; 2]>>,
+        closed: bool,
+        style: Style,
+    },
+    Words(Words),
+}
+
+/// A picture: shapes and words over each other, the first below. Unit: pixels; origin at the upper left, y down.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drawing {
+    pub(super) width: f64,
+    pub(super) height: f64,
+    /// Marks, each with the rectangle outside of which nothing of it is seen.
+    pub(super) marks: Vec<(Option<Rect>, Mark)>,
+    clip: Option<Rect>,
+}
+
+/// Farther away no coordinate is kept: simulations that went wrong have bodies anywhere. Unit: pixels.
+const FAR_PX: f64 = 20_000.0;
+
+impl Drawing {
+    pub(super) fn new(width: f64) -> Self {
+        Self { width, height: 0.0, marks: Vec::new(), clip: None }
+    }
+
+    /// From now on nothing is seen outside of a rectangle, or everything again.
+    pub(super) fn clip(&mut self, within: Option<Rect>) {
+        self.clip = within;
+    }
+
+    pub(super) fn polygon(&mut self, points: Vec<[f64; 2]>, style: Style) {
+        self.shape(vec![points], true, style);
+    }
+
+    pub(super) fn line(&mut self, points: Vec<[f64; 2]>, line: Line) {
+        self.shape(vec![points], false, Style::line(line));
+    }
+
+    pub(super) fn circle(&mut self, [x, y]: [f64; 2], radius: f64, style: Style) {
+        let turn = std::f64::consts::TAU / 28.0;
+        let points = (0..28).map(|idx| turn * f64::from(idx));
+        self.polygon(points.map(|a| [x + radius * libm::cos(a), y + radius * libm::sin(a)]).collect(), style);
+    }
+
+    /// Polygons or lines as one shape: where they lie over each other, a translucent fill does not double.
+    pub(super) fn shape(&mut self, lines: Vec<Vec<[f64; 2]>>, closed: bool, style: Style) {
+        let near = |point: &[f64; 2]| point.iter().all(|value| value.abs() < FAR_PX);
+        let lines: Vec<Vec<[f64; 2]>> =
+            lines.into_iter().filter(|line| line.len() > 1 && line.iter().all(near)).collect();
+        if !lines.is_empty() {
+            self.marks.push((self.clip, Mark::Shape { lines, closed, style }));
+        }
+    }
+
+    pub(super) fn words(&mut self, words: Words) {
+        if words.at.iter().all(|value| value.abs() < FAR_PX) {
+            self.marks.push((self.clip, Mark::Words(words)));
+        }
+    }
+}

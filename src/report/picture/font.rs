@@ -1,0 +1,150 @@
+//! Letters: how wide words are, and their outlines.
+//!
+//! The fonts are parts of DejaVu Sans, carried in the program so that a picture needs nothing of the machine it is made on.
+
+use std::sync::OnceLock;
+
+use ttf_parser::{Face, GlyphId, OutlineBuilder};
+use zeno::{Command, PathBuilder, Vector};
+
+const REGULAR: &[u8] = include_bytes!("font/DejaVuSans.ttf");
+const BOLD: &[u8] = include_bytes!("font/DejaVuSans-Bold.ttf");
+
+/// What a letter that the font lacks is shown as.
+const MISSING: char = '\u{fffd}';
+
+fn face(bold: bool) -> Option<&'static Face<'static>> {
+    static FACES: [OnceLock<Option<Face<'static>>>; 2] = [OnceLock::new(), OnceLock::new()];
+    let (slot, bytes) = if bold { (1, BOLD) } else { (0, REGULAR) };
+    FACES[slot].get_or_init(|| Face::parse(bytes, 0).ok()).as_ref()
+}
+
+/// Glyphs of a text with their distance from its left end in units of the font, and the whole width.
+fn glyphs(face: &Face<'_>, text: &str) -> (Vec<(GlyphId, f32)>, f32) {
+    let mut along = 0.0;
+    let mut placed = Vec::new();
+    for letter in text.chars() {
+        let Some(glyph) = face.glyph_index(letter).or_else(|| face.glyph_index(MISSING)) else { continue };
+        placed.push((glyph, along));
+        along += f32::from(face.glyph_hor_advance(glyph).unwrap_or(0));
+    }
+    (placed, along)
+}
+
+/// Width of a text. Unit: that of `size`.
+pub(super) fn width(text: &str, size: f64, bold: bool) -> f64 {
+    face(bold).map_or(0.0, |face| f64::from(glyphs(face, text).1) * size / f64::from(face.units_per_em()))
+}
+
+/// Outline of a text whose line begins at a point. Unit: pixels, y down.
+pub(super) fn outline(text: &str, at: [f64; 2], size: f64, bold: bool) -> Vec<Command> {
+    let Some(face) = face(bold) else { return Vec::new() };
+    #[expect(clippy::cast_possible_truncation, reason = "pixels")]
+    let (size, [x, y]) = (size as f32, at.map(|value| value as f32));
+    let scale = size / f32::from(face.units_per_em());
+    let mut pen = Pen { x, y, scale, path: Vec::new() };
+    for (glyph, along) in glyphs(face, text).0 {
+        pen.x = x + along * scale;
+        face.outline_glyph(glyph, &mut pen);
+    }
+    pen.path
+}
+
+/// Splits a text into lines no wider than `most`, between words where that is possible.
+pub(super) fn wrapped(text: &str, size: f64, most: f64) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let mut rest = word;
+        while let Some(line) = lines.last_mut() {
+            let longer = if line.is_empty() { rest.to_owned() } else { format!("{line} {rest}") };
+            if width(&longer, size, false) <= most {
+                *line = longer;
+                break;
+            }
+            if line.is_empty() {
+                // A word that is wider than a line is broken.
+                let fits = rest.char_indices().map(|(at, letter)| at + letter.len_utf8());
+                let end = fits.take_while(|end| width(&rest[..*end], size, false) <= most).last();
+                let first = rest.chars().next().map_or(rest.len(), char::len_utf8);
+                let (head, tail) = rest.split_at(end.unwrap_or(first));
+                line.push_str(head);
+                rest = tail;
+                if rest.is_empty() {
+                    break;
+                }
+            }
+            lines.push(String::new());
+        }
+    }
+    lines
+}
+
+/// Turns the font's outlines, y up, into a path.
+struct Pen {
+    x: f32,
+    y: f32,
+    scale: f32,
+    path: Vec<Command>,
+}
+
+impl Pen {
+    fn at(&self, x: f32, y: f32) -> Vector {
+        Vector::new(self.x + x * self.scale, self.y - y * self.scale)
+    }
+}
+
+impl OutlineBuilder for Pen {
+    fn move_to(&mut self, x: f32, y: f32) {
+        let to = self.at(x, y);
+        self.path.move_to(to);
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        let to = self.at(x, y);
+        self.path.line_to(to);
+    }
+
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        let (control, to) = (self.at(x1, y1), self.at(x, y));
+        self.path.quad_to(control, to);
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        let (first, second, to) = (self.at(x1, y1), self.at(x2, y2), self.at(x, y));
+        self.path.curve_to(first, second, to);
+    }
+
+    fn close(&mut self) {
+        self.path.close();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_carried_fonts_have_letters_of_some_width() {
+        for bold in [false, true] {
+            assert!(face(bold).is_some());
+            assert!((0.5..1.0).contains(&(width("mm", 12.0, bold) / 24.0)));
+            assert!(outline("Ä→✗", [0.0, 0.0], 12.0, bold).len() > 20);
+        }
+        assert_eq!(width("\u{4e00}", 12.0, false), width("\u{fffd}", 12.0, false));
+    }
+
+    #[test]
+    fn text_is_wrapped_and_nothing_of_it_is_lost() {
+        let text = "the fingers did not close on glass_1 averyveryverylongwordthatfitsnowhere ok";
+        for most in [5.0, 60.0, 200.0, 5000.0] {
+            let lines = wrapped(text, 12.0, most);
+            let letters = |text: &str| text.chars().filter(|letter| *letter != ' ').collect::<String>();
+            assert_eq!(letters(&lines.concat()), letters(text));
+            assert!(
+                lines.iter().all(|line| width(line, 12.0, false) <= most || line.chars().count() == 1),
+                "{lines:?}"
+            );
+        }
+        assert_eq!(wrapped("", 12.0, 100.0), [""]);
+    }
+}

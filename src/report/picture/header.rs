@@ -1,0 +1,93 @@
+//! What a picture says above its panels: which run, what was done, what failed.
+
+use crate::base::names;
+use crate::history::RunDetail;
+use crate::report::picture::drawing::{Drawing, Paint, Rect, Style, Words};
+use crate::report::picture::{font, paint};
+use crate::verdict::Outcome;
+
+/// Lines of failures at most: a picture is no report.
+const MOST_FAILURES: usize = 8;
+/// Height of a line of words. Unit: pixels.
+const LINE_PX: f64 = 17.0;
+/// Size of the words. Unit: pixels.
+const SIZE_PX: f64 = 12.0;
+
+/// Writes the header from `top` on and returns where it ends.
+pub(super) fn draw(drawing: &mut Drawing, run: &RunDetail, left: f64, top: f64, width: f64) -> f64 {
+    let mut writer = Writer { drawing, left, width, y: top };
+    let row = &run.row;
+    let title = format!("{} · {} · {} · S = {:.2}", row.run, row.test, row.status.word(), row.score);
+    writer.title(&title);
+    if let Some(reason) = &run.reason {
+        writer.lines(&format!("{}: {reason}", row.status.word()), 0.0, paint::FAILED);
+    }
+    for (idx, action) in run.actions.iter().enumerate() {
+        let said = match (action.reported, action.message.as_deref()) {
+            (Some(true), _) => "reported success".to_owned(),
+            (Some(false), Some(message)) => format!("reported failure: {message}"),
+            (Some(false), None) => "reported failure".to_owned(),
+            (None, _) => action.end.clone(),
+        };
+        let name = names::local(&action.action);
+        let text = format!("{}. {name}: A = {:.2}, {:.1} s, {said}", action.step, action.score, action.duration_secs);
+        writer.swatch(paint::action(idx));
+        writer.lines(&text, 18.0, paint::INK);
+    }
+    failures(&mut writer, run);
+    writer.y
+}
+
+/// One line for each property that failed.
+fn failures(writer: &mut Writer<'_>, run: &RunDetail) {
+    let failed = run.actions.iter().flat_map(|action| {
+        let judged = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
+        judged.map(|judgement| {
+            let (action, property) = (names::local(&action.action), names::local(&judgement.property));
+            format!("✗ {action}: {property}: {}", judgement.witness)
+        })
+    });
+    let failed: Vec<String> = failed.collect();
+    for text in failed.iter().take(MOST_FAILURES) {
+        writer.lines(text, 18.0, paint::FAILED);
+    }
+    if failed.len() > MOST_FAILURES {
+        writer.lines(&format!("✗ and {} more", failed.len() - MOST_FAILURES), 18.0, paint::FAILED);
+    }
+    let judged = run.actions.iter().map(|action| action.judgements.len()).sum::<usize>();
+    if failed.is_empty() && judged > 0 {
+        writer.lines("no property failed", 18.0, paint::GREY);
+    }
+}
+
+struct Writer<'a> {
+    drawing: &'a mut Drawing,
+    left: f64,
+    width: f64,
+    y: f64,
+}
+
+impl Writer<'_> {
+    fn title(&mut self, text: &str) {
+        self.y += 18.0;
+        let at = [self.left, self.y];
+        let paint = Paint::solid(paint::INK);
+        self.drawing.words(Words { text: text.to_owned(), at, size: 17.0, bold: true, paint, rim: false });
+        self.y += 6.0;
+    }
+
+    fn lines(&mut self, text: &str, indent: f64, rgb: u32) {
+        for line in font::wrapped(text, SIZE_PX, self.width - indent) {
+            self.y += LINE_PX;
+            let at = [self.left + indent, self.y];
+            let paint = Paint::solid(rgb);
+            self.drawing.words(Words { text: line, at, size: SIZE_PX, bold: false, paint, rim: false });
+        }
+    }
+
+    /// A square in the colour of an action's ways, before the line that comes next.
+    fn swatch(&mut self, rgb: u32) {
+        let square = Rect { left: self.left + 1.0, top: self.y + LINE_PX - 9.5, width: 10.0, height: 10.0 };
+        self.drawing.polygon(square.corners(), Style::fill(Paint::solid(rgb)));
+    }
+}

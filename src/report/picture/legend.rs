@@ -1,0 +1,64 @@
+//! What the colours and lines of a picture mean: only of those that are in it.
+
+use crate::history::Role;
+use crate::report::picture::drawing::{Drawing, Paint, Rect, Style, Words};
+use crate::report::picture::panel::Material;
+use crate::report::picture::paths::Mover;
+use crate::report::picture::{font, paint};
+
+/// Size of the words. Unit: pixels.
+const SIZE_PX: f64 = 11.5;
+/// Height of a line. Unit: pixels.
+const LINE_PX: f64 = 20.0;
+/// Width of a sample. Unit: pixels.
+const SAMPLE_PX: f64 = 22.0;
+
+enum Sample {
+    Area(Style),
+    Way(Mover),
+}
+
+/// Writes the legend from `top` on and returns where it ends.
+pub(super) fn draw(drawing: &mut Drawing, material: &Material<'_>, left: f64, top: f64, width: f64) -> f64 {
+    let (mut x, mut y) = (left, top);
+    for (sample, text) in entries(material) {
+        let wide = SAMPLE_PX + 6.0 + font::width(text, SIZE_PX, false) + 20.0;
+        if x + wide > left + width && x > left {
+            (x, y) = (left, y + LINE_PX);
+        }
+        let middle = y + LINE_PX / 2.0;
+        match sample {
+            Sample::Area(style) => {
+                let area = Rect { left: x, top: middle - 6.0, width: SAMPLE_PX, height: 12.0 };
+                drawing.polygon(area.corners(), style);
+            }
+            Sample::Way(mover) => {
+                drawing.line(vec![[x, middle], [x + SAMPLE_PX, middle]], paint::way(mover, paint::action(0)));
+            }
+        }
+        let at = [x + SAMPLE_PX + 6.0, middle + SIZE_PX * 0.36];
+        let ink = Paint::solid(paint::INK);
+        drawing.words(Words { text: text.to_owned(), at, size: SIZE_PX, bold: false, paint: ink, rim: false });
+        x += wide;
+    }
+    y + LINE_PX
+}
+
+fn entries(material: &Material<'_>) -> Vec<(Sample, &'static str)> {
+    let has = |role: Role| material.roles.values().any(|other| *other == role);
+    let moved = |mover: Mover| material.ways.iter().any(|way| way.mover == mover);
+    let perceived =
+        material.trace.actions.iter().any(|action| !action.percepts.is_empty() || action.perceived.is_some());
+    let all = [
+        (has(Role::Target), Sample::Area(paint::movable(Role::Target)), "target"),
+        (has(Role::Other), Sample::Area(paint::movable(Role::Other)), "other objects"),
+        (has(Role::Obstacle), Sample::Area(paint::movable(Role::Obstacle)), "obstacles"),
+        (true, Sample::Area(paint::FURNITURE), "furniture"),
+        (true, Sample::Area(paint::ROBOT), "robot"),
+        (perceived, Sample::Area(paint::GLIMPSE), "perceived, where the robot believes it"),
+        (moved(Mover::Base), Sample::Way(Mover::Base), "way of the base, in the colour of its action"),
+        (moved(Mover::Hand), Sample::Way(Mover::Hand), "of the hand"),
+        (moved(Mover::Target), Sample::Way(Mover::Target), "of the target"),
+    ];
+    all.into_iter().filter(|(there, ..)| *there).map(|(_, sample, text)| (sample, text)).collect()
+}

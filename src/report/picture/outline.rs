@@ -1,0 +1,110 @@
+//! Outlines of bodies in a view: the hull of each convex part, laid over each other.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Isometry3, Point3};
+
+use crate::history::{Part, Shape};
+use crate::report::picture::window::Window;
+
+/// Corners of what is round.
+const AROUND: u32 = 28;
+
+/// What is seen of a body made of parts: a polygon for each. Unit: pixels.
+pub(super) fn silhouette(parts: &[Part], pose: &Isometry3<f64>, window: &Window) -> Vec<Vec<[f64; 2]>> {
+    let seen = parts.iter().map(|part| {
+        let placed = pose * part.pose.to_isometry();
+        hull(corners(&part.shape).iter().map(|corner| window.pixel((placed * corner).coords.into())).collect())
+    });
+    seen.filter(|polygon| polygon.len() > 2).collect()
+}
+
+/// Points whose hull is the shape, or within a few percent of it. Frame: the shape's.
+fn corners(shape: &Shape) -> Vec<Point3<f64>> {
+    match shape {
+        Shape::Box { size } => {
+            let [x, y, z] = size.map(|extent| extent / 2.0);
+            let signs = [-1.0, 1.0];
+            let pairs = signs.iter().flat_map(|a| signs.iter().map(move |b| (a, b)));
+            pairs.flat_map(|(a, b)| signs.iter().map(move |c| Point3::new(x * a, y * b, z * c))).collect()
+        }
+        Shape::Cylinder { radius, height } => rings([(*radius, -height / 2.0), (*radius, height / 2.0)]),
+        Shape::Tube { radius_low, radius_high, height, .. } => {
+            rings([(*radius_low, -height / 2.0), (*radius_high, height / 2.0)])
+        }
+        Shape::Sphere { radius } => rings(latitudes().map(|(cos, sin)| (radius * cos, radius * sin))),
+        Shape::Capsule { radius, height } => {
+            let ends = [-height / 2.0, height / 2.0];
+            rings(
+                ends.into_iter().flat_map(|end| latitudes().map(move |(cos, sin)| (radius * cos, end + radius * sin))),
+            )
+        }
+        Shape::Hull { points, .. } => points.iter().map(|point| Point3::from(*point)).collect(),
+        // Traces hold none: see `Form`.
+        Shape::Mesh { .. } => Vec::new(),
+    }
+}
+
+/// Cosines and sines from pole to pole.
+fn latitudes() -> impl Iterator<Item = (f64, f64)> {
+    (0..=8).map(|step| PI * (f64::from(step) / 8.0 - 0.5)).map(|angle| (libm::cos(angle), libm::sin(angle)))
+}
+
+/// Circles about z, by radius and height.
+fn rings(circles: impl IntoIterator<Item = (f64, f64)>) -> Vec<Point3<f64>> {
+    let turns = || (0..AROUND).map(|idx| TAU * f64::from(idx) / f64::from(AROUND));
+    let ring = |(radius, z)| turns().map(move |a| Point3::new(radius * libm::cos(a), radius * libm::sin(a), z));
+    circles.into_iter().flat_map(ring).collect()
+}
+
+/// The convex hull of points of a plane, always the same way round (by Andrew's chains of lower and upper points).
+pub(super) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.retain(|point| point.iter().all(|value| value.is_finite()));
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let mut chain = half(points.iter().copied());
+    let upper = half(points.iter().rev().copied());
+    chain.pop();
+    chain.extend(upper);
+    chain.pop();
+    chain
+}
+
+/// One chain: points from one end to the other that turn the same way all along.
+fn half(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    let mut chain: Vec<[f64; 2]> = Vec::new();
+    for point in points {
+        while let [.., before, last] = chain[..]
+            && (last[0] - before[0]) * (point[1] - before[1]) <= (last[1] - before[1]) * (point[0] - before[0])
+        {
+            chain.pop();
+        }
+        chain.push(point);
+    }
+    chain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hull_leaves_out_what_is_inside_and_on_sides() {
+        let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
+        let inside = [[1.0, 1.0], [1.0, 0.0], [0.5, 1.5], [2.0, 2.0]];
+        assert_eq!(hull(square.into_iter().chain(inside).collect()), square);
+        assert_eq!(hull(vec![[f64::NAN, 0.0], [1.0, 1.0]]), [[1.0, 1.0]]);
+    }
+
+    #[test]
+    fn corners_reach_as_far_as_the_shape() {
+        let reach = |shape: &Shape| corners(shape).iter().map(|point| point.coords.abs().max()).fold(0.0, f64::max);
+        assert_eq!(reach(&Shape::Box { size: [0.2, 0.4, 0.6] }), 0.3);
+        assert_eq!(reach(&Shape::Cylinder { radius: 0.4, height: 0.2 }), 0.4);
+        assert_eq!(reach(&Shape::Sphere { radius: 0.25 }), 0.25);
+        assert_eq!(reach(&Shape::Capsule { radius: 0.1, height: 0.4 }), 0.3);
+    }
+}

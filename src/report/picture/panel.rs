@@ -1,0 +1,249 @@
+//! One panel: a state of the world in a window, with names.
+
+use std::collections::BTreeMap;
+
+use crate::base::names;
+use crate::history::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
+use crate::report::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
+use crate::report::picture::labels::{Label, Labels};
+use crate::report::picture::outline::silhouette;
+use crate::report::picture::paths::{Mover, Way, pose_at};
+use crate::report::picture::window::{Bounds, Window};
+use crate::report::picture::{font, paint};
+
+/// What all panels of a run draw from.
+pub(super) struct Material<'a> {
+    pub(super) trace: &'a Trace,
+    pub(super) ways: &'a [Way],
+    pub(super) roles: BTreeMap<&'a str, Role>,
+    pub(super) forms: BTreeMap<&'a str, &'a Form>,
+}
+
+/// Which moment a panel shows.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Moment {
+    /// The state before the first action, with what was perceived of it.
+    Before,
+    /// The state after the last, with the ways there.
+    After,
+}
+
+impl Material<'_> {
+    fn snapshot(&self, moment: Moment) -> Option<&Snapshot> {
+        match moment {
+            Moment::Before => self.trace.snapshots.first(),
+            Moment::After => self.trace.snapshots.last(),
+        }
+    }
+
+    fn role(&self, body: &BodyState) -> Role {
+        let role = self.roles.get(body.id.as_str()).copied();
+        role.unwrap_or(if body.fixed { Role::Platform } else { Role::Other })
+    }
+}
+
+/// Draws a panel. A map shows places and the names of furniture; a close-up names what can be moved.
+pub(super) fn draw(drawing: &mut Drawing, material: &Material<'_>, moment: Moment, window: &Window, is_map: bool) {
+    let Some(snapshot) = material.snapshot(moment) else { return };
+    drawing.polygon(window.panel.corners(), paint::BACKGROUND);
+    drawing.clip(Some(window.panel));
+    if is_map {
+        rooms(drawing, material.trace, window);
+    }
+    let shown: Vec<&BodyState> = snapshot.bodies.iter().filter(|body| window.is_about(&Bounds::of(body))).collect();
+    for body in shown.iter().filter(|body| body.fixed) {
+        drawing.shape(form(material, body, window), true, fixed_style(body));
+    }
+    for body in shown.iter().filter(|body| !body.fixed) {
+        drawing.shape(form(material, body, window), true, paint::movable(material.role(body)));
+    }
+    robot(drawing, material, moment, window);
+    heading(drawing, snapshot.robot.base_true, window);
+    match moment {
+        Moment::Before => glimpses(drawing, material.trace, window),
+        Moment::After => ways(drawing, material.ways, window),
+    }
+    let mut labels = Labels::new(window.panel, things(&shown, window));
+    ruler(drawing, window, &mut labels);
+    if is_map {
+        name_places(drawing, material.trace, window, &mut labels);
+    }
+    name_bodies(drawing, material, &shown, window, &mut labels, is_map);
+    if moment == Moment::Before && !is_map && window.view.up == 1 {
+        name_glimpses(drawing, material.trace, window, &mut labels);
+    }
+    drawing.clip(None);
+}
+
+fn is_wall(body: &BodyState) -> bool {
+    names::local(&body.category) == "Wall"
+}
+
+fn fixed_style(body: &BodyState) -> Style {
+    if is_wall(body) { paint::WALL } else { paint::FURNITURE }
+}
+
+/// Outline of a body: of its form, or of the box around it where the trace has none.
+fn form(material: &Material<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64; 2]>> {
+    match material.forms.get(body.id.as_str()) {
+        Some(form) => silhouette(&form.parts, &body.pose.to_isometry(), window),
+        None => vec![window.rect(&Bounds::of(body)).corners()],
+    }
+}
+
+/// The robot's links where they were in the first or last frame.
+fn robot(drawing: &mut Drawing, material: &Material<'_>, moment: Moment, window: &Window) {
+    let frames = &material.trace.frames;
+    let row = if moment == Moment::Before { 0 } else { frames.rows.len().saturating_sub(1) };
+    let links = frames.names.iter().enumerate().filter_map(|(slot, name)| {
+        let form = material.forms.get(name.as_str())?;
+        Some(silhouette(&form.parts, &pose_at(material.trace, row, slot)?, window))
+    });
+    drawing.shape(links.flatten().collect(), true, paint::ROBOT);
+}
+
+/// An arrow at the robot's base, seen from above.
+fn heading(drawing: &mut Drawing, [x, y, heading]: [f64; 3], window: &Window) {
+    if window.view.up != 1 {
+        return;
+    }
+    arrow(drawing, window.pixel([x, y, 0.0]), heading, 11.0, Style::fill(Paint::new(0x2d_4560, 0.9)));
+}
+
+fn arrow(drawing: &mut Drawing, [x, y]: [f64; 2], heading: f64, size: f64, style: Style) {
+    let corners = [(0.0, 1.0), (2.5, 0.75), (std::f64::consts::PI, 0.35), (-2.5, 0.75)];
+    let corner = |(turn, reach): (f64, f64)| {
+        let angle = heading + turn;
+        [x + size * reach * libm::cos(angle), y - size * reach * libm::sin(angle)]
+    };
+    drawing.polygon(corners.map(corner).to_vec(), style);
+}
+
+fn rooms(drawing: &mut Drawing, trace: &Trace, window: &Window) {
+    for room in &trace.map.rooms {
+        let bounds = Bounds { low: [room.low_m[0], room.low_m[1], 0.0], high: [room.high_m[0], room.high_m[1], 0.0] };
+        drawing.polygon(window.rect(&bounds).corners(), paint::ROOM);
+    }
+}
+
+/// What was perceived, as boxes: things, planes, and what a skill looked up.
+fn glimpse_parts(trace: &Trace) -> Vec<(String, Part)> {
+    let standing = |pose: &crate::base::Pose, [x, y, z]: [f64; 3]| {
+        let middle = pose.to_isometry() * nalgebra::Translation3::new(0.0, 0.0, z / 2.0);
+        Part { pose: crate::base::Pose::from_isometry(&middle), shape: Shape::Box { size: [x, y, z] } }
+    };
+    let mut parts = Vec::new();
+    for action in &trace.actions {
+        for percept in &action.percepts {
+            parts.push((percept.id.clone(), standing(&percept.pose, percept.size_m)));
+        }
+        for thing in action.perceived.iter().flat_map(|perceived| &perceived.things) {
+            let name = thing.category.as_deref().map_or("?", names::local);
+            parts.push((name.to_owned(), standing(&thing.pose, thing.size_m)));
+        }
+        for plane in action.perceived.iter().filter_map(|perceived| perceived.plane) {
+            let [x, y] = plane.size_m;
+            parts.push((String::new(), Part { pose: plane.pose, shape: Shape::Box { size: [x, y, 0.004] } }));
+        }
+    }
+    parts
+}
+
+fn glimpses(drawing: &mut Drawing, trace: &Trace, window: &Window) {
+    for (_, part) in glimpse_parts(trace) {
+        let outline = silhouette(&[part], &nalgebra::Isometry3::identity(), window);
+        drawing.shape(outline, true, paint::GLIMPSE);
+    }
+}
+
+/// Says as what things were perceived.
+fn name_glimpses(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &mut Labels) {
+    let seen = trace.actions.iter().filter_map(|action| action.perceived.as_ref());
+    for thing in seen.flat_map(|perceived| &perceived.things) {
+        let name = thing.category.as_deref().map_or("unknown", names::local);
+        let reach = thing.size_m[0].max(thing.size_m[1]) / 2.0;
+        let at = window.rect(&Bounds::point(thing.pose.position).grown(reach));
+        let text = format!("seen: {name}");
+        labels.write(drawing, &Label { text: &text, size: 10.5, bold: false, rgb: paint::PERCEIVED, at });
+    }
+}
+
+fn ways(drawing: &mut Drawing, ways: &[Way], window: &Window) {
+    // From the side, the base only goes along the floor.
+    for way in ways.iter().filter(|way| way.mover != Mover::Base || window.view.up == 1) {
+        let points: Vec<[f64; 2]> = way.points.iter().map(|point| window.pixel(*point)).collect();
+        let rgb = paint::action(way.action);
+        if let (Some(start), Mover::Hand | Mover::Base) = (points.first(), way.mover) {
+            drawing.circle(*start, 2.6, Style::fill(Paint::solid(rgb)));
+        }
+        drawing.line(points, paint::way(way.mover, rgb));
+    }
+}
+
+/// Rectangles of what can be moved: labels keep off them.
+fn things(shown: &[&BodyState], window: &Window) -> Vec<Rect> {
+    shown.iter().filter(|body| !body.fixed).map(|body| window.rect(&Bounds::of(body))).collect()
+}
+
+/// A bar of a round length in the lower left corner.
+fn ruler(drawing: &mut Drawing, window: &Window, labels: &mut Labels) {
+    let lengths = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
+    let length = lengths.into_iter().find(|metres| metres * window.scale >= 45.0).unwrap_or(5.0);
+    let (left, bottom) = (window.panel.left + 10.0, window.panel.bottom() - 9.0);
+    let right = left + length * window.scale;
+    let line = Line::new(Paint::solid(paint::INK), 1.6);
+    drawing.line(vec![[left, bottom - 4.0], [left, bottom], [right, bottom], [right, bottom - 4.0]], line);
+    let text = if length < 1.0 { format!("{:.0} cm", length * 100.0) } else { format!("{length:.0} m") };
+    let width = font::width(&text, 10.5, false);
+    let paint = Paint::solid(paint::INK);
+    drawing.words(Words { text, at: [right + 5.0, bottom + 1.0], size: 10.5, bold: false, paint, rim: true });
+    labels.keep_out(Rect { left, top: bottom - 12.0, width: right - left + width + 8.0, height: 16.0 });
+}
+
+/// Rooms and locations.
+fn name_places(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &mut Labels) {
+    for location in &trace.map.locations {
+        let [x, y, heading] = location.at;
+        let at = window.pixel([x, y, 0.0]);
+        arrow(drawing, at, heading, 5.5, Style::fill(Paint::new(0x1f_7a4d, 0.9)));
+        let spot = Rect { left: at[0], top: at[1], width: 0.0, height: 0.0 }.grown(5.0);
+        labels.keep_out(spot);
+        labels.write(drawing, &Label { text: &location.name, size: 9.5, bold: false, rgb: 0x1f_6b45, at: spot });
+    }
+    for room in &trace.map.rooms {
+        let middle = [0, 1].map(|axis| f64::midpoint(room.low_m[axis], room.high_m[axis]));
+        let [left, top] = window.pixel([middle[0], middle[1], 0.0]);
+        let at = Rect { left, top, width: 0.0, height: 0.0 };
+        labels.write(drawing, &Label { text: &room.name, size: 13.0, bold: true, rgb: 0x9a_9b8c, at });
+    }
+}
+
+/// Names of what can be moved, the target first, then of furniture.
+fn name_bodies(
+    drawing: &mut Drawing,
+    material: &Material<'_>,
+    shown: &[&BodyState],
+    window: &Window,
+    labels: &mut Labels,
+    is_map: bool,
+) {
+    let mut named: Vec<(&BodyState, Role)> =
+        shown.iter().filter(|body| !is_wall(body)).map(|body| (*body, material.role(body))).collect();
+    let rank = |role: Role| [Role::Target, Role::Obstacle, Role::Other, Role::Platform].iter().position(|r| *r == role);
+    named.sort_by_key(|(body, role)| (body.fixed, rank(*role)));
+    for (body, role) in named {
+        // On a map, what stands on tables is too small to be named.
+        if is_map && !body.fixed && role == Role::Other {
+            continue;
+        }
+        let at = window.rect(&Bounds::of(body));
+        let (rgb, size) = if body.fixed { (0x7a_6231, 10.0) } else { (darker(paint::rgb_of(role)), 11.0) };
+        labels.write(drawing, &Label { text: &body.id, size, bold: role == Role::Target, rgb, at });
+    }
+}
+
+/// The same colour for words, which are thin.
+fn darker(rgb: u32) -> u32 {
+    let [_, channels @ ..] = rgb.to_be_bytes();
+    channels.into_iter().fold(0, |sum, channel| (sum << 8) | (u32::from(channel) * 2 / 3))
+}

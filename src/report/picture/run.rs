@@ -1,0 +1,80 @@
+//! The whole picture of a run: header, panels side by side, legend.
+
+use std::collections::BTreeSet;
+
+use crate::history::{Role, RunDetail, Trace};
+use crate::report::picture::drawing::{Drawing, Paint, Rect, Words};
+use crate::report::picture::panel::{Material, Moment};
+use crate::report::picture::paths::{Mover, ways};
+use crate::report::picture::window::{Bounds, View, Window, close_ups, overview};
+use crate::report::picture::{header, legend, paint, panel};
+
+/// Width of a picture. Unit: pixels.
+const WIDTH_PX: f64 = 1200.0;
+/// Around everything and between panels. Unit: pixels.
+const GAP_PX: f64 = 18.0;
+/// Height of a panel's title. Unit: pixels.
+const TITLE_PX: f64 = 20.0;
+/// A panel is no higher than that: the map, from above, from the side. Unit: pixels.
+const HIGHEST_PX: [f64; 3] = [330.0, 430.0, 340.0];
+
+/// Draws a run, or nothing where it has no state to draw.
+///
+/// On the left is the state before the first action with what was perceived of it, on the right that after the last with the
+/// ways of base, hand and target, in the colour of the action; above a map where the world is larger than the close-ups, then
+/// what the run is about from above and from the side.
+pub fn run_picture(run: &RunDetail, trace: &Trace) -> Option<Drawing> {
+    let of_role = |role: Role| run.objects.iter().filter(move |object| object.role == role);
+    let target = of_role(Role::Target).next().map(|object| object.id.as_str());
+    let subjects: BTreeSet<&str> = match target {
+        Some(target) => BTreeSet::from([target]),
+        None => of_role(Role::Other).map(|object| object.id.as_str()).collect(),
+    };
+    let ways = ways(trace, target);
+    let material = Material {
+        trace,
+        ways: &ways,
+        roles: run.objects.iter().map(|object| (object.id.as_str(), object.role)).collect(),
+        forms: trace.forms.iter().map(|form| (form.name.as_str(), form)).collect(),
+    };
+    let close_ups = close_ups(trace, &subjects)?;
+    let base_way: Vec<[f64; 3]> =
+        ways.iter().filter(|way| way.mover == Mover::Base).flat_map(|way| way.points.iter().copied()).collect();
+    let mut drawing = Drawing::new(WIDTH_PX);
+    let inner = WIDTH_PX - 2.0 * GAP_PX;
+    let mut y = header::draw(&mut drawing, run, GAP_PX, GAP_PX - 4.0, inner) + 12.0;
+    let side = View { across: across(trace, &close_ups[0]), up: 2 };
+    let whole = overview(trace, &close_ups, &base_way).map(|whole| (View::TOP, [whole; 2], 0));
+    for (view, bounds, kind) in whole.into_iter().chain([(View::TOP, close_ups, 1), (side, close_ups, 2)]) {
+        y = row(&mut drawing, &material, view, &bounds, kind, y);
+    }
+    drawing.height = legend::draw(&mut drawing, &material, GAP_PX, y, inner) + GAP_PX / 2.0;
+    Some(drawing)
+}
+
+/// The side view looks along the axis that the robot does not come from, so that hand and target don't hide each other.
+fn across(trace: &Trace, about: &Bounds) -> usize {
+    let base = trace.snapshots.first().map_or([0.0; 3], |snapshot| snapshot.robot.base_true);
+    let way = |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();
+    usize::from(way(1) > way(0))
+}
+
+/// Two panels of one view, before and after. Returns where they end.
+fn row(drawing: &mut Drawing, material: &Material<'_>, view: View, bounds: &[Bounds; 2], kind: usize, top: f64) -> f64 {
+    let width = (WIDTH_PX - 3.0 * GAP_PX) / 2.0;
+    let extent = |axis: usize| bounds[0].extent(axis).max(bounds[1].extent(axis));
+    let scale = (width / extent(view.across)).min(HIGHEST_PX[kind] / extent(view.up));
+    let height = extent(view.up) * scale;
+    let is_map = kind == 0;
+    for (idx, moment) in [Moment::Before, Moment::After].into_iter().enumerate() {
+        let left = GAP_PX + idx as f64 * (width + GAP_PX);
+        let panel = Rect { left, top: top + TITLE_PX, width, height };
+        let when = if moment == Moment::Before { "before" } else { "after" };
+        let what = if is_map { "the whole world " } else { "" };
+        let text = format!("{when}, {what}{}", view.title());
+        let paint = Paint::solid(paint::GREY);
+        drawing.words(Words { text, at: [left, top + TITLE_PX - 6.0], size: 12.0, bold: false, paint, rim: false });
+        panel::draw(drawing, material, moment, &Window::new(view, bounds[idx], scale, panel), is_map);
+    }
+    top + TITLE_PX + height + 10.0
+}
