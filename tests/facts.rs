@@ -165,6 +165,7 @@ pub fn sample_trace(seed: u64) -> Trace {
         frames: frames(&mut choices, 25.0),
         hash,
         map: SceneMap::default(),
+        forms: vec![],
     }
 }
 

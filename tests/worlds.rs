@@ -184,6 +184,7 @@ fn the_map_is_facts() {
         frames: actcheck::actions::Frames::default(),
         hash: String::new(),
         map: scene.map.clone(),
+        forms: vec![],
     };
     let facts = actcheck::facts::extract(&trace);
     let holds = |subject: &str, property: &str, object: Term| {
