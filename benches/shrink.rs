@@ -13,7 +13,7 @@ use actcheck::campaign::shrink::{ShrinkOptions, Shrunk, shrink};
 use actcheck::campaign::{Clock, Env, Manner, run_line};
 use actcheck::config::Overrides;
 use actcheck::history::{Role, RunRecord};
-use actcheck::report::run_picture;
+use actcheck::report::{Caption, run_picture};
 use actcheck::verdict::Outcome;
 
 /// Failing runs that are shrunk unless the command line says otherwise.
@@ -102,12 +102,16 @@ fn signature(record: &RunRecord) -> Signature {
 }
 
 fn draw(record: &RunRecord, mode: &Signature, folder: &Path) {
-    let target =
-        record.scene.objects.iter().find(|object| object.role == Role::Target).map(|object| object.id.as_str());
-    let title = format!("run {} of clutter.toml, shrunk: {}", record.index + 1, words(mode));
-    if let Some(picture) = run_picture(&record.trace, target, &title) {
+    let caption = Caption {
+        title: format!("run {} of clutter.toml, shrunk: {}", record.index + 1, words(mode)),
+        roles: record.scene.objects.iter().map(|object| (object.id.clone(), object.role)).collect(),
+        ..Caption::default()
+    };
+    if let Some(picture) = run_picture(&caption, &record.trace) {
         let file = folder.join(format!("{:03}-{}.svg", record.index + 1, words(mode).replace(" + ", "-")));
-        std::fs::create_dir_all(folder).and_then(|()| std::fs::write(file, picture)).expect("a folder to write to");
+        std::fs::create_dir_all(folder)
+            .and_then(|()| std::fs::write(file, picture.to_svg()))
+            .expect("a folder to write to");
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::base::{Diagnostic, Diagnostics};
 use crate::history::{History, RunDetail};
-use crate::report::{Drawing, run_picture};
+use crate::report::{Caption, Drawing, run_picture};
 
 /// A file that a picture shall be drawn into, of an ending that we can write.
 pub(super) struct Picture<'a> {
@@ -37,7 +37,7 @@ impl<'a> Picture<'a> {
     /// X006: the run has no state to draw; X007: the file can't be written.
     pub(super) fn draw(&self, history: &History, run: &RunDetail) -> Result<(), Diagnostics> {
         let trace = history.trace(&run.row.run)?;
-        let drawing = run_picture(run, &trace).ok_or_else(|| {
+        let drawing = run_picture(&Caption::of(run), &trace).ok_or_else(|| {
             Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
                 .help("it was broken before its first action; `actcheck show` says why")
         })?;

@@ -35,7 +35,7 @@ pub use compare_table::{compare_json, compare_table};
 pub use compare_text::compare_text;
 pub use health::{HealthSummary, health_json, health_lines, health_table, health_text};
 pub use oracles::{OracleSummary, oracles_json, oracles_table, oracles_text};
-pub use picture::{Drawing, run_picture};
+pub use picture::{Caption, Drawing, run_picture};
 pub use recheck_summary::{Change, RecheckLine, RecheckSummary, Why};
 pub use recheck_text::{recheck_json, recheck_table, recheck_text};
 pub use remarks::{Oddity, Remark};

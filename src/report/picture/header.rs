@@ -1,7 +1,9 @@
 //! What a picture says above its panels: which run, what was done, what failed.
 
+use std::collections::BTreeMap;
+
 use crate::base::names;
-use crate::history::RunDetail;
+use crate::history::{ActionDetail, Role, RunDetail};
 use crate::report::picture::drawing::{Drawing, Paint, Rect, Style, Words};
 use crate::report::picture::{font, paint};
 use crate::verdict::Outcome;
@@ -13,51 +15,69 @@ const LINE_PX: f64 = 17.0;
 /// Size of the words. Unit: pixels.
 const SIZE_PX: f64 = 12.0;
 
-/// Writes the header from `top` on and returns where it ends.
-pub(super) fn draw(drawing: &mut Drawing, run: &RunDetail, left: f64, top: f64, width: f64) -> f64 {
-    let mut writer = Writer { drawing, left, width, y: top };
-    let row = &run.row;
-    let title = format!("{} · {} · {} · S = {:.2}", row.run, row.test, row.status.word(), row.score);
-    writer.title(&title);
-    if let Some(reason) = &run.reason {
-        writer.lines(&format!("{}: {reason}", row.status.word()), 0.0, paint::FAILED);
-    }
-    for (idx, action) in run.actions.iter().enumerate() {
-        let said = match (action.reported, action.message.as_deref()) {
-            (Some(true), _) => "reported success".to_owned(),
-            (Some(false), Some(message)) => format!("reported failure: {message}"),
-            (Some(false), None) => "reported failure".to_owned(),
-            (None, _) => action.end.clone(),
-        };
-        let name = names::local(&action.action);
-        let text = format!("{}. {name}: A = {:.2}, {:.1} s, {said}", action.step, action.score, action.duration_secs);
-        writer.swatch(paint::action(idx));
-        writer.lines(&text, 18.0, paint::INK);
-    }
-    failures(&mut writer, run);
-    writer.y
+/// What is written above the panels.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Caption {
+    /// Which run it is.
+    pub title: String,
+    /// What was done, a line for each action.
+    pub actions: Vec<String>,
+    /// What went wrong, a line for each property that failed, or how else the run ended.
+    pub failures: Vec<String>,
+    /// What each object is there for, by its id.
+    pub roles: BTreeMap<String, Role>,
 }
 
-/// One line for each property that failed.
-fn failures(writer: &mut Writer<'_>, run: &RunDetail) {
-    let failed = run.actions.iter().flat_map(|action| {
-        let judged = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
-        judged.map(|judgement| {
-            let (action, property) = (names::local(&action.action), names::local(&judgement.property));
-            format!("✗ {action}: {property}: {}", judgement.witness)
-        })
-    });
-    let failed: Vec<String> = failed.collect();
-    for text in failed.iter().take(MOST_FAILURES) {
-        writer.lines(text, 18.0, paint::FAILED);
+impl Caption {
+    /// The caption of a stored run.
+    pub fn of(run: &RunDetail) -> Self {
+        let row = &run.row;
+        let reason = run.reason.iter().map(|reason| format!("{}: {reason}", row.status.word()));
+        let failed = run.actions.iter().flat_map(|action| {
+            let judged = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
+            judged.map(|judgement| {
+                let (action, property) = (names::local(&action.action), names::local(&judgement.property));
+                format!("{action}: {property}: {}", judgement.witness)
+            })
+        });
+        Self {
+            title: format!("{} · {} · {} · S = {:.2}", row.run, row.test, row.status.word(), row.score),
+            actions: run.actions.iter().map(what_was_done).collect(),
+            failures: reason.chain(failed).collect(),
+            roles: run.objects.iter().map(|object| (object.id.clone(), object.role)).collect(),
+        }
     }
-    if failed.len() > MOST_FAILURES {
-        writer.lines(&format!("✗ and {} more", failed.len() - MOST_FAILURES), 18.0, paint::FAILED);
+}
+
+fn what_was_done(action: &ActionDetail) -> String {
+    let said = match (action.reported, action.message.as_deref()) {
+        (Some(true), _) => "reported success".to_owned(),
+        (Some(false), Some(message)) => format!("reported failure: {message}"),
+        (Some(false), None) => "reported failure".to_owned(),
+        (None, _) => action.end.clone(),
+    };
+    let name = names::local(&action.action);
+    format!("{}. {name}: A = {:.2}, {:.1} s, {said}", action.step, action.score, action.duration_secs)
+}
+
+/// Writes the header from `top` on and returns where it ends.
+pub(super) fn draw(drawing: &mut Drawing, caption: &Caption, left: f64, top: f64, width: f64) -> f64 {
+    let mut writer = Writer { drawing, left, width, y: top };
+    writer.title(&caption.title);
+    for (idx, action) in caption.actions.iter().enumerate() {
+        writer.swatch(paint::action(idx));
+        writer.lines(action, 18.0, paint::INK);
     }
-    let judged = run.actions.iter().map(|action| action.judgements.len()).sum::<usize>();
-    if failed.is_empty() && judged > 0 {
-        writer.lines("no property failed", 18.0, paint::GREY);
+    for text in caption.failures.iter().take(MOST_FAILURES) {
+        writer.lines(&format!("✗ {text}"), 18.0, paint::FAILED);
     }
+    if caption.failures.len() > MOST_FAILURES {
+        writer.lines(&format!("✗ and {} more", caption.failures.len() - MOST_FAILURES), 18.0, paint::FAILED);
+    }
+    if caption.failures.is_empty() && !caption.actions.is_empty() {
+        writer.lines("nothing failed", 18.0, paint::GREY);
+    }
+    writer.y
 }
 
 struct Writer<'a> {

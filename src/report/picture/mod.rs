@@ -21,4 +21,5 @@ mod svg;
 mod window;
 
 pub use drawing::Drawing;
+pub use header::Caption;
 pub use run::run_picture;

@@ -15,7 +15,7 @@ use crate::report::picture::{font, paint};
 pub(super) struct Material<'a> {
     pub(super) trace: &'a Trace,
     pub(super) ways: &'a [Way],
-    pub(super) roles: BTreeMap<&'a str, Role>,
+    pub(super) roles: &'a BTreeMap<String, Role>,
     pub(super) forms: BTreeMap<&'a str, &'a Form>,
 }
 
@@ -37,7 +37,7 @@ impl Material<'_> {
     }
 
     fn role(&self, body: &BodyState) -> Role {
-        let role = self.roles.get(body.id.as_str()).copied();
+        let role = self.roles.get(&body.id).copied();
         role.unwrap_or(if body.fixed { Role::Platform } else { Role::Other })
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::history::{Role, RunDetail, Trace};
+use crate::history::{Role, Trace};
+use crate::report::picture::Caption;
 use crate::report::picture::drawing::{Drawing, Paint, Rect, Words};
 use crate::report::picture::panel::{Material, Moment};
 use crate::report::picture::paths::{Mover, ways};
@@ -23,18 +24,19 @@ const HIGHEST_PX: [f64; 3] = [330.0, 430.0, 340.0];
 /// On the left is the state before the first action with what was perceived of it, on the right that after the last with the
 /// ways of base, hand and target, in the colour of the action; above a map where the world is larger than the close-ups, then
 /// what the run is about from above and from the side.
-pub fn run_picture(run: &RunDetail, trace: &Trace) -> Option<Drawing> {
-    let of_role = |role: Role| run.objects.iter().filter(move |object| object.role == role);
-    let target = of_role(Role::Target).next().map(|object| object.id.as_str());
+pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
+    let of_role =
+        |role: Role| caption.roles.iter().filter(move |(_, other)| **other == role).map(|(id, _)| id.as_str());
+    let target = of_role(Role::Target).next();
     let subjects: BTreeSet<&str> = match target {
         Some(target) => BTreeSet::from([target]),
-        None => of_role(Role::Other).map(|object| object.id.as_str()).collect(),
+        None => of_role(Role::Other).collect(),
     };
     let ways = ways(trace, target);
     let material = Material {
         trace,
         ways: &ways,
-        roles: run.objects.iter().map(|object| (object.id.as_str(), object.role)).collect(),
+        roles: &caption.roles,
         forms: trace.forms.iter().map(|form| (form.name.as_str(), form)).collect(),
     };
     let close_ups = close_ups(trace, &subjects)?;
@@ -42,7 +44,7 @@ pub fn run_picture(run: &RunDetail, trace: &Trace) -> Option<Drawing> {
         ways.iter().filter(|way| way.mover == Mover::Base).flat_map(|way| way.points.iter().copied()).collect();
     let mut drawing = Drawing::new(WIDTH_PX);
     let inner = WIDTH_PX - 2.0 * GAP_PX;
-    let mut y = header::draw(&mut drawing, run, GAP_PX, GAP_PX - 4.0, inner) + 12.0;
+    let mut y = header::draw(&mut drawing, caption, GAP_PX, GAP_PX - 4.0, inner) + 12.0;
     let side = View { across: across(trace, &close_ups[0]), up: 2 };
     let whole = overview(trace, &close_ups, &base_way).map(|whole| (View::TOP, [whole; 2], 0));
     for (view, bounds, kind) in whole.into_iter().chain([(View::TOP, close_ups, 1), (side, close_ups, 2)]) {
