@@ -46,6 +46,10 @@ const ROUND_M: f64 = 0.015;
 const SLANT_RAD: f64 = 0.95;
 /// What speaks against a slanted hand: half a metre of driving.
 const SLANT_PENALTY: f64 = 0.2;
+/// What speaks against taking a tall thing from above, or a low one from the side.
+const UNUSUAL_PENALTY: f64 = 0.1;
+/// How much of a thing has to stand out above a level hand. Unit: metres.
+const SIDE_ABOVE_M: f64 = 0.01;
 /// Directions that are tried around a thing.
 const N_HEADINGS: u32 = 24;
 
@@ -53,9 +57,33 @@ const N_HEADINGS: u32 = 24;
 pub fn grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
     let headings = (0..N_HEADINGS).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS));
     let tall = thing.size_m[2] >= TALL_M;
-    headings
-        .flat_map(|heading| if tall { vec![from_side(thing, heading)] } else { from_above(thing, heading) })
-        .filter(|(across, _)| width_across(thing, *across) + LEAST_ROOM_M <= max_opening_m)
+    let ways =
+        headings.flat_map(|heading| if tall { vec![from_side(thing, heading)] } else { from_above(thing, heading) });
+    fitting(thing, max_opening_m, ways)
+}
+
+/// From the side, from above and slanted, whatever the thing's height: for an arm that can't choose where it stands, and for
+/// where the usual ways are not free. The fingers are across the heading.
+pub fn all_grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
+    let headings = (0..N_HEADINGS).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS));
+    let tall = thing.size_m[2] >= TALL_M;
+    let ways = headings.flat_map(|heading| {
+        let mut ways = vec![straight_down(thing, heading), slanted(thing, heading)];
+        if thing.size_m[2] >= SIDE_HEIGHT_M.0 + SIDE_ABOVE_M {
+            ways.push(from_side(thing, heading));
+        }
+        for (_, grasp) in &mut ways {
+            let usual = tall == (grasp.approach == Approach::Side);
+            grasp.penalty += if usual { 0.0 } else { UNUSUAL_PENALTY };
+        }
+        ways
+    });
+    fitting(thing, max_opening_m, ways)
+}
+
+/// Those ways for which the gripper opens wide enough.
+fn fitting(thing: &Sighting, max_opening_m: f64, ways: impl Iterator<Item = (f64, Grasp)>) -> Vec<Grasp> {
+    ways.filter(|(across, _)| width_across(thing, *across) + LEAST_ROOM_M <= max_opening_m)
         .map(|(_, grasp)| Grasp { opening_m: max_opening_m, ..grasp })
         .collect()
 }
@@ -69,18 +97,25 @@ fn from_side(thing: &Sighting, heading: f64) -> (f64, Grasp) {
 
 /// The ways from above with the base at one heading, each with the heading to which the fingers are across.
 fn from_above(thing: &Sighting, heading: f64) -> Vec<(f64, Grasp)> {
-    let height = (thing.size_m[2] - TOP_DEPTH_M).max(TOP_LOWEST_M);
-    let grasp = |turn: f64, pitch: f64, penalty: f64| {
-        let pose = hand(thing, height, turn, pitch);
-        (turn, Grasp { approach: Approach::Top, pose, heading, opening_m: 0.0, penalty })
+    let turned = |eighth: u32| {
+        let (across, grasp) = straight_down(thing, heading + std::f64::consts::FRAC_PI_4 * f64::from(eighth));
+        (across, Grasp { heading, ..grasp })
     };
-    let mut found: Vec<(f64, Grasp)> = (0..4)
-        .map(|eighth| {
-            grasp(heading + std::f64::consts::FRAC_PI_4 * f64::from(eighth), std::f64::consts::FRAC_PI_2, 0.0)
-        })
-        .collect();
-    found.push(grasp(heading, SLANT_RAD, SLANT_PENALTY));
-    found
+    (0..4).map(turned).chain([slanted(thing, heading)]).collect()
+}
+
+fn straight_down(thing: &Sighting, heading: f64) -> (f64, Grasp) {
+    downwards(thing, heading, std::f64::consts::FRAC_PI_2, 0.0)
+}
+
+fn slanted(thing: &Sighting, heading: f64) -> (f64, Grasp) {
+    downwards(thing, heading, SLANT_RAD, SLANT_PENALTY)
+}
+
+fn downwards(thing: &Sighting, heading: f64, pitch: f64, penalty: f64) -> (f64, Grasp) {
+    let height = (thing.size_m[2] - TOP_DEPTH_M).max(TOP_LOWEST_M);
+    let pose = hand(thing, height, heading, pitch);
+    (heading, Grasp { approach: Approach::Top, pose, heading, opening_m: 0.0, penalty })
 }
 
 /// The grasp link at a height above a thing's foot, heading somewhere and pointing down by an angle.
@@ -118,6 +153,21 @@ mod tests {
         assert!(grasps(&thing([0.08, 0.08, 0.146]), 0.135).iter().all(|g| g.approach == Approach::Side));
         assert!(grasps(&thing([0.099, 0.077, 0.085]), 0.135).iter().all(|g| g.approach == Approach::Top));
         assert_eq!(grasps(&thing([0.16, 0.16, 0.065]), 0.135), []);
+    }
+
+    #[test]
+    fn an_arm_that_stands_still_has_all_ways_to_all_things() {
+        let of = |size_m: [f64; 3], approach: Approach| {
+            let found = all_grasps(&thing(size_m), 0.135);
+            let penalties: Vec<f64> = found.iter().filter(|g| g.approach == approach).map(|g| g.penalty).collect();
+            (penalties.len(), penalties.iter().copied().fold(f64::INFINITY, f64::min))
+        };
+        assert_eq!(of([0.08, 0.08, 0.146], Approach::Side), (24, 0.0));
+        assert_eq!(of([0.08, 0.08, 0.146], Approach::Top), (48, UNUSUAL_PENALTY));
+        assert_eq!(of([0.08, 0.08, 0.085], Approach::Side), (24, UNUSUAL_PENALTY));
+        assert_eq!(of([0.08, 0.08, 0.085], Approach::Top), (48, 0.0));
+        // Too flat for a level hand.
+        assert_eq!(of([0.08, 0.08, 0.02], Approach::Side).0, 0);
     }
 
     #[test]

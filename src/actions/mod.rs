@@ -7,6 +7,7 @@ mod cut;
 mod grasp;
 mod grip;
 mod memory;
+mod motion;
 mod operator;
 mod perceive;
 mod perform;
@@ -16,6 +17,7 @@ mod plan;
 mod route;
 mod sabotage;
 mod skills;
+mod standing;
 mod trace;
 
 pub use call::ActionCall;

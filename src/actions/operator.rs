@@ -161,6 +161,11 @@ impl<'a> Operator<'a> {
         self.world.look(self.choices)
     }
 
+    /// Which postures a planner of arm motion samples: a number from 0 to 1, recorded like every decision.
+    pub fn choose_samples(&mut self) -> f64 {
+        self.choices.real("motion.samples", 0.0, 1.0, 0.5)
+    }
+
     /// What earlier actions of the run left to know.
     pub fn memory(&self) -> &Memory {
         self.memory

@@ -34,7 +34,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     if grasps.is_empty() {
         return Ok(failed(format!("{target} is too wide for the gripper")));
     }
-    let way = match plan::plan(robot, &grasps, &others) {
+    let way = match plan::plan(robot, &seen, &grasps, &others) {
         Ok(way) => way,
         Err(reason) => return Ok(failed(format!("{target}: {reason}"))),
     };
@@ -42,7 +42,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.follow(&way.drive, 0.0)?;
     robot.begin("reach");
     robot.set_opening(robot.profile().max_opening_m);
-    robot.follow(&[way.reach], 0.0)?;
+    robot.follow(&way.reach, 0.0)?;
     robot.begin("approach");
     robot.follow(&way.near, 0.0)?;
     robot.follow(&way.approach, APPROACH_SECS)?;

@@ -2,10 +2,12 @@
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
-use crate::actions::grasp::{Approach, Grasp};
+use crate::actions::grasp::{self, Approach, Grasp};
+use crate::actions::motion::{self, ArmSpace, Room, Samples};
 use crate::actions::operator::Operator;
 use crate::actions::route::{Block, Ground, Pillar, length};
-use crate::world::{Kinematics, Layout, Sighting, ik};
+use crate::actions::standing;
+use crate::world::{Kinematics, Layout, SelfContact, Sighting, ik};
 
 /// Joint positions for each leg of a pick.
 #[derive(Debug, Clone)]
@@ -13,7 +15,7 @@ pub struct Plan {
     /// To in front of the furniture, arm as it is for driving.
     pub drive: Vec<Vec<f64>>,
     /// The same place with the arm as it will take the thing.
-    pub reach: Vec<f64>,
+    pub reach: Vec<Vec<f64>>,
     /// To where the hand is a little before the thing.
     pub near: Vec<Vec<f64>>,
     /// From there to the thing, straight.
@@ -23,34 +25,61 @@ pub struct Plan {
     /// Back out with it.
     pub retreat: Vec<Vec<f64>>,
     /// What makes other plans better. No unit.
-    cost: f64,
+    pub(super) cost: f64,
 }
 
 /// How far the hand lifts, the best first: the arm may not reach higher. Unit: metres.
-const LIFTS_M: [f64; 3] = [0.17, 0.13, 0.09];
+pub(super) const LIFTS_M: [f64; 3] = [0.17, 0.13, 0.09];
 /// Length of the slow last part of the way. Unit: metres.
-const APPROACH_M: f64 = 0.12;
+pub(super) const APPROACH_M: f64 = 0.12;
 /// How far in front of the furniture's edge the hand stays while the arm unfolds. Unit: metres.
 const OFF_EDGE_M: f64 = 0.1;
 /// Longest way from there to the thing. Unit: metres.
 const LONGEST_WAY_M: f64 = 1.2;
 /// Clearance to furniture that a plan must have: fingertips go down to it to take flat things. Unit: metres.
-const FURNITURE_CLEAR_M: f64 = 0.002;
+pub(super) const FURNITURE_CLEAR_M: f64 = 0.002;
 /// Clearance to other things that is as good as any more. Unit: metres.
-const AMPLE_CLEAR_M: f64 = 0.04;
+pub(super) const AMPLE_CLEAR_M: f64 = 0.04;
 /// Clearance to other things without which a plan is hopeless: the hand would go through their middle. Unit: metres.
-const LEAST_CLEAR_M: f64 = -0.025;
+pub(super) const LEAST_CLEAR_M: f64 = -0.025;
 /// Distance between points and between postures that are checked for clearance. Unit: metres.
 const CHECK_M: f64 = 0.03;
 /// Postures that are checked on the way of an unfolding arm.
 const N_CHECKS: usize = 12;
+/// Postures that are sampled where no arm unfolds straight to any grasp.
+const MOST_SAMPLES: u32 = 4000;
+/// For one grasp.
+const SAMPLES_A_GRASP: u32 = 400;
+/// What is said where there is no plan.
+pub(super) const NO_WAY: &str = "no reachable and free way to it was found";
 
 /// The best plan among all grasps, or why there is none.
 ///
+/// Where the base moves, the arm unfolds straight, in front of the furniture; where no grasp can be had that way, unusual
+/// grasps and ways around are tried. Where the base stands still, see [`standing`].
+///
 /// # Errors
 /// A sentence for the action's report.
-pub fn plan(operator: &Operator<'_>, grasps: &[Grasp], others: &[Sighting]) -> Result<Plan, String> {
-    let planner = Planner::new(operator, others);
+pub fn plan(
+    operator: &mut Operator<'_>,
+    thing: &Sighting,
+    grasps: &[Grasp],
+    others: &[Sighting],
+) -> Result<Plan, String> {
+    if operator.layout().base.is_none() {
+        return standing::plan(operator, thing, others);
+    }
+    if let Some(plan) = best(&Planner::new(operator, others), grasps, &mut Samples::new(0.0, 0)) {
+        return Ok(plan);
+    }
+    let mut samples = Samples::new(operator.choose_samples(), MOST_SAMPLES);
+    let mut all = grasps.to_vec();
+    all.extend(grasp::all_grasps(thing, operator.profile().max_opening_m));
+    best(&Planner::new(operator, others), &all, &mut samples).ok_or_else(|| NO_WAY.to_owned())
+}
+
+/// The best plan among some grasps.
+fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples) -> Option<Plan> {
     let mut seeds: Vec<(f64, &Grasp, Vec<f64>)> = Vec::new();
     for grasp in grasps {
         for posture in &planner.postures {
@@ -65,11 +94,11 @@ pub fn plan(operator: &Operator<'_>, grasps: &[Grasp], others: &[Sighting]) -> R
     let mut best: Option<Plan> = None;
     for (_, grasp, seed) in seeds {
         let bound = best.as_ref().map_or(f64::INFINITY, |best| best.cost);
-        if let Some(plan) = planner.plan(grasp, &seed, bound) {
+        if let Some(plan) = planner.plan(grasp, &seed, bound, samples) {
             best = Some(plan);
         }
     }
-    best.ok_or_else(|| "no reachable and free way to it was found".to_owned())
+    best
 }
 
 /// A way of the base to a place (x, y, heading), with the arm as it is; nothing if there is none.
@@ -92,6 +121,8 @@ struct Planner<'a> {
     furniture: Vec<Block>,
     things: Vec<Pillar>,
     ground: Ground,
+    /// Which postures let links go into each other.
+    itself: SelfContact,
 }
 
 impl<'a> Planner<'a> {
@@ -104,11 +135,12 @@ impl<'a> Planner<'a> {
         let ground = Ground::new(&furniture, &things, radius(kinematics, layout, &start, &points));
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
-        Self { kinematics, layout, start, postures, points, furniture, things, ground }
+        let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
+        Self { kinematics, layout, start, postures, points, furniture, things, ground, itself }
     }
 
     /// A plan that costs less than `bound`, if there is one near the seed.
-    fn plan(&self, grasp: &Grasp, seed: &[f64], bound: f64) -> Option<Plan> {
+    fn plan(&self, grasp: &Grasp, seed: &[f64], bound: f64, samples: &mut Samples) -> Option<Plan> {
         let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
         let way = self.way_out(&grasp.pose.translation.vector, &back)?;
         // What the way alone costs, before anything is solved. (Solving moves the base by centimetres.)
@@ -134,8 +166,8 @@ impl<'a> Planner<'a> {
         );
         let drive = self.drive(&reach)?;
         let retreat = vec![self.moved(&lifted, &(back * way))];
-        let mut plan = Plan { drive, reach, near, approach, lift, retreat, cost: 0.0 };
-        plan.cost = grasp.penalty + self.cost(&plan, bound - grasp.penalty)?;
+        let mut plan = Plan { drive, reach: vec![reach], near, approach, lift, retreat, cost: 0.0 };
+        plan.cost = grasp.penalty + self.cost(&mut plan, bound - grasp.penalty, samples)?;
         Some(plan)
     }
 
@@ -241,21 +273,59 @@ impl<'a> Planner<'a> {
     }
 
     /// What speaks against a plan: closeness to things, then length of the way; nothing if it is not free, or no better
-    /// than `bound`.
-    fn cost(&self, plan: &Plan, bound: f64) -> Option<f64> {
-        let stand = plan.drive.last()?;
-        let travel = self.travel_cost(stand) + 0.4 * self.detour(&plan.drive);
-        let course = [stand, &plan.reach, &plan.near[0], plan.approach.last()?, plan.lift.last()?];
+    /// than `bound`. An arm that can't unfold straight goes around, as long as there are samples.
+    fn cost(&self, plan: &mut Plan, bound: f64, samples: &mut Samples) -> Option<f64> {
+        let travel = self.travel_cost(plan.drive.last()?) + 0.4 * self.detour(&plan.drive);
+        let course = [plan.reach.last()?, &plan.near[0], plan.approach.last()?, plan.lift.last()?];
         let mut cost = travel;
         // From the last leg, where most plans fail.
         for pair in course.windows(2).rev() {
-            let (furniture, things) = self.clearance(pair[0], pair[1]);
-            cost = cost.max(travel + (AMPLE_CLEAR_M - things).max(0.0) * 50.0);
-            if furniture < FURNITURE_CLEAR_M || things < LEAST_CLEAR_M || cost >= bound {
-                return None;
-            }
+            cost = cost.max(self.leg_cost(pair[0], pair[1], travel).filter(|cost| *cost < bound)?);
         }
-        Some(cost)
+        let stand = plan.drive.last()?;
+        let straight = self.leg_cost(stand, plan.reach.last()?, travel);
+        if let Some(leg) = straight.filter(|_| self.keeps_off_itself(stand, plan.reach.last())) {
+            return Some(cost.max(leg)).filter(|cost| *cost < bound);
+        }
+        let mut samples = samples.share(SAMPLES_A_GRASP);
+        plan.reach = self.around(stand, plan.reach.last()?, &mut samples)?;
+        for (from, to) in std::iter::once(stand).chain(&plan.reach).zip(&plan.reach) {
+            cost = cost.max(self.leg_cost(from, to, travel)?);
+        }
+        Some(cost).filter(|cost| *cost < bound)
+    }
+
+    /// What a leg brings to the cost; nothing where something is in the way.
+    fn leg_cost(&self, from: &[f64], to: &[f64], travel: f64) -> Option<f64> {
+        let (furniture, things) = self.clearance(from, to);
+        let is_free = furniture >= FURNITURE_CLEAR_M && things >= LEAST_CLEAR_M;
+        is_free.then(|| travel + (AMPLE_CLEAR_M - things).max(0.0) * 50.0)
+    }
+
+    /// Whether no link goes into another on the way.
+    fn keeps_off_itself(&self, from: &[f64], to: Option<&Vec<f64>>) -> bool {
+        let Some(to) = to else { return true };
+        (1..=N_CHECKS).all(|step| {
+            let share = step as f64 / N_CHECKS as f64;
+            let positions: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
+            !self.itself.touches(&self.kinematics.links(&positions))
+        })
+    }
+
+    /// A way for the arm around what is in the way.
+    fn around(&self, from: &[f64], to: &[f64], samples: &mut Samples) -> Option<Vec<Vec<f64>>> {
+        if samples.are_spent() {
+            return None;
+        }
+        let space = ArmSpace::new(
+            self.kinematics,
+            self.layout,
+            &self.furniture,
+            &self.things,
+            std::slice::from_ref(&self.start),
+        );
+        let least = Room { furniture_m: FURNITURE_CLEAR_M, things_m: LEAST_CLEAR_M };
+        motion::way(&space, from, to, least, samples)
     }
 
     /// How much longer the drive is than the straight line. Unit: metres.
@@ -299,6 +369,6 @@ fn radius(kinematics: &Kinematics, layout: &Layout, positions: &[f64], points: &
 }
 
 /// An angle brought into (−π, π]. Unit: radians.
-fn wrapped(angle: f64) -> f64 {
+pub(super) fn wrapped(angle: f64) -> f64 {
     libm::atan2(libm::sin(angle), libm::cos(angle))
 }

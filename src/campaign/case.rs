@@ -13,9 +13,10 @@ use crate::history::{CampaignEnd, History, RunRecord, RunStatus};
 use crate::scenario::{self, Scene, Space};
 use crate::verdict::{Counts, Outcome, Recurrence};
 
-/// What sensors get wrong is asked for only during a run; these are its names but for those that name an object.
-const SENSES: [&str; 4] =
-    ["sense.localisation.x", "sense.localisation.y", "sense.localisation.heading", "sense.gripper"];
+/// What is asked for only during a run: what sensors get wrong, and which postures a planner tries. These are its names but
+/// for those that name an object.
+const SENSES: [&str; 5] =
+    ["sense.localisation.x", "sense.localisation.y", "sense.localisation.heading", "sense.gripper", "motion.samples"];
 /// The same of one object.
 const SENSES_OF_OBJECT: [&str; 7] = ["x", "y", "z", "yaw", "width", "depth", "height"];
 

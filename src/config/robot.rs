@@ -20,6 +20,9 @@ pub struct RobotProfile {
     pub urdf: Source,
     /// Joints of an omnidirectional base in the order x, y, heading; `None` where the base is fixed.
     pub base_joints: Option<[String; 3]>,
+    /// Height of the root above the floor, for a base that is mounted on something; what it is mounted on is not simulated.
+    /// Unit: metres.
+    pub mount_height_m: f64,
     /// Joints that position the hand (lift and arm), from the base outwards.
     pub arm_joints: Vec<String>,
     /// Finger joints, left then right; they move the same distance.
@@ -128,6 +131,7 @@ fn read_table(
     let head_joints = table.strings("head_joints").unwrap_or_default();
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
     let grasp_turned_rad = table.numbers("grasp_turned_rad", ..).unwrap_or([0.0; 3]);
+    let mount_height_m = table.number("mount_height_m", 0.0..=3.0).unwrap_or(0.0);
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
     let finger_friction = table.number("finger_friction", 0.0..=2.0);
     let grip_force_n = table.number("grip_force_n", 0.1..=1000.0);
@@ -147,6 +151,7 @@ fn read_table(
         name: name?.value,
         urdf,
         base_joints,
+        mount_height_m,
         arm_joints: values(arm_joints?),
         finger_joints: finger_joints?,
         head_joints: values(head_joints),

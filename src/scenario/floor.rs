@@ -14,6 +14,8 @@ use crate::scenario::{Role, SceneObject};
 
 /// Gap between the surface's edge and the middle of the robot's base. Unit: metres. Shape: least, nominal, most.
 const BASE_GAP_M: [f64; 3] = [0.59, 0.69, 0.79];
+/// The same for an arm that stays where it is: near enough to reach to the far edge of a table, and a little in front of it.
+const FIXED_GAP_M: [f64; 3] = [0.18, 0.22, 0.26];
 /// The base stands at most this far beside the surface's middle. Unit: metres.
 const BASE_SIDE_M: f64 = 0.05;
 /// The base heads at most this far beside the surface's middle. Unit: radians.
@@ -21,6 +23,8 @@ const BASE_HEADING_RAD: f64 = 0.05;
 /// Where a base stands or shall stand, nothing else does within this distance. Unit: metres. That of a slim mobile
 /// manipulator, with room to turn.
 const BASE_ROOM_M: f64 = 0.4;
+/// The same for a base that stays where it is, which is as slim as its pedestal.
+const FIXED_ROOM_M: f64 = 0.17;
 /// How high that room is. Unit: metres.
 const BASE_HEIGHT_M: f64 = 1.2;
 /// Without rooms obstacles stand this far around the robot's side of the surface. Unit: metres.
@@ -33,12 +37,22 @@ impl Hand<'_> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);
         }
-        let [least, nominal, most] = BASE_GAP_M;
+        let [least, nominal, most] = if self.is_fixed() { FIXED_GAP_M } else { BASE_GAP_M };
         let edge = surface.map_or(0.0, |surface| surface.size_m[0] / 2.0);
         let gap = self.choices.real("robot.gap", least, most, nominal);
         let side = self.choices.real("robot.side", -BASE_SIDE_M, BASE_SIDE_M, 0.0);
         let heading = self.choices.real("robot.heading", -BASE_HEADING_RAD, BASE_HEADING_RAD, 0.0);
         Ok(self.in_world([-edge - gap, side, heading]))
+    }
+
+    /// Whether the robot stays where it is.
+    fn is_fixed(&self) -> bool {
+        self.space.robot.base_joints.is_none()
+    }
+
+    /// The room that the robot takes at the start.
+    fn own_room(&self, base: [f64; 3]) -> Solid {
+        room_for_base(base, if self.is_fixed() { FIXED_ROOM_M } else { BASE_ROOM_M })
     }
 
     /// A place of the floor, from the frame of the platform.
@@ -57,7 +71,7 @@ impl Hand<'_> {
             let mut draw = |name: &str, (low, high): (f64, f64)| self.choices.real(name, low, high, (low + high) / 2.0);
             let [x, y, heading] = ranges;
             let base = [draw("robot.x", x), draw("robot.y", y), draw("robot.heading", heading)];
-            if self.is_free(&room_for_base(base)) {
+            if self.is_free(&self.own_room(base)) {
                 return Ok(base);
             }
         }
@@ -69,12 +83,12 @@ impl Hand<'_> {
         if self.space.obstacles.is_empty() || self.space.obstacle_count == 0 {
             return Ok(());
         }
-        let mut kept_free: Vec<Solid> = vec![room_for_base(base)];
+        let mut kept_free: Vec<Solid> = vec![self.own_room(base)];
         let fronts: Vec<[f64; 3]> = match world {
             Some(world) => world.map.locations.iter().map(|location| location.at).collect(),
             None => self.fronts(),
         };
-        kept_free.extend(fronts.into_iter().map(room_for_base));
+        kept_free.extend(fronts.into_iter().map(|front| room_for_base(front, BASE_ROOM_M)));
         let (low, high) = world.map_or_else(|| field(base), Surroundings::extent);
         for number in 1..=self.space.obstacle_count {
             let name = format!("obstacle.{number}");
@@ -143,8 +157,8 @@ fn field([x, y, _]: [f64; 3]) -> ([f64; 2], [f64; 2]) {
 }
 
 /// The room that a base takes.
-fn room_for_base([x, y, _]: [f64; 3]) -> Solid {
-    let room = Shape::Cylinder { radius: BASE_ROOM_M, height: BASE_HEIGHT_M };
+fn room_for_base([x, y, _]: [f64; 3], radius: f64) -> Solid {
+    let room = Shape::Cylinder { radius, height: BASE_HEIGHT_M };
     let pose = Pose::upright([x, y, BASE_HEIGHT_M / 2.0 + 0.05], 0.0);
     Solid::of_parts(&[Part { pose, shape: room }], &Pose::IDENTITY)
 }

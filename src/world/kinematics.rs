@@ -71,6 +71,11 @@ impl Kinematics {
         self.links(positions)[self.camera.0] * self.camera.1
     }
 
+    /// Collision shapes of each link, in its frame.
+    pub(crate) fn solids_of_links(&self) -> impl Iterator<Item = &[Part]> {
+        self.model.links.iter().map(|link| link.solids.as_slice())
+    }
+
     /// Poses of all collision shapes, with the shapes.
     pub(crate) fn solids(&self, positions: &[f64]) -> Vec<(Isometry3<f64>, Shape)> {
         let links = self.model.links.iter().zip(self.links(positions));

@@ -2,6 +2,7 @@
 //!
 //! Never: decides what the robot does, calls anything a success, or attaches a thing to the hand by a constraint.
 
+mod assemble;
 mod body;
 mod camera;
 mod contacts;
@@ -14,12 +15,14 @@ mod fault;
 mod forms;
 pub mod ik;
 mod kinematics;
+mod layout;
 mod mishap;
 mod observe;
 mod quality;
 mod rays;
 mod recorder;
 mod robot;
+mod self_contact;
 mod sense;
 mod settle;
 mod simulation;
@@ -33,9 +36,10 @@ pub use description::{Joint, JointKind};
 pub use error::WorldError;
 pub use fault::{Fault, Mishap, Poison};
 pub use kinematics::{GRAVITY, Kinematics};
+pub use layout::{Layout, check_robot};
 pub use quality::Quality;
 pub use recorder::{Contact, Course, Record, Tracks};
-pub use robot::{Layout, check_robot};
+pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;
 pub use simulation::{Command, Observation, World, build};

@@ -1,51 +1,31 @@
-//! The robot in the engine: links as multibody joints, motors with limits, coupled fingers.
+//! The robot in the engine and its joint controllers: motors with limits, coupled fingers.
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use rapier3d::prelude::{
-    GenericJoint, JointAxesMask, JointAxis, MassProperties, MotorModel, MultibodyDofCoupling, MultibodyJointHandle,
-    PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
-};
+use nalgebra::Isometry3;
+use rapier3d::prelude::{JointAxis, MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
 
 use crate::base::Pose;
-use crate::scenario::RobotProfile;
-use crate::scenario::RobotStart;
-use crate::world::convert::{to_pose, to_real, to_vector};
-use crate::world::description::{Joint, JointKind, RobotModel};
-use crate::world::engine::{Owner, collider};
+use crate::scenario::{RobotProfile, RobotStart};
+use crate::world::assemble::{home, insert_joints, insert_links};
+use crate::world::convert::to_real;
+use crate::world::description::{Joint, RobotModel};
+use crate::world::layout::{Layout, Named};
 use crate::world::{JointState, Kinematics, WorldError};
-
-/// Error at which a motor gives all it has. Unit: metres. Stiffness is the effort limit over this.
-const SATURATION_M: f64 = 1e-3;
-/// The same for joints that turn. Unit: radians.
-const SATURATION_RAD: f64 = 0.02;
-/// Damping over stiffness of a motor. Unit: seconds.
-const DAMPING_SECS: f64 = 0.02;
-/// The same for fingers, which are light.
-const FINGER_DAMPING_SECS: f64 = 0.01;
-/// Friction of the robot's links other than the fingers: painted metal and plastic.
-const LINK_FRICTION: f64 = 0.4;
-/// Natural frequency of the stops at joint limits. Unit: hertz. The engine's own stops throw a loaded joint back.
-const STOP_FREQUENCY_HZ: f32 = 60.0;
-/// Damping ratio of the stops.
-const STOP_DAMPING: f32 = 5.0;
-/// Ranges wider than this are no stops in practice; leaving them out saves the solver work. Unit: metres or radians.
-const WIDEST_RANGE: f64 = 20.0;
 
 /// The motor of one joint.
 #[derive(Debug, Clone)]
-struct Motor {
-    joint: MultibodyJointHandle,
-    axis: JointAxis,
-    stiffness: f64,
-    damping: f64,
-    max_effort: f64,
+pub(super) struct Motor {
+    pub(super) joint: MultibodyJointHandle,
+    pub(super) axis: JointAxis,
+    pub(super) stiffness: f64,
+    pub(super) damping: f64,
+    pub(super) max_effort: f64,
     /// Where the controller wants to be in the end.
-    target: f64,
+    pub(super) target: f64,
     /// Where it wants to be now: follows the target no faster than the joint may move.
-    setpoint: f64,
-    setpoint_velocity: f64,
+    pub(super) setpoint: f64,
+    pub(super) setpoint_velocity: f64,
 }
 
 /// The robot, its bodies in the engine, and its joint controllers.
@@ -65,62 +45,6 @@ pub struct Robot {
     motors: Vec<Motor>,
 }
 
-/// Which joints of the robot are what, by their index.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Layout {
-    /// The base's: x, y, heading; none where it is fixed.
-    pub base: Option<[usize; 3]>,
-    /// The arm's, in the profile's order.
-    pub arm: Vec<usize>,
-    /// The head's: pan, tilt.
-    pub head: Vec<usize>,
-    /// The fingers': left, right.
-    pub fingers: [usize; 2],
-}
-
-/// Where the profile's names are in the URDF.
-struct Named {
-    layout: Layout,
-    finger_links: [usize; 2],
-    grasp: (usize, Isometry3<f64>),
-    camera: (usize, Isometry3<f64>),
-}
-
-impl Named {
-    fn find(profile: &RobotProfile, model: &RobotModel) -> Result<Self, WorldError> {
-        let joints = |names: &[String]| names.iter().map(|name| model.joint(name)).collect::<Result<Vec<_>, _>>();
-        let base = match &profile.base_joints {
-            Some([x, y, heading]) => Some([model.joint(x)?, model.joint(y)?, model.joint(heading)?]),
-            None => None,
-        };
-        let [left, right] = &profile.finger_joints;
-        let [left_link, right_link] = &profile.finger_links;
-        let layout = Layout {
-            base,
-            arm: joints(&profile.arm_joints)?,
-            head: joints(&profile.head_joints)?,
-            fingers: [model.joint(left)?, model.joint(right)?],
-        };
-        let [roll, pitch, yaw] = profile.grasp_turned_rad;
-        let (grasp_link, grasp_at) = model.frame(&profile.grasp_link)?;
-        Ok(Self {
-            layout,
-            finger_links: [model.frame(left_link)?.0, model.frame(right_link)?.0],
-            grasp: (grasp_link, grasp_at * UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
-            camera: model.frame(&profile.camera_link)?,
-        })
-    }
-}
-
-/// Whether a profile and its URDF fit together, without simulating.
-///
-/// # Errors
-/// [`WorldError`]: the first thing that is missing or can't be simulated.
-pub fn check_robot(profile: &RobotProfile) -> Result<(), WorldError> {
-    let model = RobotModel::read(profile)?;
-    Named::find(profile, &model).map(|_| ())
-}
-
 impl Robot {
     /// Puts the robot into the engine, in its home posture.
     ///
@@ -134,7 +58,7 @@ impl Robot {
         // A robot with a base of its own has its root at the origin of the world: its odometry's frame.
         let root = match named.layout.base {
             Some(_) => Isometry3::identity(),
-            None => Pose::upright([start.base[0], start.base[1], 0.0], start.base[2]).to_isometry(),
+            None => Pose::upright([start.base[0], start.base[1], profile.mount_height_m], start.base[2]).to_isometry(),
         };
         let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera);
         let bodies =
@@ -285,126 +209,6 @@ impl Robot {
     }
 }
 
-/// Home posture with the base where it starts and the fingers half open.
-fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, base: [f64; 3]) -> Vec<f64> {
-    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
-    for (idx, position) in named.layout.arm.iter().zip(&profile.home) {
-        positions[*idx] = position.clamp(model.joints[*idx].lower, model.joints[*idx].upper);
-    }
-    for (idx, position) in named.layout.base.iter().flatten().zip(base) {
-        positions[*idx] = position;
-    }
-    for idx in named.layout.fingers {
-        positions[idx] = (profile.max_opening_m / 4.0).clamp(model.joints[idx].lower, model.joints[idx].upper);
-    }
-    positions
-}
-
-fn insert_links(
-    engine: &mut PhysicsWorld,
-    model: &RobotModel,
-    poses: &[Isometry3<f64>],
-    finger_links: [usize; 2],
-    finger_friction: f64,
-) -> Vec<RigidBodyHandle> {
-    let mut bodies = Vec::with_capacity(model.links.len());
-    for (idx, (link, pose)) in model.links.iter().zip(poses).enumerate() {
-        let builder = if idx == 0 { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
-        let inertia = link.inertia.map(to_real);
-        let matrix = rapier3d::math::Matrix::from_cols_array(&[
-            inertia.m11,
-            inertia.m21,
-            inertia.m31,
-            inertia.m12,
-            inertia.m22,
-            inertia.m32,
-            inertia.m13,
-            inertia.m23,
-            inertia.m33,
-        ]);
-        let mass = MassProperties::with_inertia_matrix(to_vector(&link.com), to_real(link.mass), matrix);
-        let body = engine.insert_body(builder.pose(to_pose(pose)).additional_mass_properties(mass).can_sleep(false));
-        let friction = if finger_links.contains(&idx) { finger_friction } else { LINK_FRICTION };
-        for solid in &link.solids {
-            if let Some(collider) = collider(solid, Owner::Link(idx), friction, 0.0) {
-                engine.insert_collider(collider.density(0.0), Some(body));
-            }
-        }
-        bodies.push(body);
-    }
-    bodies
-}
-
-fn insert_joints(
-    engine: &mut PhysicsWorld,
-    model: &RobotModel,
-    bodies: &[RigidBodyHandle],
-    named: &Named,
-    profile: &RobotProfile,
-) -> Result<Vec<Motor>, WorldError> {
-    let mut motors = Vec::with_capacity(model.joints.len());
-    for (idx, joint) in model.joints.iter().enumerate() {
-        let is_finger = named.layout.fingers.contains(&idx);
-        let (data, axis) = engine_joint(joint);
-        let handle =
-            engine.multibody_joints.insert(bodies[joint.parent], bodies[idx + 1], data, true).ok_or_else(|| {
-                WorldError::Urdf {
-                    name: profile.urdf.name.to_string(),
-                    reason: format!("joint `{}` closes a loop", joint.name),
-                }
-            })?;
-        if let Some((multibody, link)) = engine.multibody_joints.get_mut(handle) {
-            multibody.set_self_contacts_enabled(false);
-            let dof = multibody.link(link).map(rapier3d::prelude::MultibodyLink::assembly_id);
-            if let Some(dof) = dof {
-                multibody.damping_mut()[dof] = to_real(joint.damping);
-            }
-        }
-        let saturation = if joint.kind == JointKind::Prismatic { SATURATION_M } else { SATURATION_RAD };
-        let max_effort = if is_finger { joint.effort.min(profile.grip_force_n) } else { joint.effort };
-        let stiffness = (max_effort / saturation).max(1.0);
-        let damping = stiffness * if is_finger { FINGER_DAMPING_SECS } else { DAMPING_SECS };
-        motors.push(Motor {
-            joint: handle,
-            axis,
-            stiffness,
-            damping,
-            max_effort,
-            target: 0.0,
-            setpoint: 0.0,
-            setpoint_velocity: 0.0,
-        });
-    }
-    Ok(motors)
-}
-
-/// A joint for the engine, which moves along or about the x axis of a frame of its own.
-fn engine_joint(joint: &Joint) -> (GenericJoint, JointAxis) {
-    let (locked, axis) = match joint.kind {
-        JointKind::Prismatic => (JointAxesMask::LOCKED_PRISMATIC_AXES, JointAxis::LinX),
-        JointKind::Revolute => (JointAxesMask::LOCKED_REVOLUTE_AXES, JointAxis::AngX),
-    };
-    let turned = x_onto(&joint.axis);
-    let frame = Isometry3::from_parts(Translation3::identity(), turned);
-    let mut data = GenericJoint::new(locked);
-    data.set_local_frame1(to_pose(&(joint.origin * frame)));
-    data.set_local_frame2(to_pose(&frame));
-    data.set_motor_model(axis, MotorModel::ForceBased);
-    if joint.upper - joint.lower < WIDEST_RANGE {
-        data.softness = SpringCoefficients { natural_frequency: STOP_FREQUENCY_HZ, damping_ratio: STOP_DAMPING };
-        data.set_limits(axis, [to_real(joint.lower), to_real(joint.upper)]);
-    }
-    (data, axis)
-}
-
-/// A rotation that brings the x axis onto another one.
-fn x_onto(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
-    Rotation3::rotation_between(&Vector3::x(), axis).map_or_else(
-        || UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI),
-        |rotation| UnitQuaternion::from_rotation_matrix(&rotation),
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
@@ -415,6 +219,7 @@ mod tests {
     use crate::config::{Camera, Physics, Sensing};
     use crate::scenario::Scene;
     use crate::world::convert::from_pose;
+    use crate::world::layout::check_robot;
     use crate::world::{World, build, ik};
 
     fn lonely() -> World {

@@ -11,8 +11,8 @@ use crate::scenario::{CONTROL_HZ, Inertia, KnownKind, ObjectModel, RobotProfile,
 use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
 use crate::world::engine::{Owner, add_floor, collider, engine};
 use crate::world::recorder::Recorder;
-use crate::world::robot::{Layout, Robot};
-use crate::world::{Fault, Kinematics, Poison, WorldError, fault};
+use crate::world::robot::Robot;
+use crate::world::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 
 /// A body slower than this may fall asleep. Unit: m/s of its farthest point.
 const SLEEP_SPEED: f32 = 0.02;

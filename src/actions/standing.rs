@@ -1,0 +1,198 @@
+//! A way to a grasp for an arm whose base stands where it is.
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::actions::grasp::{self, Approach, Grasp};
+use crate::actions::motion::{self, ArmSpace, Room, Samples};
+use crate::actions::operator::Operator;
+use crate::actions::plan::{
+    AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, wrapped,
+};
+use crate::actions::route::{Block, Pillar};
+use crate::world::{JointKind, Kinematics, Layout, Sighting, ik};
+
+/// Postures that may be sampled for one plan, all grasps together, and for one grasp: half a second's work.
+const MOST_SAMPLES: u32 = 3000;
+/// For one grasp.
+const SAMPLES_A_GRASP: u32 = 500;
+/// Room that the arm keeps on its way where both ends have it. Unit: metres.
+const WAY_CLEAR_M: f64 = 0.03;
+/// What speaks against a hand that points aside of the way from the base to the thing. Unit: of cost, for each radian.
+const ASIDE_COST: f64 = 0.15;
+/// The same for one that points down, which is all the same to the arm but for its last joint.
+const TURNED_COST: f64 = 0.03;
+/// What speaks against a metre of the arm's way.
+const WAY_COST: f64 = 0.02;
+/// A straight way along which a joint goes further than this between two postures is none: the arm flips over. Unit: radians
+/// or metres.
+const LARGEST_STEP: f64 = 0.6;
+/// Length of a step of a straight way. Unit: metres.
+const STEP_M: f64 = 0.03;
+/// Ways back out with the thing, the best first. Unit: metres.
+const RETREATS_M: [f64; 2] = [0.1, 0.05];
+
+/// The best plan among all grasps, or why there is none.
+///
+/// # Errors
+/// A sentence for the action's report.
+pub fn plan(operator: &mut Operator<'_>, thing: &Sighting, others: &[Sighting]) -> Result<Plan, String> {
+    let mut samples = Samples::new(operator.choose_samples(), MOST_SAMPLES);
+    let furniture: Vec<Block> = others.iter().filter(|seen| seen.furniture).map(Block::new).collect();
+    let mut things = vec![Pillar::new(thing)];
+    things.extend(others.iter().filter(|seen| !seen.furniture).map(Pillar::new));
+    let arm = Arm::new(operator, &furniture, &things);
+    let mut grasps: Vec<(f64, Grasp)> = grasp::all_grasps(thing, operator.profile().max_opening_m)
+        .into_iter()
+        .map(|grasp| (arm.least_cost(&grasp), grasp))
+        .collect();
+    grasps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best: Option<Plan> = None;
+    for (cost, grasp) in grasps {
+        for seed in arm.seeds(&grasp) {
+            let bound = best.as_ref().map_or(f64::INFINITY, |best| best.cost);
+            if cost >= bound {
+                return best.ok_or_else(|| NO_WAY.to_owned());
+            }
+            if let Some(plan) = arm.plan(&grasp, &seed, (cost, bound), &mut samples) {
+                best = Some(plan);
+            }
+        }
+    }
+    best.ok_or_else(|| NO_WAY.to_owned())
+}
+
+/// The arm, where it begins, and what it keeps clear of.
+struct Arm<'a> {
+    kinematics: &'a Kinematics,
+    layout: &'a Layout,
+    /// Joint positions to begin with.
+    start: Vec<f64>,
+    postures: Vec<Vec<f64>>,
+    /// With the thing that is to be taken.
+    before: ArmSpace<'a>,
+    /// Without it.
+    meanwhile: ArmSpace<'a>,
+}
+
+impl<'a> Arm<'a> {
+    fn new(operator: &'a Operator<'_>, furniture: &'a [Block], things: &'a [Pillar]) -> Self {
+        let (kinematics, layout) = (operator.kinematics(), operator.layout());
+        let start = operator.commanded().to_vec();
+        let mut postures = operator.profile().postures.clone();
+        postures.push(operator.profile().home.clone());
+        let right = std::slice::from_ref(&start);
+        let before = ArmSpace::new(kinematics, layout, furniture, things, right);
+        let meanwhile = before.among(things.get(1..).unwrap_or_default());
+        Self { kinematics, layout, start, postures, before, meanwhile }
+    }
+
+    /// What a grasp costs whatever the way to it.
+    fn least_cost(&self, grasp: &Grasp) -> f64 {
+        let aside = wrapped(grasp.heading - self.bearing(&grasp.pose.translation.vector)).abs();
+        let points_down = (grasp.pose.rotation * Vector3::x()).z < -0.99;
+        grasp.penalty + aside * if points_down { TURNED_COST } else { ASIDE_COST }
+    }
+
+    /// Direction from the base to a place. Unit: radians.
+    fn bearing(&self, place: &Vector3<f64>) -> f64 {
+        let root = self.kinematics.links(&self.start)[0].translation.vector;
+        libm::atan2(place.y - root.y, place.x - root.x)
+    }
+
+    /// Where inverse kinematics looks first: the profile's postures, turned towards the thing where the arm's first joint
+    /// stands upright.
+    fn seeds(&self, grasp: &Grasp) -> Vec<Vec<f64>> {
+        let place = grasp.pose.translation.vector;
+        let seeds = self.postures.iter().map(|posture| {
+            let mut positions = self.start.clone();
+            for (idx, value) in self.layout.arm.iter().zip(posture) {
+                positions[*idx] = *value;
+            }
+            for idx in self.layout.fingers {
+                positions[idx] = grasp.opening_m / 2.0;
+            }
+            if let Some(first) = self.layout.arm.first().filter(|first| self.stands_upright(**first)) {
+                let hand = self.kinematics.grasp(&positions).translation.vector;
+                let joint = &self.kinematics.joints()[*first];
+                let turned = positions[*first] + wrapped(self.bearing(&place) - self.bearing(&hand));
+                positions[*first] = turned.clamp(joint.lower, joint.upper);
+            }
+            positions
+        });
+        seeds.collect()
+    }
+
+    fn stands_upright(&self, joint: usize) -> bool {
+        let joint = &self.kinematics.joints()[joint];
+        let parent = self.kinematics.links(&self.start)[joint.parent].rotation;
+        let axis = parent * (joint.origin.rotation * joint.axis.into_inner());
+        joint.kind == JointKind::Revolute && axis.z > 0.99
+    }
+
+    /// A plan near a seed that costs at least `costs.0` anyway, and less than `costs.1`.
+    fn plan(&self, grasp: &Grasp, seed: &[f64], (least, bound): (f64, f64), samples: &mut Samples) -> Option<Plan> {
+        let at_thing = self.solve(seed, &grasp.pose)?;
+        let lift = LIFTS_M.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)))?;
+        let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
+        let mut approach = match grasp.approach {
+            Approach::Side => self.straight(&at_thing, &(back * APPROACH_M))?,
+            Approach::Top => lift.clone(),
+        };
+        approach.reverse();
+        let near = approach.remove(0);
+        approach.push(at_thing);
+        let legs = [approach.as_slice(), lift.as_slice()].concat();
+        let nearest =
+            legs.iter().map(|posture| self.meanwhile.room(posture)).try_fold(f64::INFINITY, |least, (room, own)| {
+                let is_free = own && room.furniture_m >= FURNITURE_CLEAR_M && room.things_m >= LEAST_CLEAR_M;
+                is_free.then(|| least.min(room.things_m))
+            })?;
+        let cost = least + (AMPLE_CLEAR_M - nearest).max(0.0) * 50.0;
+        if cost >= bound {
+            return None;
+        }
+        let way = self.way(&near, samples)?;
+        let length: f64 =
+            std::iter::once(&self.start).chain(&way).zip(&way).map(|(from, to)| self.before.span(from, to)).sum();
+        let cost = cost + length * WAY_COST;
+        let lifted = lift.last()?;
+        let retreat = RETREATS_M.iter().find_map(|way| self.straight(lifted, &(back * *way))).unwrap_or_default();
+        let (drive, reach) = (Vec::new(), Vec::new());
+        (cost < bound).then_some(Plan { drive, reach, near: way, approach, lift, retreat, cost })
+    }
+
+    /// From where the arm is to a posture.
+    fn way(&self, to: &[f64], samples: &mut Samples) -> Option<Vec<Vec<f64>>> {
+        let wanted = Room { furniture_m: WAY_CLEAR_M, things_m: WAY_CLEAR_M };
+        let least = wanted.least(self.before.room(&self.start).0).least(self.before.room(to).0);
+        if least.furniture_m < 0.0 || least.things_m < LEAST_CLEAR_M {
+            return None;
+        }
+        motion::way(&self.before, &self.start, to, least, &mut samples.share(SAMPLES_A_GRASP))
+    }
+
+    fn solve(&self, seed: &[f64], target: &Isometry3<f64>) -> Option<Vec<f64>> {
+        let mut mobility = vec![0.0; seed.len()];
+        self.layout.arm.iter().for_each(|idx| mobility[*idx] = 1.0);
+        ik::solve(self.kinematics, seed, &ik::Reach { target: *target, mobility })
+    }
+
+    /// Postures on a straight way of the hand, not turning, a few centimetres apart; nothing where the arm can't follow.
+    fn straight(&self, from: &[f64], by: &Vector3<f64>) -> Option<Vec<Vec<f64>>> {
+        let hand = self.kinematics.grasp(from);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few steps")]
+        let n_steps = (by.norm() / STEP_M).ceil().clamp(1.0, 100.0) as usize;
+        let mut path: Vec<Vec<f64>> = Vec::new();
+        for step in 1..=n_steps {
+            let mut target = hand;
+            target.translation.vector += by * (step as f64 / n_steps as f64);
+            let last = path.last().map_or(from, Vec::as_slice);
+            let next = self.solve(last, &target)?;
+            if next.iter().zip(last).any(|(a, b)| (a - b).abs() > LARGEST_STEP) {
+                return None;
+            }
+            path.push(next);
+        }
+        Some(path)
+    }
+}

@@ -1,0 +1,152 @@
+//! The robot's links and joints put into the engine.
+
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use rapier3d::prelude::{
+    GenericJoint, JointAxesMask, JointAxis, MassProperties, MotorModel, PhysicsWorld, RigidBodyBuilder,
+    RigidBodyHandle, SpringCoefficients,
+};
+
+use crate::scenario::RobotProfile;
+use crate::world::WorldError;
+use crate::world::convert::{to_pose, to_real, to_vector};
+use crate::world::description::{Joint, JointKind, RobotModel};
+use crate::world::engine::{Owner, collider};
+use crate::world::layout::Named;
+use crate::world::robot::Motor;
+
+/// Error at which a motor gives all it has. Unit: metres. Stiffness is the effort limit over this.
+const SATURATION_M: f64 = 1e-3;
+/// The same for joints that turn. Unit: radians.
+const SATURATION_RAD: f64 = 0.02;
+/// Damping over stiffness of a motor. Unit: seconds.
+const DAMPING_SECS: f64 = 0.02;
+/// The same for fingers, which are light.
+const FINGER_DAMPING_SECS: f64 = 0.01;
+/// Friction of the robot's links other than the fingers: painted metal and plastic.
+const LINK_FRICTION: f64 = 0.4;
+/// Natural frequency of the stops at joint limits. Unit: hertz. The engine's own stops throw a loaded joint back.
+const STOP_FREQUENCY_HZ: f32 = 60.0;
+/// Damping ratio of the stops.
+const STOP_DAMPING: f32 = 5.0;
+/// Ranges wider than this are no stops in practice; leaving them out saves the solver work. Unit: metres or radians.
+const WIDEST_RANGE: f64 = 20.0;
+
+/// Home posture with the base where it starts and the fingers half open.
+pub(super) fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, base: [f64; 3]) -> Vec<f64> {
+    let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
+    for (idx, position) in named.layout.arm.iter().zip(&profile.home) {
+        positions[*idx] = position.clamp(model.joints[*idx].lower, model.joints[*idx].upper);
+    }
+    for (idx, position) in named.layout.base.iter().flatten().zip(base) {
+        positions[*idx] = position;
+    }
+    for idx in named.layout.fingers {
+        positions[idx] = (profile.max_opening_m / 4.0).clamp(model.joints[idx].lower, model.joints[idx].upper);
+    }
+    positions
+}
+
+pub(super) fn insert_links(
+    engine: &mut PhysicsWorld,
+    model: &RobotModel,
+    poses: &[Isometry3<f64>],
+    finger_links: [usize; 2],
+    finger_friction: f64,
+) -> Vec<RigidBodyHandle> {
+    let mut bodies = Vec::with_capacity(model.links.len());
+    for (idx, (link, pose)) in model.links.iter().zip(poses).enumerate() {
+        let builder = if idx == 0 { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
+        let inertia = link.inertia.map(to_real);
+        let matrix = rapier3d::math::Matrix::from_cols_array(&[
+            inertia.m11,
+            inertia.m21,
+            inertia.m31,
+            inertia.m12,
+            inertia.m22,
+            inertia.m32,
+            inertia.m13,
+            inertia.m23,
+            inertia.m33,
+        ]);
+        let mass = MassProperties::with_inertia_matrix(to_vector(&link.com), to_real(link.mass), matrix);
+        let body = engine.insert_body(builder.pose(to_pose(pose)).additional_mass_properties(mass).can_sleep(false));
+        let friction = if finger_links.contains(&idx) { finger_friction } else { LINK_FRICTION };
+        for solid in &link.solids {
+            if let Some(collider) = collider(solid, Owner::Link(idx), friction, 0.0) {
+                engine.insert_collider(collider.density(0.0), Some(body));
+            }
+        }
+        bodies.push(body);
+    }
+    bodies
+}
+
+pub(super) fn insert_joints(
+    engine: &mut PhysicsWorld,
+    model: &RobotModel,
+    bodies: &[RigidBodyHandle],
+    named: &Named,
+    profile: &RobotProfile,
+) -> Result<Vec<Motor>, WorldError> {
+    let mut motors = Vec::with_capacity(model.joints.len());
+    for (idx, joint) in model.joints.iter().enumerate() {
+        let is_finger = named.layout.fingers.contains(&idx);
+        let (data, axis) = engine_joint(joint);
+        let handle =
+            engine.multibody_joints.insert(bodies[joint.parent], bodies[idx + 1], data, true).ok_or_else(|| {
+                WorldError::Urdf {
+                    name: profile.urdf.name.to_string(),
+                    reason: format!("joint `{}` closes a loop", joint.name),
+                }
+            })?;
+        if let Some((multibody, link)) = engine.multibody_joints.get_mut(handle) {
+            multibody.set_self_contacts_enabled(false);
+            let dof = multibody.link(link).map(rapier3d::prelude::MultibodyLink::assembly_id);
+            if let Some(dof) = dof {
+                multibody.damping_mut()[dof] = to_real(joint.damping);
+            }
+        }
+        let saturation = if joint.kind == JointKind::Prismatic { SATURATION_M } else { SATURATION_RAD };
+        let max_effort = if is_finger { joint.effort.min(profile.grip_force_n) } else { joint.effort };
+        let stiffness = (max_effort / saturation).max(1.0);
+        let damping = stiffness * if is_finger { FINGER_DAMPING_SECS } else { DAMPING_SECS };
+        motors.push(Motor {
+            joint: handle,
+            axis,
+            stiffness,
+            damping,
+            max_effort,
+            target: 0.0,
+            setpoint: 0.0,
+            setpoint_velocity: 0.0,
+        });
+    }
+    Ok(motors)
+}
+
+/// A joint for the engine, which moves along or about the x axis of a frame of its own.
+fn engine_joint(joint: &Joint) -> (GenericJoint, JointAxis) {
+    let (locked, axis) = match joint.kind {
+        JointKind::Prismatic => (JointAxesMask::LOCKED_PRISMATIC_AXES, JointAxis::LinX),
+        JointKind::Revolute => (JointAxesMask::LOCKED_REVOLUTE_AXES, JointAxis::AngX),
+    };
+    let turned = x_onto(&joint.axis);
+    let frame = Isometry3::from_parts(Translation3::identity(), turned);
+    let mut data = GenericJoint::new(locked);
+    data.set_local_frame1(to_pose(&(joint.origin * frame)));
+    data.set_local_frame2(to_pose(&frame));
+    data.set_motor_model(axis, MotorModel::ForceBased);
+    if joint.upper - joint.lower < WIDEST_RANGE {
+        data.softness = SpringCoefficients { natural_frequency: STOP_FREQUENCY_HZ, damping_ratio: STOP_DAMPING };
+        data.set_limits(axis, [to_real(joint.lower), to_real(joint.upper)]);
+    }
+    (data, axis)
+}
+
+/// A rotation that brings the x axis onto another one.
+fn x_onto(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
+    Rotation3::rotation_between(&Vector3::x(), axis).map_or_else(
+        || UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI),
+        |rotation| UnitQuaternion::from_rotation_matrix(&rotation),
+    )
+}

@@ -1,0 +1,63 @@
+//! Which joints and links of a URDF do what.
+
+use nalgebra::{Isometry3, UnitQuaternion};
+
+use crate::scenario::RobotProfile;
+use crate::world::WorldError;
+use crate::world::description::RobotModel;
+
+/// Which joints of the robot are what, by their index.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Layout {
+    /// The base's: x, y, heading; none where it is fixed.
+    pub base: Option<[usize; 3]>,
+    /// The arm's, in the profile's order.
+    pub arm: Vec<usize>,
+    /// The head's: pan, tilt.
+    pub head: Vec<usize>,
+    /// The fingers': left, right.
+    pub fingers: [usize; 2],
+}
+
+/// Where the profile's names are in the URDF.
+pub(super) struct Named {
+    pub(super) layout: Layout,
+    pub(super) finger_links: [usize; 2],
+    pub(super) grasp: (usize, Isometry3<f64>),
+    pub(super) camera: (usize, Isometry3<f64>),
+}
+
+impl Named {
+    pub(super) fn find(profile: &RobotProfile, model: &RobotModel) -> Result<Self, WorldError> {
+        let joints = |names: &[String]| names.iter().map(|name| model.joint(name)).collect::<Result<Vec<_>, _>>();
+        let base = match &profile.base_joints {
+            Some([x, y, heading]) => Some([model.joint(x)?, model.joint(y)?, model.joint(heading)?]),
+            None => None,
+        };
+        let [left, right] = &profile.finger_joints;
+        let [left_link, right_link] = &profile.finger_links;
+        let layout = Layout {
+            base,
+            arm: joints(&profile.arm_joints)?,
+            head: joints(&profile.head_joints)?,
+            fingers: [model.joint(left)?, model.joint(right)?],
+        };
+        let [roll, pitch, yaw] = profile.grasp_turned_rad;
+        let (grasp_link, grasp_at) = model.frame(&profile.grasp_link)?;
+        Ok(Self {
+            layout,
+            finger_links: [model.frame(left_link)?.0, model.frame(right_link)?.0],
+            grasp: (grasp_link, grasp_at * UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
+            camera: model.frame(&profile.camera_link)?,
+        })
+    }
+}
+
+/// Whether a profile and its URDF fit together, without simulating.
+///
+/// # Errors
+/// [`WorldError`]: the first thing that is missing or can't be simulated.
+pub fn check_robot(profile: &RobotProfile) -> Result<(), WorldError> {
+    let model = RobotModel::read(profile)?;
+    Named::find(profile, &model).map(|_| ())
+}
