@@ -31,6 +31,7 @@ mod recheck;
 mod repeat;
 mod replay;
 mod resume;
+mod robots;
 mod rules;
 mod scenario;
 mod search;

@@ -39,6 +39,7 @@ pub use kinematics::{GRAVITY, Kinematics};
 pub use layout::{Layout, check_robot};
 pub use quality::Quality;
 pub use recorder::{Contact, Course, Record, Tracks};
+pub use robot::geometry;
 pub use self_contact::SelfContact;
 pub use sense::Sighting;
 pub use settle::Settling;

@@ -45,6 +45,28 @@ pub struct Robot {
     motors: Vec<Motor>,
 }
 
+/// A robot's geometry, layout and home posture without a simulation.
+///
+/// # Errors
+/// [`WorldError`] where profile and URDF don't fit.
+pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), WorldError> {
+    let model = Arc::new(RobotModel::read(&start.profile)?);
+    let named = Named::find(&start.profile, &model)?;
+    let positions = home(&start.profile, &model, &named, start.base);
+    let root = root_of(start, &named.layout);
+    Ok((Kinematics::new(model, root, named.grasp, named.camera), named.layout, positions))
+}
+
+/// Pose of the root link. Frame: world.
+fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
+    let [x, y, heading] = start.base;
+    match layout.base {
+        // A robot with a base of its own has its root at the origin of the world: its odometry's frame.
+        Some(_) => Isometry3::identity(),
+        None => Pose::upright([x, y, start.profile.mount_height_m], heading).to_isometry(),
+    }
+}
+
 impl Robot {
     /// Puts the robot into the engine, in its home posture.
     ///
@@ -55,11 +77,7 @@ impl Robot {
         let model = Arc::new(RobotModel::read(&profile)?);
         let named = Named::find(&profile, &model)?;
         let positions = home(&profile, &model, &named, start.base);
-        // A robot with a base of its own has its root at the origin of the world: its odometry's frame.
-        let root = match named.layout.base {
-            Some(_) => Isometry3::identity(),
-            None => Pose::upright([start.base[0], start.base[1], profile.mount_height_m], start.base[2]).to_isometry(),
-        };
+        let root = root_of(start, &named.layout);
         let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera);
         let bodies =
             insert_links(engine, &model, &kinematics.links(&positions), named.finger_links, profile.finger_friction);

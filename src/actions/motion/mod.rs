@@ -6,6 +6,8 @@
 mod connect;
 mod samples;
 mod space;
+#[cfg(test)]
+mod tests;
 
 pub use connect::way;
 pub use samples::Samples;
