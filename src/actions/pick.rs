@@ -3,7 +3,8 @@
 use crate::actions::grip::{EMPTY_M, close, feels};
 use crate::actions::memory::Held;
 use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::{ActionCall, ActionReport, grasp, memory, plan};
+use crate::actions::plan::{self, Wanted};
+use crate::actions::{ActionCall, ActionReport, grasp, memory};
 use crate::base::Pose;
 use crate::world::Sighting;
 
@@ -30,11 +31,13 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
         Ok(found) => found,
         Err(reason) => return Ok(failed(reason)),
     };
-    let grasps = grasp::grasps(&seen, robot.profile().max_opening_m);
+    let max_opening_m = robot.profile().max_opening_m;
+    let (grasps, all) = (grasp::grasps(&seen, max_opening_m), grasp::all_grasps(&seen, max_opening_m));
     if grasps.is_empty() {
         return Ok(failed(format!("{target} is too wide for the gripper")));
     }
-    let way = match plan::plan(robot, &seen, &grasps, &others) {
+    let wanted = Wanted { grasps: &grasps, all: &all, taken: Some(&seen) };
+    let way = match plan::plan(robot, wanted, &others) {
         Ok(way) => way,
         Err(reason) => return Ok(failed(format!("{target}: {reason}"))),
     };

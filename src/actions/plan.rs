@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
-use crate::actions::grasp::{self, Approach, Grasp};
+use crate::actions::grasp::{Approach, Grasp};
 use crate::actions::motion::{self, ArmSpace, Room, Samples};
 use crate::actions::operator::Operator;
 use crate::actions::route::{Block, Ground, Pillar, length};
@@ -53,6 +53,18 @@ const SAMPLES_A_GRASP: u32 = 400;
 /// What is said where there is no plan.
 pub(super) const NO_WAY: &str = "no reachable and free way to it was found";
 
+/// What the hand is to do.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// Usual ways to do it, for a robot that drives.
+    pub grasps: &'a [Grasp],
+    /// All ways, for an arm that can't drive, and for where none of the usual ones is free; none if there are no others.
+    pub all: &'a [Grasp],
+    /// What is taken: in the way until the hand is there. Nothing where the hand is full: then the arm goes straight, for what it
+    /// holds to stay level.
+    pub taken: Option<&'a Sighting>,
+}
+
 /// The best plan among all grasps, or why there is none.
 ///
 /// Where the base moves, the arm unfolds straight, in front of the furniture; where no grasp can be had that way, unusual
@@ -60,21 +72,18 @@ pub(super) const NO_WAY: &str = "no reachable and free way to it was found";
 ///
 /// # Errors
 /// A sentence for the action's report.
-pub fn plan(
-    operator: &mut Operator<'_>,
-    thing: &Sighting,
-    grasps: &[Grasp],
-    others: &[Sighting],
-) -> Result<Plan, String> {
+pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]) -> Result<Plan, String> {
     if operator.layout().base.is_none() {
-        return standing::plan(operator, thing, others);
+        return standing::plan(operator, wanted, others);
     }
-    if let Some(plan) = best(&Planner::new(operator, others), grasps, &mut Samples::new(0.0, 0)) {
+    if let Some(plan) = best(&Planner::new(operator, others), wanted.grasps, &mut Samples::new(0.0, 0)) {
         return Ok(plan);
     }
+    if wanted.all.is_empty() {
+        return Err(NO_WAY.to_owned());
+    }
     let mut samples = Samples::new(operator.choose_samples(), MOST_SAMPLES);
-    let mut all = grasps.to_vec();
-    all.extend(grasp::all_grasps(thing, operator.profile().max_opening_m));
+    let all = [wanted.grasps, wanted.all].concat();
     best(&Planner::new(operator, others), &all, &mut samples).ok_or_else(|| NO_WAY.to_owned())
 }
 

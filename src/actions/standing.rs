@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::actions::grasp::{self, Approach, Grasp};
+use crate::actions::grasp::{Approach, Grasp};
 use crate::actions::motion::{self, ArmSpace, Room, Samples};
 use crate::actions::operator::Operator;
 use crate::actions::plan::{
-    AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, wrapped,
+    AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, Wanted, wrapped,
 };
 use crate::actions::route::{Block, Pillar};
 use crate::world::{JointKind, Kinematics, Layout, Sighting, ik};
@@ -35,25 +35,27 @@ const RETREATS_M: [f64; 2] = [0.1, 0.05];
 ///
 /// # Errors
 /// A sentence for the action's report.
-pub fn plan(operator: &mut Operator<'_>, thing: &Sighting, others: &[Sighting]) -> Result<Plan, String> {
-    let mut samples = Samples::new(operator.choose_samples(), MOST_SAMPLES);
+pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]) -> Result<Plan, String> {
+    let mut samples = match wanted.taken {
+        Some(_) => Samples::new(operator.choose_samples(), MOST_SAMPLES),
+        None => Samples::new(0.0, 0),
+    };
     let furniture: Vec<Block> = others.iter().filter(|seen| seen.furniture).map(Block::new).collect();
-    let mut things = vec![Pillar::new(thing)];
+    let mut things: Vec<Pillar> = wanted.taken.iter().map(|thing| Pillar::new(thing)).collect();
+    let n_taken = things.len();
     things.extend(others.iter().filter(|seen| !seen.furniture).map(Pillar::new));
-    let arm = Arm::new(operator, &furniture, &things);
-    let mut grasps: Vec<(f64, Grasp)> = grasp::all_grasps(thing, operator.profile().max_opening_m)
-        .into_iter()
-        .map(|grasp| (arm.least_cost(&grasp), grasp))
-        .collect();
+    let arm = Arm::new(operator, &furniture, (&things, &things[n_taken..]));
+    let all = if wanted.all.is_empty() { wanted.grasps } else { wanted.all };
+    let mut grasps: Vec<(f64, &Grasp)> = all.iter().map(|grasp| (arm.least_cost(grasp), grasp)).collect();
     grasps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<Plan> = None;
     for (cost, grasp) in grasps {
-        for seed in arm.seeds(&grasp) {
+        for seed in arm.seeds(grasp) {
             let bound = best.as_ref().map_or(f64::INFINITY, |best| best.cost);
             if cost >= bound {
                 return best.ok_or_else(|| NO_WAY.to_owned());
             }
-            if let Some(plan) = arm.plan(&grasp, &seed, (cost, bound), &mut samples) {
+            if let Some(plan) = arm.plan(grasp, &seed, (cost, bound), &mut samples) {
                 best = Some(plan);
             }
         }
@@ -75,14 +77,14 @@ struct Arm<'a> {
 }
 
 impl<'a> Arm<'a> {
-    fn new(operator: &'a Operator<'_>, furniture: &'a [Block], things: &'a [Pillar]) -> Self {
+    fn new(operator: &'a Operator<'_>, furniture: &'a [Block], (things, others): (&'a [Pillar], &'a [Pillar])) -> Self {
         let (kinematics, layout) = (operator.kinematics(), operator.layout());
         let start = operator.commanded().to_vec();
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
         let right = std::slice::from_ref(&start);
         let before = ArmSpace::new(kinematics, layout, furniture, things, right);
-        let meanwhile = before.among(things.get(1..).unwrap_or_default());
+        let meanwhile = before.among(others);
         Self { kinematics, layout, start, postures, before, meanwhile }
     }
 

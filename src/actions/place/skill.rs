@@ -9,7 +9,7 @@ use crate::actions::perceive::{Survey, survey};
 use crate::actions::pick::failed;
 use crate::actions::place::touch::Touch;
 use crate::actions::place::{carry, spot};
-use crate::actions::plan::{self, Plan};
+use crate::actions::plan::{self, Plan, Wanted};
 use crate::actions::{ActionCall, ActionReport, memory};
 use crate::world::Sighting;
 
@@ -149,7 +149,7 @@ fn choose(
     held: &Held,
     survey: &Survey,
     others: &[Sighting],
-    robot: &Operator<'_>,
+    robot: &mut Operator<'_>,
 ) -> Result<(Plan, Point3<f64>), Halt> {
     let base = Point3::from(robot.base().translation.vector);
     let spots = spot::spots(&survey.plane, &survey.things, spot::radius(held.size_m), &base);
@@ -159,7 +159,8 @@ fn choose(
     let mut around: Vec<Sighting> = others.iter().chain(&survey.things).cloned().collect();
     around.push(furniture(surface, &survey.plane));
     let ways = spot::ways(held, &spots, robot.profile().max_opening_m);
-    let plan = plan::plan(robot, &ways, &spot::heightened(&around, held));
+    let wanted = Wanted { grasps: &ways, all: &[], taken: None };
+    let plan = plan::plan(robot, wanted, &spot::heightened(&around, held));
     let plan = plan.map_err(|reason| Halt::Failed(format!("{surface}: {reason}")))?;
     let lowest = plan.approach.last().map(|posture| robot.kinematics().grasp(posture).translation.vector.xy().into());
     let spot = lowest.and_then(|at| spot::nearest(&spots, &at));
@@ -176,7 +177,7 @@ fn set_down(
 ) -> Result<String, Halt> {
     robot.begin("approach");
     robot.follow(&plan.drive, 0.0)?;
-    robot.follow(std::slice::from_ref(&plan.reach), FOLD_SECS)?;
+    robot.follow(&plan.reach, FOLD_SECS)?;
     robot.follow(&plan.near, 0.0)?;
     still_in_hand(held, robot)?;
     robot.begin("lower");
@@ -221,10 +222,10 @@ fn withdraw(held: &Held, plan: &Plan, robot: &mut Operator<'_>) -> Result<(), Ha
         return Ok(());
     }
     let mut back = robot.commanded().to_vec();
-    let path = match (robot.layout().base, plan.near.last()) {
-        (Some([x, y, _]), Some(above)) => {
-            back[x] += plan.reach[x] - above[x];
-            back[y] += plan.reach[y] - above[y];
+    let path = match (robot.layout().base, plan.reach.last().zip(plan.near.last())) {
+        (Some([x, y, _]), Some((reach, above))) => {
+            back[x] += reach[x] - above[x];
+            back[y] += reach[y] - above[y];
             vec![back]
         }
         _ => {
