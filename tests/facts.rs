@@ -156,6 +156,7 @@ pub fn sample_trace(seed: u64) -> Trace {
             size_m: [0.09, 0.09, 0.15],
         }],
         perceived: None,
+        base: None,
         phases: vec![Phase { name: "approach".to_owned(), start_secs: 2.0 }],
     };
     let hash = format!("{seed:032x}");

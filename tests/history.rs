@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use actcheck::actions::{ActionEnd, Quality};
 use actcheck::base::{Choice, ChoiceKind, Diagnostics, Pose, Source, Term, digest_of, names};
-use actcheck::config::{Camera, ObjectModel, Physics, RobotProfile, Sensing};
+use actcheck::config::{Camera, ObjectModel, Odometry, Physics, RobotProfile, Sensing};
 use actcheck::facts::{RunFacts, extract};
 use actcheck::history::{CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus};
 use actcheck::scenario::{RobotStart, Role, Scene, SceneObject};
@@ -81,6 +81,7 @@ fn scene() -> Scene {
             localisation_noise_m: 0.01,
             heading_noise_rad: 0.01,
             gripper_noise_m: 0.001,
+            odometry: Odometry::IDEAL,
             camera: Camera::IDEAL,
         },
         physics: Physics {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use actcheck::actions::{ActionCall, ActionEnd, Trace, perform};
 use actcheck::base::{Choices, Files, Pose};
-use actcheck::config::{Budget, Camera, ObjectModel, Part, Physics, RobotProfile, Sensing, Shape};
+use actcheck::config::{Budget, Camera, ObjectModel, Odometry, Part, Physics, RobotProfile, Sensing, Shape};
 use actcheck::scenario::{RobotStart, Role, Scene, SceneObject};
 use actcheck::world::{BodyState, GRAVITY, Poison, World, build};
 
@@ -18,6 +18,7 @@ const PERFECT: Sensing = Sensing {
     localisation_noise_m: 0.0,
     heading_noise_rad: 0.0,
     gripper_noise_m: 0.0,
+    odometry: Odometry::IDEAL,
     camera: Camera::IDEAL,
 };
 

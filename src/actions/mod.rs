@@ -8,6 +8,7 @@ mod grasp;
 mod grip;
 mod memory;
 mod motion;
+mod navigate;
 mod operator;
 mod perceive;
 mod perform;

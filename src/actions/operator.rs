@@ -7,7 +7,7 @@ use crate::actions::memory::{Held, Memory};
 use crate::actions::sabotage::IDLE_SECS;
 use crate::actions::{ActionReport, Cut, Interference, Perceived, Percept, Phase, Saboteur};
 use crate::base::Choices;
-use crate::scenario::{KnownKind, RobotProfile};
+use crate::scenario::{FloorPlan, KnownKind, RobotProfile};
 use crate::world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
 
 /// Why a skill has to stop.
@@ -135,7 +135,12 @@ impl<'a> Operator<'a> {
 
     /// Where the base stands. Frame: world, by its own belief.
     pub fn base(&self) -> Isometry3<f64> {
-        let links = self.kinematics().links(&self.observe().positions);
+        self.base_of(&self.observe().positions)
+    }
+
+    /// Where the base stands for given joint positions.
+    pub fn base_of(&self, positions: &[f64]) -> Isometry3<f64> {
+        let links = self.kinematics().links(positions);
         // The link with this number is moved by the joint before it.
         let link = self.layout().base.map_or(0, |[.., heading]| heading + 1);
         links.get(link).copied().unwrap_or_else(Isometry3::identity)
@@ -149,6 +154,11 @@ impl<'a> Operator<'a> {
     /// The kinds of things that the robot can tell apart.
     pub fn known_kinds(&self) -> &[KnownKind] {
         self.world.known_kinds()
+    }
+
+    /// The robot's map of its world.
+    pub fn floor_plan(&self) -> &FloorPlan {
+        self.world.floor_plan()
     }
 
     /// The kind of thing that a designator's value stands for.
@@ -273,6 +283,29 @@ impl<'a> Operator<'a> {
         Ok(false)
     }
 
+    /// Time between two commands. Unit: seconds.
+    pub fn tick_secs(&self) -> f64 {
+        self.world.tick_secs()
+    }
+
+    /// Sends joints towards positions for one tick; joints that are not named go on to where they were sent.
+    ///
+    /// # Errors
+    /// [`Interrupt`] if the action has to end.
+    pub fn send(&mut self, joints: &[usize], positions: &[f64]) -> Result<(), Interrupt> {
+        self.aim(joints, positions);
+        self.tick()
+    }
+
+    /// Sets where joints go from now on.
+    pub fn aim(&mut self, joints: &[usize], positions: &[f64]) {
+        for (joint, position) in joints.iter().zip(positions) {
+            if let Some(commanded) = self.command.positions.get_mut(*joint) {
+                *commanded = *position;
+            }
+        }
+    }
+
     /// Sets the finger gap that the fingers go to from now on, with the profile's grip force.
     pub fn set_opening(&mut self, opening_m: f64) {
         self.command.gripper_opening_m = opening_m;
@@ -296,6 +329,7 @@ impl<'a> Operator<'a> {
             None => self.world.step(&self.command),
             Some(saboteur) => saboteur.step(self.world, &self.command),
         }
+        self.world.track_base(self.choices);
         if self.world.fault().is_some() {
             return Err(Interrupt::Fault);
         }

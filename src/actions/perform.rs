@@ -110,6 +110,7 @@ fn perform_one(
         percepts,
         perceived,
         extremes: extremes.collect(),
+        base: record.base,
         phases,
     }
 }

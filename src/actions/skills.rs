@@ -1,5 +1,6 @@
 //! Which actions the reference skills perform.
 
+use crate::actions::navigate::move_to;
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::perceive::perceive_plane;
 use crate::actions::pick::pick;
@@ -11,7 +12,8 @@ use crate::base::{Diagnostic, did_you_mean};
 pub(super) type Skill = fn(&ActionCall, &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
 
 /// The skills by the names of their actions, sorted.
-const SKILLS: [(&str, Skill); 3] = [("PerceivePlane", perceive_plane), ("Pick", pick), ("Place", place)];
+const SKILLS: [(&str, Skill); 4] =
+    [("MoveTo", move_to), ("PerceivePlane", perceive_plane), ("Pick", pick), ("Place", place)];
 
 /// An action that no reference skill performs.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

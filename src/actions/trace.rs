@@ -58,6 +58,8 @@ pub struct ActionTrace {
     pub perceived: Option<Perceived>,
     /// Extremes along the way, one for each body of the scene, in scene order.
     pub extremes: Vec<Extremes>,
+    /// Smallest and largest true x and y of the base along the way; nothing where it stands for good. Unit: metres.
+    pub base: Option<[[f64; 2]; 2]>,
     /// Phases of the action with their start times, for the timeline.
     pub phases: Vec<Phase>,
 }
@@ -75,6 +77,7 @@ impl ActionTrace {
             percepts: Vec::new(),
             perceived: None,
             extremes: Vec::new(),
+            base: None,
             phases: Vec::new(),
         }
     }

@@ -216,6 +216,7 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
             percepts: Vec::new(),
             perceived: None,
             extremes: Vec::new(),
+            base: None,
             phases: Vec::new(),
         })
         .collect();

@@ -160,8 +160,32 @@ pub struct Sensing {
     pub heading_noise_rad: f64,
     /// Of a measured finger opening. Unit: metres.
     pub gripper_noise_m: f64,
+    /// How the base finds out where it is while it drives.
+    pub odometry: Odometry,
     /// The depth camera (`[camera]`).
     pub camera: Camera,
+}
+
+/// How the base's belief of where it stands changes as it drives; what counts in `[sensing]`. Standard deviations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Odometry {
+    /// Error of the way over the way, along it and across (`odometry_drift`).
+    pub drift: f64,
+    /// Error of the heading for each radian turned and for each metre of way (`heading_drift`). Unit: radians.
+    pub heading_drift: f64,
+    /// Way between two sights of landmarks, which correct the belief (`landmark_every_m`); 0 where there are none. Unit:
+    /// metres.
+    pub landmark_every_m: f64,
+    /// Error of the position by landmarks (`landmark_noise_m`). Unit: metres.
+    pub landmark_noise_m: f64,
+    /// Error of the heading by landmarks (`landmark_noise_rad`). Unit: radians.
+    pub landmark_noise_rad: f64,
+}
+
+impl Odometry {
+    /// What the base believes at first it goes on believing.
+    pub const IDEAL: Self =
+        Self { drift: 0.0, heading_drift: 0.0, landmark_every_m: 0.0, landmark_noise_m: 0.0, landmark_noise_rad: 0.0 };
 }
 
 /// The depth camera on the robot's camera link: what its pictures are like, and what they get wrong.

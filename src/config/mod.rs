@@ -20,7 +20,7 @@ mod value;
 mod words;
 mod world_map;
 
-pub use campaign::{Budget, Camera, Campaign, Launcher, Limits, Overrides, Physics, Range, Sensing};
+pub use campaign::{Budget, Camera, Campaign, Launcher, Limits, Odometry, Overrides, Physics, Range, Sensing};
 pub use case::Case;
 pub use case_text::{CaseText, case_text, written_paths};
 pub use duration::duration_secs;

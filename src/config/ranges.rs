@@ -3,7 +3,7 @@
 use std::ops::Bound;
 
 use crate::base::Diagnostics;
-use crate::config::{Budget, Camera, Limits, Physics, Sensing, Table, duration_secs};
+use crate::config::{Budget, Camera, Limits, Odometry, Physics, Sensing, Table, duration_secs};
 
 const ABOVE_ZERO: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(100.0));
 
@@ -59,6 +59,7 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
         localisation_noise_m: 0.0,
         heading_noise_rad: 0.0,
         gripper_noise_m: 0.0,
+        odometry: Odometry::IDEAL,
         camera: read_camera(root, found),
     };
     let Some(mut table) = root.table("sensing") else { return sensing };
@@ -71,6 +72,17 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
         ("localisation_noise_m", &mut sensing.localisation_noise_m, 0.5),
         ("heading_noise_rad", &mut sensing.heading_noise_rad, 3.2),
         ("gripper_noise_m", &mut sensing.gripper_noise_m, 0.5),
+    ] {
+        set(value, table.number(key, 0.0..=most));
+    }
+    let odometry = &mut sensing.odometry;
+    // A base that is wrong about half of its way, or that sees a landmark a hundred metres away, knows nothing.
+    for (key, value, most) in [
+        ("odometry_drift", &mut odometry.drift, 0.5),
+        ("heading_drift", &mut odometry.heading_drift, 0.5),
+        ("landmark_every_m", &mut odometry.landmark_every_m, 100.0),
+        ("landmark_noise_m", &mut odometry.landmark_noise_m, 0.5),
+        ("landmark_noise_rad", &mut odometry.landmark_noise_rad, 3.2),
     ] {
         set(value, table.number(key, 0.0..=most));
     }

@@ -34,6 +34,13 @@ pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
     }
 }
 
+/// Writes how far the base got, for the bounds of rooms.
+pub(super) fn write_base([low, high]: &[[f64; 2]; 2], writer: &mut Writer) {
+    let subject = writer.w("robot");
+    writer.numbers(subject, ["baseMinX", "baseMinY"], *low);
+    writer.numbers(subject, ["baseMaxX", "baseMaxY"], *high);
+}
+
 /// The strongest episodes of each pair, in the order of their start (then of their pair).
 fn kept(contacts: &[ContactEpisode]) -> Vec<&ContactEpisode> {
     let mut by_pair: BTreeMap<&[String; 2], Vec<&ContactEpisode>> = BTreeMap::new();

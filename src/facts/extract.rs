@@ -23,6 +23,9 @@ pub fn extract(trace: &Trace) -> RunFacts {
     for action in &trace.actions {
         if action.end != ActionEnd::NotReached {
             during::write(action, &mut writer);
+            if let (Some(base), false) = (&action.base, trace.map.rooms.is_empty()) {
+                during::write_base(base, &mut writer);
+            }
         }
         facts.during.push(writer.take());
         facts.parameters.push(parameters(&action.parameters, &bodies, &trace.map, &mut writer));

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use crate::base::{Choices, Pose};
-use crate::config::{ObjectModel, Surface};
+use crate::config::{Location, ObjectModel, Surface};
 use crate::scenario::overlap::Solid;
 use crate::scenario::surroundings::Surroundings;
 use crate::scenario::{RobotStart, Role, Scene, SceneMap, SceneObject, Space, placement};
@@ -33,11 +33,12 @@ pub struct Discard {
 /// One scene: a function of the choices alone.
 ///
 /// Where the world has no surfaces of its own, the platform's middle is its origin. The robot stands on the platform's
-/// negative x side. All tests of a configuration draw from the same space.
+/// negative x side; where the test begins with a drive, somewhere else. But for that, all tests of a configuration draw
+/// from the same space.
 ///
 /// # Errors
 /// An object found no free place.
-pub fn draw(space: &Space, _test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
+pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
     let mut hand = Hand {
         space,
         choices,
@@ -46,6 +47,7 @@ pub fn draw(space: &Space, _test: usize, choices: &mut Choices) -> Result<Scene,
         left_out: Vec::new(),
         designators: BTreeMap::new(),
         platform: None,
+        front: None,
     };
     let world = hand.choose_world();
     hand.choose_names();
@@ -63,12 +65,20 @@ pub fn draw(space: &Space, _test: usize, choices: &mut Choices) -> Result<Scene,
     if let Some(world) = world {
         hand.surround(world);
     }
-    let base = hand.start_robot(surface.as_ref())?;
-    hand.set_obstacles(base, world)?;
+    let drives = space.drives.get(test).copied().unwrap_or(false);
+    let base = if drives {
+        hand.name_front(world);
+        hand.start_elsewhere(world)?
+    } else {
+        hand.start_robot(surface.as_ref())?
+    };
+    hand.set_obstacles(base, world, drives)?;
     let name = hand.designators.get("world").and_then(|names| names.first()).cloned();
+    let mut map = world.map(SceneMap::of).unwrap_or_default();
+    map.locations.extend(hand.front);
     Ok(Scene {
         world: name.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),
-        map: world.map(SceneMap::of).unwrap_or_default(),
+        map,
         objects: hand.objects,
         robot: RobotStart { profile: Arc::clone(&space.robot), base, knows: Arc::clone(&space.knows) },
         designators: hand.designators,
@@ -102,6 +112,8 @@ pub(super) struct Hand<'a> {
     pub(super) designators: BTreeMap<String, Vec<String>>,
     /// Where the platform stands; nothing where that is the origin.
     pub(super) platform: Option<Pose>,
+    /// The place in front of the platform, where it got its name from the configuration.
+    pub(super) front: Option<Location>,
 }
 
 impl<'a> Hand<'a> {

@@ -6,14 +6,15 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::base::Pose;
-use crate::config::{ObjectModel, Part, Shape, Surface};
+use crate::config::{Location, ObjectModel, Part, Shape, Surface};
 use crate::scenario::draw::{Discard, Hand, TRIES};
+use crate::scenario::floor_plan::{FRONT_GAP_M, front_of};
 use crate::scenario::overlap::Solid;
 use crate::scenario::surroundings::Surroundings;
 use crate::scenario::{Role, SceneObject};
 
 /// Gap between the surface's edge and the middle of the robot's base. Unit: metres. Shape: least, nominal, most.
-const BASE_GAP_M: [f64; 3] = [0.59, 0.69, 0.79];
+const BASE_GAP_M: [f64; 3] = [0.59, FRONT_GAP_M, 0.79];
 /// The same for an arm that stays where it is: near enough to reach to the far edge of a table, and a little in front of it.
 const FIXED_GAP_M: [f64; 3] = [0.18, 0.22, 0.26];
 /// The base stands at most this far beside the surface's middle. Unit: metres.
@@ -27,6 +28,13 @@ const BASE_ROOM_M: f64 = 0.4;
 const FIXED_ROOM_M: f64 = 0.17;
 /// How high that room is. Unit: metres.
 const BASE_HEIGHT_M: f64 = 1.2;
+/// A base that has to drive to a place starts at least this far from it. Unit: metres.
+const DRIVE_M: f64 = 1.0;
+/// Nominal distance of such a start from the place. Unit: metres.
+const NOMINAL_DRIVE_M: f64 = 1.5;
+/// Without rooms a base that has to drive starts this far around the front of the surface. Unit: metres. Shape: back and
+/// forwards, to either side.
+const ARENA_M: [[f64; 2]; 2] = [[-2.2, 1.2], [-2.2, 2.2]];
 /// Without rooms obstacles stand this far around the robot's side of the surface. Unit: metres.
 const FIELD_M: f64 = 2.0;
 
@@ -67,29 +75,110 @@ impl Hand<'_> {
     }
 
     fn start_within(&mut self, ranges: [(f64, f64); 3]) -> Result<[f64; 3], Discard> {
+        let middles = ranges.map(|(low, high)| (low + high) / 2.0);
+        self.start_about(ranges, middles, |_| true)
+    }
+
+    /// A free place within ranges that is as it should be.
+    fn start_about(
+        &mut self,
+        ranges: [(f64, f64); 3],
+        nominal: [f64; 3],
+        serves: impl Fn(&[f64; 3]) -> bool,
+    ) -> Result<[f64; 3], Discard> {
         for _ in 0..TRIES {
-            let mut draw = |name: &str, (low, high): (f64, f64)| self.choices.real(name, low, high, (low + high) / 2.0);
-            let [x, y, heading] = ranges;
-            let base = [draw("robot.x", x), draw("robot.y", y), draw("robot.heading", heading)];
-            if self.is_free(&self.own_room(base)) {
+            let mut draw = |name: &str, axis: usize| {
+                let (low, high) = ranges[axis];
+                self.choices.real(name, low, high, nominal[axis])
+            };
+            let base = [draw("robot.x", 0), draw("robot.y", 1), draw("robot.heading", 2)];
+            if serves(&base) && self.is_free(&self.own_room(base)) {
                 return Ok(base);
             }
         }
         Err(Discard { model: "robot".to_owned(), name: "robot".to_owned(), tries: TRIES })
     }
 
+    /// Where a base starts that has to drive first: anywhere in the world but near its goal, heading anywhere; within the
+    /// ranges of the configuration, where it has some. Nominal is a little way from the goal, facing as it shall there.
+    pub(super) fn start_elsewhere(&mut self, world: Option<&Surroundings>) -> Result<[f64; 3], Discard> {
+        if let Some(ranges) = self.space.start {
+            return self.start_within(ranges);
+        }
+        let (low, high) = self.arena(world);
+        let goal = self.goal(world);
+        let ranges = [(low[0], high[0]), (low[1], high[1]), (-PI, PI)];
+        let nominal = goal.map_or([0.0; 3], |goal| self.nominal_start(goal, (low, high)));
+        let is_far =
+            |base: &[f64; 3]| goal.is_none_or(|goal| libm::hypot(base[0] - goal[0], base[1] - goal[1]) >= DRIVE_M);
+        self.start_about(ranges, nominal, is_far)
+    }
+
+    /// The first free place around the goal, from straight behind it on.
+    fn nominal_start(&self, goal: [f64; 3], (low, high): ([f64; 2], [f64; 2])) -> [f64; 3] {
+        let around = [4.0, 3.0, 5.0, 2.0, 6.0, 1.0, 7.0, 0.0].map(|eighths: f64| {
+            let angle = goal[2] + eighths * PI / 4.0;
+            let (x, y) = (goal[0] + NOMINAL_DRIVE_M * libm::cos(angle), goal[1] + NOMINAL_DRIVE_M * libm::sin(angle));
+            [x, y, libm::atan2(libm::sin(goal[2]), libm::cos(goal[2]))]
+        });
+        let serves = |base: &&[f64; 3]| {
+            let inside = (low[0]..=high[0]).contains(&base[0]) && (low[1]..=high[1]).contains(&base[1]);
+            inside && self.is_free(&self.own_room(**base))
+        };
+        around.iter().find(serves).copied().unwrap_or(around[0])
+    }
+
+    /// The part of the floor in which a base that drives can be.
+    fn arena(&self, world: Option<&Surroundings>) -> ([f64; 2], [f64; 2]) {
+        if let Some(world) = world {
+            return world.extent();
+        }
+        let [x, y, _] = self.objects.first().map_or([0.0; 3], front_of);
+        let [along, beside] = ARENA_M;
+        ([x + along[0], y + beside[0]], [x + along[1], y + beside[1]])
+    }
+
+    /// Where the robot is sent to.
+    fn goal(&self, world: Option<&Surroundings>) -> Option<[f64; 3]> {
+        let name = self.designators.get("objectLocation")?.first()?;
+        let locations = world.into_iter().flat_map(|world| &world.map.locations).chain(&self.front);
+        locations.into_iter().find(|location| location.name == *name).map(|location| location.at)
+    }
+
+    /// Gives the front of the surface a name, where the robot is sent there and the world has none for it: the one that
+    /// the configuration has.
+    pub(super) fn name_front(&mut self, world: Option<&Surroundings>) {
+        let Some(platform) = self.objects.first().filter(|object| object.role == Role::Platform) else { return };
+        if self.goal(world).is_some() || self.designators.get("objectSurface").is_none() {
+            return;
+        }
+        let named = self.designators.get("objectLocation").and_then(|names| names.first()).cloned();
+        let name = named.unwrap_or_else(|| format!("{}_front", platform.id));
+        let front = Location { name: name.clone(), at: front_of(platform), surface: Some(platform.id.clone()) };
+        self.front = Some(front);
+        self.designators.insert("objectLocation".to_owned(), vec![name]);
+    }
+
     /// Sets obstacles on the floor, clear of everything, of the robot, and of the places where it may have to go.
-    pub(super) fn set_obstacles(&mut self, base: [f64; 3], world: Option<&Surroundings>) -> Result<(), Discard> {
+    /// Where the robot has to drive first, such a place may be taken: that is what it has to find out.
+    pub(super) fn set_obstacles(
+        &mut self,
+        base: [f64; 3],
+        world: Option<&Surroundings>,
+        drives: bool,
+    ) -> Result<(), Discard> {
         if self.space.obstacles.is_empty() || self.space.obstacle_count == 0 {
             return Ok(());
         }
         let mut kept_free: Vec<Solid> = vec![self.own_room(base)];
         let fronts: Vec<[f64; 3]> = match world {
+            _ if drives => Vec::new(),
             Some(world) => world.map.locations.iter().map(|location| location.at).collect(),
             None => self.fronts(),
         };
         kept_free.extend(fronts.into_iter().map(|front| room_for_base(front, BASE_ROOM_M)));
-        let (low, high) = world.map_or_else(|| field(base), Surroundings::extent);
+        let (low, high) =
+            if drives { self.arena(world) } else { world.map_or_else(|| field(base), Surroundings::extent) };
         for number in 1..=self.space.obstacle_count {
             let name = format!("obstacle.{number}");
             let Some(model) = self.choose(&format!("{name}.model"), &self.space.obstacles) else { continue };
@@ -133,13 +222,7 @@ impl Hand<'_> {
 
     /// Places in front of the platforms.
     fn fronts(&self) -> Vec<[f64; 3]> {
-        let platforms = self.objects.iter().filter(|object| object.role == Role::Platform);
-        let front = |platform: &SceneObject| {
-            let edge = platform.model.surface.map_or(0.0, |surface| surface.size_m[0] / 2.0);
-            let at = platform.pose.to_isometry() * Point3::new(-edge - BASE_GAP_M[1], 0.0, 0.0);
-            [at.x, at.y, platform.pose.yaw()]
-        };
-        platforms.map(front).collect()
+        self.objects.iter().filter(|object| object.role == Role::Platform).map(front_of).collect()
     }
 
     /// Whether nothing that stands in the scene is in the way.

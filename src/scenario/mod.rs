@@ -9,6 +9,7 @@
 
 mod draw;
 mod floor;
+mod floor_plan;
 mod overlap;
 mod parameters;
 mod placement;
@@ -18,6 +19,7 @@ mod space;
 mod surroundings;
 
 pub use draw::{Discard, draw};
+pub use floor_plan::{FloorPlan, Outline};
 pub use overlap::{CLEARANCE_M, Solid};
 pub use parameters::{Parameter, ParameterKind};
 pub use scene::{KnownKind, RobotStart, Role, Scene, SceneObject};
@@ -26,5 +28,6 @@ pub use space::Space;
 
 // What a scene is made of: its readers meet it here.
 pub use crate::config::{
-    Budget, CONTROL_HZ, Camera, Inertia, Mesh, ObjectModel, Part, Physics, RobotProfile, Sensing, Shape, Surface,
+    Budget, CONTROL_HZ, Camera, Inertia, Location, Mesh, ObjectModel, Odometry, Part, Physics, RobotProfile, Room,
+    Sensing, Shape, Surface,
 };

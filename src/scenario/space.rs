@@ -12,10 +12,15 @@ use crate::scenario::{KnownKind, placement};
 /// Designators that scene generation gives a meaning, whether an ontology declares them or not.
 const SPECIAL: [&str; 6] = ["world", "objectLocation", "objectSurface", "placeSurface", "pickObject", "surfaceObjects"];
 
+/// The action that drives to a place: a test that begins with it has its robot start somewhere else.
+const DRIVING: &str = "MoveTo";
+
 /// Everything that scenes are drawn from, with nothing left to check.
 #[derive(Debug, Clone)]
 pub struct Space {
     pub(super) tests: usize,
+    /// For each test whether the robot has to drive first.
+    pub(super) drives: Vec<bool>,
     pub(super) surfaces: Vec<Arc<ObjectModel>>,
     pub(super) targets: Vec<Arc<ObjectModel>>,
     pub(super) others: Vec<Arc<ObjectModel>>,
@@ -82,6 +87,7 @@ impl Space {
         let names = campaign.candidates.iter().filter(|(name, _)| !is_of_objects(name));
         config::in_order_of_place(found).or(Self {
             tests: campaign.tests.len(),
+            drives: campaign.tests.iter().map(|test| test.first().is_some_and(|first| first == DRIVING)).collect(),
             surfaces,
             targets,
             others,

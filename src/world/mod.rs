@@ -18,6 +18,7 @@ mod kinematics;
 mod layout;
 mod mishap;
 mod observe;
+mod odometry;
 mod quality;
 mod rays;
 mod recorder;

@@ -56,6 +56,8 @@ pub struct Record {
     pub contacts: Vec<Contact>,
     /// One for each object, in scene order.
     pub courses: Vec<Course>,
+    /// Smallest and largest true x and y of the base; nothing where it stands for good. Unit: metres.
+    pub base: Option<[[f64; 2]; 2]>,
 }
 
 /// Poses over time; see the fields of the same names in a trace.
@@ -88,6 +90,7 @@ pub struct Recorder {
     rows: Vec<Vec<f32>>,
     begin_poses: Vec<Isometry3<f64>>,
     extremes: Vec<[f64; 4]>,
+    base: Option<[[f64; 2]; 2]>,
     open: BTreeMap<(Owner, Owner), Episode>,
     closed: Vec<((Owner, Owner), Episode)>,
     pub(super) quality: QualityMeter,
@@ -108,6 +111,7 @@ impl Recorder {
             rows: Vec::new(),
             begin_poses: Vec::new(),
             extremes: vec![[0.0; 4]; n_objects],
+            base: None,
             open: BTreeMap::new(),
             closed: Vec::new(),
             quality: QualityMeter::default(),
@@ -123,6 +127,7 @@ impl World {
         recorder.began = recorder.n_ticks;
         recorder.begin_poses = poses;
         recorder.extremes = vec![[0.0; 4]; self.objects.len()];
+        recorder.base = None;
         recorder.open.clear();
         recorder.closed.clear();
         if recorder.rows.is_empty() {
@@ -157,7 +162,7 @@ impl World {
                 max_displacement_m: *max_displacement_m,
             })
             .collect();
-        Record { contacts, courses }
+        Record { contacts, courses, base: self.recorder.base }
     }
 
     /// The course of everything that moves since the first record began.
@@ -193,6 +198,7 @@ impl World {
         let recording = !self.recorder.begin_poses.is_empty();
         if recording {
             self.record_extremes();
+            self.record_base();
             self.record_contacts();
             if (self.recorder.n_ticks - self.recorder.began).is_multiple_of(self.recorder.ticks_per_frame) {
                 self.frame();
@@ -227,6 +233,15 @@ impl World {
                 *extreme = extreme.max(value);
             }
         }
+    }
+
+    fn record_base(&mut self) {
+        if self.robot.layout.base.is_none() {
+            return;
+        }
+        let [x, y, _] = self.base_true();
+        let [low, high] = self.recorder.base.get_or_insert([[x, y], [x, y]]);
+        (*low, *high) = ([low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]);
     }
 
     fn record_contacts(&mut self) {

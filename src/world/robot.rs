@@ -234,7 +234,7 @@ mod tests {
 
     use super::*;
     use crate::base::{Choices, Files};
-    use crate::config::{Camera, Physics, Sensing};
+    use crate::config::{Camera, Odometry, Physics, Sensing};
     use crate::scenario::Scene;
     use crate::world::convert::from_pose;
     use crate::world::layout::check_robot;
@@ -258,6 +258,7 @@ mod tests {
                 localisation_noise_m: 0.0,
                 heading_noise_rad: 0.0,
                 gripper_noise_m: 0.0,
+                odometry: Odometry::IDEAL,
                 camera: Camera::IDEAL,
             },
             physics: Physics {

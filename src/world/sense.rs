@@ -27,7 +27,8 @@ pub struct Sighting {
 }
 
 impl World {
-    /// Draws where the base believes that it stands. The error stays as it is while the base moves.
+    /// Draws where the base believes that it stands. The error stays as it is while the base moves, unless its odometry
+    /// drifts.
     pub fn localise(&mut self, choices: &mut Choices) {
         let x = choices.normal("sense.localisation.x", self.sensing.localisation_noise_m);
         let y = choices.normal("sense.localisation.y", self.sensing.localisation_noise_m);
@@ -36,6 +37,7 @@ impl World {
         let truth = Pose::upright([base_x, base_y, 0.0], heading).to_isometry();
         let believed = Pose::upright([base_x + x, base_y + y, 0.0], heading + turn).to_isometry();
         self.believed_from_true = believed * truth.inverse();
+        self.begin_tracking();
     }
 
     /// Ids of everything that can be seen, in scene order.

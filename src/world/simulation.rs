@@ -7,9 +7,12 @@ use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 
 use crate::base::Pose;
-use crate::scenario::{CONTROL_HZ, Inertia, KnownKind, ObjectModel, RobotProfile, Scene, SceneObject, Sensing};
+use crate::scenario::{
+    CONTROL_HZ, FloorPlan, Inertia, KnownKind, ObjectModel, RobotProfile, Scene, SceneObject, Sensing,
+};
 use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
 use crate::world::engine::{Owner, add_floor, collider, engine};
+use crate::world::odometry::Tracker;
 use crate::world::recorder::Recorder;
 use crate::world::robot::Robot;
 use crate::world::{Fault, Kinematics, Layout, Poison, WorldError, fault};
@@ -70,6 +73,7 @@ pub struct World {
     pub(super) sensing: Sensing,
     /// Where the base believes that it is, from where it is. Frame: world.
     pub(super) believed_from_true: Isometry3<f64>,
+    pub(super) tracker: Tracker,
     pub(super) recorder: Recorder,
     pub(super) fault: Option<Fault>,
     /// Where sensors see an object, by its index, if not where it is.
@@ -77,6 +81,7 @@ pub struct World {
     knows: Arc<[KnownKind]>,
     /// Whether the robot has a map of what stands in the world for good.
     pub(super) has_map: bool,
+    plan: FloorPlan,
     n_steps: u64,
     steps_per_tick: u32,
     steps_per_second: u32,
@@ -110,10 +115,12 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         robot,
         sensing: scene.sensing.clone(),
         believed_from_true: Isometry3::identity(),
+        tracker: Tracker::default(),
         fault: None,
         decoys: BTreeMap::new(),
         knows: Arc::clone(&scene.robot.knows),
         has_map: !scene.map.is_empty(),
+        plan: FloorPlan::of(scene),
         n_steps: 0,
         steps_per_tick,
         steps_per_second,
@@ -207,6 +214,11 @@ impl World {
     /// The kinds of things that the robot can tell apart.
     pub fn known_kinds(&self) -> &Arc<[KnownKind]> {
         &self.knows
+    }
+
+    /// The robot's map of its world: walls, furniture and places with names.
+    pub fn floor_plan(&self) -> &FloorPlan {
+        &self.plan
     }
 
     /// The kind of thing that an id of the scene stands for: what a robot is told with its task, and nothing of where it is.

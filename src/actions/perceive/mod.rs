@@ -18,5 +18,6 @@ mod sight;
 mod skill;
 mod survey;
 
+pub use gaze::towards;
 pub use skill::perceive_plane;
 pub use survey::{Survey, survey};

@@ -1,0 +1,101 @@
+//! A way over cells as few straight legs.
+
+use crate::actions::navigate::search::cheapest;
+use crate::actions::navigate::terrain::Terrain;
+
+/// How much dearer a straight leg may be than the cells that it replaces: those only go eight ways.
+const TOLERATED: f64 = 1.001;
+
+/// The way from one place to another as the ends of its straight legs, the first place left out; nothing where there is
+/// none.
+pub fn way(terrain: &Terrain<'_>, from: [f64; 2], to: [f64; 2]) -> Option<Vec<[f64; 2]>> {
+    let grid = terrain.grid();
+    let cells = cheapest(terrain, grid.cell(from)?, grid.cell(to)?)?;
+    let mut points: Vec<[f64; 2]> = cells.into_iter().map(|cell| grid.middle(cell)).collect();
+    match points.as_mut_slice() {
+        [only] => *only = to,
+        [first, .., last] => (*first, *last) = (from, to),
+        [] => return None,
+    }
+    if points.len() == 1 {
+        return Some(points);
+    }
+    Some(shortened(terrain, &points))
+}
+
+/// From each point the longest straight leg that costs no more than the way.
+fn shortened(terrain: &Terrain<'_>, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut sums = vec![0.0];
+    for pair in points.windows(2) {
+        let step = terrain.straight(pair[0], pair[1]).unwrap_or(f64::INFINITY);
+        sums.push(sums.last().copied().unwrap_or(0.0) + step);
+    }
+    let mut kept = Vec::new();
+    let mut at = 0;
+    while at + 1 < points.len() {
+        let serves = |next: &usize| {
+            let straight = terrain.straight(points[at], points[*next]);
+            straight.is_some_and(|straight| straight <= (sums[*next] - sums[at]) * TOLERATED)
+        };
+        at = (at + 2..points.len()).rev().find(serves).unwrap_or(at + 1);
+        kept.push(points[at]);
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::actions::navigate::grid::Grid;
+    use crate::actions::route::length;
+    use crate::base::Pose;
+    use crate::scenario::{FloorPlan, Outline, Room};
+
+    /// A room with a wall across it that leaves a door of 90 cm at its upper end.
+    fn two_rooms() -> Grid {
+        let wall = Outline { pose: Pose::upright([0.0, -0.45, 0.0], 0.0), size_m: [0.1, 3.1] };
+        let room = Room { name: "hall".to_owned(), low_m: [-2.0, -2.0], high_m: [2.0, 2.0] };
+        let plan = FloorPlan { outlines: vec![wall], rooms: vec![room], ..FloorPlan::default() };
+        Grid::new(&plan, &[])
+    }
+
+    fn total(from: [f64; 2], way: &[[f64; 2]]) -> f64 {
+        let ends = std::iter::once(&from).chain(way);
+        ends.zip(way).map(|(a, b)| length(b[0] - a[0], b[1] - a[1])).sum()
+    }
+
+    #[test]
+    fn a_free_way_is_one_leg_and_a_door_is_found() {
+        let grid = two_rooms();
+        let from = [-1.33, -0.97];
+        let terrain = Terrain::new(&grid, 0.3, from);
+        let straight = way(&terrain, from, [-1.1, 1.0]).expect("nothing is in the way");
+        assert_eq!(straight, [[-1.1, 1.0]]);
+        let around = way(&terrain, from, [1.0, -0.5]).expect("there is a door");
+        assert_eq!(around.last(), Some(&[1.0, -0.5]));
+        // Through the door's middle would be 5.04 m; along its inner side 4.7 m.
+        assert!((4.7..5.3).contains(&total(from, &around)), "{around:?}");
+        let crossed = around.iter().filter(|at| at[0].abs() < 0.3).all(|at| (1.3..1.75).contains(&at[1]));
+        assert!(crossed && around.len() <= 8, "{around:?}");
+        assert_eq!(way(&terrain, from, from), Some(vec![from]));
+    }
+
+    #[test]
+    fn a_wide_base_has_no_way_and_no_way_leads_into_walls() {
+        let grid = two_rooms();
+        let wide = Terrain::new(&grid, 0.5, [-1.0, 0.0]);
+        assert_eq!(way(&wide, [-1.0, 0.0], [1.0, 0.0]), None);
+        let slim = Terrain::new(&grid, 0.3, [-1.0, 0.0]);
+        assert_eq!(way(&slim, [-1.0, 0.0], [0.1, 0.0]), None);
+        assert_eq!(way(&slim, [-1.0, 0.0], [9.0, 0.0]), None);
+    }
+
+    #[test]
+    fn who_stands_too_near_gets_away() {
+        let grid = two_rooms();
+        let from = [-0.2, 0.0];
+        let terrain = Terrain::new(&grid, 0.3, from);
+        let away = way(&terrain, from, [-1.0, 0.0]).expect("it can move away from the wall");
+        assert_eq!(away.last(), Some(&[-1.0, 0.0]));
+    }
+}

@@ -1,0 +1,229 @@
+//! The skill: a way by the map, driven while looking ahead, and another way where that one is not free.
+
+use nalgebra::Point3;
+
+use crate::actions::navigate::follow::{Follower, Limits, wrapped};
+use crate::actions::navigate::grid::Grid;
+use crate::actions::navigate::sense::{Size, look};
+use crate::actions::navigate::shorten::way;
+use crate::actions::navigate::terrain::Terrain;
+use crate::actions::operator::{Interrupt, Operator};
+use crate::actions::perceive::towards;
+use crate::actions::route::length;
+use crate::actions::{ActionCall, ActionReport};
+
+/// Designators of the place to go to, the first that there is.
+const PLACES: [&str; 2] = ["objectLocation", "objectSurface"];
+/// Room beside the robot on its way. Unit: metres. The map, the pictures and its belief are off by as much.
+const MARGIN_M: f64 = 0.04;
+/// Share of the joints' velocity limits that is used: room for the controller to catch up.
+const SPEED_SHARE: f64 = 0.9;
+/// Unit: m/s². At full speed the robot stops within 10 cm.
+const ACCELERATION: f64 = 0.3;
+/// Unit: rad/s².
+const TURN_ACCELERATION: f64 = 1.5;
+/// Time between two pictures while driving. Unit: seconds. The robot goes a quarter of a metre.
+const LOOK_SECS: f64 = 1.0;
+/// Time between two thoughts about where to look. Unit: seconds.
+const GAZE_SECS: f64 = 0.25;
+/// How far ahead on its way the robot looks at the floor. Unit: metres.
+const GAZE_M: f64 = 1.4;
+/// Where it looks when it stands and does not know on: to both sides and ahead. Unit: radians.
+const LOOK_AROUND_RAD: [f64; 3] = [-0.9, 0.9, 0.0];
+/// Time for the head to get there and come to rest. Unit: seconds.
+const REST_SECS: f64 = 1.2;
+/// Other ways that are tried before the robot gives up.
+const MOST_WAYS: usize = 12;
+/// A base that is so far from where it is driven to is held up by something. Unit: metres.
+const HELD_UP_M: f64 = 0.15;
+/// The end is reached within this. Units: metres, radians.
+const REACHED: [f64; 2] = [0.03, 0.03];
+/// Time for the base to come to rest. Unit: seconds.
+const ARRIVE_SECS: f64 = 0.5;
+
+/// Drives to the designated place and reports whether it believes to be there.
+///
+/// # Errors
+/// [`Interrupt`] if simulation broke or time ran out.
+pub fn move_to(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
+    let named: Vec<&str> = PLACES.iter().filter_map(|designator| call.value(designator)).collect();
+    let Some(first) = named.first() else { return Ok(failed("no place was named to drive to")) };
+    let Some(goal) = named.iter().find_map(|name| robot.floor_plan().place(name)) else {
+        return Ok(failed(format!("{first} is not on the map")));
+    };
+    let Some(base) = robot.layout().base else { return Ok(failed("the robot has no base that drives")) };
+    let mut drive = Drive::new(robot, base, goal);
+    match drive.go()? {
+        Some(reason) => Ok(failed(format!("{first}: {reason}"))),
+        None => drive.report(first),
+    }
+}
+
+/// A drive to a place. Everything is by the base's belief of where it is.
+struct Drive<'r, 'o> {
+    robot: &'r mut Operator<'o>,
+    base: [usize; 3],
+    goal: [f64; 3],
+    size: Size,
+    limits: Limits,
+    grid: Grid,
+    follower: Follower,
+}
+
+impl<'r, 'o> Drive<'r, 'o> {
+    fn new(robot: &'r mut Operator<'o>, base: [usize; 3], goal: [f64; 3]) -> Self {
+        let at = base.map(|joint| robot.commanded()[joint]);
+        let fastest = |joint: usize| SPEED_SHARE * robot.kinematics().joints()[joint].velocity;
+        let limits = Limits {
+            speed: fastest(base[0]).min(fastest(base[1])),
+            acceleration: ACCELERATION,
+            turn_speed: fastest(base[2]),
+            turn_acceleration: TURN_ACCELERATION,
+        };
+        let grid = Grid::new(robot.floor_plan(), &[[at[0], at[1]], [goal[0], goal[1]]]);
+        let size = Size::of(robot);
+        Self { robot, base, goal, size, limits, grid, follower: Follower::new(at, Vec::new(), at[2]) }
+    }
+
+    /// Drives there. Gives the reason why it did not, if it did not.
+    fn go(&mut self) -> Result<Option<String>, Interrupt> {
+        let mut looked_around = false;
+        for _ in 0..MOST_WAYS {
+            self.robot.begin("plan");
+            if !self.set_out() {
+                let reason = self.why_not();
+                if std::mem::replace(&mut looked_around, true) {
+                    return Ok(Some(reason));
+                }
+                self.look_around()?;
+                continue;
+            }
+            self.robot.begin("drive");
+            match self.follow()? {
+                Leg::Arrived => return Ok(None),
+                Leg::Blocked => {}
+                Leg::HeldUp => return Ok(Some("something holds the robot up that it does not see".to_owned())),
+            }
+        }
+        Ok(Some("no way stayed free".to_owned()))
+    }
+
+    /// Takes the best way from here, if there is one.
+    fn set_out(&mut self) -> bool {
+        let at = self.follower.at();
+        let (from, to) = ([at[0], at[1]], [self.goal[0], self.goal[1]]);
+        match way(&Terrain::new(&self.grid, self.size.radius_m + MARGIN_M, from), from, to) {
+            Some(way) => {
+                self.follower = Follower::new(at, way, self.goal[2]);
+                true
+            }
+            None => false,
+        }
+    }
+
+    fn why_not(&self) -> String {
+        let goal = self.grid.cell([self.goal[0], self.goal[1]]);
+        let taken = goal.is_none_or(|cell| self.grid.seen_m()[cell] < self.size.radius_m + MARGIN_M);
+        if taken { "the goal is occupied".to_owned() } else { "there is no free way".to_owned() }
+    }
+
+    /// Follows the way, looking ahead, to its end or to where it is not free any more.
+    fn follow(&mut self) -> Result<Leg, Interrupt> {
+        let tick = self.robot.tick_secs();
+        let (mut since_look, mut since_gaze) = (0.0, GAZE_SECS);
+        let mut blocked = false;
+        while !(self.follower.has_arrived() || blocked && self.follower.is_still()) {
+            if since_gaze >= GAZE_SECS {
+                since_gaze = 0.0;
+                self.gaze();
+            }
+            if since_look >= LOOK_SECS && !blocked {
+                since_look = 0.0;
+                look(self.robot, self.size, &mut self.grid);
+                blocked = !self.is_free();
+            }
+            self.follower.advance(&self.limits, tick, blocked);
+            self.robot.send(&self.base, &self.follower.at())?;
+            if self.is_held_up() {
+                return Ok(Leg::HeldUp);
+            }
+            since_look += tick;
+            since_gaze += tick;
+        }
+        Ok(if blocked { Leg::Blocked } else { Leg::Arrived })
+    }
+
+    /// Whether what is left of the way is free as far as is known.
+    fn is_free(&self) -> bool {
+        let left: Vec<[f64; 2]> = self.follower.left().collect();
+        let from = left.first().copied().unwrap_or_default();
+        // What the way was planned with must not fail by the size of a cell.
+        let terrain = Terrain::new(&self.grid, self.size.radius_m, from);
+        left.windows(2).all(|pair| terrain.straight(pair[0], pair[1]).is_some())
+    }
+
+    /// Turns the head to the floor ahead.
+    fn gaze(&mut self) {
+        let [x, y] = self.follower.ahead(GAZE_M);
+        let [at_x, at_y, heading] = self.follower.at();
+        let way = length(x - at_x, y - at_y);
+        // Near the end, as far ahead as it faces.
+        let point = if way < GAZE_M / 2.0 {
+            Point3::new(at_x + GAZE_M * libm::cos(heading), at_y + GAZE_M * libm::sin(heading), 0.0)
+        } else {
+            Point3::new(x, y, 0.0)
+        };
+        self.look_towards(&point);
+    }
+
+    fn look_towards(&mut self, point: &Point3<f64>) {
+        let posture = towards(self.robot.kinematics(), self.robot.layout(), self.robot.commanded(), point);
+        let head = self.robot.layout().head.clone();
+        let positions: Vec<f64> = head.iter().map(|joint| posture[*joint]).collect();
+        self.robot.aim(&head, &positions);
+    }
+
+    /// Forgets what it saw, which may have been noise, and looks again.
+    fn look_around(&mut self) -> Result<(), Interrupt> {
+        self.robot.begin("look around");
+        self.grid.forget();
+        let [x, y, heading] = self.follower.at();
+        for aside in LOOK_AROUND_RAD {
+            let to = heading + aside;
+            self.look_towards(&Point3::new(x + GAZE_M * libm::cos(to), y + GAZE_M * libm::sin(to), 0.0));
+            self.robot.wait(REST_SECS)?;
+            look(self.robot, self.size, &mut self.grid);
+        }
+        Ok(())
+    }
+
+    fn is_held_up(&self) -> bool {
+        let ([x, y, _], positions) = (self.follower.at(), self.robot.observe().positions);
+        length(positions[self.base[0]] - x, positions[self.base[1]] - y) > HELD_UP_M
+    }
+
+    fn report(&mut self, place: &str) -> Result<ActionReport, Interrupt> {
+        self.robot.begin("arrive");
+        self.robot.wait(ARRIVE_SECS)?;
+        let positions = self.robot.observe().positions;
+        let [x, y, heading] = self.base.map(|joint| positions[joint]);
+        let off = length(x - self.goal[0], y - self.goal[1]);
+        let turned = wrapped(heading - self.goal[2]).abs();
+        if off > REACHED[0] || turned > REACHED[1] {
+            let (off, turned) = (off * 100.0, turned.to_degrees());
+            return Ok(failed(format!("{place} was missed by {off:.0} cm and {turned:.0} degrees")));
+        }
+        Ok(ActionReport { succeeded: true, message: format!("stands at {place}") })
+    }
+}
+
+/// How a way ended.
+enum Leg {
+    Arrived,
+    Blocked,
+    HeldUp,
+}
+
+fn failed(message: impl Into<String>) -> ActionReport {
+    ActionReport { succeeded: false, message: message.into() }
+}

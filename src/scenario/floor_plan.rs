@@ -1,0 +1,78 @@
+//! The floor as a robot knows it from its map.
+//!
+//! Never: what a scene adds to its world. Obstacles and objects are for the robot's eyes.
+
+use nalgebra::Point3;
+
+use crate::base::Pose;
+use crate::config::{Location, ObjectModel, Room};
+use crate::scenario::{Role, Scene, SceneObject};
+
+/// Gap between a surface's edge and the middle of a base that stands in front of it. Unit: metres.
+pub(super) const FRONT_GAP_M: f64 = 0.69;
+
+/// Walls, furniture and named places. Frame: world.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FloorPlan {
+    /// Where no robot can go.
+    pub outlines: Vec<Outline>,
+    /// Places with names.
+    pub locations: Vec<Location>,
+    /// Rooms; none where the floor has no bounds.
+    pub rooms: Vec<Room>,
+    /// Where a robot stands that has to do with a surface. Units: metres, metres, radians. Shape: id and x, y, heading.
+    pub fronts: Vec<(String, [f64; 3])>,
+}
+
+/// A rectangle of the floor below a wall or a piece of furniture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outline {
+    /// Middle of the rectangle, upright.
+    pub pose: Pose,
+    /// Lengths of the sides along the pose's axes. Unit: metres.
+    pub size_m: [f64; 2],
+}
+
+impl FloorPlan {
+    /// The map of a scene's world.
+    pub fn of(scene: &Scene) -> Self {
+        let standing = || scene.objects.iter().filter(|object| object.role == Role::Platform);
+        let surfaces = standing().filter(|object| object.model.surface.is_some());
+        Self {
+            outlines: standing().map(|object| Outline::below(&object.model, &object.pose)).collect(),
+            locations: scene.map.locations.clone(),
+            rooms: scene.map.rooms.clone(),
+            fronts: surfaces.map(|object| (object.id.clone(), front_of(object))).collect(),
+        }
+    }
+
+    /// Where a robot stands that is sent to a location, or to a surface by its name.
+    pub fn place(&self, name: &str) -> Option<[f64; 3]> {
+        let location = self.locations.iter().find(|location| location.name == name).map(|location| location.at);
+        location.or_else(|| self.fronts.iter().find(|(id, _)| id == name).map(|(_, at)| *at))
+    }
+}
+
+impl Outline {
+    fn below(model: &ObjectModel, pose: &Pose) -> Self {
+        let mut around = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for part in &model.parts {
+            let (low, high) = part.bounds();
+            for axis in 0..2 {
+                around.0[axis] = around.0[axis].min(low[axis]);
+                around.1[axis] = around.1[axis].max(high[axis]);
+            }
+        }
+        let (low, high) = if model.parts.is_empty() { ([0.0; 2], [0.0; 2]) } else { around };
+        let middle = pose.to_isometry() * Point3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, 0.0);
+        let upright = Pose::upright([middle.x, middle.y, 0.0], pose.yaw());
+        Self { pose: upright, size_m: [high[0] - low[0], high[1] - low[1]] }
+    }
+}
+
+/// The place in front of a platform, on its negative x side and facing it.
+pub(super) fn front_of(platform: &SceneObject) -> [f64; 3] {
+    let edge = platform.model.surface.map_or(0.0, |surface| surface.size_m[0] / 2.0);
+    let at = platform.pose.to_isometry() * Point3::new(-edge - FRONT_GAP_M, 0.0, 0.0);
+    [at.x, at.y, platform.pose.yaw()]
+}

@@ -1,0 +1,171 @@
+//! How the base's belief of where it stands changes as it drives: wheels are off, landmarks put it right.
+//!
+//! Wheels are off by the same share for a stretch of the way, then by another: each stretch has choices of its own, named
+//! `sense.odometry.*`. A landmark gives the true place with noise; how much of it is believed follows from how far astray
+//! the belief may be by now (a Kalman filter with one variance for the place and one for the heading).
+
+use nalgebra::Vector2;
+
+use crate::base::{Choices, Pose};
+use crate::scenario::Odometry;
+use crate::world::World;
+
+/// Way, or turn, after which wheels are off by another share. Units: metres, or radians.
+const STRETCH: f64 = 0.5;
+/// A correction is believed no faster than this, so that a base that follows its belief does not jerk. Units: m/s and
+/// rad/s.
+const CORRECTION_SPEED: f64 = 0.05;
+
+/// What the base remembers of its way.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tracker {
+    /// Where it truly was a tick ago.
+    last: Option<[f64; 3]>,
+    /// Errors in this stretch: along the way, across it, for each radian turned, and of the heading for each metre.
+    off: [f64; 4],
+    /// What is left of this stretch.
+    left: f64,
+    /// Way since a landmark was seen. Unit: metres.
+    since_landmark_m: f64,
+    /// Variances of place and heading. Units: m² and rad².
+    variances: [f64; 2],
+    /// Corrections that are not believed yet: x, y, heading.
+    pending: [f64; 3],
+}
+
+/// A step of the base, truly.
+struct Step {
+    along: Vector2<f64>,
+    way_m: f64,
+    turn_rad: f64,
+}
+
+impl World {
+    /// Begins with what the base may be wrong about at first.
+    pub(super) fn begin_tracking(&mut self) {
+        let (place, heading) = (self.sensing.localisation_noise_m, self.sensing.heading_noise_rad);
+        self.tracker = Tracker { variances: [place * place, heading * heading], ..Tracker::default() };
+    }
+
+    /// Takes into the belief how the base has moved since the last time. To be called after every tick.
+    pub fn track_base(&mut self, choices: &mut Choices) {
+        if self.sensing.odometry == Odometry::IDEAL || self.robot.layout.base.is_none() {
+            return;
+        }
+        let now = self.base_true();
+        let Some(last) = self.tracker.last.replace(now) else { return };
+        let along = Vector2::new(now[0] - last[0], now[1] - last[1]);
+        let step = Step { along, way_m: (along.x * along.x + along.y * along.y).sqrt(), turn_rad: now[2] - last[2] };
+        let mut believed = self.by_wheels(last, &step, choices);
+        let every_m = self.sensing.odometry.landmark_every_m;
+        if every_m > 0.0 && self.tracker.since_landmark_m >= every_m {
+            self.see_landmark(now, believed, choices);
+        }
+        let most = CORRECTION_SPEED * self.tick_secs();
+        for (belief, pending) in believed.iter_mut().zip(&mut self.tracker.pending) {
+            let change = pending.clamp(-most, most);
+            *belief += change;
+            *pending -= change;
+        }
+        let [x, y, heading] = believed;
+        let truth = Pose::upright([now[0], now[1], 0.0], now[2]).to_isometry();
+        self.believed_from_true = Pose::upright([x, y, 0.0], heading).to_isometry() * truth.inverse();
+    }
+
+    /// The believed pose after a step, by what the wheels say of it.
+    fn by_wheels(&mut self, last: [f64; 3], step: &Step, choices: &mut Choices) -> [f64; 3] {
+        let [x, y, heading] = self.believed(last);
+        let astray = heading - last[2];
+        let odometry = &self.sensing.odometry;
+        let tracker = &mut self.tracker;
+        tracker.left -= step.way_m + step.turn_rad.abs();
+        if tracker.left <= 0.0 && step.way_m + step.turn_rad.abs() > 0.0 {
+            let mut draw = |what: &str, sigma: f64| choices.normal(&format!("sense.odometry.{what}"), sigma);
+            tracker.off = [
+                draw("along", odometry.drift),
+                draw("across", odometry.drift),
+                draw("turning", odometry.heading_drift),
+                draw("veering", odometry.heading_drift),
+            ];
+            tracker.left = STRETCH;
+        }
+        tracker.grow(odometry, step);
+        let [along, across, turning, veering] = tracker.off;
+        let measured = step.along * (1.0 + along) + Vector2::new(-step.along.y, step.along.x) * across;
+        let (sin, cos) = (libm::sin(astray), libm::cos(astray));
+        [
+            x + cos * measured.x - sin * measured.y,
+            y + sin * measured.x + cos * measured.y,
+            heading + step.turn_rad * (1.0 + turning) + step.way_m * veering,
+        ]
+    }
+
+    /// Notes how the belief is to be corrected by a landmark.
+    fn see_landmark(&mut self, truth: [f64; 3], believed: [f64; 3], choices: &mut Choices) {
+        let odometry = &self.sensing.odometry;
+        let noise = [odometry.landmark_noise_m, odometry.landmark_noise_m, odometry.landmark_noise_rad];
+        let tracker = &mut self.tracker;
+        tracker.since_landmark_m = 0.0;
+        let shares = [
+            share(&mut tracker.variances[0], odometry.landmark_noise_m),
+            share(&mut tracker.variances[1], odometry.landmark_noise_rad),
+        ];
+        for (axis, name) in ["x", "y", "heading"].into_iter().enumerate() {
+            let seen = truth[axis] + choices.normal(&format!("sense.odometry.landmark.{name}"), noise[axis]);
+            tracker.pending[axis] = shares[axis / 2] * (seen - believed[axis]);
+        }
+    }
+}
+
+impl Tracker {
+    /// How far astray the belief may be grows with the way. Stretches are independent of each other; a wrong heading takes
+    /// the place aside in proportion to the way.
+    fn grow(&mut self, odometry: &Odometry, step: &Step) {
+        let moved = step.way_m + step.turn_rad.abs();
+        self.since_landmark_m += step.way_m;
+        self.variances[1] += odometry.heading_drift * odometry.heading_drift * STRETCH * moved;
+        self.variances[0] += odometry.drift * odometry.drift * STRETCH * step.way_m
+            + self.variances[1] * self.since_landmark_m * step.way_m;
+    }
+}
+
+/// The share of a measurement that is believed, which leaves a smaller variance.
+fn share(variance: &mut f64, noise: f64) -> f64 {
+    let total = *variance + noise * noise;
+    if total <= 0.0 {
+        return 0.0;
+    }
+    let share = *variance / total;
+    *variance *= 1.0 - share;
+    share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equally_good_knowledge_counts_the_same() {
+        let mut variance = 0.04;
+        assert!((share(&mut variance, 0.2) - 0.5).abs() < 1e-12 && (variance - 0.02).abs() < 1e-12);
+        let mut sure = 0.0;
+        assert_eq!((share(&mut sure, 0.2), share(&mut sure, 0.0)), (0.0, 0.0));
+        let mut unsure = 0.04;
+        assert_eq!((share(&mut unsure, 0.0), unsure), (1.0, 0.0));
+    }
+
+    #[test]
+    fn doubt_grows_with_the_way_and_with_turning() {
+        let odometry = Odometry { drift: 0.1, heading_drift: 0.02, ..Odometry::IDEAL };
+        let mut tracker = Tracker::default();
+        for _ in 0..200 {
+            tracker.grow(&odometry, &Step { along: Vector2::zeros(), way_m: 0.01, turn_rad: 0.0 });
+        }
+        // Two metres: four stretches of half a metre, each off by a tenth.
+        assert!((tracker.variances[1].sqrt() - 0.02).abs() < 1e-9, "{}", tracker.variances[1].sqrt());
+        let straight = 0.1 * 0.5 * 2.0;
+        assert!(tracker.variances[0].sqrt() > straight && tracker.variances[0].sqrt() < 1.2 * straight);
+        tracker.grow(&odometry, &Step { along: Vector2::zeros(), way_m: 0.0, turn_rad: 1.0 });
+        assert!(tracker.variances[1].sqrt() > 0.024);
+    }
+}
