@@ -17,6 +17,7 @@ mod health;
 mod history;
 mod merge;
 mod models;
+mod move_to;
 mod no_panic;
 mod ontology;
 mod oracle;

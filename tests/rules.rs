@@ -54,7 +54,10 @@ pub fn ontology_of(case: &Path) -> Ontology {
             rule_file(&["rules.rls", "rules.rq"].map(|name| case.join(name)).into_iter().find(|p| p.is_file()).unwrap())
         }
     };
-    ontology.properties = tested(rule);
+    let of_shipped =
+        ontology.properties.values().find(|property| property.rule.path.ends_with(&format!("/{}", rule.path)));
+    let unit = of_shipped.map_or(Some("m".to_owned()), |property| property.unit.clone());
+    ontology.properties = tested(rule, unit);
     ontology
 }
 
@@ -62,7 +65,8 @@ fn shipped_ontology() -> Ontology {
     ontology::load(&Files::Disk, &root().join("../../ontology/actions.ttl")).unwrap()
 }
 
-fn tested(rule: RuleFile) -> std::collections::BTreeMap<String, Property> {
+/// The property that a rule decides, its margin in a unit.
+fn tested(rule: RuleFile, unit: Option<String>) -> std::collections::BTreeMap<String, Property> {
     let property = Property {
         iri: TESTED.into(),
         name: "Tested".into(),
@@ -70,7 +74,7 @@ fn tested(rule: RuleFile) -> std::collections::BTreeMap<String, Property> {
         comment: None,
         rule,
         needs: Default::default(),
-        unit: Some("m".into()),
+        unit,
     };
     [(TESTED.to_owned(), property)].into()
 }

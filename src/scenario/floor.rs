@@ -149,7 +149,7 @@ impl Hand<'_> {
     /// the configuration has.
     pub(super) fn name_front(&mut self, world: Option<&Surroundings>) {
         let Some(platform) = self.objects.first().filter(|object| object.role == Role::Platform) else { return };
-        if self.goal(world).is_some() || self.designators.get("objectSurface").is_none() {
+        if self.goal(world).is_some() || !self.designators.contains_key("objectSurface") {
             return;
         }
         let named = self.designators.get("objectLocation").and_then(|names| names.first()).cloned();

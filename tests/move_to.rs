@@ -1,0 +1,175 @@
+//! Driving to places, from scenes to verdicts: what the base believes, what it sees, and what it runs into.
+
+use std::collections::BTreeMap;
+
+use actcheck::actions::ActionReport;
+use actcheck::base::{Choices, Pose, names};
+use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
+use actcheck::config::Overrides;
+use actcheck::history::RunRecord;
+use actcheck::verdict::Outcome;
+use actcheck::world::{Poison, World};
+
+use crate::support::{actcheck, project, stdout};
+
+/// The front of a table in the kitchen, and a table in the living room: the way leads through the passage.
+const KITCHEN: &str = "[world]\nworlds = [\"apartment\"]\n[objectLocation]\nlocation_list = [\"dining_table_front\"]\n\
+    [objectSurface]\nobject_surfaces = [\"dining_table\"]\n";
+/// What may stand in the way.
+const TABLE: &str = "nav_obstacle_list = [\"mini_coffee_table\"]\nnav_obstacle_count = 1\n";
+
+fn env(before: &str, tables: &str) -> Env {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("config.toml");
+    std::fs::write(&config, format!("tests = [[\"MoveTo\"]]\ntest_count = 1\nseed = 5\n{before}{tables}")).unwrap();
+    Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
+    let clock = Clock { now: String::new, secs: || 0.0 };
+    run_line(env, "test", 0, choices, &Manner { clock, disturb }).unwrap()
+}
+
+/// The scene with nothing special but what is said, and no noise.
+fn nominal(env: &Env, choices: &[(&str, f64)], disturb: Option<Disturbance>) -> RunRecord {
+    let values: BTreeMap<String, Vec<f64>> =
+        choices.iter().map(|(name, value)| ((*name).to_owned(), vec![*value])).collect();
+    run(env, Choices::named(&values), disturb)
+}
+
+fn report(run: &RunRecord) -> &ActionReport {
+    run.trace.actions[0].report.as_ref().expect("it came to its end")
+}
+
+fn outcomes(run: &RunRecord) -> BTreeMap<&str, Outcome> {
+    run.judgements[0].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
+}
+
+fn all_passed(run: &RunRecord) -> bool {
+    outcomes(run).values().all(|outcome| *outcome == Outcome::Passed)
+}
+
+/// Where the base ended: truly, and by its own belief.
+fn ends(run: &RunRecord) -> [[f64; 3]; 2] {
+    let robot = &run.trace.snapshots[1].robot;
+    [robot.base_true, robot.base_believed]
+}
+
+fn off(a: &[f64], b: &[f64]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+const GOAL: [f64; 2] = [1.31, 1.3];
+
+#[test]
+fn without_noise_and_obstacles_every_place_is_reached() {
+    let lab = "[world]\nworlds = [\"apartment\", \"lab\"]\n[objectLocation]\nlocation_list = [\"dining_table_front\", \
+        \"kitchen_cabinet_front\", \"side_table_front\", \"left_bench_front\", \"assembly_table_front\"]\n[objectSurface]\n\
+        object_surfaces = [\"dining_table\", \"kitchen_cabinet\", \"side_table\", \"left_bench\", \"assembly_table\"]\n";
+    let floor = "[objectLocation]\nlocation_list = [\"table_front\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n";
+    for (tables, n_runs) in [(lab, 8), (floor, 3)] {
+        let env = env("", tables);
+        for index in 0..n_runs {
+            let run = run(&env, Choices::random(5, index), None);
+            let fine =
+                outcomes(&run).values().all(|outcome| [Outcome::Passed, Outcome::Inapplicable].contains(outcome));
+            assert!(fine, "run {index}: {:?}", run.judgements);
+            let [truly, believed] = ends(&run);
+            let name = &run.scene.designators["objectLocation"][0];
+            let goal = run.scene.map.locations.iter().find(|location| location.name == *name);
+            let goal = goal.expect("it was sent to a place on the map");
+            assert!(
+                off(&truly, &goal.at) < 0.01 && off(&truly, &believed) < 1e-6,
+                "run {index}: {truly:?} for {goal:?}"
+            );
+        }
+    }
+}
+
+/// The paper's robot failed where an obstacle stood on its goal. Ours finds out, and touches nothing.
+#[test]
+fn a_goal_that_is_taken_is_not_reached() {
+    let env = env(TABLE, KITCHEN);
+    let run = nominal(&env, &[("obstacle.1.x", GOAL[0]), ("obstacle.1.y", GOAL[1])], None);
+    assert_eq!(report(&run).message, "dining_table_front: the goal is occupied");
+    let outcomes = outcomes(&run);
+    assert_eq!((outcomes["GoalReported"], outcomes["GoalReached"]), (Outcome::Failed, Outcome::Failed));
+    assert_eq!((outcomes["NoDriveCollisions"], outcomes["StayedInZone"]), (Outcome::Passed, Outcome::Passed));
+    assert!(off(&ends(&run)[0], &GOAL) > 0.5);
+}
+
+/// In the passage between the rooms, where the straight way is.
+const PASSAGE: [(&str, f64); 2] = [("obstacle.1.x", 0.3), ("obstacle.1.y", 0.75)];
+
+#[test]
+fn what_stands_in_the_way_is_driven_around() {
+    let env = env(TABLE, KITCHEN);
+    let free = nominal(&env, &[("obstacle.1.x", 3.5), ("obstacle.1.y", -2.5)], None);
+    let blocked = nominal(&env, &PASSAGE, None);
+    assert!(all_passed(&free) && all_passed(&blocked), "{:?} {:?}", free.judgements, blocked.judgements);
+    let plans = |run: &RunRecord| run.trace.actions[0].phases.iter().filter(|phase| phase.name == "plan").count();
+    assert_eq!(plans(&free), 1);
+    assert!(plans(&blocked) > 1, "it sees that the way by the map is blocked");
+}
+
+/// Sensors see the obstacle in a corner of the kitchen, wherever it is.
+fn hide(_: u64, world: &mut World) {
+    assert!(world.poison("mini_coffee_table_1", Poison::Decoy(Pose::upright([3.5, -2.5, 0.0], 0.0))));
+}
+
+/// Sensors see the obstacle on the goal, wherever it is.
+fn pretend(_: u64, world: &mut World) {
+    assert!(world.poison("mini_coffee_table_1", Poison::Decoy(Pose::upright([GOAL[0], GOAL[1], 0.0], 0.0))));
+}
+
+#[test]
+fn the_robot_knows_of_obstacles_what_it_sees_and_no_more() {
+    let env = env(TABLE, KITCHEN);
+    let hit = nominal(&env, &PASSAGE, Some(hide));
+    assert_eq!(outcomes(&hit)["NoDriveCollisions"], Outcome::Failed);
+    let told = hit.judgements[0].iter().find(|judgement| judgement.outcome == Outcome::Failed).unwrap();
+    assert!(told.witness.contains("mini_coffee_table_1"), "{}", told.witness);
+    let deceived = nominal(&env, &[("obstacle.1.x", 3.5), ("obstacle.1.y", -2.5)], Some(pretend));
+    assert_eq!(report(&deceived).message, "dining_table_front: the goal is occupied");
+    assert_eq!(outcomes(&deceived)["NoDriveCollisions"], Outcome::Passed);
+}
+
+#[test]
+fn a_base_that_drifts_is_not_where_it_believes_to_be_and_landmarks_help() {
+    let failures = |sensing: &str| {
+        let env = env("", &format!("{KITCHEN}[sensing]\n{sensing}"));
+        let runs: Vec<RunRecord> = (0..5).map(|index| run(&env, Choices::random(9, index), None)).collect();
+        // It ends where it believes the goal to be.
+        for run in &runs {
+            assert!(off(&ends(run)[1], &GOAL) < 0.03, "{:?}: {}", ends(run), report(run).message);
+        }
+        let agree = runs.iter().map(|run| outcomes(run)["LocalisationAgrees"]);
+        agree.filter(|outcome| *outcome == Outcome::Failed).count()
+    };
+    let drift = "odometry_drift = 0.1\nheading_drift = 0.03\n";
+    assert!(failures(drift) >= 3);
+    let landmarks = "landmark_every_m = 0.3\nlandmark_noise_m = 0.01\nlandmark_noise_rad = 0.01\n";
+    assert_eq!(failures(&format!("{drift}{landmarks}")), 0);
+}
+
+#[test]
+fn every_run_is_the_same_at_one_and_at_two_workers_and_without_its_noise_it_is_another() {
+    let project = project();
+    let hashes = |jobs: &str| {
+        let all = ["run", "configs/move_to.toml", "--runs", "4", "--jobs", jobs, "--history", jobs, "--format", "json"];
+        assert!(actcheck(project.path(), &all).status.code().is_some_and(|code| code < 2));
+        let text = stdout(&actcheck(project.path(), &["list", "--history", jobs, "--format", "csv"]));
+        let hashes = text.lines().skip(1).filter_map(|line| line.rsplit(',').next().map(str::to_owned));
+        hashes.collect::<Vec<String>>()
+    };
+    let one = hashes("1");
+    assert_eq!(one.len(), 4);
+    assert_eq!(one, hashes("2"));
+    let env = Env::prepare(&project.path().join("configs/move_to.toml"), &Overrides::default()).unwrap();
+    let first = run(&env, Choices::random(env.campaign.seed, 0), None);
+    let again = run(&env, Choices::recorded(&first.choices), None);
+    assert_eq!(first.trace, again.trace);
+    let quiet: Vec<_> = first.choices.iter().filter(|c| !c.name.starts_with("sense.odometry")).cloned().collect();
+    assert!(quiet.len() < first.choices.len());
+    assert_ne!(run(&env, Choices::recorded(&quiet), None).trace.hash, first.trace.hash);
+}
