@@ -15,6 +15,9 @@ use crate::support::{actcheck, project, stdout};
 /// The front of a table in the kitchen, and a table in the living room: the way leads through the passage.
 const KITCHEN: &str = "[world]\nworlds = [\"apartment\"]\n[objectLocation]\nlocation_list = [\"dining_table_front\"]\n\
     [objectSurface]\nobject_surfaces = [\"dining_table\"]\n";
+/// A table on a floor with nothing else.
+const FLOOR: &str =
+    "[objectLocation]\nlocation_list = [\"table_front\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n";
 /// What may stand in the way.
 const TABLE: &str = "nav_obstacle_list = [\"mini_coffee_table\"]\nnav_obstacle_count = 1\n";
 
@@ -45,8 +48,9 @@ fn outcomes(run: &RunRecord) -> BTreeMap<&str, Outcome> {
     run.judgements[0].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
 }
 
-fn all_passed(run: &RunRecord) -> bool {
-    outcomes(run).values().all(|outcome| *outcome == Outcome::Passed)
+/// Where there are no rooms, there is no zone to stay in.
+fn nothing_failed(run: &RunRecord) -> bool {
+    outcomes(run).values().all(|outcome| [Outcome::Passed, Outcome::Inapplicable].contains(outcome))
 }
 
 /// Where the base ended: truly, and by its own belief.
@@ -66,14 +70,11 @@ fn without_noise_and_obstacles_every_place_is_reached() {
     let lab = "[world]\nworlds = [\"apartment\", \"lab\"]\n[objectLocation]\nlocation_list = [\"dining_table_front\", \
         \"kitchen_cabinet_front\", \"side_table_front\", \"left_bench_front\", \"assembly_table_front\"]\n[objectSurface]\n\
         object_surfaces = [\"dining_table\", \"kitchen_cabinet\", \"side_table\", \"left_bench\", \"assembly_table\"]\n";
-    let floor = "[objectLocation]\nlocation_list = [\"table_front\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n";
-    for (tables, n_runs) in [(lab, 8), (floor, 3)] {
+    for (tables, n_runs) in [(lab, 8), (FLOOR, 3)] {
         let env = env("", tables);
         for index in 0..n_runs {
             let run = run(&env, Choices::random(5, index), None);
-            let fine =
-                outcomes(&run).values().all(|outcome| [Outcome::Passed, Outcome::Inapplicable].contains(outcome));
-            assert!(fine, "run {index}: {:?}", run.judgements);
+            assert!(nothing_failed(&run), "run {index}: {:?}", run.judgements);
             let [truly, believed] = ends(&run);
             let name = &run.scene.designators["objectLocation"][0];
             let goal = run.scene.map.locations.iter().find(|location| location.name == *name);
@@ -98,39 +99,45 @@ fn a_goal_that_is_taken_is_not_reached() {
     assert!(off(&ends(&run)[0], &GOAL) > 0.5);
 }
 
-/// In the passage between the rooms, where the straight way is.
-const PASSAGE: [(&str, f64); 2] = [("obstacle.1.x", 0.3), ("obstacle.1.y", 0.75)];
+/// The robot starts two metres before the front of a table, and an obstacle is put somewhere.
+fn from_afar(obstacle: [f64; 2], disturb: Option<Disturbance>) -> RunRecord {
+    let env = env(TABLE, FLOOR);
+    let [x, y] = obstacle;
+    let start = [("robot.x", -3.4), ("robot.y", 0.0), ("robot.heading", 0.0)];
+    nominal(&env, &[&start[..], &[("obstacle.1.x", x), ("obstacle.1.y", y)]].concat(), disturb)
+}
+
+const IN_THE_WAY: [f64; 2] = [-2.3, 0.1];
+const ASIDE: [f64; 2] = [-3.4, 2.0];
+const FRONT: [f64; 2] = [-1.29, 0.0];
 
 #[test]
 fn what_stands_in_the_way_is_driven_around() {
-    let env = env(TABLE, KITCHEN);
-    let free = nominal(&env, &[("obstacle.1.x", 3.5), ("obstacle.1.y", -2.5)], None);
-    let blocked = nominal(&env, &PASSAGE, None);
-    assert!(all_passed(&free) && all_passed(&blocked), "{:?} {:?}", free.judgements, blocked.judgements);
+    let (free, blocked) = (from_afar(ASIDE, None), from_afar(IN_THE_WAY, None));
+    assert!(nothing_failed(&free) && nothing_failed(&blocked), "{:?} {:?}", free.judgements, blocked.judgements);
     let plans = |run: &RunRecord| run.trace.actions[0].phases.iter().filter(|phase| phase.name == "plan").count();
     assert_eq!(plans(&free), 1);
     assert!(plans(&blocked) > 1, "it sees that the way by the map is blocked");
 }
 
-/// Sensors see the obstacle in a corner of the kitchen, wherever it is.
+/// Sensors see the obstacle aside, wherever it is.
 fn hide(_: u64, world: &mut World) {
-    assert!(world.poison("mini_coffee_table_1", Poison::Decoy(Pose::upright([3.5, -2.5, 0.0], 0.0))));
+    assert!(world.poison("mini_coffee_table_1", Poison::Decoy(Pose::upright([ASIDE[0], ASIDE[1], 0.0], 0.0))));
 }
 
 /// Sensors see the obstacle on the goal, wherever it is.
 fn pretend(_: u64, world: &mut World) {
-    assert!(world.poison("mini_coffee_table_1", Poison::Decoy(Pose::upright([GOAL[0], GOAL[1], 0.0], 0.0))));
+    assert!(world.poison("mini_coffee_table_1", Poison::Decoy(Pose::upright([FRONT[0], FRONT[1], 0.0], 0.0))));
 }
 
 #[test]
 fn the_robot_knows_of_obstacles_what_it_sees_and_no_more() {
-    let env = env(TABLE, KITCHEN);
-    let hit = nominal(&env, &PASSAGE, Some(hide));
+    let hit = from_afar(IN_THE_WAY, Some(hide));
     assert_eq!(outcomes(&hit)["NoDriveCollisions"], Outcome::Failed);
-    let told = hit.judgements[0].iter().find(|judgement| judgement.outcome == Outcome::Failed).unwrap();
+    let told = hit.judgements[0].iter().find(|judgement| judgement.property.ends_with("NoDriveCollisions")).unwrap();
     assert!(told.witness.contains("mini_coffee_table_1"), "{}", told.witness);
-    let deceived = nominal(&env, &[("obstacle.1.x", 3.5), ("obstacle.1.y", -2.5)], Some(pretend));
-    assert_eq!(report(&deceived).message, "dining_table_front: the goal is occupied");
+    let deceived = from_afar(ASIDE, Some(pretend));
+    assert_eq!(report(&deceived).message, "table_front: the goal is occupied");
     assert_eq!(outcomes(&deceived)["NoDriveCollisions"], Outcome::Passed);
 }
 

@@ -321,7 +321,7 @@ fn every_example_of_the_readme_runs() {
         let mut ontology = shipped_ontology();
         match words.as_str() {
             "prolog property" | "sparql property" => {
-                ontology.properties = tested(file("example"));
+                ontology.properties = tested(file("example"), Some("m".to_owned()));
                 let book = RuleBook::prepare(&ontology).unwrap_or_else(|faults| panic!("{faults}\n{text}"));
                 let findings = judged(&book, &facts.action(0).unwrap()).unwrap();
                 assert!(
