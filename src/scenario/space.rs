@@ -85,9 +85,14 @@ impl Space {
         }
         check_worlds(campaign, &worlds, &mut found);
         let names = campaign.candidates.iter().filter(|(name, _)| !is_of_objects(name));
+        let mobile = campaign.robot.base_joints.is_some();
         config::in_order_of_place(found).or(Self {
             tests: campaign.tests.len(),
-            drives: campaign.tests.iter().map(|test| test.first().is_some_and(|first| first == DRIVING)).collect(),
+            drives: campaign
+                .tests
+                .iter()
+                .map(|test| mobile && test.first().is_some_and(|first| first == DRIVING))
+                .collect(),
             surfaces,
             targets,
             others,
