@@ -3,8 +3,8 @@
 use super::proposal::{Component, Marginal, Proposal};
 use super::space::{Dimension, Space};
 
-/// What the spread of noise is multiplied with. With 2 a third of it is beyond two standard deviations.
-const SPREAD: f64 = 2.0;
+/// What the spread of noise is multiplied with. With 2.5 two fifths of it are beyond two standard deviations.
+const SPREAD: f64 = 2.5;
 
 /// Standard deviation of how far things lie from what they are put beside, in shares of the way that they could be.
 const BESIDE: f64 = 0.15;
