@@ -167,6 +167,7 @@ pub fn sample_trace(seed: u64) -> Trace {
         hash,
         map: SceneMap::default(),
         forms: vec![],
+        robot_courses: vec![],
     }
 }
 

@@ -185,6 +185,7 @@ fn the_map_is_facts() {
         hash: String::new(),
         map: scene.map.clone(),
         forms: vec![],
+        robot_courses: vec![],
     };
     let facts = actcheck::facts::extract(&trace);
     let holds = |subject: &str, property: &str, object: Term| {

@@ -33,4 +33,6 @@ pub use trace::{
 
 // States and the map are part of a trace: its readers meet them here.
 pub use crate::scenario::SceneMap;
-pub use crate::world::{BodyState, JointState, Quality, RobotState, Snapshot};
+pub use crate::world::{
+    BodyState, HeldCourse, JointCourse, JointState, Quality, RobotCourse, RobotState, SelfCollision, Snapshot,
+};

@@ -5,7 +5,8 @@ use crate::actions::memory::Memory;
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::skills::skill;
 use crate::actions::{
-    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Saboteur, Trace,
+    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, RobotCourse, Saboteur,
+    Trace,
 };
 use crate::base::Choices;
 use crate::scenario::{Budget, SceneMap};
@@ -49,19 +50,22 @@ pub fn perform_with(
     let mut snapshots = vec![world.snapshot()];
     let mut memory = Memory::default();
     let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
+    let mut robot_courses = Vec::with_capacity(calls.len());
     for call in calls {
         let stopped = actions.last().is_some_and(|last| last.end != ActionEnd::Completed);
         if stopped {
             actions.push(ActionTrace::not_reached(&call.action, &call.parameters));
             continue;
         }
-        actions.push(perform_one(call, world, choices, &mut memory, budget, interference.lent()));
+        let (action, course) = perform_one(call, world, choices, &mut memory, budget, interference.lent());
+        actions.push(action);
+        robot_courses.push(course);
         snapshots.push(world.snapshot());
     }
     let tracks = world.tracks();
     let frames = Frames { period_secs: tracks.period_secs, names: tracks.names, rows: tracks.rows };
     let forms = world.forms().into_iter().map(|(name, parts)| Form { name, parts }).collect();
-    Trace { snapshots, actions, frames, hash: world.state_digest(), map: SceneMap::default(), forms }
+    Trace { snapshots, actions, frames, hash: world.state_digest(), map: SceneMap::default(), forms, robot_courses }
 }
 
 fn perform_one(
@@ -71,7 +75,7 @@ fn perform_one(
     memory: &mut Memory,
     budget: &Budget,
     mut interference: Interference<'_>,
-) -> ActionTrace {
+) -> (ActionTrace, RobotCourse) {
     let began = world.time_secs();
     world.begin_record();
     let misled = interference.saboteur.as_deref_mut().map(|saboteur| saboteur.begin(call, world));
@@ -81,7 +85,8 @@ fn perform_one(
         Ok(skill) => operator.act(|operator| skill(understood, operator)),
         Err(unknown) => {
             let nothing = ActionTrace::not_reached(&call.action, &call.parameters);
-            return ActionTrace { end: ActionEnd::Broken(unknown.to_string()), ..nothing };
+            let broken = ActionTrace { end: ActionEnd::Broken(unknown.to_string()), ..nothing };
+            return (broken, RobotCourse::default());
         }
     };
     let (phases, percepts, perceived) = (operator.phases, operator.percepts, operator.perceived);
@@ -100,7 +105,7 @@ fn perform_one(
         max_rise_m: course.max_rise_m,
         max_displacement_m: course.max_displacement_m,
     });
-    ActionTrace {
+    let trace = ActionTrace {
         action: call.action.clone(),
         parameters: call.parameters.clone(),
         end,
@@ -112,7 +117,8 @@ fn perform_one(
         extremes: extremes.collect(),
         base: record.base,
         phases,
-    }
+    };
+    (trace, record.robot)
 }
 
 fn ended(

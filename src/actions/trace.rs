@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::base::Pose;
 use crate::scenario::{Part, SceneMap};
-use crate::world::Snapshot;
+use crate::world::{RobotCourse, Snapshot};
 
 /// A whole run as it was observed by simulation.
 ///
@@ -26,6 +26,8 @@ pub struct Trace {
     pub map: SceneMap,
     /// What objects and links look like, for pictures. Empty in traces of earlier versions.
     pub forms: Vec<Form>,
+    /// What the robot went through, one for each action that was performed. Empty in traces of earlier versions.
+    pub robot_courses: Vec<RobotCourse>,
 }
 
 /// What a body looks like: enough for an outline. Pieces of meshes are reduced to their outermost points.

@@ -317,6 +317,7 @@ mod tests {
             hash: "a".into(),
             map: Default::default(),
             forms: vec![],
+            robot_courses: vec![],
         }
     }
 

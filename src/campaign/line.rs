@@ -227,6 +227,7 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
         hash: String::new(),
         map: scene.map.clone(),
         forms: Vec::new(),
+        robot_courses: Vec::new(),
     }
 }
 

@@ -66,6 +66,7 @@ impl Requirement {
             hash: String::new(),
             map: scene.map.clone(),
             forms: Vec::new(),
+            robot_courses: Vec::new(),
         };
         let facts = facts::extract(&trace);
         let state = &facts.snapshots[0];

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::actions::{ActionEnd, SceneMap, Trace};
 use crate::base::{Term, TermId, names};
 use crate::facts::writer::Writer;
-use crate::facts::{RunFacts, during, places, snapshot};
+use crate::facts::{RunFacts, during, places, robot_course, snapshot};
 
 /// The facts of a run: one list for each snapshot, and one list of what happened and one of designators for each action.
 ///
@@ -20,11 +20,14 @@ pub fn extract(trace: &Trace) -> RunFacts {
         facts.snapshots.push(writer.take());
     }
     let bodies: BTreeSet<&str> = trace.snapshots.iter().flat_map(|s| s.bodies.iter().map(|b| b.id.as_str())).collect();
-    for action in &trace.actions {
+    for (idx, action) in trace.actions.iter().enumerate() {
         if action.end != ActionEnd::NotReached {
             during::write(action, &mut writer);
             if let (Some(base), false) = (&action.base, trace.map.rooms.is_empty()) {
                 during::write_base(base, &mut writer);
+            }
+            if let Some(course) = trace.robot_courses.get(idx) {
+                robot_course::write(course, &mut writer);
             }
         }
         facts.during.push(writer.take());

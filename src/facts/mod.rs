@@ -5,6 +5,7 @@
 mod during;
 mod extract;
 mod places;
+mod robot_course;
 mod run_facts;
 mod snapshot;
 mod writer;

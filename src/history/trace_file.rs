@@ -10,15 +10,15 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
 use crate::actions::Snapshot;
-use crate::actions::{ActionTrace, Form, Frames, SceneMap, Trace};
+use crate::actions::{ActionTrace, Form, Frames, RobotCourse, SceneMap, Trace};
 use crate::base::Choice;
 use crate::history::frames;
 
 /// What each file begins with. The last letter is the format; it goes up whenever a type of the trace changes.
 const MAGIC: &[u8; 8] = b"actrace2";
 
-/// First part: decisions, states, actions, time between frames, names of tracks, hash. Behind it stand the map and the forms
-/// of bodies. (Traces of earlier versions end before either.)
+/// First part: decisions, states, actions, time between frames, names of tracks, hash. Behind it stand the map, the forms of
+/// bodies and what the robot went through. (Traces of earlier versions end before either.)
 type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
 
 /// A run's file as bytes.
@@ -29,7 +29,9 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
     let frames = &trace.frames;
     let head = (choices, &trace.snapshots, &trace.actions, frames.period_secs, &frames.names, &trace.hash);
     let mut head = postcard::to_stdvec(&head).map_err(|error| error.to_string())?;
-    head.extend(postcard::to_stdvec(&(&trace.map, &trace.forms)).map_err(|error| error.to_string())?);
+    head.extend(
+        postcard::to_stdvec(&(&trace.map, &trace.forms, &trace.robot_courses)).map_err(|error| error.to_string())?,
+    );
     let head = compressed(&head)?;
     let course = compressed(&frames::encode(&frames.rows))?;
     let length = u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
@@ -60,11 +62,20 @@ fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let read = |error: postcard::Error| error.to_string().to_lowercase();
     let (head, rest): (Head, &[u8]) = postcard::take_from_bytes(&head).map_err(read)?;
     let (map, rest): (SceneMap, &[u8]) = part_of(rest).map_err(read)?;
-    let (forms, _): (Vec<Form>, &[u8]) = part_of(rest).map_err(read)?;
+    let (forms, rest): (Vec<Form>, &[u8]) = part_of(rest).map_err(read)?;
+    let (robot_courses, _): (Vec<RobotCourse>, &[u8]) = part_of(rest).map_err(read)?;
     let (choices, snapshots, actions, period_secs, names, hash) = head;
     Ok((
         choices,
-        Trace { snapshots, actions, frames: Frames { period_secs, names, rows: Vec::new() }, hash, map, forms },
+        Trace {
+            snapshots,
+            actions,
+            frames: Frames { period_secs, names, rows: Vec::new() },
+            hash,
+            map,
+            forms,
+            robot_courses,
+        },
     ))
 }
 

@@ -7,10 +7,11 @@ use rapier3d::prelude::RigidBodyHandle;
 
 use crate::base::{Digest, Pose};
 use crate::world::World;
-use crate::world::contacts::touches;
+use crate::world::contacts::{Touch, touches};
 use crate::world::convert::{from_pose, from_vector};
 use crate::world::engine::Owner;
 use crate::world::quality::QualityMeter;
+use crate::world::robot_course::{RobotCourse, RobotMeter};
 
 /// Time between two frames. Unit: seconds. Pictures and replays need no more, and a trace stays small.
 const FRAME_SECS: f64 = 0.1;
@@ -58,6 +59,8 @@ pub struct Record {
     pub courses: Vec<Course>,
     /// Smallest and largest true x and y of the base; nothing where it stands for good. Unit: metres.
     pub base: Option<[[f64; 2]; 2]>,
+    /// What the robot went through.
+    pub robot: RobotCourse,
 }
 
 /// Poses over time; see the fields of the same names in a trace.
@@ -94,6 +97,7 @@ pub struct Recorder {
     open: BTreeMap<(Owner, Owner), Episode>,
     closed: Vec<((Owner, Owner), Episode)>,
     pub(super) quality: QualityMeter,
+    pub(super) robot: RobotMeter,
 }
 
 impl Recorder {
@@ -115,7 +119,18 @@ impl Recorder {
             open: BTreeMap::new(),
             closed: Vec::new(),
             quality: QualityMeter::default(),
+            robot: RobotMeter::default(),
         }
+    }
+
+    /// Control ticks since the world was built.
+    pub(super) fn n_ticks(&self) -> u64 {
+        self.n_ticks
+    }
+
+    /// Time of a tick since the record began. Unit: seconds.
+    pub(super) fn secs_since_begin(&self, tick: u64) -> f64 {
+        tick.saturating_sub(self.began) as f64 * self.tick_secs
     }
 }
 
@@ -133,14 +148,14 @@ impl World {
         if recorder.rows.is_empty() {
             self.frame();
         }
+        self.begin_robot_course();
     }
 
     /// Ends a record and hands it out.
     pub fn end_record(&mut self) -> Record {
         let mut closed = std::mem::take(&mut self.recorder.closed);
         closed.extend(std::mem::take(&mut self.recorder.open));
-        let (began, tick_secs) = (self.recorder.began, self.recorder.tick_secs);
-        let secs = |tick: u64| tick.saturating_sub(began) as f64 * tick_secs;
+        let secs = |tick: u64| self.recorder.secs_since_begin(tick);
         let mut contacts: Vec<Contact> = closed
             .iter()
             .map(|((first, second), episode)| {
@@ -162,7 +177,7 @@ impl World {
                 max_displacement_m: *max_displacement_m,
             })
             .collect();
-        Record { contacts, courses, base: self.recorder.base }
+        Record { contacts, courses, base: self.recorder.base, robot: self.end_robot_course() }
     }
 
     /// The course of everything that moves since the first record began.
@@ -195,11 +210,13 @@ impl World {
     pub(super) fn record(&mut self) {
         self.recorder.n_ticks += 1;
         self.digest_state();
-        let recording = !self.recorder.begin_poses.is_empty();
+        let recording = !self.recorder.rows.is_empty();
         if recording {
             self.record_extremes();
             self.record_base();
-            self.record_contacts();
+            let touches = touches(&self.engine);
+            self.record_contacts(&touches);
+            self.record_robot(&touches);
             if (self.recorder.n_ticks - self.recorder.began).is_multiple_of(self.recorder.ticks_per_frame) {
                 self.frame();
             }
@@ -244,16 +261,16 @@ impl World {
         (*low, *high) = ([low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]);
     }
 
-    fn record_contacts(&mut self) {
+    fn record_contacts(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
         let now = self.recorder.n_ticks;
         let patience = SAME_CONTACT_SECS / self.recorder.tick_secs;
         let mut deepest_m = 0.0f64;
-        for (pair, touch) in touches(&self.engine) {
+        for (pair, touch) in touches {
             deepest_m = deepest_m.max(touch.depth_m);
             let episode =
-                self.recorder.open.entry(pair).or_insert(Episode { start: now, latest: now, max_force_n: 0.0 });
+                self.recorder.open.entry(*pair).or_insert(Episode { start: now, latest: now, max_force_n: 0.0 });
             if (now - episode.latest) as f64 > patience {
-                self.recorder.closed.push((pair, *episode));
+                self.recorder.closed.push((*pair, *episode));
                 *episode = Episode { start: now, latest: now, max_force_n: 0.0 };
             }
             episode.latest = now;

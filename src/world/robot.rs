@@ -140,6 +140,19 @@ impl Robot {
         joints.map(load).collect()
     }
 
+    /// What each motor would give by its control law, as a share of what its joint may: more than 1 is cut off. The robot's own
+    /// weight, which is compensated, comes on top of it.
+    pub fn effort_shares(&self, positions: &[f64], velocities: &[f64]) -> Vec<f64> {
+        let states = positions.iter().zip(velocities);
+        let motors = self.motors.iter().zip(&self.model.joints).zip(states);
+        let shares = motors.map(|((motor, joint), (position, velocity))| {
+            let effort =
+                motor.stiffness * (motor.setpoint - position) + motor.damping * (motor.setpoint_velocity - velocity);
+            if joint.effort > 0.0 { effort.abs() / joint.effort } else { 0.0 }
+        });
+        shares.collect()
+    }
+
     /// Tells one joint's controller where to go. Positions beyond the limits are brought back to them.
     pub fn aim(&mut self, joint: usize, target: f64) {
         let Joint { lower, upper, .. } = self.model.joints[joint];
@@ -228,7 +241,7 @@ impl Robot {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::collections::BTreeMap;
     use std::path::Path;
 
@@ -240,7 +253,7 @@ mod tests {
     use crate::world::layout::check_robot;
     use crate::world::{World, build, ik};
 
-    fn lonely() -> World {
+    pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         let profile = Arc::new(crate::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right"));
         let one = (1.0, 1.0);

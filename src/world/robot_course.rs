@@ -1,0 +1,269 @@
+//! What the robot itself goes through: joints at their limits, links in each other, things in its hand.
+//!
+//! The simulation lets links of the robot pass through each other (a posture in which they do is no fault of physics), so
+//! whether they would have collided is measured beside it, from their shapes and poses.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Isometry3, Point3};
+use parry3d::query::contact;
+use rapier3d::prelude::{Collider, RigidBodyHandle};
+use serde::{Deserialize, Serialize};
+
+use crate::base::Pose;
+use crate::world::World;
+use crate::world::contacts::Touch;
+use crate::world::convert::{from_pose, from_vector};
+use crate::world::engine::Owner;
+
+/// Control ticks between two looks for links in each other. At 60 ticks a second that is twenty looks: what moves at 1 m/s
+/// goes 5 cm from one to the next.
+const TICKS_PER_LOOK: u64 = 3;
+/// A motor that gives more than this share of its limit is overloaded.
+const OVERLOAD_SHARE: f64 = 0.99;
+/// Links that go no deeper into each other than this only touch. Unit: metres.
+const TOUCH_M: f64 = 1e-4;
+
+/// What the robot went through during one action.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct RobotCourse {
+    /// One for each joint, in the robot's order.
+    pub joints: Vec<JointCourse>,
+    /// Pairs of links that were in each other, sorted.
+    pub self_contacts: Vec<SelfCollision>,
+    /// Things that both fingers touched at some time, in scene order.
+    pub held: Vec<HeldCourse>,
+}
+
+/// Extremes of one joint. Units: metres or radians, by kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointCourse {
+    /// Name in the URDF.
+    pub name: String,
+    /// How far its position was beyond its limits at most; negative where it kept inside.
+    pub max_excess: f64,
+    /// Largest speed as a share of the joint's limit.
+    pub max_speed_share: f64,
+    /// Longest time without a break that its motor gave all it may. Unit: seconds.
+    pub overload_secs: f64,
+}
+
+/// Two links of the robot that were in each other, and had not been when the run began.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SelfCollision {
+    /// `robot/LINK`, sorted.
+    pub pair: [String; 2],
+    /// When it was first seen, since the action began. Unit: seconds.
+    pub start_secs: f64,
+    /// How deep they were in each other at most. Unit: metres.
+    pub max_depth_m: f64,
+}
+
+/// Something between both fingers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeldCourse {
+    /// Id of the object.
+    pub id: String,
+    /// For how long, all together. Unit: seconds.
+    pub held_secs: f64,
+    /// Largest angle from the vertical meanwhile. Unit: radians.
+    pub max_tilt_rad: f64,
+}
+
+/// Gathers a [`RobotCourse`].
+#[derive(Default)]
+pub(super) struct RobotMeter {
+    joints: Vec<JointMeter>,
+    /// Tick of the first sight and largest depth.
+    self_contacts: BTreeMap<(usize, usize), (u64, f64)>,
+    /// Ticks and largest tilt.
+    held: BTreeMap<usize, (u64, f64)>,
+    /// Pairs of links that could collide, found when the first record begins.
+    pairs: Option<Vec<(usize, usize)>>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct JointMeter {
+    max_excess: f64,
+    max_speed_share: f64,
+    overloaded: u64,
+    longest_overload: u64,
+}
+
+impl RobotMeter {
+    fn begin(&mut self, n_joints: usize) {
+        let nothing =
+            JointMeter { max_excess: f64::NEG_INFINITY, max_speed_share: 0.0, overloaded: 0, longest_overload: 0 };
+        self.joints = vec![nothing; n_joints];
+        self.self_contacts.clear();
+        self.held.clear();
+    }
+}
+
+impl World {
+    /// Begins to measure anew; what of the robot may collide with itself is settled when this is first done.
+    pub(super) fn begin_robot_course(&mut self) {
+        if self.recorder.robot.pairs.is_none() {
+            self.recorder.robot.pairs = Some(self.pairs_apart());
+        }
+        self.recorder.robot.begin(self.robot.model.joints.len());
+    }
+
+    /// Looks at the robot after a tick.
+    pub(super) fn record_robot(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
+        self.record_joints();
+        self.record_held(touches);
+        if self.recorder.n_ticks().is_multiple_of(TICKS_PER_LOOK) {
+            self.record_self_contacts();
+        }
+    }
+
+    /// What was measured since it began.
+    pub(super) fn end_robot_course(&self) -> RobotCourse {
+        let (meter, tick_secs) = (&self.recorder.robot, self.tick_secs());
+        let joints = self.robot.model.joints.iter().zip(&meter.joints).map(|(joint, course)| JointCourse {
+            name: joint.name.clone(),
+            max_excess: course.max_excess,
+            max_speed_share: course.max_speed_share,
+            overload_secs: course.longest_overload as f64 * tick_secs,
+        });
+        let contacts = meter.self_contacts.iter().map(|((first, second), (tick, depth))| {
+            let mut pair = [*first, *second].map(|link| self.name_of(Owner::Link(link)));
+            pair.sort();
+            SelfCollision { pair, start_secs: self.recorder.secs_since_begin(*tick), max_depth_m: *depth }
+        });
+        let mut self_contacts: Vec<SelfCollision> = contacts.collect();
+        self_contacts.sort_by(|a, b| a.pair.cmp(&b.pair));
+        let held = meter.held.iter().map(|(idx, (ticks, tilt))| HeldCourse {
+            id: self.name_of(Owner::Object(*idx)),
+            held_secs: *ticks as f64 * tick_secs,
+            max_tilt_rad: *tilt,
+        });
+        RobotCourse { joints: joints.collect(), self_contacts, held: held.collect() }
+    }
+
+    fn record_joints(&mut self) {
+        let (positions, velocities) = self.robot.state(&self.engine);
+        let efforts = self.robot.effort_shares(&positions, &velocities);
+        let joints = self.robot.model.joints.iter().zip(&mut self.recorder.robot.joints);
+        for (idx, (joint, course)) in joints.enumerate() {
+            let (Some(position), Some(velocity)) = (positions.get(idx), velocities.get(idx)) else { continue };
+            course.max_excess = course.max_excess.max((joint.lower - position).max(position - joint.upper));
+            if joint.velocity > 0.0 {
+                course.max_speed_share = course.max_speed_share.max(velocity.abs() / joint.velocity);
+            }
+            let overloaded = efforts.get(idx).is_some_and(|share| *share > OVERLOAD_SHARE);
+            course.overloaded = if overloaded { course.overloaded + 1 } else { 0 };
+            course.longest_overload = course.longest_overload.max(course.overloaded);
+        }
+    }
+
+    fn record_held(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
+        let [left, right] = self.robot.finger_links;
+        for (idx, object) in self.objects.iter().enumerate() {
+            let by = |link| touches.contains_key(&(Owner::Object(idx), Owner::Link(link)));
+            if object.fixed || !(by(left) && by(right)) {
+                continue;
+            }
+            let Some(body) = self.engine.bodies.get(object.body) else { continue };
+            let tilt = Pose::from_isometry(&from_pose(body.position())).tilt();
+            let (ticks, most) = self.recorder.robot.held.entry(idx).or_insert((0, 0.0));
+            (*ticks, *most) = (*ticks + 1, most.max(tilt));
+        }
+    }
+
+    fn record_self_contacts(&mut self) {
+        let pairs = self.recorder.robot.pairs.take().unwrap_or_default();
+        let now = self.recorder.n_ticks();
+        for (first, second) in &pairs {
+            let depth = self.depth_of(*first, *second);
+            if depth > TOUCH_M {
+                let (_, most) = self.recorder.robot.self_contacts.entry((*first, *second)).or_insert((now, 0.0));
+                *most = most.max(depth);
+            }
+        }
+        self.recorder.robot.pairs = Some(pairs);
+    }
+
+    /// Pairs of links that are apart now, and are not next to each other on the robot.
+    fn pairs_apart(&self) -> Vec<(usize, usize)> {
+        let links = &self.robot.model.links;
+        let solid: Vec<usize> = (0..links.len()).filter(|idx| !links[*idx].solids.is_empty()).collect();
+        let mut neighbours = BTreeSet::new();
+        for idx in &solid {
+            // Stages without a form, such as those of the base, lie between neighbours.
+            let mut at = *idx;
+            while at > 0 {
+                at = self.robot.model.joints[at - 1].parent;
+                if !links[at].solids.is_empty() {
+                    neighbours.insert((at, *idx));
+                    break;
+                }
+            }
+        }
+        let later = |first: &usize| solid.iter().copied().filter(|second| second > first).collect::<Vec<_>>();
+        let pairs = solid.iter().flat_map(|first| later(first).into_iter().map(|second| (*first, second)));
+        pairs.filter(|pair| !neighbours.contains(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M).collect()
+    }
+
+    /// How deep two links are in each other. Unit: metres; 0 where they are apart.
+    fn depth_of(&self, first: usize, second: usize) -> f64 {
+        let balls = |idx: usize| self.solids_of(self.robot.bodies[idx]).map(|solid| (ball(solid), solid));
+        let mut deepest = 0.0f64;
+        for ((middle, radius), a) in balls(first) {
+            for ((other, other_radius), b) in balls(second) {
+                if (middle - other).norm() > radius + other_radius {
+                    continue;
+                }
+                let met = contact(a.position(), a.shape(), b.position(), b.shape(), 0.0).ok().flatten();
+                deepest = deepest.max(met.map_or(0.0, |met| -f64::from(met.dist)));
+            }
+        }
+        deepest
+    }
+
+    fn solids_of(&self, body: RigidBodyHandle) -> impl Iterator<Item = &Collider> {
+        let handles = self.engine.bodies.get(body).map(rapier3d::prelude::RigidBody::colliders).unwrap_or_default();
+        handles.iter().filter_map(|handle| self.engine.colliders.get(*handle))
+    }
+}
+
+/// Middle and radius of a ball around a solid. Frame: world. Unit: metres.
+fn ball(solid: &Collider) -> (Point3<f64>, f64) {
+    let around = solid.shape().compute_local_bounding_sphere();
+    let pose: Isometry3<f64> = from_pose(solid.position());
+    (pose * Point3::from(from_vector(around.center)), f64::from(around.radius))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::world::robot::tests::lonely;
+
+    /// A posture puts the hand into the robot's own body: it is seen; the home posture is free of it.
+    #[test]
+    fn links_in_each_other_are_seen_and_joints_beyond_their_limits_too() {
+        let mut world = lonely();
+        world.begin_record();
+        let hold = world.hold();
+        for _ in 0..30 {
+            world.step(&hold);
+        }
+        let quiet = world.end_record().robot;
+        assert!(quiet.self_contacts.is_empty(), "{quiet:?}");
+        assert!(quiet.joints.iter().all(|joint| joint.max_excess < 1e-3 && joint.max_speed_share < 0.5), "{quiet:?}");
+        assert!(quiet.joints.iter().all(|joint| joint.overload_secs < 0.2), "{quiet:?}");
+
+        world.begin_record();
+        let mut bent = hold.clone();
+        for (slot, idx) in world.layout().arm.clone().into_iter().enumerate() {
+            let joint = &world.kinematics().joints()[idx];
+            bent.positions[idx] = if slot % 2 == 0 { joint.lower } else { joint.upper };
+        }
+        for _ in 0..400 {
+            world.step(&bent);
+        }
+        let folded = world.end_record().robot;
+        let [first, ..] = folded.self_contacts.as_slice() else { panic!("{folded:?}") };
+        assert!(first.max_depth_m > 0.005 && first.start_secs > 0.0, "{folded:?}");
+    }
+}
