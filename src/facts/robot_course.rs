@@ -14,7 +14,10 @@ pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
     writer.boolean(action, "robotMeasured", true);
     for joint in &course.joints {
         let subject = writer.named("joint", &joint.name);
-        writer.number(subject, "maxExcess", joint.max_excess);
+        // A joint that turns without end is infinitely far from its limits.
+        if joint.max_excess.is_finite() {
+            writer.number(subject, "maxExcess", joint.max_excess);
+        }
         if joint.max_speed_share >= STANDS_STILL {
             writer.number(subject, "maxSpeedShare", joint.max_speed_share);
         }

@@ -53,12 +53,15 @@ impl DepthImage {
 impl World {
     /// Takes a picture with the camera as it is now, at its true place.
     pub fn look(&self, choices: &mut Choices) -> DepthImage {
+        let began_secs = self.watch_secs();
         let camera = &self.sensing.camera;
         let frame = choices.index("sense.camera.frame", FRAMES);
         let noise = (frame > 0).then(|| Noise { camera, stream: Stream::new(frame as u64) });
         let eye = self.robot.kinematics.camera(&self.robot.state(&self.engine).0);
         let solids = Solids::new(lens(camera), &eye, self.solids());
-        picture(camera, &solids, noise.as_ref())
+        let image = picture(camera, &solids, noise.as_ref());
+        self.looked(began_secs);
+        image
     }
 
     /// All shapes, where sensors see them.
@@ -89,7 +92,7 @@ fn picture(camera: &Camera, solids: &Solids<'_>, noise: Option<&Noise<'_>>) -> D
     let mut depths = Vec::with_capacity(width * height);
     for row in 0..height {
         for column in 0..width {
-            let [left, up] = lens.slopes(column, row);
+            let [left, up] = solids.slopes(column, row);
             let stretch = (1.0 + left * left + up * up).sqrt();
             let depth = solids.first(column, row, camera.max_range_m / stretch).and_then(|hit| {
                 let range = hit.along * stretch;
@@ -116,11 +119,17 @@ impl Noise<'_> {
     /// The range that a pixel measures, if it measures any. `sine` is that of the angle between ray and surface.
     fn measure(&self, pixel: u64, range: f64, sine: impl FnOnce() -> f64) -> Option<f64> {
         let grazing = self.camera.grazing_rad;
-        let lost = if grazing > 0.0 { (1.0 - libm::asin(sine()) / grazing).max(0.0) } else { 0.0 };
+        let lost = if grazing > 0.0 { lost_at(sine(), grazing) } else { 0.0 };
         let kept = (1.0 - lost) * (1.0 - self.camera.dropout);
         let error = self.camera.range_noise_m * range * range * self.stream.bell(2 * pixel);
         (self.stream.unit(2 * pixel + 1) < kept).then_some(range + error)
     }
+}
+
+/// Share of pixels that are lost where a surface is seen at an angle of this sine: all of them at 0, none from `grazing` on.
+fn lost_at(sine: f64, grazing: f64) -> f64 {
+    // An angle is never smaller than its sine: the arc sine, which takes long, is for grazing rays only.
+    if sine >= grazing { 0.0 } else { (1.0 - libm::asin(sine) / grazing).max(0.0) }
 }
 
 #[cfg(test)]

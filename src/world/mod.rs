@@ -27,6 +27,7 @@ mod robot_course;
 mod self_contact;
 mod sense;
 mod settle;
+mod silhouette;
 mod simulation;
 mod snapshot;
 

@@ -1,19 +1,21 @@
 //! Rays from one eye: which shape each meets first.
 //!
 //! A picture has as many rays as pixels, and all start at one point. So every shape is prepared once for that point, and
-//! each ray is only tried against the shapes whose outline is near its pixel, nearest first. Boxes, cylinders and balls,
-//! which most shapes are, are met in closed form; the library's cylinders are searched for and take a hundred times as long.
+//! each ray is only tried against the shapes whose outline meets the tile of its pixel and whose ball it passes through,
+//! nearest first. Boxes, cylinders and balls, which most shapes are, are met in closed form; the library's cylinders are
+//! searched for and take a hundred times as long.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::query::Ray;
 use parry3d::shape::{Shape, TypedShape};
 
 use crate::world::convert::{from_vector, to_real, to_vector};
+use crate::world::silhouette::Silhouette;
 
 /// Pixels along one side of a tile: fine enough for few shapes in each, coarse enough for few tiles.
 const TILE: usize = 8;
-/// What is not so far in front of the eye may be anywhere in the picture. Unit: metres.
-const NEAR_M: f64 = 0.01;
+/// By this much balls around shapes are larger, so that rounding makes no ray miss what it meets. Unit: metres.
+const BALL_RIM_M: f64 = 1e-4;
 
 /// A lens: how pixels and directions belong together. Frame: camera, x forwards, y left, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +50,8 @@ impl Lens {
 /// Shapes as they are met from one eye.
 pub(super) struct Solids<'a> {
     lens: Lens,
+    /// How far the rays of each column go left, and of each row up, on a unit of their way forwards.
+    slopes: [Vec<f64>; 2],
     solids: Vec<Solid<'a>>,
     /// For each tile, row by row: the shapes that may be in it, the nearest first.
     tiles: Vec<Vec<usize>>,
@@ -73,19 +77,32 @@ impl<'a> Solids<'a> {
         order.sort_by(|a, b| solids[*a].nearest.total_cmp(&solids[*b].nearest).then(a.cmp(b)));
         let mut tiles = vec![Vec::new(); columns * rows];
         for idx in order {
-            let Some([left, right, top, bottom]) = solids[idx].outline(&lens) else { continue };
+            let Some(silhouette) = Silhouette::of(&solids[idx].corners, &lens) else { continue };
+            let [left, right, top, bottom] = silhouette.within(lens.width, lens.height);
             for row in top / TILE..=bottom / TILE {
                 for column in left / TILE..=right / TILE {
-                    tiles[row * columns + column].push(idx);
+                    if silhouette.meets([column * TILE, row * TILE], TILE) {
+                        tiles[row * columns + column].push(idx);
+                    }
                 }
             }
         }
-        Self { lens, solids, tiles }
+        let slopes = [
+            (0..lens.width).map(|column| lens.slopes(column, 0)[0]).collect(),
+            (0..lens.height).map(|row| lens.slopes(0, row)[1]).collect(),
+        ];
+        Self { lens, slopes, solids, tiles }
+    }
+
+    /// As [`Lens::slopes`], looked up.
+    pub(super) fn slopes(&self, column: usize, row: usize) -> [f64; 2] {
+        [self.slopes[0][column], self.slopes[1][row]]
     }
 
     /// The first shape that a pixel's ray meets within `most` of its lengths.
     pub(super) fn first(&self, column: usize, row: usize, most: f64) -> Option<Hit> {
-        let slopes = self.lens.slopes(column, row);
+        let slopes = self.slopes(column, row);
+        let square = 1.0 + slopes[0] * slopes[0] + slopes[1] * slopes[1];
         let [columns, _] = self.lens.tiles();
         let mut best: Option<Hit> = None;
         for idx in &self.tiles[row / TILE * columns + column / TILE] {
@@ -93,6 +110,9 @@ impl<'a> Solids<'a> {
             let solid = &self.solids[*idx];
             if solid.nearest >= limit {
                 break;
+            }
+            if !solid.ball.is_passed_by(slopes, square) {
+                continue;
             }
             if let Some(along) = solid.met_at(slopes, limit) {
                 best = Some(Hit { along, solid: *idx });
@@ -104,7 +124,7 @@ impl<'a> Solids<'a> {
     /// Sine of the angle between a pixel's ray and the surface that it met.
     pub(super) fn sine(&self, column: usize, row: usize, hit: Hit) -> f64 {
         let solid = &self.solids[hit.solid];
-        let ray = solid.direction(self.lens.slopes(column, row));
+        let ray = solid.direction(self.slopes(column, row));
         let normal = solid.normal(&ray, hit.along);
         (normal.dot(&ray) / (normal.norm() * ray.norm())).abs().min(1.0)
     }
@@ -118,10 +138,26 @@ struct Solid<'a> {
     forwards: Vector3<f64>,
     left: Vector3<f64>,
     up: Vector3<f64>,
-    /// Corners of the box around it. Frame: camera.
+    /// Corners of the box around it. Frame: camera. A corner's number has a bit for each axis.
     corners: [Point3<f64>; 8],
+    ball: Around,
     /// Forward distance that none of its points is nearer than. Unit: metres.
     nearest: f64,
+}
+
+/// A ball around a shape, as rays from the eye pass it. Frame: camera.
+struct Around {
+    middle: Vector3<f64>,
+    /// Squared distance of the eye from its surface, along a tangent; negative where the eye is inside.
+    off: f64,
+}
+
+impl Around {
+    /// Whether a ray passes through, or may. `square` is that of its length.
+    fn is_passed_by(&self, [left, up]: [f64; 2], square: f64) -> bool {
+        let dot = self.middle.x + self.middle.y * left + self.middle.z * up;
+        self.off <= 0.0 || (dot > 0.0 && dot * dot >= self.off * square)
+    }
 }
 
 /// Forms that rays meet in closed form. Unit: metres.
@@ -158,6 +194,8 @@ impl<'a> Solid<'a> {
             let pick = |axis: usize| if bits >> axis & 1 == 1 { high[axis] } else { low[axis] };
             eye_from_shape * Point3::new(pick(0), pick(1), pick(2))
         });
+        let middle = (eye_from_shape * Point3::from((low + high) / 2.0)).coords;
+        let radius = (high - low).norm() / 2.0 + BALL_RIM_M;
         let nearest = corners.iter().map(|corner| corner.x).fold(f64::INFINITY, f64::min);
         Self {
             shape,
@@ -167,32 +205,9 @@ impl<'a> Solid<'a> {
             left: shape_from_eye.rotation * Vector3::y(),
             up: shape_from_eye.rotation * Vector3::z(),
             corners,
+            ball: Around { middle, off: middle.norm_squared() - radius * radius },
             nearest,
         }
-    }
-
-    /// First and last column, first and last row of the part of the picture that it may be in, if any.
-    fn outline(&self, lens: &Lens) -> Option<[usize; 4]> {
-        let (last_column, last_row) = (lens.width - 1, lens.height - 1);
-        if self.corners.iter().all(|corner| corner.x < NEAR_M) {
-            return None;
-        }
-        if self.nearest < NEAR_M {
-            return Some([0, last_column, 0, last_row]);
-        }
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for pixel in self.corners.iter().filter_map(|corner| lens.pixel(corner)) {
-            for axis in 0..2 {
-                (low[axis], high[axis]) = (low[axis].min(pixel[axis]), high[axis].max(pixel[axis]));
-            }
-        }
-        let inside = high[0] >= 0.0 && high[1] >= 0.0 && low[0] <= lens.width as f64 && low[1] <= lens.height as f64;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the picture")]
-        let within = |at: f64, last: usize| at.floor().clamp(0.0, last as f64) as usize;
-        inside.then(|| {
-            let columns = [within(low[0] - 1.0, last_column), within(high[0] + 1.0, last_column)];
-            [columns[0], columns[1], within(low[1] - 1.0, last_row), within(high[1] + 1.0, last_row)]
-        })
     }
 
     fn direction(&self, [left, up]: [f64; 2]) -> Vector3<f64> {

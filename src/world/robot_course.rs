@@ -44,7 +44,7 @@ pub struct JointCourse {
     pub max_excess: f64,
     /// Largest speed as a share of the joint's limit.
     pub max_speed_share: f64,
-    /// Longest time without a break that its motor gave all it may. Unit: seconds.
+    /// Longest time without a break that its motor gave all it may; 0 for fingers, which hold by force. Unit: seconds.
     pub overload_secs: f64,
 }
 
@@ -152,7 +152,8 @@ impl World {
             if joint.velocity > 0.0 {
                 course.max_speed_share = course.max_speed_share.max(velocity.abs() / joint.velocity);
             }
-            let overloaded = efforts.get(idx).is_some_and(|share| *share > OVERLOAD_SHARE);
+            let grips = self.robot.layout.fingers.contains(&idx) || joint.mimic.is_some();
+            let overloaded = !grips && efforts.get(idx).is_some_and(|share| *share > OVERLOAD_SHARE);
             course.overloaded = if overloaded { course.overloaded + 1 } else { 0 };
             course.longest_overload = course.longest_overload.max(course.overloaded);
         }

@@ -1,5 +1,6 @@
 //! A scene that steps: the robot acts by commands, physics does the rest.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -92,6 +93,8 @@ pub struct World {
 struct Watch {
     clock_secs: fn() -> f64,
     spent_secs: f64,
+    /// Looking changes nothing of the world.
+    looked_secs: Cell<f64>,
 }
 
 /// Builds the simulation of a scene. Nothing has moved yet: see [`World::settle`].
@@ -264,12 +267,29 @@ impl World {
 
     /// From now on the wall time that the engine's steps take is measured, by a clock that counts seconds.
     pub fn watch(&mut self, clock_secs: fn() -> f64) {
-        self.watch = Some(Watch { clock_secs, spent_secs: 0.0 });
+        self.watch = Some(Watch { clock_secs, spent_secs: 0.0, looked_secs: Cell::new(0.0) });
     }
 
     /// Wall time that the engine's steps took since [`World::watch`]; 0 without it. Unit: seconds.
     pub fn watched_secs(&self) -> f64 {
         self.watch.as_ref().map_or(0.0, |watch| watch.spent_secs)
+    }
+
+    /// Time that the camera's pictures took since [`World::watch`]; 0 without it. Unit: seconds.
+    pub fn looked_secs(&self) -> f64 {
+        self.watch.as_ref().map_or(0.0, |watch| watch.looked_secs.get())
+    }
+
+    /// What the clock shows, where there is one. Unit: seconds.
+    pub(super) fn watch_secs(&self) -> Option<f64> {
+        self.watch.as_ref().map(|watch| (watch.clock_secs)())
+    }
+
+    /// A picture was taken that began at this time on the clock. Unit: seconds.
+    pub(super) fn looked(&self, began_secs: Option<f64>) {
+        if let (Some(watch), Some(began)) = (&self.watch, began_secs) {
+            watch.looked_secs.set(watch.looked_secs.get() + (watch.clock_secs)() - began);
+        }
     }
 
     /// What the robot measures of itself now.
