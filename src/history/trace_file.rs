@@ -15,7 +15,7 @@ use crate::base::Choice;
 use crate::history::frames;
 
 /// What each file begins with. The last letter is the format; it goes up whenever a type of the trace changes.
-const MAGIC: &[u8; 8] = b"actrace2";
+const MAGIC: &[u8; 8] = b"actrace3";
 
 /// First part: decisions, states, actions, time between frames, names of tracks, hash. Behind it stand the map, the forms of
 /// bodies and what the robot went through. (Traces of earlier versions end before either.)
