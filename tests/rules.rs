@@ -61,8 +61,9 @@ pub fn ontology_of(case: &Path) -> Ontology {
     ontology
 }
 
+/// With the invariants, which say in which units their margins are.
 fn shipped_ontology() -> Ontology {
-    ontology::load(&Files::Disk, &root().join("../../ontology/actions.ttl")).unwrap()
+    ontology::load(&Files::Disk, &root().join("../../ontology/extra.ttl")).unwrap()
 }
 
 /// The property that a rule decides, its margin in a unit.
