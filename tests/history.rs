@@ -38,6 +38,7 @@ fn robot() -> Arc<RobotProfile> {
         name: "mobile manipulator".to_owned(),
         urdf: Source::new("robot.urdf", "<robot/>"),
         base_joints: None,
+        planar_base: false,
         mount_height_m: 0.0,
         arm_joints: Vec::new(),
         finger_joints: [String::new(), String::new()],

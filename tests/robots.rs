@@ -1,8 +1,96 @@
 //! Robots: those that ship with the project do their task, and what is wrong with one is told with its place.
+//!
+//! A wrong robot is a folder below `tests/diagnostics/robots/` that holds `robot.toml` and what it names, with what is said about
+//! it in `expected`. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write what is missing, and read it. All are
+//! `tests/models/crane` but for what is wrong.
 
+use std::path::Path;
+use std::process::Command;
+
+use actcheck::base::{Files, Source};
+use actcheck::config::{self, Overrides};
 use serde_json::Value;
 
-use crate::support::{actcheck, project, root, stderr, stdout};
+use crate::support::{actcheck, copy, project, root, stderr, stdout};
+
+const WRONG: &str = "tests/diagnostics/robots";
+
+/// What is said of a robot; nothing if nothing is wrong.
+fn said_of(folder: &Path, profile: &str) -> String {
+    let text = format!("tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"{profile}\"\n");
+    config::load_text(Source::new(folder.join("c.toml").display().to_string(), text), folder, &Overrides::default())
+        .map_or_else(|found| found.to_string(), |_| String::new())
+}
+
+#[test]
+fn every_wrong_robot_is_told_with_its_place() {
+    assert_eq!(said_of(Path::new("tests/models"), "crane/robot.toml"), "");
+    let bless = std::env::var_os("ACTCHECK_BLESS").is_some();
+    let cases = Files::Disk.folders(Path::new(WRONG));
+    assert!(cases.len() >= 30, "only {} cases", cases.len());
+    let mut wrong = Vec::new();
+    for case in cases {
+        let name = case.file_name().unwrap().to_str().unwrap();
+        let said = said_of(Path::new(WRONG), &format!("{name}/robot.toml"));
+        let expected_path = case.join("expected");
+        if bless {
+            std::fs::write(&expected_path, &said).unwrap();
+        }
+        let expected = std::fs::read_to_string(&expected_path).unwrap_or_default();
+        if said.is_empty() || said != expected {
+            wrong.push(format!("== {}\n-- expected\n{expected}-- said\n{said}", case.display()));
+        }
+        assert_eq!(said.matches("  help: ").count(), said.lines().count() / 2, "each fault has its help:\n{said}");
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let said = said_of(Path::new(WRONG), "fixed_amr");
+    assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
+}
+
+/// The crane as xacro, checked with `xacro` as the shell finds it in the folders of `path`.
+fn check_xacro(path: &Path, body: &str) -> (Option<i32>, String) {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&root().join("tests/models/crane"), folder.path());
+    std::fs::write(folder.path().join("robot.urdf.xacro"), body).unwrap();
+    let profile = std::fs::read_to_string(folder.path().join("robot.toml")).unwrap();
+    std::fs::write(folder.path().join("x.toml"), profile.replace("robot.urdf", "robot.urdf.xacro")).unwrap();
+    let text = "tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"x.toml\"\n";
+    std::fs::write(folder.path().join("c.toml"), text).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(["check", "c.toml"])
+        .current_dir(folder.path())
+        .env("NO_COLOR", "1")
+        .env("PATH", path)
+        .output()
+        .unwrap();
+    (output.status.code(), format!("{}{}", stdout(&output), stderr(&output)))
+}
+
+/// A stand-in for the program: what matters here is that its output is read, and what it refuses is told.
+#[cfg(unix)]
+#[test]
+fn xacro_is_expanded_by_the_program_of_that_name_or_refused_with_help() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let urdf = std::fs::read_to_string(root().join("tests/models/crane/robot.urdf")).unwrap();
+    let tools = tempfile::tempdir().unwrap();
+    let (code, said) = check_xacro(tools.path(), &urdf);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("W012") && said.contains("pip install xacro"), "{said}");
+    let program = tools.path().join("xacro");
+    let script = "#!/bin/sh\nwhile IFS= read -r line; do\n  case \"$line\" in *xacro:if*) \
+        echo \"undefined name 'arm' when processing file $1\" >&2; exit 2;; esac\n  printf '%s\\n' \"$line\"\ndone < \"$1\"\n";
+    std::fs::write(&program, script).unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let (code, said) = check_xacro(tools.path(), &urdf);
+    assert_eq!(code, Some(0), "{said}");
+    let (code, said) = check_xacro(tools.path(), "<robot><xacro:if value=\"${arm}\"/></robot>\n");
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("xacro refuses robot.urdf.xacro: undefined name 'arm'"), "{said}");
+    // Faults of what came out are told with their lines in it.
+    let (code, said) = check_xacro(tools.path(), &urdf.replace("value=\"3\"", "value=\"-3\""));
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("robot.urdf.xacro (expanded):10:"), "{said}");
+}
 
 /// The lone glass of `configs/lone_glass.toml`, for the arm that can't drive.
 fn lone_glass_for_fixed_arm() -> String {

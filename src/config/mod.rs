@@ -13,12 +13,14 @@ mod mesh;
 pub mod model;
 mod ranges;
 pub mod robot;
+mod robot_roles;
 mod shape;
 mod shelf;
 mod table;
 mod value;
 mod words;
 mod world_map;
+mod xacro;
 
 pub use campaign::{Budget, Camera, Campaign, Launcher, Limits, Odometry, Overrides, Physics, Range, Sensing};
 pub use case::Case;

@@ -3,13 +3,17 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Digest, Files, Source, digest_of};
+use crate::base::{Diagnostic, Diagnostics, Digest, Files, Source, did_you_mean, digest_of};
 use crate::config::foreign::{self, Lookup};
 use crate::config::load::beside;
-use crate::config::{Located, Shape, Table};
+use crate::config::robot_roles::Roles;
+use crate::config::{Located, Shape, Table, xacro};
 
 /// `package://` is looked for in so many folders above the URDF: `PACKAGE/robots/FILE.urdf` lies two below the packages.
 const PACKAGE_LEVELS: usize = 4;
+
+/// Joints of the base that `base = "planar"` puts below the URDF's root: x, y, heading.
+const PLANAR_JOINTS: [&str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 
 /// A robot: its URDF and the parts that the skills need to know. Read from a profile beside the URDF.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +24,8 @@ pub struct RobotProfile {
     pub urdf: Source,
     /// Joints of an omnidirectional base in the order x, y, heading; `None` where the base is fixed.
     pub base_joints: Option<[String; 3]>,
+    /// Whether those joints are not in the URDF, but are put below its root: `base = "planar"`.
+    pub planar_base: bool,
     /// Height of the root above the floor, for a base that is mounted on something; what it is mounted on is not simulated.
     /// Unit: metres.
     pub mount_height_m: f64,
@@ -63,39 +69,45 @@ pub fn read(files: &Files, path: &Path) -> Result<RobotProfile, Diagnostics> {
 }
 
 /// Reads a profile, the URDF that it names (relative to the profile) and the meshes that this names: `package://NAME/…` is
-/// looked for in the folders of the profile's `package_dirs`, in `packages`, and around the URDF.
+/// looked for in the folders of the profile's `package_dirs`, in `packages`, and around the URDF. xacro is expanded.
 ///
 /// # Errors
-/// Every fault of the text: the table reader's own (`C…`), a file that can't be read (W010), a list of the
-/// wrong length (W011), xacro (W012), and meshes that are unusable (W037). Whether the URDF holds what the profile names is for [`crate::world`] to check.
+/// Every fault of both texts: the table reader's own (`C…`), a file that can't be read (W010), a list of the wrong length
+/// (W011), xacro that can't be expanded (W012), what is wrong with the URDF and its meshes (W031 to W037, W051), and roles that
+/// the URDF can't fill (W050 to W054).
 pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<RobotProfile, Diagnostics> {
     let source = files.read(path).map_err(|reason| {
         Diagnostic::error("W010", format!("cannot read the robot profile {}: {reason}", path.display()))
             .help("a profile is a TOML file that names a URDF and its joints")
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut urdf_path = PathBuf::new();
     let mut table = Table::parse(&source)?;
     let mut found = Diagnostics::new();
     let mut folders: Vec<PathBuf> = values(table.strings("package_dirs").unwrap_or_default())
         .into_iter()
         .map(|written| beside(folder, &written))
         .collect();
-    let profile = read_table(&mut table, &source, &mut found, |urdf| {
-        urdf_path = beside(folder, urdf);
-        files.read(&urdf_path).map_err(|reason| format!("cannot read the URDF {}: {reason}", urdf_path.display()))
-    });
+    let urdf = read_urdf(files, folder, &mut table);
+    let mut roles = Roles::default();
+    let profile = read_table(&mut table, urdf.as_ref().map(|(urdf, _)| urdf), &mut roles, &mut found);
+    let mut read = None;
+    if let Some((text, path)) = &urdf {
+        folders.extend(packages.iter().cloned());
+        folders.extend(path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf));
+        let text = foreign::robot::read(text, path, &Lookup { files, folders }, &mut found);
+        if let Some(tree) = &text.tree {
+            roles.check(tree, &mut table);
+        }
+        read = Some(text);
+    }
     table.finish(&mut found);
-    folders.extend(packages.iter().cloned());
-    folders.extend(urdf_path.ancestors().skip(1).take(PACKAGE_LEVELS).map(Path::to_path_buf));
-    let profile = profile.map(|profile| with_meshes(profile, &urdf_path, &Lookup { files, folders }, &mut found));
     found.or(())?;
     // Every missing or wrong key was noted above, so something is missing only beside a fault.
-    profile.ok_or_else(|| Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into())
+    let incomplete = || Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into();
+    profile.zip(read).map(|(profile, read)| with_meshes(profile, read)).ok_or_else(incomplete)
 }
 
-fn with_meshes(mut profile: RobotProfile, urdf: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotProfile {
-    let read = foreign::robot::read(&profile.urdf, urdf, lookup, found);
+fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> RobotProfile {
     if !read.meshes.is_empty() {
         profile.digest = digest_of(&format!("{}{}", profile.digest, read.digest));
         profile.meshes = read.meshes;
@@ -103,54 +115,88 @@ fn with_meshes(mut profile: RobotProfile, urdf: &Path, lookup: &Lookup, found: &
     profile
 }
 
+/// The URDF's text, expanded where it is xacro, and its path.
+fn read_urdf(files: &Files, folder: &Path, table: &mut Table) -> Option<(Source, PathBuf)> {
+    let written = table.string("urdf")?;
+    let path = beside(folder, &written.value);
+    match files.read(&path) {
+        Ok(_) if xacro::is_xacro(&path) => match xacro::expand(&path) {
+            Ok(urdf) => return Some((urdf, path)),
+            Err(fault) => table.fault("W012", written.span, fault.message, fault.help),
+        },
+        Ok(urdf) => return Some((urdf, path)),
+        Err(reason) => {
+            let message = format!("cannot read the URDF {}: {reason}", path.display());
+            table.fault("W010", written.span, message, "the path is relative to the profile");
+        }
+    }
+    None
+}
+
+/// The base: joints of the URDF, joints that are put below it, or none.
+fn read_base(table: &mut Table, roles: &mut Roles) -> Option<(Option<[String; 3]>, bool)> {
+    let kind = table.string("base");
+    let joints = if table.has("base_joints") { Some(names(table, "base_joints", roles)?) } else { None };
+    let Some(kind) = kind else { return Some((joints, false)) };
+    match (kind.value.as_str(), joints) {
+        ("planar", None) => Some((Some(PLANAR_JOINTS.map(str::to_owned)), true)),
+        ("fixed", None) => Some((None, false)),
+        ("planar" | "fixed", Some(_)) => {
+            let message = format!("`base = \"{}\"` and `base_joints` exclude each other", kind.value);
+            table.fault("W052", kind.span, message, "`base_joints` are for a URDF that has joints for its base");
+            None
+        }
+        (other, _) => {
+            let help = did_you_mean(other, ["planar", "fixed"]);
+            table.fault("W011", kind.span, format!("there is no base `{other}`"), help);
+            None
+        }
+    }
+}
+
 fn read_table(
     table: &mut Table,
-    source: &Source,
+    urdf: Option<&Source>,
+    roles: &mut Roles,
     found: &mut Diagnostics,
-    read_urdf: impl FnOnce(&str) -> Result<Source, String>,
 ) -> Option<RobotProfile> {
     table.require(&["name", "urdf", "arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link"]);
     table.require(&["max_opening_m", "finger_friction", "grip_force_n", "home"]);
     let name = table.string("name");
-    let urdf = table.string("urdf").and_then(|written| match read_urdf(&written.value) {
-        Ok(_) if written.value.ends_with(".xacro") => {
-            let message = format!("{} is xacro, which has to be expanded first", written.value);
-            table.fault("W012", written.span, message, "run `xacro FILE.urdf.xacro > FILE.urdf`, and name that file");
-            None
-        }
-        Ok(urdf) => Some(urdf),
-        Err(reason) => {
-            table.fault("W010", written.span, reason, "the path is relative to the profile");
-            None
-        }
-    });
-    let base_joints = if table.has("base_joints") { Some(names(table, "base_joints")?) } else { None };
+    let base = read_base(table, roles);
     let arm_joints = table.some_strings("arm_joints");
-    let finger_joints = names(table, "finger_joints");
-    let finger_links = names(table, "finger_links");
+    roles.joints.push(("arm_joints", arm_joints.clone().unwrap_or_default()));
+    let finger_joints = names(table, "finger_joints", roles);
+    let finger_links = names(table, "finger_links", roles);
     let head_joints = table.strings("head_joints").unwrap_or_default();
+    roles.joints.push(("head_joints", head_joints.clone()));
     let (grasp_link, camera_link) = (table.string("grasp_link"), table.string("camera_link"));
+    roles.links.push(grasp_link.iter().chain(&camera_link).cloned().collect());
     let grasp_turned_rad = table.numbers("grasp_turned_rad", ..).unwrap_or([0.0; 3]);
     let mount_height_m = table.number("mount_height_m", 0.0..=3.0).unwrap_or(0.0);
+    let opening_span = table.key_span("max_opening_m");
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
+    roles.opening = opening_span.zip(max_opening_m);
     let finger_friction = table.number("finger_friction", 0.0..=2.0);
     let grip_force_n = table.number("grip_force_n", 0.1..=1000.0);
     let n_arm_joints = arm_joints.as_ref().map_or(0, Vec::len);
-    let home = posture(table, "home", n_arm_joints);
+    let home = posture(table, "home", n_arm_joints, roles);
     let postures = table.tables("postures").into_iter().filter_map(|mut posture_table| {
-        let arm = posture(&mut posture_table, "arm", n_arm_joints);
+        let arm = posture(&mut posture_table, "arm", n_arm_joints, roles);
         posture_table.finish(found);
         arm
     });
     let postures: Vec<Vec<f64>> = postures.collect();
-    let urdf = urdf?;
+    let (base_joints, planar_base) = base?;
+    let urdf = urdf?.clone();
     let mut digest = Digest::new();
-    digest.update(source.text.as_bytes());
+    digest.update(table.source().text.as_bytes());
     digest.update(urdf.text.as_bytes());
     Some(RobotProfile {
         name: name?.value,
         urdf,
         base_joints,
+        planar_base,
         mount_height_m,
         arm_joints: values(arm_joints?),
         finger_joints: finger_joints?,
@@ -173,12 +219,17 @@ fn values(list: Vec<Located<String>>) -> Vec<String> {
     list.into_iter().map(|name| name.value).collect()
 }
 
-/// A list of exactly `N` names.
-fn names<const N: usize>(table: &mut Table, key: &str) -> Option<[String; N]> {
+/// A list of exactly `N` names: joints or links, as the key says.
+fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles) -> Option<[String; N]> {
     let span = table.key_span(key)?;
-    let list = values(table.strings(key)?);
+    let list = table.strings(key)?;
     let length = list.len();
-    let names = <[String; N]>::try_from(list).ok();
+    if key.ends_with("_links") {
+        roles.links.push(list.clone());
+    } else {
+        roles.joints.push((key, list.clone()));
+    }
+    let names = <[String; N]>::try_from(values(list)).ok();
     if names.is_none() {
         let message = format!("`{key}` must name {N} things, but this list has {length}");
         table.fault("W011", span, message, "see models/robots/mobile_manipulator.toml for an example");
@@ -187,7 +238,7 @@ fn names<const N: usize>(table: &mut Table, key: &str) -> Option<[String; N]> {
 }
 
 /// Positions of all arm joints.
-fn posture(table: &mut Table, key: &str, n_arm_joints: usize) -> Option<Vec<f64>> {
+fn posture(table: &mut Table, key: &str, n_arm_joints: usize, roles: &mut Roles) -> Option<Vec<f64>> {
     let span = table.key_span(key)?;
     let positions = table.number_list(key, ..)?;
     if positions.len() != n_arm_joints && n_arm_joints > 0 {
@@ -195,6 +246,7 @@ fn posture(table: &mut Table, key: &str, n_arm_joints: usize) -> Option<Vec<f64>
         table.fault("W011", span, message, "give one position for each joint of `arm_joints`");
         return None;
     }
+    roles.postures.push((span, positions.clone()));
     Some(positions)
 }
 
@@ -213,8 +265,8 @@ mod tests {
         );
         let mut table = Table::parse(&source).expect("it is TOML");
         let mut found = Diagnostics::new();
-        let profile = read_table(&mut table, &source, &mut found, |_| Err("cannot read it".to_owned()));
-        assert!(profile.is_none());
+        assert!(read_urdf(&Files::Disk, Path::new("no/such"), &mut table).is_none());
+        assert!(read_table(&mut table, None, &mut Roles::default(), &mut found).is_none());
         table.finish(&mut found);
         let codes: Vec<&str> = found.iter().map(|d| d.code).collect();
         assert_eq!(codes.iter().filter(|code| **code == "W011").count(), 2, "{found}");

@@ -90,7 +90,7 @@ impl RobotModel {
         if robot.links.is_empty() {
             return Err(WorldError::Urdf { name, reason: "it has no links".to_owned() });
         }
-        Folding::new(&robot, name, &profile.meshes)?.fold()
+        Folding::new(&robot, name, &profile.meshes)?.fold(profile)
     }
 
     /// Index of a joint by its name.
@@ -150,7 +150,7 @@ impl<'a> Folding<'a> {
         Ok(Self { robot, links, children, meshes, out })
     }
 
-    fn fold(mut self) -> Result<RobotModel, WorldError> {
+    fn fold(mut self, profile: &RobotProfile) -> Result<RobotModel, WorldError> {
         let is_child = |name: &str| self.robot.joints.iter().any(|joint| joint.child.link == name);
         let roots: Vec<&str> =
             self.robot.links.iter().map(|link| link.name.as_str()).filter(|name| !is_child(name)).collect();
@@ -158,9 +158,12 @@ impl<'a> Folding<'a> {
             let reason = format!("it has {} roots instead of one", roots.len());
             return Err(WorldError::Urdf { name: self.out.name, reason });
         };
+        if let (true, Some(names)) = (profile.planar_base, &profile.base_joints) {
+            self.add_planar_base(names);
+        }
         self.out.links.push(empty_link(root));
         // Links whose children are still to be visited, with the folded link that they belong to.
-        let mut open: Vec<(&str, usize, Isometry3<f64>)> = vec![(root, 0, Isometry3::identity())];
+        let mut open = vec![(*root, self.out.links.len() - 1, Isometry3::identity())];
         while let Some((name, into, at)) = open.pop() {
             self.merge(name, into, &at)?;
             for joint in self.children.get(name).cloned().unwrap_or_default().into_iter().rev() {
@@ -182,6 +185,28 @@ impl<'a> Folding<'a> {
             }
         }
         Ok(self.out)
+    }
+
+    /// Puts a base that drives every way below the URDF's root, with the speeds and efforts of the mobile manipulator's.
+    fn add_planar_base(&mut self, names: &[String; 3]) {
+        let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+        for (parent, (name, axis)) in names.iter().zip(axes).enumerate() {
+            let turns = parent == 2;
+            self.out.links.push(empty_link(name));
+            self.out.joints.push(Joint {
+                name: name.clone(),
+                kind: if turns { JointKind::Revolute } else { JointKind::Prismatic },
+                parent,
+                origin: Isometry3::identity(),
+                axis,
+                lower: f64::NEG_INFINITY,
+                upper: f64::INFINITY,
+                effort: if turns { 150.0 } else { 400.0 },
+                velocity: if turns { 1.0 } else { 0.25 },
+                damping: 1.0,
+                mimic: None,
+            });
+        }
     }
 
     /// Adds one link of the URDF to a folded one: mass, inertia (by the parallel axis theorem) and shapes.

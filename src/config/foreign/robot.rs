@@ -1,4 +1,4 @@
-//! The collision meshes that a robot's URDF names.
+//! A robot's URDF, as far as its text shows what is wrong with it, and the collision meshes that it names.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,28 +7,64 @@ use crate::base::{Diagnostics, Digest, Source};
 use crate::config::Shape;
 use crate::config::foreign::geometry::Shapes;
 use crate::config::foreign::lookup::Lookup;
-use crate::config::foreign::xml::{self, Reader};
+use crate::config::foreign::robot_tree::{self, Tree};
+use crate::config::foreign::xml::{self, Node, Reader};
 
-/// Meshes by the name that the URDF gives their file, with a digest of the files.
-pub(crate) struct RobotMeshes {
+/// What a URDF holds for a profile.
+pub(crate) struct RobotText {
+    /// Meshes by the name that the URDF gives their file.
     pub(crate) meshes: BTreeMap<String, Vec<Shape>>,
+    /// Digest of the mesh files.
     pub(crate) digest: String,
+    /// Its links and joints; nothing where the text is no URDF at all.
+    pub(crate) tree: Option<Tree>,
 }
 
-/// Reads every mesh that a link of a URDF collides with. What else is wrong with the text is for others to say.
-pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotMeshes {
-    let mut reader = Reader::new(source);
+/// Reads the links, the joints and every mesh that a link collides with; notes every fault with its place.
+pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotText {
     let mut shapes = Shapes { lookup, path, digest: Digest::new() };
     let mut meshes = BTreeMap::new();
-    if let Ok(document) = xml::parse(source) {
-        let collisions = document.descendants().filter(|node| node.tag_name().name() == "collision");
-        for mesh in collisions.filter_map(|collision| xml::child(xml::child(collision, "geometry")?, "mesh")) {
-            let Some(name) = mesh.attribute("filename").filter(|name| !meshes.contains_key(*name)) else { continue };
-            if let Some(shape) = shapes.mesh(mesh, name, [1.0; 3], &mut reader) {
-                meshes.insert(name.to_owned(), vec![shape]);
-            }
+    let document = match xml::parse(source) {
+        Ok(document) => document,
+        Err(faults) => {
+            found.extend(faults);
+            return RobotText { meshes, digest: shapes.digest.finish(), tree: None };
+        }
+    };
+    let mut reader = Reader::new(source);
+    let root = document.root_element();
+    let tree = if root.tag_name().name() == "robot" {
+        Some(robot_tree::read(root, &mut reader))
+    } else {
+        let message = format!("the root is `<{}>` and not `<robot>`", root.tag_name().name());
+        reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");
+        None
+    };
+    for link in xml::children(root, "link") {
+        for collision in xml::children(link, "collision") {
+            read_collision(collision, &mut shapes, &mut meshes, &mut reader);
         }
     }
     found.extend(reader.found);
-    RobotMeshes { meshes, digest: shapes.digest.finish() }
+    RobotText { meshes, digest: shapes.digest.finish(), tree }
+}
+
+fn read_collision(
+    collision: Node,
+    shapes: &mut Shapes,
+    meshes: &mut BTreeMap<String, Vec<Shape>>,
+    reader: &mut Reader,
+) {
+    let Some(geometry) = reader.required(collision, "geometry") else { return };
+    let Some(mesh) = xml::child(geometry, "mesh") else {
+        // A primitive is made anew with the robot; here its numbers are read.
+        shapes.urdf(geometry, reader);
+        return;
+    };
+    let Some(name) = reader.attribute(mesh, "filename") else { return };
+    if !meshes.contains_key(name)
+        && let Some(shape) = shapes.mesh(mesh, name, [1.0; 3], reader)
+    {
+        meshes.insert(name.to_owned(), vec![shape]);
+    }
 }

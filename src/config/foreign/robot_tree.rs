@@ -1,0 +1,190 @@
+//! The links and joints of a robot's URDF: whether they make one tree, and what each joint can do.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::base::did_you_mean;
+use crate::config::foreign::xml::{self, Bound, Node, Reader};
+
+/// Kinds of joints that simulation has.
+const KINDS: [&str; 4] = ["fixed", "prismatic", "revolute", "continuous"];
+
+/// How a joint of a URDF moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Motion {
+    Fixed,
+    Slides,
+    Turns,
+}
+
+/// What a profile has to know of a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TreeJoint {
+    pub(crate) motion: Motion,
+    /// Unit: metres or radians; infinite where it goes on turning.
+    pub(crate) lower: f64,
+    pub(crate) upper: f64,
+}
+
+/// The names of a URDF.
+#[derive(Debug, Default)]
+pub(crate) struct Tree {
+    pub(crate) joints: BTreeMap<String, TreeJoint>,
+    pub(crate) links: BTreeSet<String>,
+}
+
+/// Reads the tree below `<robot>` and notes what is wrong with it: names that are missing or double (W033, W051), joints that
+/// can't be simulated (W035), numbers (W034), and links that make no tree (W051).
+pub(crate) fn read(root: Node, reader: &mut Reader) -> Tree {
+    let mut tree = Tree::default();
+    for link in xml::children(root, "link") {
+        let Some(name) = reader.attribute(link, "name") else { continue };
+        if !tree.links.insert(name.to_owned()) {
+            let message = format!("there are two links `{name}`");
+            reader.error("W051", link, message, "give one of them another name");
+        }
+        read_mass(link, reader);
+    }
+    if tree.links.is_empty() {
+        reader.error("W051", root, "the robot has no links".to_owned(), "add `<link name=\"base_link\"/>`");
+        return tree;
+    }
+    // Child link: joint and parent link.
+    let mut above: BTreeMap<&str, (Node, &str)> = BTreeMap::new();
+    for joint in xml::children(root, "joint") {
+        let Some(name) = reader.attribute(joint, "name") else { continue };
+        if let Some(read) = read_joint(joint, name, reader)
+            && tree.joints.insert(name.to_owned(), read).is_some()
+        {
+            reader.error("W051", joint, format!("there are two joints `{name}`"), "give one of them another name");
+        }
+        let (parent, child) = (end(joint, "parent", &tree, reader), end(joint, "child", &tree, reader));
+        let (Some(parent), Some(child)) = (parent, child) else { continue };
+        if above.insert(child, (joint, parent)).is_some() {
+            let message = format!("the link `{child}` hangs on two joints");
+            reader.error("W051", joint, message, "links form one tree: each but the first hangs on one joint");
+        }
+        weigh(root, joint, child, reader);
+    }
+    check_mimics(root, &tree, reader);
+    check_tree(root, &tree, &above, reader);
+    tree
+}
+
+/// A mass below nothing.
+fn read_mass(link: Node, reader: &mut Reader) {
+    let Some(inertial) = xml::child(link, "inertial") else { return };
+    if let Some(mass) = reader.required(inertial, "mass")
+        && let Some(written) = reader.attribute(mass, "value")
+    {
+        reader.numbers::<1>(mass, written, Bound::NotNegative);
+    }
+}
+
+/// A link that moves, touches things and states that it weighs nothing: nothing could push it, or be pushed by it.
+fn weigh(root: Node, joint: Node, child: &str, reader: &mut Reader) {
+    let link = xml::children(root, "link").find(|link| link.attribute("name") == Some(child));
+    let moves = joint.attribute("type") != Some("fixed");
+    let Some(link) = link.filter(|link| moves && xml::child(*link, "collision").is_some()) else { return };
+    let mass = xml::child(link, "inertial").and_then(|inertial| xml::child(inertial, "mass"));
+    let weight: Option<f64> = mass.and_then(|mass| mass.attribute("value")?.trim().parse().ok());
+    if let (Some(mass), Some(0.0)) = (mass, weight) {
+        let message = format!("the link `{child}` moves, and weighs nothing");
+        reader.error("W034", mass, message, "give it its mass in kilograms, or no `<collision>`");
+    }
+}
+
+fn read_joint(joint: Node, name: &str, reader: &mut Reader) -> Option<TreeJoint> {
+    let kind = reader.attribute(joint, "type")?;
+    let motion = match kind {
+        "fixed" => Motion::Fixed,
+        "prismatic" => Motion::Slides,
+        "revolute" | "continuous" => Motion::Turns,
+        _ => {
+            let message = format!("the joint `{name}` is of the type {kind}, which can't be simulated");
+            reader.error("W035", joint, message, did_you_mean(kind, KINDS));
+            return None;
+        }
+    };
+    if motion == Motion::Fixed {
+        return Some(TreeJoint { motion, lower: 0.0, upper: 0.0 });
+    }
+    if let Some(axis) = xml::child(joint, "axis")
+        && let Some(written) = reader.attribute(axis, "xyz")
+        && reader.numbers(axis, written, Bound::Finite) == Some([0.0; 3])
+    {
+        let message = format!("the axis of the joint `{name}` has no direction");
+        reader.error("W034", axis, message, "write `<axis xyz=\"0 0 1\"/>`, or another direction");
+    }
+    if kind == "continuous" {
+        return Some(TreeJoint { motion, lower: f64::NEG_INFINITY, upper: f64::INFINITY });
+    }
+    let limit = reader.required(joint, "limit")?;
+    let mut number = |key: &str, bound: Bound| {
+        // Both ends are 0 where they are left out; efforts and velocities must be said.
+        let written = match (limit.attribute(key), key) {
+            (None, "lower" | "upper") => "0",
+            _ => reader.attribute(limit, key)?,
+        };
+        reader.numbers::<1>(limit, written, bound).map(|[number]| number)
+    };
+    let (lower, upper) = (number("lower", Bound::Finite), number("upper", Bound::Finite));
+    number("effort", Bound::NotNegative);
+    number("velocity", Bound::NotNegative);
+    let (lower, upper) = (lower?, upper?);
+    if lower > upper {
+        let message = format!("the joint `{name}` goes from {lower} down to {upper}");
+        reader.error("W034", limit, message, "`lower` is the smaller number");
+    }
+    Some(TreeJoint { motion, lower, upper })
+}
+
+/// The link at one end of a joint.
+fn end<'n>(joint: Node<'n>, which: &str, tree: &Tree, reader: &mut Reader) -> Option<&'n str> {
+    let end = reader.required(joint, which)?;
+    let link = reader.attribute(end, "link")?;
+    if !tree.links.contains(link) {
+        let help = did_you_mean(link, tree.links.iter().map(String::as_str));
+        reader.error("W051", end, format!("there is no link `{link}`"), help);
+        return None;
+    }
+    Some(link)
+}
+
+fn check_mimics(root: Node, tree: &Tree, reader: &mut Reader) {
+    for joint in xml::children(root, "joint") {
+        let Some(mimic) = xml::child(joint, "mimic") else { continue };
+        let Some(leader) = reader.attribute(mimic, "joint") else { continue };
+        let moves = tree.joints.get(leader).is_some_and(|joint| joint.motion != Motion::Fixed);
+        if !moves {
+            let known = tree.joints.iter().filter(|(_, joint)| joint.motion != Motion::Fixed);
+            let help = did_you_mean(leader, known.map(|(name, _)| name.as_str()));
+            reader.error("W051", mimic, format!("there is no joint `{leader}` to follow"), help);
+        }
+    }
+}
+
+/// One root, and no circles.
+fn check_tree(root: Node, tree: &Tree, above: &BTreeMap<&str, (Node, &str)>, reader: &mut Reader) {
+    let mut circles: BTreeSet<&str> = BTreeSet::new();
+    for start in tree.links.iter().map(String::as_str) {
+        let mut seen = BTreeSet::new();
+        let mut link = start;
+        while let Some((joint, parent)) = above.get(link) {
+            if !seen.insert(link) {
+                if circles.is_disjoint(&seen) {
+                    let message = format!("the link `{link}` hangs on itself by way of `{parent}`");
+                    reader.error("W051", *joint, message, "links form one tree: take one of the joints away");
+                }
+                circles.extend(&seen);
+                break;
+            }
+            link = parent;
+        }
+    }
+    let roots: Vec<&str> = tree.links.iter().map(String::as_str).filter(|link| !above.contains_key(link)).collect();
+    // Where joints are wrong, links seem to be loose that are not.
+    if roots.len() > 1 && !reader.found.has_errors() {
+        let message = format!("the links make {} trees, which begin at `{}`", roots.len(), roots.join("`, `"));
+        reader.error("W051", root, message, "links form one tree: join them with joints of the type `fixed`");
+    }
+}

@@ -1,0 +1,114 @@
+//! What a robot profile gives a part of the URDF to do, and whether that part can do it.
+
+use std::collections::BTreeMap;
+
+use crate::base::{Span, did_you_mean};
+use crate::config::foreign::robot_tree::{Motion, Tree};
+use crate::config::{Located, Table};
+
+/// Slack of positions at a limit, which are often rounded. Unit: metres or radians.
+const SLACK: f64 = 1e-3;
+
+/// The names of a profile with the places where they are written.
+#[derive(Debug, Default)]
+pub(super) struct Roles {
+    /// Keys of the profile with the joints that they name.
+    pub(super) joints: Vec<(&'static str, Vec<Located<String>>)>,
+    /// The links that it names.
+    pub(super) links: Vec<Vec<Located<String>>>,
+    /// Postures of the arm: where each is written, and its positions.
+    pub(super) postures: Vec<(Span, Vec<f64>)>,
+    /// The widest gap between the fingers, and where it is written.
+    pub(super) opening: Option<(Span, f64)>,
+}
+
+impl Roles {
+    /// Notes every role that its joint or link can't have: W050 there is none of that name, W052 a joint has two roles, W053
+    /// it moves otherwise, W054 a position is beyond its limits.
+    pub(super) fn check(&self, tree: &Tree, table: &mut Table) {
+        for link in self.links.iter().flatten() {
+            if !tree.links.contains(&link.value) {
+                let help = did_you_mean(&link.value, tree.links.iter().map(String::as_str));
+                table.fault("W050", link.span.clone(), format!("the URDF has no link `{}`", link.value), help);
+            }
+        }
+        let mut taken: BTreeMap<&str, &str> = BTreeMap::new();
+        for (key, joints) in &self.joints {
+            for (place, joint) in joints.iter().enumerate() {
+                if let Some(other) = taken.insert(&joint.value, key) {
+                    let message = if other == *key {
+                        format!("the joint `{}` is named twice in `{key}`", joint.value)
+                    } else {
+                        format!("the joint `{}` is both in `{other}` and in `{key}`", joint.value)
+                    };
+                    table.fault("W052", joint.span.clone(), message, "each joint has one role");
+                }
+                check_joint(key, place, joint, tree, table);
+            }
+        }
+        self.check_postures(tree, table);
+        self.check_opening(tree, table);
+    }
+
+    fn of(&self, key: &str) -> &[Located<String>] {
+        self.joints.iter().find(|(known, _)| *known == key).map_or(&[], |(_, joints)| joints)
+    }
+
+    fn check_postures(&self, tree: &Tree, table: &mut Table) {
+        for (span, positions) in &self.postures {
+            for (joint, position) in self.of("arm_joints").iter().zip(positions) {
+                let Some(limits) = tree.joints.get(&joint.value) else { continue };
+                if *position < limits.lower - SLACK || *position > limits.upper + SLACK {
+                    let message = format!("{position} is beyond the limits of `{}`", joint.value);
+                    let help = format!("it goes from {} to {}", limits.lower, limits.upper);
+                    table.fault("W054", span.clone(), message, help);
+                }
+            }
+        }
+    }
+
+    /// Whether the fingers go so far apart.
+    fn check_opening(&self, tree: &Tree, table: &mut Table) {
+        let Some((span, opening)) = &self.opening else { return };
+        let fingers: Vec<f64> = self
+            .of("finger_joints")
+            .iter()
+            .filter_map(|joint| tree.joints.get(&joint.value))
+            .filter(|joint| joint.motion == Motion::Slides)
+            .map(|joint| joint.upper)
+            .collect();
+        let widest = 2.0 * fingers.iter().copied().fold(f64::INFINITY, f64::min);
+        if fingers.len() == 2 && *opening > widest + SLACK {
+            let message = format!("the fingers open no wider than {widest} m");
+            let help = "each finger slides from 0, where both meet, to half of `max_opening_m`";
+            table.fault("W054", span.clone(), message, help);
+        }
+    }
+}
+
+/// Whether a joint is there and moves as its role wants it.
+fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, table: &mut Table) {
+    let name = &joint.value;
+    let Some(found) = tree.joints.get(name) else {
+        let movable = tree.joints.iter().filter(|(_, joint)| joint.motion != Motion::Fixed);
+        let help = did_you_mean(name, movable.map(|(name, _)| name.as_str()));
+        table.fault("W050", joint.span.clone(), format!("the URDF has no joint `{name}`"), help);
+        return;
+    };
+    let wanted = match (key, place) {
+        ("finger_joints", _) | ("base_joints", 0 | 1) => Some(Motion::Slides),
+        ("base_joints", _) => Some(Motion::Turns),
+        _ => None,
+    };
+    let (fault, help) = match (found.motion, wanted) {
+        (Motion::Fixed, _) => ("does not move", "name a joint of the type prismatic, revolute or continuous"),
+        (Motion::Turns, Some(Motion::Slides)) if key == "finger_joints" => (
+            "turns, and fingers have to slide",
+            "only parallel grippers are known, whose two fingers are prismatic joints",
+        ),
+        (Motion::Turns, Some(Motion::Slides)) => ("turns, and has to slide", "`base_joints` are x, y and heading"),
+        (Motion::Slides, Some(Motion::Turns)) => ("slides, and has to turn", "`base_joints` are x, y and heading"),
+        _ => return,
+    };
+    table.fault("W053", joint.span.clone(), format!("the joint `{name}` {fault}"), help);
+}
