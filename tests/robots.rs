@@ -123,3 +123,39 @@ fn a_campaign_of_the_fixed_arm_comes_out_the_same_and_replays() {
     let replayed = actcheck(project.path(), &["replay", "--sample", "3", "--history", "h1"]);
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
 }
+
+/// The mobile manipulator without the joints of its base, which `base = "planar"` gives back, does what it did.
+#[test]
+fn a_planar_base_drives_a_urdf_that_has_none() {
+    let project = project();
+    let folder = project.path().join("models/robots");
+    let urdf = std::fs::read_to_string(folder.join("mobile_manipulator.urdf")).unwrap();
+    let (head, rest) = urdf.split_once("  <link name=\"odom\"/>").unwrap();
+    let (_, rest) = rest.split_once("<link name=\"base_link\">").unwrap();
+    std::fs::write(folder.join("rootless.urdf"), format!("{head}<link name=\"base_link\">{rest}")).unwrap();
+    let profile = std::fs::read_to_string(folder.join("mobile_manipulator.toml")).unwrap();
+    let joints = "base_joints = [\"base_x_joint\", \"base_y_joint\", \"base_heading_joint\"]";
+    assert!(profile.contains(joints));
+    let profile = profile.replace(joints, "base = \"planar\"").replace("mobile_manipulator.urdf", "rootless.urdf");
+    std::fs::write(folder.join("rootless.toml"), profile).unwrap();
+    let text = std::fs::read_to_string(root().join("configs/lone_glass.toml")).unwrap();
+    std::fs::write(project.path().join("configs/r.toml"), format!("{text}\n[robot]\nprofile = \"rootless\"\n"))
+        .unwrap();
+    let output =
+        actcheck(project.path(), &["run", "configs/r.toml", "--runs", "5", "--history", "h", "--format", "json"]);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(json["runs_passed"]["count"].as_u64(), Some(5), "{}", stdout(&output));
+}
+
+/// An arm that can't drive looks down from its mast, and takes what it found in its pictures.
+#[test]
+fn a_fixed_arm_takes_what_it_saw_with_its_camera() {
+    let project = project();
+    let text = lone_glass_for_fixed_arm().replace("[[\"Pick\"]]", "[[\"PerceivePlane\", \"Pick\"]]");
+    std::fs::write(project.path().join("configs/see.toml"), text).unwrap();
+    let arguments = ["run", "configs/see.toml", "--runs", "6", "--history", "h", "--format", "json"];
+    let output = actcheck(project.path(), &arguments);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    let passed = json["runs_passed"]["count"].as_u64().unwrap();
+    assert!(passed >= 5, "{passed} of 6 runs passed fully with a lone object and no noise: {}", stdout(&output));
+}

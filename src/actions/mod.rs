@@ -15,6 +15,7 @@ mod perform;
 mod pick;
 mod place;
 mod plan;
+mod plan_cost;
 mod route;
 mod sabotage;
 mod skills;

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use crate::actions::grasp::{Approach, Grasp};
-use crate::actions::motion::{self, ArmSpace, Room, Samples};
+use crate::actions::motion::Samples;
 use crate::actions::operator::Operator;
 use crate::actions::route::{Block, Ground, Pillar, length};
 use crate::actions::standing;
@@ -44,12 +44,8 @@ pub(super) const AMPLE_CLEAR_M: f64 = 0.04;
 pub(super) const LEAST_CLEAR_M: f64 = -0.025;
 /// Distance between points and between postures that are checked for clearance. Unit: metres.
 const CHECK_M: f64 = 0.03;
-/// Postures that are checked on the way of an unfolding arm.
-const N_CHECKS: usize = 12;
 /// Postures that are sampled where no arm unfolds straight to any grasp.
 const MOST_SAMPLES: u32 = 4000;
-/// For one grasp.
-const SAMPLES_A_GRASP: u32 = 400;
 /// What is said where there is no plan.
 pub(super) const NO_WAY: &str = "no reachable and free way to it was found";
 
@@ -120,18 +116,19 @@ pub fn drive(operator: &Operator<'_>, to: [f64; 3], others: &[Sighting]) -> Opti
     planner.drive(&posture)
 }
 
-struct Planner<'a> {
-    kinematics: &'a Kinematics,
-    layout: &'a Layout,
+/// A robot that drives, and what is around it.
+pub(super) struct Planner<'a> {
+    pub(super) kinematics: &'a Kinematics,
+    pub(super) layout: &'a Layout,
     /// Joint positions to begin with.
-    start: Vec<f64>,
+    pub(super) start: Vec<f64>,
     postures: Vec<Vec<f64>>,
-    points: Vec<(usize, Point3<f64>)>,
-    furniture: Vec<Block>,
-    things: Vec<Pillar>,
+    pub(super) points: Vec<(usize, Point3<f64>)>,
+    pub(super) furniture: Vec<Block>,
+    pub(super) things: Vec<Pillar>,
     ground: Ground,
     /// Which postures let links go into each other.
-    itself: SelfContact,
+    pub(super) itself: SelfContact,
 }
 
 impl<'a> Planner<'a> {
@@ -187,7 +184,7 @@ impl<'a> Planner<'a> {
     }
 
     /// What driving to a posture's base pose costs.
-    fn travel_cost(&self, positions: &[f64]) -> f64 {
+    pub(super) fn travel_cost(&self, positions: &[f64]) -> f64 {
         self.layout.base.map_or(0.0, |[x, y, heading]| {
             let way = length(positions[x] - self.start[x], positions[y] - self.start[y]);
             0.4 * way + 0.12 * (positions[heading] - self.start[heading]).abs()
@@ -279,90 +276,6 @@ impl<'a> Planner<'a> {
             positions
         });
         Some(legs.collect())
-    }
-
-    /// What speaks against a plan: closeness to things, then length of the way; nothing if it is not free, or no better
-    /// than `bound`. An arm that can't unfold straight goes around, as long as there are samples.
-    fn cost(&self, plan: &mut Plan, bound: f64, samples: &mut Samples) -> Option<f64> {
-        let travel = self.travel_cost(plan.drive.last()?) + 0.4 * self.detour(&plan.drive);
-        let course = [plan.reach.last()?, &plan.near[0], plan.approach.last()?, plan.lift.last()?];
-        let mut cost = travel;
-        // From the last leg, where most plans fail.
-        for pair in course.windows(2).rev() {
-            cost = cost.max(self.leg_cost(pair[0], pair[1], travel).filter(|cost| *cost < bound)?);
-        }
-        let stand = plan.drive.last()?;
-        let straight = self.leg_cost(stand, plan.reach.last()?, travel);
-        if let Some(leg) = straight.filter(|_| self.keeps_off_itself(stand, plan.reach.last())) {
-            return Some(cost.max(leg)).filter(|cost| *cost < bound);
-        }
-        let mut samples = samples.share(SAMPLES_A_GRASP);
-        plan.reach = self.around(stand, plan.reach.last()?, &mut samples)?;
-        for (from, to) in std::iter::once(stand).chain(&plan.reach).zip(&plan.reach) {
-            cost = cost.max(self.leg_cost(from, to, travel)?);
-        }
-        Some(cost).filter(|cost| *cost < bound)
-    }
-
-    /// What a leg brings to the cost; nothing where something is in the way.
-    fn leg_cost(&self, from: &[f64], to: &[f64], travel: f64) -> Option<f64> {
-        let (furniture, things) = self.clearance(from, to);
-        let is_free = furniture >= FURNITURE_CLEAR_M && things >= LEAST_CLEAR_M;
-        is_free.then(|| travel + (AMPLE_CLEAR_M - things).max(0.0) * 50.0)
-    }
-
-    /// Whether no link goes into another on the way.
-    fn keeps_off_itself(&self, from: &[f64], to: Option<&Vec<f64>>) -> bool {
-        let Some(to) = to else { return true };
-        (1..=N_CHECKS).all(|step| {
-            let share = step as f64 / N_CHECKS as f64;
-            let positions: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
-            !self.itself.touches(&self.kinematics.links(&positions))
-        })
-    }
-
-    /// A way for the arm around what is in the way.
-    fn around(&self, from: &[f64], to: &[f64], samples: &mut Samples) -> Option<Vec<Vec<f64>>> {
-        if samples.are_spent() {
-            return None;
-        }
-        let space = ArmSpace::new(
-            self.kinematics,
-            self.layout,
-            &self.furniture,
-            &self.things,
-            std::slice::from_ref(&self.start),
-        );
-        let least = Room { furniture_m: FURNITURE_CLEAR_M, things_m: LEAST_CLEAR_M };
-        motion::way(&space, from, to, least, samples)
-    }
-
-    /// How much longer the drive is than the straight line. Unit: metres.
-    fn detour(&self, drive: &[Vec<f64>]) -> f64 {
-        let (Some([x, y, _]), Some(end)) = (self.layout.base, drive.last()) else { return 0.0 };
-        let way = |a: &[f64], b: &[f64]| length(b[x] - a[x], b[y] - a[y]);
-        let legs = std::iter::once(&self.start).chain(drive);
-        legs.zip(drive).map(|(a, b)| way(a, b)).sum::<f64>() - way(&self.start, end)
-    }
-
-    /// Least distances to furniture and to things on the way between two postures. Unit: metres; negative inside.
-    fn clearance(&self, from: &[f64], to: &[f64]) -> (f64, f64) {
-        let mut least = (f64::INFINITY, f64::INFINITY);
-        for step in 0..=N_CHECKS {
-            let share = step as f64 / N_CHECKS as f64;
-            let positions: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
-            let links = self.kinematics.links(&positions);
-            for (link, point) in &self.points {
-                let point = links[*link] * point;
-                for block in &self.furniture {
-                    least.0 = least.0.min(block.distance(&point));
-                }
-                for pillar in &self.things {
-                    least.1 = least.1.min(pillar.distance(&point));
-                }
-            }
-        }
-        least
     }
 }
 

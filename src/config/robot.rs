@@ -15,6 +15,21 @@ const PACKAGE_LEVELS: usize = 4;
 /// Joints of the base that `base = "planar"` puts below the URDF's root: x, y, heading.
 const PLANAR_JOINTS: [&str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 
+/// Keys of a profile that have no default.
+const REQUIRED: [&str; 11] = [
+    "name",
+    "urdf",
+    "arm_joints",
+    "finger_joints",
+    "finger_links",
+    "grasp_link",
+    "camera_link",
+    "max_opening_m",
+    "finger_friction",
+    "grip_force_n",
+    "home",
+];
+
 /// A robot: its URDF and the parts that the skills need to know. Read from a profile beside the URDF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotProfile {
@@ -82,6 +97,7 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut table = Table::parse(&source)?;
+    table.require(&REQUIRED);
     let mut found = Diagnostics::new();
     let mut folders: Vec<PathBuf> = values(table.strings("package_dirs").unwrap_or_default())
         .into_iter()
@@ -160,8 +176,6 @@ fn read_table(
     roles: &mut Roles,
     found: &mut Diagnostics,
 ) -> Option<RobotProfile> {
-    table.require(&["name", "urdf", "arm_joints", "finger_joints", "finger_links", "grasp_link", "camera_link"]);
-    table.require(&["max_opening_m", "finger_friction", "grip_force_n", "home"]);
     let name = table.string("name");
     let base = read_base(table, roles);
     let arm_joints = table.some_strings("arm_joints");
@@ -232,7 +246,12 @@ fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles
     let names = <[String; N]>::try_from(values(list)).ok();
     if names.is_none() {
         let message = format!("`{key}` must name {N} things, but this list has {length}");
-        table.fault("W011", span, message, "see models/robots/mobile_manipulator.toml for an example");
+        let help = if key.starts_with("finger") {
+            "only parallel grippers of two fingers are known; a robot without one has to be given one in its URDF"
+        } else {
+            "see models/robots/mobile_manipulator.toml for an example"
+        };
+        table.fault("W011", span, message, help);
     }
     names
 }
@@ -265,6 +284,7 @@ mod tests {
         );
         let mut table = Table::parse(&source).expect("it is TOML");
         let mut found = Diagnostics::new();
+        table.require(&REQUIRED);
         assert!(read_urdf(&Files::Disk, Path::new("no/such"), &mut table).is_none());
         assert!(read_table(&mut table, None, &mut Roles::default(), &mut found).is_none());
         table.finish(&mut found);
