@@ -2,16 +2,16 @@
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
-    GenericJoint, JointAxesMask, JointAxis, MassProperties, MotorModel, PhysicsWorld, RigidBodyBuilder,
-    RigidBodyHandle, SpringCoefficients,
+    GenericJoint, InteractionGroups, JointAxesMask, JointAxis, MassProperties, MotorModel, PhysicsWorld,
+    RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
 };
 
 use crate::scenario::RobotProfile;
 use crate::world::WorldError;
 use crate::world::convert::{to_pose, to_real, to_vector};
 use crate::world::description::{Joint, JointKind, RobotModel};
-use crate::world::engine::{Owner, collider};
-use crate::world::layout::Named;
+use crate::world::engine::{Owner, collider, off_floor};
+use crate::world::layout::{Layout, Named};
 use crate::world::robot::Motor;
 
 /// Error at which a motor gives all it has. Unit: metres. Stiffness is the effort limit over this.
@@ -50,9 +50,10 @@ pub(super) fn insert_links(
     engine: &mut PhysicsWorld,
     model: &RobotModel,
     poses: &[Isometry3<f64>],
-    finger_links: [usize; 2],
-    finger_friction: f64,
+    named: &Named,
+    profile: &RobotProfile,
 ) -> Vec<RigidBodyHandle> {
+    let on_floor = links_on_floor(model, named, profile);
     let mut bodies = Vec::with_capacity(model.links.len());
     for (idx, (link, pose)) in model.links.iter().zip(poses).enumerate() {
         let builder = if idx == 0 { RigidBodyBuilder::fixed() } else { RigidBodyBuilder::dynamic() };
@@ -70,15 +71,29 @@ pub(super) fn insert_links(
         ]);
         let mass = MassProperties::with_inertia_matrix(to_vector(&link.com), to_real(link.mass), matrix);
         let body = engine.insert_body(builder.pose(to_pose(pose)).additional_mass_properties(mass).can_sleep(false));
-        let friction = if finger_links.contains(&idx) { finger_friction } else { LINK_FRICTION };
+        let is_finger = named.finger_links.contains(&idx);
+        let friction = if is_finger { profile.finger_friction } else { LINK_FRICTION };
         for solid in &link.solids {
             if let Some(collider) = collider(solid, Owner::Link(idx), friction, 0.0) {
-                engine.insert_collider(collider.density(0.0), Some(body));
+                let groups = if on_floor[idx] { off_floor() } else { InteractionGroups::all() };
+                engine.insert_collider(collider.density(0.0).collision_groups(groups), Some(body));
             }
         }
         bodies.push(body);
     }
     bodies
+}
+
+/// Links that a planar base stands on the floor with, such as wheels. Its joints carry it, and are all that moves it: wheels that
+/// are pressed on the floor as well would throw it about.
+fn links_on_floor(model: &RobotModel, named: &Named, profile: &RobotProfile) -> Vec<bool> {
+    let Layout { arm, head, fingers, .. } = &named.layout;
+    let mut on_floor = vec![profile.planar_base];
+    for (idx, joint) in model.joints.iter().enumerate() {
+        let lifted = arm.contains(&idx) || head.contains(&idx) || fingers.contains(&idx);
+        on_floor.push(on_floor[joint.parent] && !lifted);
+    }
+    on_floor
 }
 
 pub(super) fn insert_joints(

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 use rapier3d::prelude::{
-    CoefficientCombineRule, ColliderBuilder, IntegrationParameters, PhysicsWorld, SpringCoefficients,
+    CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups, InteractionTestMode,
+    PhysicsWorld, SpringCoefficients,
 };
 
 use crate::scenario::{Part, Physics, Shape};
@@ -78,6 +79,14 @@ pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
     Ok(PhysicsWorld { gravity, integration_parameters: parameters, ..PhysicsWorld::default() })
 }
 
+/// The group of the floor alone.
+const FLOOR_GROUP: Group = Group::GROUP_32;
+
+/// Groups of what meets everything but the floor.
+pub fn off_floor() -> InteractionGroups {
+    InteractionGroups::new(Group::ALL, Group::ALL.difference(FLOOR_GROUP), InteractionTestMode::And)
+}
+
 /// Adds the floor: a slab with its top at 0.
 pub fn add_floor(engine: &mut PhysicsWorld) {
     let half = to_real(fault::WORLD_RADIUS_M + 1.0);
@@ -85,6 +94,7 @@ pub fn add_floor(engine: &mut PhysicsWorld) {
         .position(to_pose(&nalgebra::Isometry3::translation(0.0, 0.0, -0.5)))
         .friction(FLOOR_FRICTION)
         .friction_combine_rule(CoefficientCombineRule::GeometricMean)
+        .collision_groups(InteractionGroups::new(FLOOR_GROUP, Group::ALL, InteractionTestMode::And))
         .user_data(Owner::Floor.to_tag());
     engine.insert_collider(floor, None);
 }

@@ -79,8 +79,7 @@ impl Robot {
         let positions = home(&profile, &model, &named, start.base);
         let root = root_of(start, &named.layout);
         let kinematics = Kinematics::new(model.clone(), root, named.grasp, named.camera);
-        let bodies =
-            insert_links(engine, &model, &kinematics.links(&positions), named.finger_links, profile.finger_friction);
+        let bodies = insert_links(engine, &model, &kinematics.links(&positions), &named, &profile);
         let motors = insert_joints(engine, &model, &bodies, &named, &profile)?;
         let mut robot =
             Self { profile, model, kinematics, bodies, layout: named.layout, finger_links: named.finger_links, motors };

@@ -16,7 +16,7 @@ pub(crate) struct RobotText {
     pub(crate) meshes: BTreeMap<String, Vec<Shape>>,
     /// Digest of the mesh files.
     pub(crate) digest: String,
-    /// Its links and joints; nothing where the text is no URDF at all.
+    /// Its links and joints; nothing where the text is no URDF at all or has none.
     pub(crate) tree: Option<Tree>,
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
     let mut reader = Reader::new(source);
     let root = document.root_element();
     let tree = if root.tag_name().name() == "robot" {
-        Some(robot_tree::read(root, &mut reader))
+        Some(robot_tree::read(root, &mut reader)).filter(|tree| !tree.links.is_empty())
     } else {
         let message = format!("the root is `<{}>` and not `<robot>`", root.tag_name().name());
         reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");

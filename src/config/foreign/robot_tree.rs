@@ -14,6 +14,8 @@ pub(crate) enum Motion {
     Fixed,
     Slides,
     Turns,
+    /// Something is wrong with it, which has been said.
+    Unknown,
 }
 
 /// What a profile has to know of a joint.
@@ -52,9 +54,9 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> Tree {
     let mut above: BTreeMap<&str, (Node, &str)> = BTreeMap::new();
     for joint in xml::children(root, "joint") {
         let Some(name) = reader.attribute(joint, "name") else { continue };
-        if let Some(read) = read_joint(joint, name, reader)
-            && tree.joints.insert(name.to_owned(), read).is_some()
-        {
+        let unknown = TreeJoint { motion: Motion::Unknown, lower: f64::NEG_INFINITY, upper: f64::INFINITY };
+        let read = read_joint(joint, name, reader).unwrap_or(unknown);
+        if tree.joints.insert(name.to_owned(), read).is_some() {
             reader.error("W051", joint, format!("there are two joints `{name}`"), "give one of them another name");
         }
         let (parent, child) = (end(joint, "parent", &tree, reader), end(joint, "child", &tree, reader));
@@ -134,6 +136,7 @@ fn read_joint(joint: Node, name: &str, reader: &mut Reader) -> Option<TreeJoint>
     if lower > upper {
         let message = format!("the joint `{name}` goes from {lower} down to {upper}");
         reader.error("W034", limit, message, "`lower` is the smaller number");
+        return None;
     }
     Some(TreeJoint { motion, lower, upper })
 }
