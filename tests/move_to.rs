@@ -10,7 +10,7 @@ use actcheck::history::RunRecord;
 use actcheck::verdict::Outcome;
 use actcheck::world::{Poison, World};
 
-use crate::support::{actcheck, project, stdout};
+use crate::support::{actcheck, project, stderr, stdout};
 
 /// The front of a table in the kitchen, and a table in the living room: the way leads through the passage.
 const KITCHEN: &str = "[world]\nworlds = [\"apartment\"]\n[objectLocation]\nlocation_list = [\"dining_table_front\"]\n\
@@ -172,6 +172,12 @@ fn every_run_is_the_same_at_one_and_at_two_workers_and_without_its_noise_it_is_a
     let one = hashes("1");
     assert_eq!(one.len(), 4);
     assert_eq!(one, hashes("2"));
+    // A run can be taken out as a case, with all that its wheels got wrong.
+    let listed = stdout(&actcheck(project.path(), &["list", "--history", "1", "--format", "csv"]));
+    let id = listed.lines().nth(1).and_then(|line| line.split(',').next()).expect("there are runs").to_owned();
+    actcheck(project.path(), &["export", &id, "--history", "1", "-o", "configs/case.toml"]);
+    let case = actcheck(project.path(), &["check", "configs/case.toml"]);
+    assert_eq!(case.status.code(), Some(0), "{}", stderr(&case));
     let env = Env::prepare(&project.path().join("configs/move_to.toml"), &Overrides::default()).unwrap();
     let first = run(&env, Choices::random(env.campaign.seed, 0), None);
     let again = run(&env, Choices::recorded(&first.choices), None);

@@ -15,8 +15,21 @@ use crate::verdict::{Counts, Outcome, Recurrence};
 
 /// What is asked for only during a run: what sensors get wrong, and which postures a planner tries. These are its names but
 /// for those that name an object.
-const SENSES: [&str; 5] =
-    ["sense.localisation.x", "sense.localisation.y", "sense.localisation.heading", "sense.gripper", "motion.samples"];
+const SENSES: [&str; 13] = [
+    "sense.localisation.x",
+    "sense.localisation.y",
+    "sense.localisation.heading",
+    "sense.gripper",
+    "sense.camera.frame",
+    "sense.odometry.along",
+    "sense.odometry.across",
+    "sense.odometry.turning",
+    "sense.odometry.veering",
+    "sense.odometry.landmark.x",
+    "sense.odometry.landmark.y",
+    "sense.odometry.landmark.heading",
+    "motion.samples",
+];
 /// The same of one object.
 const SENSES_OF_OBJECT: [&str; 7] = ["x", "y", "z", "yaw", "width", "depth", "height"];
 
