@@ -65,13 +65,12 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
     if let Some(world) = world {
         hand.surround(world);
     }
-    let drives = space.drives.get(test).copied().unwrap_or(false);
-    let base = if drives {
+    let drive = space.drives.get(test).copied().flatten();
+    if drive.is_some() {
         hand.name_front(world);
-        hand.start_elsewhere(world)?
-    } else {
-        hand.start_robot(surface.as_ref())?
-    };
+    }
+    let drives = drive == Some(0);
+    let base = if drives { hand.start_elsewhere(world)? } else { hand.start_robot(surface.as_ref())? };
     hand.set_obstacles(base, world, drives)?;
     let name = hand.designators.get("world").and_then(|names| names.first()).cloned();
     let mut map = world.map(SceneMap::of).unwrap_or_default();

@@ -19,8 +19,8 @@ const DRIVING: &str = "MoveTo";
 #[derive(Debug, Clone)]
 pub struct Space {
     pub(super) tests: usize,
-    /// For each test whether the robot has to drive first.
-    pub(super) drives: Vec<bool>,
+    /// For each test its first action that drives to a place, counted from 0; nothing where there is none.
+    pub(super) drives: Vec<Option<usize>>,
     pub(super) surfaces: Vec<Arc<ObjectModel>>,
     pub(super) targets: Vec<Arc<ObjectModel>>,
     pub(super) others: Vec<Arc<ObjectModel>>,
@@ -85,14 +85,9 @@ impl Space {
         }
         check_worlds(campaign, &worlds, &mut found);
         let names = campaign.candidates.iter().filter(|(name, _)| !is_of_objects(name));
-        let mobile = campaign.robot.base_joints.is_some();
         config::in_order_of_place(found).or(Self {
             tests: campaign.tests.len(),
-            drives: campaign
-                .tests
-                .iter()
-                .map(|test| mobile && test.first().is_some_and(|first| first == DRIVING))
-                .collect(),
+            drives: drives(campaign),
             surfaces,
             targets,
             others,
@@ -117,6 +112,13 @@ impl Space {
     pub fn tests(&self) -> usize {
         self.tests
     }
+}
+
+/// The first action of each test that drives to a place, where the robot can drive.
+fn drives(campaign: &Campaign) -> Vec<Option<usize>> {
+    let mobile = campaign.robot.base_joints.is_some();
+    let first = |test: &Vec<String>| test.iter().position(|action| mobile && action == DRIVING);
+    campaign.tests.iter().map(first).collect()
 }
 
 /// All models but platforms, sorted by name.
