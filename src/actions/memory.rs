@@ -65,6 +65,17 @@ pub fn recall(
     Ok((sighting(id.to_owned(), target), others.collect()))
 }
 
+/// The furniture of a map but for the piece whose top was perceived, which is known better than by the map.
+pub fn elsewhere(map: Vec<Sighting>, perceived: &Perceived) -> Vec<Sighting> {
+    let is_other = |piece: &Sighting| {
+        perceived.plane.is_none_or(|plane| {
+            let local = piece.pose.to_isometry().inverse() * nalgebra::Point3::from(plane.pose.position);
+            local.x.abs() > piece.size_m[0] / 2.0 || local.y.abs() > piece.size_m[1] / 2.0
+        })
+    };
+    map.into_iter().filter(is_other).collect()
+}
+
 /// What carries a surface: a box down to the floor.
 pub fn furniture(id: &str, plane: &PerceivedPlane) -> Sighting {
     let [x, y, height] = plane.pose.position;
@@ -104,6 +115,20 @@ mod tests {
         assert_eq!((others[2].size_m, others[2].furniture), ([0.6, 0.5, 0.7], true));
         let (target, _) = recalled(vec![thing(Some(GLASS), 0.9, 0.14), thing(Some(GLASS), 1.0, 0.146)]).expect("two");
         assert_eq!(target.pose.position[0], 1.0);
+    }
+
+    #[test]
+    fn what_was_looked_at_is_known_better_than_by_the_map() {
+        let table = |x: f64| Sighting {
+            id: "table".to_owned(),
+            pose: Pose::upright([x, 0.0, 0.0], 0.3),
+            size_m: [0.6, 0.5, 0.7],
+            furniture: true,
+        };
+        let plane = PerceivedPlane { pose: Pose::upright([1.0, 0.0, 0.7], 0.3), size_m: [0.6, 0.5] };
+        let perceived = Perceived { plane: Some(plane), things: Vec::new() };
+        assert_eq!(elsewhere(vec![table(1.1), table(3.0)], &perceived), [table(3.0)]);
+        assert_eq!(elsewhere(vec![table(1.1)], &Perceived::default()).len(), 1);
     }
 
     #[test]

@@ -71,9 +71,10 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
 fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), String> {
     if let Some(perceived) = &robot.memory().perceived {
         let kind = robot.kind_of(target).ok_or_else(|| format!("{target} is of no known kind"))?;
-        let found = memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
-        robot.take_for(&found.0);
-        return Ok(found);
+        let (seen, mut others) = memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
+        others.extend(memory::elsewhere(robot.map_of_furniture().unwrap_or_default(), perceived));
+        robot.take_for(&seen);
+        return Ok((seen, others));
     }
     let seen = robot.see(target).ok_or_else(|| format!("{target} was not seen"))?;
     let others = robot.see_others(target);
