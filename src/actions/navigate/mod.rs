@@ -10,4 +10,4 @@ mod shorten;
 mod skill;
 mod terrain;
 
-pub(super) use skill::move_to;
+pub(super) use skill::{drive_to, move_to};

@@ -28,7 +28,7 @@ pub struct Size {
 }
 
 impl Size {
-    /// The size of the robot as it was last told to be.
+    /// The size of the robot as it was last told to be, with what it holds.
     pub fn of(robot: &Operator<'_>) -> Self {
         let kinematics = robot.kinematics();
         let links = kinematics.links(robot.commanded());
@@ -38,6 +38,12 @@ impl Size {
             let point = links[link] * point;
             size.radius_m = size.radius_m.max(length(point.x - base.x, point.y - base.y));
             size.height_m = size.height_m.max(point.z);
+        }
+        if let Some(held) = &robot.memory().held {
+            let hand = kinematics.grasp(robot.commanded()).translation.vector;
+            let [width, depth, height] = held.size_m;
+            size.radius_m = size.radius_m.max(length(hand.x - base.x, hand.y - base.y) + length(width, depth) / 2.0);
+            size.height_m = size.height_m.max(hand.z + height);
         }
         size
     }

@@ -59,6 +59,17 @@ pub fn move_to(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionRepo
     }
 }
 
+/// Drives to a place (x, y, heading), looking ahead. Gives the reason why it did not get there, if it did not.
+///
+/// # Errors
+/// [`Interrupt`] if simulation broke or time ran out.
+pub fn drive_to(goal: [f64; 3], robot: &mut Operator<'_>) -> Result<Option<String>, Interrupt> {
+    match robot.layout().base {
+        Some(base) => Drive::new(robot, base, goal).go(),
+        None => Ok(Some("the robot has no base that drives".to_owned())),
+    }
+}
+
 /// A drive to a place. Everything is by the base's belief of where it is.
 struct Drive<'r, 'o> {
     robot: &'r mut Operator<'o>,

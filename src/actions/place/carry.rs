@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::actions::operator::Operator;
-use crate::actions::plan;
+use crate::actions::operator::{Interrupt, Operator};
+use crate::actions::{navigate, plan};
 use crate::base::Pose;
 use crate::world::{Sighting, ik};
 
@@ -58,13 +58,31 @@ pub fn straight(robot: &Operator<'_>, from: &[f64], by: &Vector3<f64>) -> Vec<Ve
     path
 }
 
-/// A way to in front of a piece of furniture, to its front if there is one to it, otherwise to another side. Nothing if there
-/// is no way to any; an empty way for a robot that stands where it stands.
-pub fn drive_to(robot: &Operator<'_>, furniture: &Sighting, others: &[Sighting]) -> Option<Vec<Vec<f64>>> {
-    if robot.layout().base.is_none() {
-        return Some(Vec::new());
+/// Drives to in front of a piece of furniture: to its front if there is a way, otherwise to another side. Where the robot looked
+/// around earlier it looks ahead, as on every drive; otherwise it goes by what the abstract detector saw. Gives the reason if it
+/// did not get there; a robot that stands where it stands is there.
+///
+/// # Errors
+/// [`Interrupt`] if the action has to end.
+pub fn drive_before(
+    furniture: &Sighting,
+    others: &[Sighting],
+    robot: &mut Operator<'_>,
+) -> Result<Option<String>, Interrupt> {
+    let mut reason = (robot.layout().base.is_some()).then(|| "no free way was found".to_owned());
+    let looks = robot.memory().perceived.is_some();
+    for stand in stands(furniture) {
+        if reason.is_none() {
+            break;
+        }
+        if looks {
+            reason = navigate::drive_to(stand, robot)?;
+        } else if let Some(way) = plan::drive(robot, stand, others) {
+            robot.follow(&way, 0.0)?;
+            reason = None;
+        }
     }
-    stands(furniture).into_iter().find_map(|stand| plan::drive(robot, stand, others))
+    Ok(reason)
 }
 
 /// Base poses in front of the four sides of a piece of furniture, facing it: the front, left and right, the back.

@@ -75,9 +75,9 @@ fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, H
     still_in_hand(&held, robot)?;
     robot.begin("drive");
     let around: Vec<Sighting> = others.iter().cloned().chain([seen.clone()]).collect();
-    let way = carry::drive_to(robot, &seen, &around);
-    let way = way.ok_or_else(|| Halt::Failed(format!("no free way to {surface} was found")))?;
-    robot.follow(&way, 0.0)?;
+    if let Some(reason) = carry::drive_before(&seen, &around, robot)? {
+        return Err(Halt::Failed(format!("{surface}: {reason}")));
+    }
     robot.begin("look");
     let survey = look_at(surface, &seen, &others, robot)?;
     still_in_hand(&held, robot)?;
