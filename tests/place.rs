@@ -8,7 +8,10 @@ use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
 use actcheck::config::Overrides;
 use actcheck::history::RunRecord;
 use actcheck::verdict::Outcome;
-use actcheck::world::{Poison, World};
+use actcheck::world::{Mishap, Poison, World};
+use serde_json::Value;
+
+use crate::support::{actcheck, edit, project, stderr, stdout};
 
 /// Two tables, a glass on the first, and what a test adds.
 fn env(actions: &str, more: &str) -> Env {
@@ -117,6 +120,68 @@ fn it_acts_on_what_it_perceives_and_not_on_what_is() {
         let seen = run.trace.actions[last].percepts.iter().find(|percept| percept.id == "table_1").unwrap();
         assert_eq!((seen.pose.position[1], seen.pose.position[2]), (2.41, 0.2));
     }
+}
+
+/// The glass has no friction at all.
+fn oil(_: u64, world: &mut World) {
+    assert!(world.befall("glass_1", Mishap::Friction(0.0)));
+}
+
+#[test]
+fn what_slips_is_felt_and_is_not_placed() {
+    let env = env("[\"Pick\", \"Place\"]", "");
+    let run = nominal(&env, Some(oil));
+    assert!(report(&run, 0).message.contains("slipped out of the hand"), "{}", report(&run, 0).message);
+    assert_eq!(outcomes(&run, 0)["ObjectGrasped"], Outcome::Failed);
+    assert_eq!(report(&run, 1).message, "nothing is in the hand: glass_1 can't be placed");
+}
+
+fn json(folder: &std::path::Path, arguments: &[&str]) -> Value {
+    let output = actcheck(folder, &[arguments, &["--format", "json"]].concat());
+    serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)))
+}
+
+#[test]
+fn the_whole_task_is_the_same_at_any_number_of_workers_and_is_told_by_action() {
+    let project = project();
+    let run = ["run", "configs/pick_and_place.toml", "--runs", "3"];
+    let of = |jobs: &str| json(project.path(), &[&run[..], &["--jobs", jobs, "--history", jobs]].concat());
+    let (one, two) = (of("1"), of("2"));
+    let hashes = |jobs: &str| {
+        let listed = json(project.path(), &["list", "--history", jobs]);
+        let rows = listed.as_array().unwrap().iter();
+        rows.map(|row| row["trace_hash"].clone()).collect::<Vec<_>>()
+    };
+    assert_eq!((hashes("1").len(), hashes("1")), (3, hashes("2")));
+    assert_eq!(one["score"], two["score"]);
+    for count in ["broken", "timeout"] {
+        assert_eq!(one["counts"][count], 0, "{one:#}");
+    }
+    let output = actcheck(project.path(), &[&run[..], &["--history", "text"]].concat());
+    let text = stdout(&output);
+    for title in ["A1 MoveTo", "A2 PerceivePlane", "A3 Pick", "A4 Place", "mean"] {
+        assert!(text.contains(title), "{title} is missing:\n{text}");
+    }
+    // Seventeen properties, by action.
+    let lines = |line: &&str| line.contains(" % [");
+    assert_eq!(text.lines().skip_while(|line| !line.contains("pass rate")).filter(lines).take(17).count(), 17);
+}
+
+/// With nothing in the way, nothing else on the table and perfect senses, the task works as a whole.
+#[test]
+fn without_noise_clutter_and_obstacles_nearly_everything_passes() {
+    let project = project();
+    let config = project.path().join("configs/pick_and_place.toml");
+    edit(&config, "nav_obstacle_count = 2", "nav_obstacle_count = 0");
+    edit(&config, "count = [1, 4]", "count = 0");
+    let text = std::fs::read_to_string(&config).unwrap();
+    // All noise is stated as `…_noise…`, `…_drift` or `dropout`.
+    let is_noise =
+        |line: &str| ["_noise", "_drift", "dropout"].iter().any(|word| line.split('=').next().unwrap().contains(word));
+    let quiet: Vec<&str> = text.lines().filter(|line| line.starts_with('#') || !is_noise(line)).collect();
+    std::fs::write(&config, quiet.join("\n")).unwrap();
+    let told = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "8", "--history", "h"]);
+    assert!(told["score"].as_f64().unwrap() > 0.9, "{told:#}");
 }
 
 #[test]
