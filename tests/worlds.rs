@@ -41,7 +41,9 @@ const EVERYWHERE: &str = "[world]\nworlds = [\"apartment\", \"lab\"]\n[objectSur
 /// Furniture and walls do not stand in each other, and a robot fits on every location.
 #[test]
 fn shipped_worlds_leave_room() {
-    for (name, surface) in [("apartment", "dining_table"), ("lab", "left_bench"), ("empty_room", "table")] {
+    for (name, surface) in
+        [("apartment", "dining_table"), ("lab", "left_bench"), ("empty_room", "table"), ("kitchen", "kitchen_table")]
+    {
         let (_folder, env) = env(&format!(
             "[world]\nworlds = [\"{name}\"]\n[objectSurface]\nobject_surfaces = [\"{surface}\"]\n{TABLES}"
         ));

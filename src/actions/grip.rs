@@ -11,8 +11,9 @@ const CLOSE_SECS: f64 = 2.5;
 const STALLED: f64 = 0.003;
 /// Share of the grip force that stalled fingers have to feel.
 const FELT_SHARE: f64 = 0.7;
-/// Fingers that close further by this have lost their hold: what they press on gives way by less. Unit: metres.
-const GAVE_WAY_M: f64 = 0.004;
+/// Fingers that close further by this have lost their hold. Unit: metres. A mug that turns between them until they lie flat
+/// gives way by less.
+const GAVE_WAY_M: f64 = 0.012;
 /// Share of the grip force below which there is nothing that resists. Half of what stalled fingers have to feel.
 const WEAK_SHARE: f64 = 0.35;
 /// Control ticks for which a hold may be weak: braking shakes it for less. A tenth of a second.
@@ -88,7 +89,7 @@ mod tests {
         }
         assert!(!shaken.slipped(), "a moment's shaking is no slip");
         let mut closing = held.clone();
-        closing.look(&felt(0.07, 7.0));
+        closing.look(&felt(0.065, 7.0));
         closing.look(&felt(0.08, 7.0));
         assert!(closing.slipped(), "what was lost once stays lost");
         let mut weak = held;

@@ -61,9 +61,10 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.follow(&way.retreat, 0.0)?;
     robot.wait(LOOK_SECS)?;
     let report = report(robot, target, held);
-    if !report.succeeded {
-        robot.hold(None);
-    }
+    // What settled between the fingers is as wide as they are apart now.
+    let opening_m = robot.observe().gripper_opening_m;
+    let held = robot.memory().held.clone().filter(|_| report.succeeded);
+    robot.hold(held.map(|held| Held { opening_m, ..held }));
     Ok(report)
 }
 

@@ -39,15 +39,29 @@ impl Survey {
 /// # Errors
 /// [`Interrupt`] if the action has to end.
 pub fn survey(expected: &Sighting, robot: &mut Operator<'_>) -> Result<Option<Survey>, Interrupt> {
-    let [x, y, z] = expected.pose.position;
     let mut sight = Sight::default();
-    sight.add_look_at(&Point3::new(x, y, z + expected.size_m[2]), robot)?;
     let find = |points: &[Point3<f64>]| Surface::find(&near(points, expected));
-    let Some(surface) = find(&sight.points) else { return Ok(None) };
+    let mut found = None;
+    for point in places(expected) {
+        robot.begin("look at the surface");
+        sight.add_look_at(&point, robot)?;
+        found = find(&sight.points);
+        if found.is_some() {
+            break;
+        }
+    }
+    let Some(surface) = found else { return Ok(None) };
     let surface = sight.take_in(surface, MOST_VIEWS, find, robot)?;
     let things = surface.things(&sight.points, &sight.eye(), robot.known_kinds());
     let things = things.iter().enumerate().map(|(idx, thing)| sighting(format!("thing_{}", idx + 1), thing));
     Ok(Some(Survey { plane: surface.perceived(), things: things.collect() }))
+}
+
+/// Where the top of a piece of furniture is looked for: its middle, then halfway to its corners, where something is in the way.
+fn places(expected: &Sighting) -> impl Iterator<Item = Point3<f64>> {
+    let ([width, depth, height], pose) = (expected.size_m, expected.pose.to_isometry());
+    let shares = [(0.0, 0.0), (-0.25, 0.25), (-0.25, -0.25), (0.25, 0.25), (0.25, -0.25)];
+    shares.into_iter().map(move |(along, across)| pose * Point3::new(along * width, across * depth, height))
 }
 
 /// The points that may belong to the top of a piece of furniture.

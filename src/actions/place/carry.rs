@@ -12,24 +12,32 @@ const STEP_M: f64 = 0.02;
 /// How far in front of the base's middle the hand is while it carries. Unit: metres. A base is about 0.2 m in radius, and a
 /// hand that holds a bowl reaches 0.1 m back.
 const NEAR_M: f64 = 0.38;
-/// How high the hand is meanwhile, if the arm reaches so low. Unit: metres. Below what the head looks over, above the base.
-const LOW_M: f64 = 0.68;
+/// How high the hand is meanwhile, if the arm reaches so low. Unit: metres. The arm and what it holds are then below what the
+/// head looks at, and still above the base.
+const LOW_M: f64 = 0.45;
+/// How far the hand goes back before it goes down, by the arm and by the base together. Unit: metres. What it holds clears the
+/// edge of the furniture that it was over.
+const BACK_M: f64 = 0.2;
 /// Distance of the base's middle from the edge of a surface that it looks at. Unit: metres. A head a metre high sees a table's
 /// near edge from there, and what the hand holds in front of the base is clear of it.
 const GAP_M: f64 = 0.69;
 
-/// Postures that bring the hand near the base and down, as it is turned; none for a robot without a base to drive.
+/// Postures that bring the hand near the base and down, as it is turned, the base a little back if the arm does not go back
+/// far enough by itself; none for a robot without a base to drive.
 pub fn fold(robot: &Operator<'_>) -> Vec<Vec<f64>> {
-    if robot.layout().base.is_none() {
-        return Vec::new();
-    }
+    let Some([x, y, _]) = robot.layout().base else { return Vec::new() };
     let start = robot.commanded().to_vec();
     let base = robot.base();
     let grasp = robot.kinematics().grasp(&start).translation.vector;
     let ahead = (base.inverse() * nalgebra::Point3::from(grasp)).x;
     let back = base.rotation * Vector3::new(-(ahead - NEAR_M).max(0.0), 0.0, 0.0);
     let mut path = straight(robot, &start, &back);
-    let near = path.last().cloned().unwrap_or(start);
+    let mut near = path.last().cloned().unwrap_or(start);
+    let pulled = (robot.kinematics().grasp(&near).translation.vector - grasp).norm();
+    let retreat = base.rotation * Vector3::new(-(BACK_M - pulled).max(0.0), 0.0, 0.0);
+    near[x] += retreat.x;
+    near[y] += retreat.y;
+    path.push(near.clone());
     let height = robot.kinematics().grasp(&near).translation.vector.z;
     path.extend(straight(robot, &near, &Vector3::new(0.0, 0.0, -(height - LOW_M).max(0.0))));
     path
