@@ -180,7 +180,7 @@ fn without_noise_clutter_and_obstacles_nearly_everything_passes() {
         |line: &str| ["_noise", "_drift", "dropout"].iter().any(|word| line.split('=').next().unwrap().contains(word));
     let quiet: Vec<&str> = text.lines().filter(|line| line.starts_with('#') || !is_noise(line)).collect();
     std::fs::write(&config, quiet.join("\n")).unwrap();
-    let told = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "8", "--history", "h"]);
+    let told = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "6", "--history", "h"]);
     assert!(told["score"].as_f64().unwrap() > 0.9, "{told:#}");
 }
 
