@@ -159,7 +159,8 @@ fn choose(
     let mut around: Vec<Sighting> = others.iter().chain(&survey.things).cloned().collect();
     around.push(furniture(surface, &survey.plane));
     let ways = spot::ways(held, &spots, robot.profile().max_opening_m);
-    let wanted = Wanted { grasps: &ways, all: &[], taken: None };
+    // Where the arm can't unfold straight, it goes around itself: what it holds may lean meanwhile.
+    let wanted = Wanted { grasps: &ways, all: &ways, taken: None };
     let plan = plan::plan(robot, wanted, &spot::heightened(&around, held));
     let plan = plan.map_err(|reason| Halt::Failed(format!("{surface}: {reason}")))?;
     let lowest = plan.approach.last().map(|posture| robot.kinematics().grasp(posture).translation.vector.xy().into());
