@@ -19,7 +19,7 @@ fn env(actions: &str, more: &str) -> Env {
     let config = folder.path().join("config.toml");
     let text = format!(
         "tests = [{actions}]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
-        [placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"glass\", \"mug\"]\n{more}"
+        [placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"glass\", \"salt_shaker\"]\n{more}"
     );
     std::fs::write(&config, text).unwrap();
     Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"))
@@ -67,7 +67,7 @@ fn at_end(run: &RunRecord, id: &str) -> Pose {
 #[test]
 fn what_was_picked_from_the_side_or_from_above_is_placed_on_the_other_table() {
     let env = env("[\"Pick\", \"Place\"]", "");
-    for (model, id) in ["glass_1", "mug_1"].into_iter().enumerate() {
+    for (model, id) in ["glass_1", "salt_shaker_1"].into_iter().enumerate() {
         let run = with_target(&env, model);
         all_passed(&run, 0);
         all_passed(&run, 1);
@@ -101,9 +101,9 @@ fn an_empty_hand_reports_failure_at_once() {
     assert_eq!((outcomes["ObjectReleased"], outcomes["NoPlaceCollisions"]), (Outcome::Passed, Outcome::Passed));
 }
 
-/// Sensors see the table where the glass shall go half a metre farther to the side and 20 cm higher than it is.
+/// Sensors see the table where the glass shall go half a metre farther to the side and 5 cm higher than it is.
 fn deceive(_: u64, world: &mut World) {
-    let decoy = Pose::upright([0.0, 2.41, 0.2], 0.0);
+    let decoy = Pose::upright([0.0, 2.41, 0.05], 0.0);
     assert!(world.poison("table_1", Poison::Decoy(decoy)));
 }
 
@@ -118,7 +118,7 @@ fn it_acts_on_what_it_perceives_and_not_on_what_is() {
         assert!(report(&run, last).message.contains("was not felt"), "{}", report(&run, last).message);
         assert_eq!(outcomes(&run, last)["PlaceReported"], Outcome::Failed);
         let seen = run.trace.actions[last].percepts.iter().find(|percept| percept.id == "table_1").unwrap();
-        assert_eq!((seen.pose.position[1], seen.pose.position[2]), (2.41, 0.2));
+        assert_eq!((seen.pose.position[1], seen.pose.position[2]), (2.41, 0.05));
     }
 }
 
