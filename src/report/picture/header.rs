@@ -10,8 +10,12 @@ use crate::verdict::Outcome;
 
 /// Lines of failures at most: a picture is no report.
 const MOST_FAILURES: usize = 8;
+/// Lines that one of them may take.
+const MOST_LINES: usize = 2;
 /// Height of a line of words. Unit: pixels.
 const LINE_PX: f64 = 17.0;
+/// Room for the dots at the end of what is cut off. Unit: pixels.
+const ELLIPSIS_PX: f64 = 20.0;
 /// Size of the words. Unit: pixels.
 const SIZE_PX: f64 = 12.0;
 
@@ -97,7 +101,12 @@ impl Writer<'_> {
     }
 
     fn lines(&mut self, text: &str, indent: f64, rgb: u32) {
-        for line in font::wrapped(text, SIZE_PX, self.width - indent) {
+        let mut lines = font::wrapped(text, SIZE_PX, self.width - indent - ELLIPSIS_PX);
+        if lines.len() > MOST_LINES {
+            lines.truncate(MOST_LINES);
+            lines[MOST_LINES - 1].push_str(" …");
+        }
+        for line in lines {
             self.y += LINE_PX;
             let at = [self.left + indent, self.y];
             let paint = Paint::solid(rgb);

@@ -37,8 +37,12 @@ impl Labels {
         self.taken.push(rect);
     }
 
-    /// Writes a label at the best free place, or not at all where the panel is full.
+    /// Writes a label at the best free place, or not at all where the panel is full or does not show what it names.
     pub(super) fn write(&mut self, drawing: &mut Drawing, label: &Label<'_>) {
+        // What is beside the panel is not seen, and has no name there.
+        if self.panel.shared(&label.at.grown(1.0)) == 0.0 {
+            return;
+        }
         let width = font::width(label.text, label.size, label.bold);
         let height = label.size * 1.15;
         let places = candidates(&label.at, width, height).into_iter().filter(|place| {

@@ -11,6 +11,9 @@ use crate::report::picture::paths::{Mover, Way, pose_at};
 use crate::report::picture::window::{Bounds, Window};
 use crate::report::picture::{font, paint};
 
+/// Links reach no farther from their origins. Unit: metres. Those beside what a window is about are left out.
+const LINK_REACH_M: f64 = 0.8;
+
 /// What all panels of a run draw from.
 pub(super) struct Material<'a> {
     pub(super) trace: &'a Trace,
@@ -95,9 +98,13 @@ fn form(material: &Material<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[
 fn robot(drawing: &mut Drawing, material: &Material<'_>, moment: Moment, window: &Window) {
     let frames = &material.trace.frames;
     let row = if moment == Moment::Before { 0 } else { frames.rows.len().saturating_sub(1) };
-    let links = frames.names.iter().enumerate().filter_map(|(slot, name)| {
+    // Objects have tracks too.
+    let links = frames.names.iter().enumerate().filter(|(_, name)| name.starts_with("robot/"));
+    let links = links.filter_map(|(slot, name)| {
         let form = material.forms.get(name.as_str())?;
-        Some(silhouette(&form.parts, &pose_at(material.trace, row, slot)?, window))
+        let pose = pose_at(material.trace, row, slot)?;
+        let around = Bounds::point(pose.translation.vector.into()).grown(LINK_REACH_M);
+        window.is_about(&around).then(|| silhouette(&form.parts, &pose, window))
     });
     drawing.shape(links.flatten().collect(), true, paint::ROBOT);
 }
