@@ -74,8 +74,8 @@ mod tests {
         assert_eq!(straight, [[-1.1, 1.0]]);
         let around = way(&terrain, from, [1.0, -0.5]).expect("there is a door");
         assert_eq!(around.last(), Some(&[1.0, -0.5]));
-        // Over the door's middle it would be 5.1 m.
-        assert!((4.8..5.4).contains(&total(from, &around)), "{around:?}");
+        // Over the door's middle it would be 5.1 m; with room at corners it is more.
+        assert!((5.1..5.8).contains(&total(from, &around)), "{around:?}");
         let crossed = around.iter().filter(|at| at[0].abs() < 0.3).all(|at| (1.3..1.8).contains(&at[1]));
         assert!(crossed && around.len() <= 12, "{around:?}");
         assert_eq!(way(&terrain, from, from), Some(vec![from]));
