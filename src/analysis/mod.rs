@@ -7,6 +7,7 @@ mod consistency;
 mod coverage;
 mod failure_modes;
 mod false_discovery;
+mod findings;
 mod fisher;
 mod frame;
 mod health;
@@ -15,12 +16,18 @@ mod oracles;
 mod paired;
 mod patterns;
 mod property_rates;
+mod tables;
 
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, Flaky, PassPower, Repeated, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
 pub use failure_modes::{FailureMode, failure_modes};
 pub use false_discovery::benjamini_hochberg;
+pub use findings::{
+    Cascade, ChangePoint, Example, FINDING_COLUMNS, FlakyScene, Judged, JudgedProperty, PropertyFindings, Quantiles,
+    Trend, TrendPoint, TwoWay, TwoWayCell, cascades, flaky_scenes, judged, property_findings, quantiles,
+    table_failure_modes, trend, two_way,
+};
 pub use fisher::{FisherTest, TwoByTwo};
 pub use frame::AnalysisError;
 pub use health::{Ailment, Health, HealthMeter};
@@ -29,6 +36,10 @@ pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow,
 pub use paired::{Difference, PairedTable, PairedTest};
 pub use patterns::{Condition, Parameter, Pattern, PatternOptions, Patterns, Subject, Values, mine, simplest_between};
 pub use property_rates::{PropertyRate, property_rates};
+pub use tables::{
+    Column, ColumnKind, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter, TextColumn, columns, export_csv,
+    export_parquet,
+};
 
 // Rates of outcomes and their intervals are part of a verdict; readers of tables meet them here.
 pub use crate::verdict::{Interval, wilson, wilson_share};

@@ -76,13 +76,16 @@ pub enum Command {
     /// 130 stopped by Ctrl-C.
     #[command(after_help = "Example:\n  actcheck check-oracles configs/pick.toml")]
     CheckOracles(crate::cli::check_oracles::CheckOraclesArgs),
-    /// Write a stored run as a configuration of its own: one readable file that makes its scene again
+    /// Write a stored run as a configuration of its own, or the history as tables or RDF
     ///
-    /// `actcheck run` takes the file like any other, and says whether it fails as it did. Values may be changed by hand: one
-    /// that can't be is refused at its line. Inside the project it names ontology and models by paths from there;
-    /// elsewhere it leaves them out where the program carries the same ones, and so runs anywhere.
+    /// A run becomes one readable file that makes its scene again. `actcheck run` takes the file like any other, and says whether it
+    /// fails as it did. Values may be changed by hand: one that can't be is refused at its line. Inside the project it names ontology and
+    /// models by paths from there; elsewhere it leaves them out where the program carries the same ones, and so runs anywhere.
+    ///
+    /// Tables come from the mirror beside the history (its folder `tables`), which is brought up to date first. Runs that shrinking
+    /// made are not in them.
     #[command(
-        after_help = "Example:\n  actcheck export k7f3-3 -o case.toml    (an id that `actcheck list` prints; its beginning is enough)"
+        after_help = "Examples:\n  actcheck export k7f3-3 -o case.toml    (an id that `actcheck list` prints; its beginning is enough)\n  actcheck export --parquet tables    (after `actcheck run configs/pick.toml`)\n  actcheck export --nquads history.nq --turtle history.ttl"
     )]
     Export(ExportArgs),
     /// Say how healthy a campaign is: what was discarded, repeated, never tried, slow, or badly simulated

@@ -1,49 +1,148 @@
 //! `actcheck export`
 
+use std::cmp::Reverse;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::base::{Diagnostic, Diagnostics};
+use crate::analysis::{Hierarchy, Mirror, TableFilter, export_csv, export_parquet};
+use crate::base::{Diagnostic, Diagnostics, names};
 use crate::campaign::{self, Env};
 use crate::cli::args::HistoryArgs;
-use crate::cli::{history_dir, output};
+use crate::cli::{history_dir, output, since, why};
+use crate::history::History;
+use crate::ontology;
 
 /// `actcheck export`
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// Id of the run, or its beginning
-    pub run: String,
+    /// Id of the run to write as a configuration, or its beginning
+    #[arg(required_unless_present_any = ["parquet", "csv", "nquads", "turtle", "rebuild_mirror"])]
+    pub run: Option<String>,
     /// The file to write (TOML); `-` prints it
-    #[arg(
-        short,
-        long,
-        value_name = "FILE.toml",
-        required_unless_present = "regression",
-        conflicts_with = "regression"
-    )]
+    #[arg(short, long, value_name = "FILE.toml", conflicts_with = "regression", requires = "run")]
+    #[arg(required_unless_present_any = ["regression", "parquet", "csv", "nquads", "turtle", "rebuild_mirror"])]
     pub output: Option<PathBuf>,
     /// Put it, under the run's id, into the project's folder `regressions`, which every campaign runs first
-    #[arg(long)]
+    #[arg(long, requires = "run")]
     pub regression: bool,
     /// Take everything but the choices from this configuration instead of the one that the history keeps
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "run")]
     pub config: Option<PathBuf>,
+    /// Write the table of outcomes, one row for each run, action and property with the scene's parameters, into this folder:
+    /// `outcomes.parquet`, and `schema.json`, which says what each column means
+    #[arg(long, value_name = "DIR")]
+    pub parquet: Option<PathBuf>,
+    /// The same as CSV: `outcomes.csv` and `schema.json`
+    #[arg(long, value_name = "DIR")]
+    pub csv: Option<PathBuf>,
+    /// Write the whole history as RDF, facts in their named graphs (N-Quads)
+    #[arg(long, value_name = "FILE.nq")]
+    pub nquads: Option<PathBuf>,
+    /// Write campaigns, runs, scenes and outcomes as RDF, without the facts in named graphs (Turtle)
+    #[arg(long, value_name = "FILE.ttl")]
+    pub turtle: Option<PathBuf>,
+    /// Make the tables beside the history anew, from its store
+    #[arg(long)]
+    pub rebuild_mirror: bool,
+    /// Only rows of this campaign (for tables; may be given several times)
+    #[arg(long, value_name = "ID")]
+    pub campaign: Vec<String>,
+    /// Only rows of runs since then, such as 2026-11-21, 2026-11-21T18:00:00Z or 12h ago as 12h (for tables)
+    #[arg(long, value_name = "WHEN", value_parser = since::moment)]
+    pub since: Option<String>,
+    /// The ontology that says which kinds belong to which (for tables) [default: ontology/actions.ttl here, or the one that the
+    /// program carries]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
     /// Where the history lies.
     #[command(flatten)]
     pub history: HistoryArgs,
 }
 
-/// Writes a stored run as a configuration of its own.
+/// Writes a stored run as a configuration of its own, or the history as tables or RDF.
 pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
     let history = history_dir::open(&args.history)?;
-    let run = history.run(&args.run)?;
-    let recalled = Env::recall(&history, &run.row.campaign, args.config.as_deref())?;
+    if let Some(run) = &args.run {
+        export_run(args, &history, run)?;
+    }
+    if let Some(file) = &args.nquads {
+        history.write_nquads(file)?;
+        output::print(&format!("{} holds the whole history\n", file.display()));
+    }
+    if let Some(file) = &args.turtle {
+        history.write_turtle(file)?;
+        output::print(&format!("{} holds campaigns, runs, scenes and outcomes\n", file.display()));
+    }
+    if args.parquet.is_some() || args.csv.is_some() || args.rebuild_mirror {
+        export_tables(args, &history)?;
+    }
+    Ok(())
+}
+
+fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics> {
+    let filter = filter(history, &args.campaign, args.since.clone())?;
+    let hierarchy = hierarchy(args.ontology.as_deref())?;
+    let (mirror, change) = if args.rebuild_mirror { Mirror::rebuild(history) } else { Mirror::update(history) }?;
+    if args.rebuild_mirror {
+        let runs = change.added;
+        output::print(&format!("{} holds the outcomes of {runs} runs\n", mirror.folder().display()));
+    }
+    let wanted = [
+        (&args.parquet, export_parquet as fn(&_, &_, &_, &_) -> _),
+        (&args.csv, export_csv as fn(&_, &_, &_, &_) -> _),
+    ];
+    for (folder, write) in wanted {
+        let Some(folder) = folder else { continue };
+        let (files, rows): (Vec<PathBuf>, usize) = write(&mirror, &filter, &hierarchy, folder.as_path())?;
+        let [table, schema] = files.as_slice() else { continue };
+        let told = format!("{} holds {rows} rows, {} what their columns mean\n", table.display(), schema.display());
+        output::print(&told);
+    }
+    Ok(())
+}
+
+/// The rows that were asked for; a campaign that is not there is a fault.
+pub(super) fn filter(
+    history: &History,
+    campaigns: &[String],
+    since: Option<String>,
+) -> Result<TableFilter, Diagnostics> {
+    for campaign in campaigns {
+        history.campaign(campaign)?;
+    }
+    Ok(TableFilter { campaigns: (!campaigns.is_empty()).then(|| campaigns.to_vec()), since })
+}
+
+/// The classes above each class of an ontology, the nearest first: the more classes are above one, the nearer it is.
+pub(super) fn hierarchy(ontology: Option<&Path>) -> Result<Hierarchy, Diagnostics> {
+    let (files, path) = why::ontology_file(ontology);
+    let classes = ontology::load(&files, &path)?.superclasses;
+    let depth = |class: &String| classes.get(class).map_or(0, BTreeSet::len);
+    let nearest_first = |above: &BTreeSet<String>| {
+        let mut above: Vec<&String> = above.iter().collect();
+        above.sort_by_key(|class| (Reverse(depth(class)), *class));
+        above.into_iter().map(|class| names::local(class).to_owned()).collect()
+    };
+    Ok(classes.iter().map(|(class, above)| (class.clone(), nearest_first(above))).collect())
+}
+
+/// Writes a stored run as a configuration of its own.
+fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Diagnostics> {
+    let run = history.run(run)?;
+    let recalled = Env::recall(history, &run.row.campaign, args.config.as_deref())?;
     let file = match &args.output {
         Some(file) => file.clone(),
-        None => new_regression(&recalled.0, &run.row.run)?,
+        None if args.regression => new_regression(&recalled.0, &run.row.run)?,
+        // Only tables were asked for beside it.
+        None => {
+            return Err(Diagnostic::error("X043", format!("where run {} is to be written was not said", run.row.run))
+                .help("name a file with `-o FILE.toml`, or use `--regression`")
+                .into());
+        }
     };
-    let text = campaign::export(&history, &recalled, &run, file.parent().unwrap_or(Path::new("")))?;
+    let text = campaign::export(history, &recalled, &run, file.parent().unwrap_or(Path::new("")))?;
     if file.as_os_str() == "-" {
         output::print(&text);
         return Ok(());

@@ -30,6 +30,7 @@ mod run;
 mod session;
 mod show;
 mod shrink;
+mod since;
 mod stop;
 mod why;
 

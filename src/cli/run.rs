@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
 
-use crate::analysis::{self, Interval};
+use crate::analysis::{self, Interval, Mirror};
 use crate::base::{Diagnostic, Diagnostics};
 use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, WeightedRate, resume_all};
 use crate::cli::args::{Format, RunArgs};
@@ -20,6 +20,9 @@ use crate::report::{
 };
 use crate::rules::Budget;
 use crate::verdict::{Counts, Outcome, mean};
+
+/// The tables beside the history are brought up to date each time so many runs were kept.
+const MIRROR_EVERY: usize = 1_000;
 
 /// Runs a campaign and prints what came of it. Returns the exit code.
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
@@ -46,6 +49,9 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
             let summary = RunSummary::of(record);
             progress.run(&summary);
             runs.push(summary);
+            if runs.len().is_multiple_of(MIRROR_EVERY) {
+                mirror(&history);
+            }
         })
     });
     progress.finish();
@@ -54,6 +60,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
     let mut summary = summarise(&env, id.clone(), runs, &end);
     summary.regressions = regressions;
+    mirror(&history);
     if finished.is_ok() {
         summary.failure_modes = failure_modes(&history, id)?;
     }
@@ -71,6 +78,13 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         _ if shrinks && stop.load(Ordering::Relaxed) => finished.map(|()| stop::INTERRUPTED),
         Ending::Finished | Ending::Budget(_) => finished.map(|()| summary.exit_code()),
         Ending::Interrupted => finished.map(|()| stop::INTERRUPTED),
+    }
+}
+
+/// Brings the tables beside the history up to date. They can be made again at any time: a fault is told, and changes nothing else.
+fn mirror(history: &History) {
+    if let Err(faults) = Mirror::update(history) {
+        output::print_diagnostics(&faults);
     }
 }
 

@@ -122,9 +122,14 @@ pub(super) fn shrunk_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryE
     Ok(select(store, SHRUNK, Vec::new())?.iter().map(|row| id(row, 0)).collect())
 }
 
+/// Ids of all campaigns, by their start.
+pub(super) fn campaign_ids(store: &Store) -> Result<Vec<String>, QueryEvaluationError> {
+    Ok(select(store, STARTS, Vec::new())?.iter().map(|row| id(row, 0)).collect())
+}
+
 /// Position of each campaign in the order of their starts.
 fn ranks(store: &Store) -> Result<BTreeMap<String, usize>, QueryEvaluationError> {
-    Ok(select(store, STARTS, Vec::new())?.iter().enumerate().map(|(rank, row)| (id(row, 0), rank)).collect())
+    Ok(campaign_ids(store)?.into_iter().enumerate().map(|(rank, id)| (id, rank)).collect())
 }
 
 /// Values of the variables that a filter fixes.

@@ -4,6 +4,7 @@
 
 mod answer;
 mod detail;
+mod dump;
 mod fault;
 mod folder;
 mod frames;

@@ -197,6 +197,26 @@ impl History {
         lists::runs(&self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
+    /// Ids of the runs of every campaign that does not hold the smaller form of a run, by the start of the campaign, sorted as texts.
+    ///
+    /// # Errors
+    /// The store can't be read.
+    pub fn run_ids(&self) -> Result<Vec<(String, Vec<String>)>, Diagnostics> {
+        let store = self.store()?;
+        let shrunk = self.shrunk_campaigns()?;
+        let campaigns = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
+        let mut found = Vec::new();
+        for id in campaigns.into_iter().filter(|id| !shrunk.contains(id)) {
+            let runs = subjects(&store, "act:campaign", &campaign_node(&id));
+            let runs = runs.map_err(|error| self.fault("reading", &error))?;
+            let mut runs: Vec<String> =
+                runs.into_iter().map(|run| short_id(&text_of(&run.into())).to_owned()).collect();
+            runs.sort();
+            found.push((id, runs));
+        }
+        Ok(found)
+    }
+
     /// Outcomes of the runs that a filter lets through, in the order of [`History::runs`], then by step and property.
     ///
     /// # Errors

@@ -1,0 +1,90 @@
+//! Which action's failure leads to which later one.
+
+use std::collections::BTreeMap;
+
+use crate::analysis::findings::judged::{failed, outcomes};
+use crate::analysis::{OutcomeTable, TwoByTwo, benjamini_hochberg};
+
+/// A property of an action at a step.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Judged {
+    /// Position of the action in the test, from 1.
+    pub step: u32,
+    /// IRI of the action.
+    pub action: String,
+    /// IRI of the property.
+    pub property: String,
+}
+
+/// Two failures of which the later one comes more often where the earlier one came.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cascade {
+    /// What failed first.
+    pub first: Judged,
+    /// What failed at a later action.
+    pub later: Judged,
+    /// Runs in which both were decided: within are those in which the first failed.
+    pub table: TwoByTwo,
+    /// Fisher's exact test, one-sided.
+    pub p: f64,
+    /// The same, adjusted for all pairs (Benjamini and Hochberg).
+    pub q: f64,
+}
+
+/// Pairs of failures at different steps of the same run that go together beyond chance, the surest first.
+///
+/// A later action that was not reached, or that could not be judged, counts neither way.
+pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
+    let runs = table.text("run");
+    let outcomes = outcomes(table);
+    let mut slots: BTreeMap<(u32, u32, u32), usize> = BTreeMap::new();
+    let mut counts: BTreeMap<(usize, usize), TwoByTwo> = BTreeMap::new();
+    let mut run: Vec<(u32, usize, bool)> = Vec::new();
+    for row in 0..table.len() {
+        if row > 0 && runs.of_row[row] != runs.of_row[row - 1] {
+            count(&run, &mut counts);
+            run.clear();
+        }
+        if let (Some(key), Some(failed)) = (key(table, row), failed(outcomes[row])) {
+            let next = slots.len();
+            run.push((key.0, *slots.entry(key).or_insert(next), failed));
+        }
+    }
+    count(&run, &mut counts);
+    let judged: BTreeMap<usize, Judged> = slots.into_iter().map(|(key, slot)| (slot, name(table, key))).collect();
+    let probabilities: Vec<f64> = counts.values().map(|table| table.fisher().greater).collect();
+    let adjusted = benjamini_hochberg(&probabilities, probabilities.len() as u64);
+    let mut found: Vec<Cascade> = counts
+        .into_iter()
+        .zip(probabilities.into_iter().zip(adjusted))
+        .filter(|(_, (_, q))| *q <= level)
+        .map(|(((first, later), table), (p, q))| Cascade {
+            first: judged[&first].clone(),
+            later: judged[&later].clone(),
+            table,
+            p,
+            q,
+        })
+        .collect();
+    found.sort_by(|a, b| a.p.total_cmp(&b.p).then_with(|| (&a.first, &a.later).cmp(&(&b.first, &b.later))));
+    found
+}
+
+/// Counts all pairs of one run.
+fn count(run: &[(u32, usize, bool)], counts: &mut BTreeMap<(usize, usize), TwoByTwo>) {
+    for (step, first, first_failed) in run {
+        for (_, later, later_failed) in run.iter().filter(|(later, ..)| later > step) {
+            counts.entry((*first, *later)).or_default().add(*first_failed, *later_failed);
+        }
+    }
+}
+
+fn key(table: &OutcomeTable, row: usize) -> Option<(u32, u32, u32)> {
+    let step = table.number("step").get(row).filter(|step| !step.is_nan())?;
+    Some((*step as u32, table.text("action").of_row[row]?, table.text("property").of_row[row]?))
+}
+
+fn name(table: &OutcomeTable, (step, action, property): (u32, u32, u32)) -> Judged {
+    let text = |column: &str, of: u32| table.text(column).texts[of as usize].clone();
+    Judged { step, action: text("action", action), property: text("property", property) }
+}

@@ -1,0 +1,90 @@
+//! The parameters of scenes in some rows of a table.
+
+use std::collections::BTreeMap;
+
+use crate::analysis::{ColumnKind, Hierarchy, OutcomeTable, Parameter, TextColumn, Values, columns};
+use crate::base::names;
+
+/// Every parameter of the scenes of some rows, and every designator that has one value in each.
+///
+/// Of several parameters that part the rows in the same way, the first stands for all.
+pub(super) fn parameters(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarchy) -> Vec<Parameter> {
+    let mut found: Vec<Parameter> = Vec::new();
+    for column in columns().iter().filter(|column| column.parameter) {
+        let values = match column.kind {
+            ColumnKind::Text => kinds(table.text(column.name), rows, hierarchy),
+            _ => numbers(table.number(column.name), rows),
+        };
+        let unit = (!column.unit.is_empty() && column.unit != "1").then(|| column.unit.to_owned());
+        add(&mut found, Parameter { name: column.name.to_owned(), unit, values });
+    }
+    for (name, column) in designators(table.text("designators"), rows) {
+        let values = kinds(&column, &(0..rows.len() as u32).collect::<Vec<u32>>(), hierarchy);
+        add(&mut found, Parameter { name, unit: None, values });
+    }
+    found
+}
+
+fn add(found: &mut Vec<Parameter>, parameter: Parameter) {
+    let same = |known: &Parameter| match (&known.values, &parameter.values) {
+        (Values::Kinds { of_run: a, above, .. }, Values::Kinds { of_run: b, .. }) => {
+            // Classes say more than names of models.
+            a == b && (above.iter().any(|above| !above.is_empty()) || known.name != parameter.name)
+        }
+        (Values::Numbers(a), Values::Numbers(b)) => a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits()),
+        _ => false,
+    };
+    if !found.iter().any(same) {
+        found.push(parameter);
+    }
+}
+
+fn numbers(column: &[f64], rows: &[u32]) -> Values {
+    Values::Numbers(rows.iter().map(|row| column.get(*row as usize).copied().unwrap_or(f64::NAN)).collect())
+}
+
+/// Kinds in the order in which they are met; IRIs by their local names, with the classes above them.
+fn kinds(column: &TextColumn, rows: &[u32], hierarchy: &Hierarchy) -> Values {
+    let mut place_of: BTreeMap<u32, u32> = BTreeMap::new();
+    let (mut names, mut above) = (Vec::new(), Vec::new());
+    let of_run = rows
+        .iter()
+        .map(|row| {
+            let text = column.of_row.get(*row as usize).copied().flatten()?;
+            Some(*place_of.entry(text).or_insert_with(|| {
+                let text = &column.texts[text as usize];
+                names.push(names::local(text).to_owned());
+                above.push(hierarchy.get(text).cloned().unwrap_or_default());
+                (names.len() - 1) as u32
+            }))
+        })
+        .collect();
+    Values::Kinds { of_run, names, above }
+}
+
+/// Designators that have just one value in each row, as columns over the rows.
+fn designators(column: &TextColumn, rows: &[u32]) -> Vec<(String, TextColumn)> {
+    let read = |text: &String| -> BTreeMap<String, Vec<String>> { serde_json::from_str(text).unwrap_or_default() };
+    let known: Vec<BTreeMap<String, Vec<String>>> = column.texts.iter().map(read).collect();
+    let mut found: BTreeMap<&String, TextColumn> = BTreeMap::new();
+    for designator in known.iter().flat_map(BTreeMap::keys) {
+        found.entry(designator).or_default();
+    }
+    for (designator, values) in &mut found {
+        for row in rows {
+            let of = column.of_row.get(*row as usize).copied().flatten();
+            let value = of.and_then(|of| match known[of as usize].get(*designator).map(Vec::as_slice) {
+                Some([only]) => Some(only),
+                _ => None,
+            });
+            values.of_row.push(value.map(|value| {
+                values.texts.iter().position(|known| known == value).unwrap_or_else(|| {
+                    values.texts.push(value.clone());
+                    values.texts.len() - 1
+                }) as u32
+            }));
+        }
+    }
+    found.retain(|_, column| column.of_row.iter().all(Option::is_some));
+    found.into_iter().map(|(name, column)| (name.clone(), column)).collect()
+}

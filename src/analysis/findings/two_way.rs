@@ -1,0 +1,114 @@
+//! How often something fails, by one or two parameters: what heat maps show.
+
+use crate::analysis::{Interval, Parameter, Subject, Values, simplest_between, wilson};
+
+/// Cells along an axis of numbers at most.
+const MOST_CELLS: usize = 8;
+
+/// Failures by one or two parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TwoWay {
+    /// Names of the parameters: down, and across where there are two.
+    pub by: Vec<String>,
+    /// What stands for each row.
+    pub down: Vec<String>,
+    /// What stands for each column; one without a name where there is one parameter.
+    pub across: Vec<String>,
+    /// Row by row. Runs in which a parameter has no value are in none.
+    pub cells: Vec<Vec<TwoWayCell>>,
+}
+
+/// One cell.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TwoWayCell {
+    /// Decided runs.
+    pub runs: u64,
+    /// Of them failed.
+    pub failed: u64,
+    /// Share of failed; nothing where there are no runs.
+    pub failing: Option<Interval>,
+}
+
+/// Counts failures by one or two parameters, by name; nothing where one is not there.
+///
+/// Ranges of numbers are cut in equal steps, so that a map of positions is one.
+pub fn two_way(subject: &Subject, by: &[&str]) -> Option<TwoWay> {
+    let parameter = |name: &str| subject.parameters.iter().find(|parameter| parameter.name == name);
+    let down = labelled(parameter(by.first()?)?);
+    let across = match by.get(1) {
+        Some(name) => labelled(parameter(name)?),
+        None => (vec![String::new()], vec![Some(0); subject.len()]),
+    };
+    let mut cells = vec![vec![TwoWayCell::default(); across.0.len()]; down.0.len()];
+    for run in 0..subject.len() {
+        if let (Some(row), Some(column)) = (down.1[run], across.1[run]) {
+            let cell = &mut cells[row][column];
+            cell.runs += 1;
+            cell.failed += u64::from(subject.failed[run]);
+        }
+    }
+    cells.iter_mut().flatten().for_each(|cell| cell.failing = wilson(cell.failed, cell.runs));
+    let by = by.iter().take(2).map(|name| (*name).to_owned()).collect();
+    Some(TwoWay { by, down: down.0, across: across.0, cells })
+}
+
+/// Labels, and for each run which it has.
+fn labelled(parameter: &Parameter) -> (Vec<String>, Vec<Option<usize>>) {
+    match &parameter.values {
+        Values::Kinds { of_run, names, .. } => {
+            let mut order: Vec<usize> = (0..names.len()).collect();
+            order.sort_by_key(|place| &names[*place]);
+            let mut rank = vec![0; names.len()];
+            order.iter().enumerate().for_each(|(at, place)| rank[*place] = at);
+            let labels = order.iter().map(|place| names[*place].clone()).collect();
+            (labels, of_run.iter().map(|of| of.map(|of| rank[of as usize])).collect())
+        }
+        Values::Numbers(numbers) => {
+            let bounds = bounds(numbers);
+            let labels = bounds.windows(2).map(|pair| format!("{} – {}", pair[0], pair[1])).collect();
+            let last = bounds.len().saturating_sub(2);
+            let cell = |value: &f64| {
+                let below = bounds.partition_point(|bound| *bound <= *value);
+                (!value.is_nan() && !bounds.is_empty()).then(|| below.saturating_sub(1).min(last))
+            };
+            (labels, numbers.iter().map(cell).collect())
+        }
+    }
+}
+
+/// Bounds of equal steps that hold all numbers: a round step, and as many as that takes, but not many.
+fn bounds(numbers: &[f64]) -> Vec<f64> {
+    let known = || numbers.iter().copied().filter(|number| number.is_finite());
+    let (Some(least), Some(most)) = (known().min_by(f64::total_cmp), known().max_by(f64::total_cmp)) else {
+        return Vec::new();
+    };
+    if least == most {
+        return vec![least, most];
+    }
+    // The steps that people read easily are 1, 2 and 5 times a power of ten.
+    let rough = (most - least) / MOST_CELLS as f64;
+    let power = libm::exp10(libm::floor(libm::log10(rough)));
+    let step =
+        [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|step| *step >= rough).unwrap_or(rough);
+    let first = libm::floor(least / step);
+    let count = (libm::floor(most / step) - first) as usize + 1;
+    let near = |number: f64| simplest_between(number - step * 1e-6, number + step * 1e-6);
+    (0..=count).map(|at| near((first + at as f64) * step)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_round_and_hold_everything() {
+        let expected = [-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6];
+        let found = bounds(&[-0.599, 0.598, f64::NAN]);
+        assert_eq!(found.len(), expected.len());
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        assert_eq!(bounds(&[2.0, 2.0]), [2.0, 2.0]);
+        assert!(bounds(&[f64::NAN]).is_empty());
+        let counts = bounds(&[0.0, 1.0, 6.0]);
+        assert_eq!(counts, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    }
+}

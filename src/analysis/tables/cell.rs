@@ -1,0 +1,25 @@
+//! One value of the table.
+
+/// A value, or nothing where there is none.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Cell {
+    Text(Option<String>),
+    Number(Option<f64>),
+    Count(Option<i64>),
+    Truth(Option<bool>),
+}
+
+impl Cell {
+    pub fn text(text: impl Into<String>) -> Self {
+        Self::Text(Some(text.into()))
+    }
+
+    pub fn number(number: f64) -> Self {
+        Self::Number(Some(number))
+    }
+
+    /// What no count of ours exceeds stays exact.
+    pub fn count(count: impl TryInto<i64>) -> Self {
+        Self::Count(Some(count.try_into().unwrap_or(i64::MAX)))
+    }
+}

@@ -1,0 +1,230 @@
+//! The columns of the table: name, sort, unit, what each says, and where it comes from.
+
+use serde::Serialize;
+use serde_json::json;
+
+use crate::analysis::tables::cell::Cell;
+use crate::analysis::tables::place::{Place, angle};
+use crate::base::names;
+use crate::history::{ObjectDetail, Role};
+
+/// What sort of values a column has. Any of them may be missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColumnKind {
+    /// Text; IRIs are whole.
+    Text,
+    /// A floating-point number.
+    Number,
+    /// A whole number.
+    Count,
+    /// True or false.
+    Truth,
+}
+
+/// One column of the table.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Column {
+    /// Its name.
+    pub name: &'static str,
+    /// What sort of values it has.
+    #[serde(rename = "type")]
+    pub kind: ColumnKind,
+    /// Unit of its numbers; empty where they have none.
+    pub unit: &'static str,
+    /// Whether it is a parameter of the scene: something that was so before the robot did anything, and may make a difference.
+    pub parameter: bool,
+    /// What it says.
+    pub description: &'static str,
+    #[serde(skip)]
+    pub(super) cell: fn(&Place<'_>) -> Cell,
+}
+
+/// All columns, in their order.
+pub fn columns() -> &'static [Column] {
+    COLUMNS
+}
+
+const COLUMNS: &[Column] = &[
+    text("run", "id of the run", |p| Cell::text(&p.run.row.run)),
+    text("campaign", "id of its campaign", |p| Cell::text(&p.run.row.campaign)),
+    count("index", "position of the run in the campaign, from 0", |p| Cell::count(p.run.row.index)),
+    count("scene", "number of its scene, where scenes are run more than once", |p| {
+        Cell::Count(p.run.row.repetition.and_then(|repetition| repetition.scene.try_into().ok()))
+    }),
+    count("repetition", "which run of its scene it is, from 0, where scenes are run more than once", |p| {
+        Cell::Count(p.run.row.repetition.and_then(|repetition| repetition.number.try_into().ok()))
+    }),
+    number("weight", "1", "importance weight of its scene, where a search chose it", |p| {
+        Cell::Number(p.run.row.weight)
+    }),
+    text("test", "names of the run's actions, joined by a space", |p| Cell::text(&p.run.row.test)),
+    text("status", "how the run ended: completed, broken or timeout", |p| Cell::text(p.run.row.status.word())),
+    number("score", "1", "the run's score S", |p| Cell::number(p.run.row.score)),
+    text("started", "when the run began (RFC 3339)", |p| Cell::text(&p.run.row.started)),
+    text("trace_hash", "digest over every state: runs with the same one went the same way", |p| {
+        Cell::text(&p.run.row.trace_hash)
+    }),
+    text("program_version", "version of the program that ran it", |p| Cell::text(&p.run.program_version)),
+    count("step", "position of the action in the test, from 1", |p| Cell::count(p.action.step)),
+    text("action", "the action (IRI)", |p| Cell::text(&p.action.action)),
+    text("action_end", "how the action ended: completed, broken, timeout or untested", |p| Cell::text(&p.action.end)),
+    truth("reported", "whether the action reported success", |p| Cell::Truth(p.action.reported)),
+    text("message", "the action's own words, or why it did not complete", |p| Cell::Text(p.action.message.clone())),
+    number("duration_s", "s", "simulated time that the action took", |p| Cell::number(p.action.duration_secs)),
+    text("property", "the property (IRI)", |p| Cell::text(&p.judgement.property)),
+    text("outcome", "passed, failed, inapplicable, broken, timeout or untested", |p| {
+        Cell::text(p.judgement.outcome.word())
+    }),
+    number("margin", "the property's", "how far the outcome was from flipping; positive: passed", |p| {
+        Cell::Number(p.judgement.margin)
+    }),
+    truth("held_before", "whether the property held before the action already", |p| {
+        Cell::Truth(p.judgement.held_before)
+    }),
+    text("designators", "designators of the action with their values, objects by their models (JSON)", designators),
+    text("world", "name of the world", |p| Cell::text(&p.run.world)).of_scene(),
+    number("base_x_m", "m", "where the base stood at first", |p| Cell::number(p.run.robot_base[0])).of_scene(),
+    number("base_y_m", "m", "where the base stood at first", |p| Cell::number(p.run.robot_base[1])).of_scene(),
+    number("base_yaw_rad", "rad", "which way the base faced at first", |p| Cell::number(p.run.robot_base[2]))
+        .of_scene(),
+    count("others", "things that stand around: the clutter", |p| Cell::count(with_role(p, Role::Other))).of_scene(),
+    count("obstacles", "obstacles on the floor", |p| Cell::count(with_role(p, Role::Obstacle))).of_scene(),
+    text("surface_model", "model of the platform", |p| model(p.scene.surface)).of_scene(),
+    text("surface_category", "class of the platform (IRI)", |p| category(p.scene.surface)).of_scene(),
+    text("target_model", "model of the target: what the action handles", |p| model(p.scene.target)).of_scene(),
+    text("target_category", "class of the target (IRI)", |p| category(p.scene.target)).of_scene(),
+    number("target_x_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.x)).of_scene(),
+    number("target_y_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.y)).of_scene(),
+    number("target_z_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.z)).of_scene(),
+    number("target_yaw_rad", "rad", "which way the target was turned, in the world", |p| {
+        of_target(p, |t| angle(t.yaw))
+    })
+    .of_scene(),
+    number("target_mass_kg", "kg", "the target's mass", |p| of_target(p, |t| t.mass_kg)).of_scene(),
+    number("target_friction", "1", "the target's friction coefficient", |p| of_target(p, |t| t.friction)).of_scene(),
+    number("target_restitution", "1", "how much the target bounces", |p| of_target(p, |t| t.restitution)).of_scene(),
+    number("robot_distance_m", "m", "horizontal distance of the target from the base", |p| {
+        of_target(p, |t| t.robot_distance_m)
+    })
+    .of_scene(),
+    number("target_ahead_m", "m", "how far ahead of the base the target lay", |p| {
+        Cell::Number(p.scene.target_from_base(p.run.robot_base).map(|[ahead, _]| ahead))
+    })
+    .of_scene(),
+    number("target_left_m", "m", "how far to the left of the base the target lay", |p| {
+        Cell::Number(p.scene.target_from_base(p.run.robot_base).map(|[_, left]| left))
+    })
+    .of_scene(),
+    number("target_turned_rad", "rad", "which way the target was turned, seen from the base", |p| {
+        of_target(p, |t| angle(t.yaw - p.run.robot_base[2]))
+    })
+    .of_scene(),
+    number("surface_x_m", "m", "where the target was on its surface, from the middle, along the surface's x", |p| {
+        Cell::Number(p.scene.target_on_surface().map(|[x, _]| x))
+    })
+    .of_scene(),
+    number("surface_y_m", "m", "where the target was on its surface, from the middle, along the surface's y", |p| {
+        Cell::Number(p.scene.target_on_surface().map(|[_, y]| y))
+    })
+    .of_scene(),
+    text("neighbour_model", "model of the thing nearest to the target", |p| model(neighbour(p))).of_scene(),
+    text("neighbour_category", "class of the thing nearest to the target (IRI)", |p| category(neighbour(p))).of_scene(),
+    number("neighbour_distance_m", "m", "horizontal distance of the nearest thing's middle from the target's", |p| {
+        Cell::Number(p.scene.neighbour.map(|(_, distance)| distance))
+    })
+    .of_scene(),
+    number(
+        "neighbour_direction_rad",
+        "rad",
+        "which way the nearest thing lies from the target: 0 towards the base",
+        |p| Cell::Number(p.scene.neighbour_direction(p.run.robot_base)),
+    )
+    .of_scene(),
+    number("obstacle_distance_m", "m", "distance of the nearest obstacle from the straight way to the target", |p| {
+        Cell::Number(p.scene.obstacle_distance_m)
+    })
+    .of_scene(),
+    number("position_noise_m", "m", "how wrong perceived positions are (standard deviation)", |p| {
+        noise(p, "positionNoise")
+    })
+    .of_scene(),
+    number("height_noise_m", "m", "how wrong perceived heights are", |p| noise(p, "heightNoise")).of_scene(),
+    number("yaw_noise_rad", "rad", "how wrong perceived headings are", |p| noise(p, "yawNoise")).of_scene(),
+    number("size_noise_m", "m", "how wrong perceived sizes are", |p| noise(p, "sizeNoise")).of_scene(),
+    number("localisation_noise_m", "m", "how wrong the robot's own position is", |p| noise(p, "localisationNoise"))
+        .of_scene(),
+    number("heading_noise_rad", "rad", "how wrong the robot's own heading is", |p| noise(p, "headingNoise")).of_scene(),
+    number("gripper_noise_m", "m", "how wrong the gripper's opening is", |p| noise(p, "gripperNoise")).of_scene(),
+    number("range_noise_m", "m", "how wrong the camera's ranges are", |p| noise(p, "rangeNoise")).of_scene(),
+    number("target_displacement_m", "m", "how far the target came from its place during the run", |p| {
+        Cell::Number(p.scene.target.and_then(|target| target.displacement_m))
+    }),
+    number("target_tilt_rad", "rad", "largest angle of the target from the vertical during the run", |p| {
+        Cell::Number(p.scene.target.and_then(|target| target.max_tilt_rad))
+    }),
+    number("others_displacement_m", "m", "how far any other thing came from its place during the run", |p| {
+        let others = p.run.objects.iter().filter(|object| object.role == Role::Other);
+        Cell::Number(others.filter_map(|object| object.displacement_m).max_by(f64::total_cmp))
+    }),
+];
+
+type Of = fn(&Place<'_>) -> Cell;
+
+const fn text(name: &'static str, description: &'static str, cell: Of) -> Column {
+    Column { name, kind: ColumnKind::Text, unit: "", parameter: false, description, cell }
+}
+
+const fn number(name: &'static str, unit: &'static str, description: &'static str, cell: Of) -> Column {
+    Column { name, kind: ColumnKind::Number, unit, parameter: false, description, cell }
+}
+
+const fn count(name: &'static str, description: &'static str, cell: Of) -> Column {
+    Column { name, kind: ColumnKind::Count, unit: "", parameter: false, description, cell }
+}
+
+const fn truth(name: &'static str, description: &'static str, cell: Of) -> Column {
+    Column { name, kind: ColumnKind::Truth, unit: "", parameter: false, description, cell }
+}
+
+impl Column {
+    const fn of_scene(mut self) -> Self {
+        self.parameter = true;
+        self
+    }
+}
+
+fn with_role(place: &Place<'_>, role: Role) -> usize {
+    place.run.objects.iter().filter(|object| object.role == role).count()
+}
+
+fn model(object: Option<&ObjectDetail>) -> Cell {
+    Cell::Text(object.map(|object| object.model.clone()))
+}
+
+fn category(object: Option<&ObjectDetail>) -> Cell {
+    Cell::Text(object.map(|object| object.category.clone()))
+}
+
+fn neighbour<'a>(place: &Place<'a>) -> Option<&'a ObjectDetail> {
+    place.scene.neighbour.map(|(object, _)| object)
+}
+
+fn of_target(place: &Place<'_>, number: impl Fn(&ObjectDetail) -> f64) -> Cell {
+    Cell::Number(place.scene.target.map(number))
+}
+
+fn noise(place: &Place<'_>, name: &str) -> Cell {
+    Cell::Number(place.run.noise.get(name).copied())
+}
+
+fn designators(place: &Place<'_>) -> Cell {
+    let named = |value: &String| {
+        let object = place.run.objects.iter().find(|object| object.id == *value);
+        object.map_or_else(|| names::local(value).to_owned(), |object| object.model.clone())
+    };
+    let values = place.action.parameters.iter();
+    let json: serde_json::Map<String, serde_json::Value> =
+        values.map(|(name, values)| (name.clone(), json!(values.iter().map(named).collect::<Vec<_>>()))).collect();
+    Cell::text(serde_json::Value::Object(json).to_string())
+}

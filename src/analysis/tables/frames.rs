@@ -1,0 +1,99 @@
+//! Runs to the rows of the table, and the table to what the table library holds.
+
+use std::collections::BTreeMap;
+
+use polars::prelude::{Column as Series, DataFrame, NamedFrom as _, PolarsError, Series as Values};
+
+use crate::analysis::tables::cell::Cell;
+use crate::analysis::tables::columns::{Column, ColumnKind, columns};
+use crate::analysis::tables::place::{ActionScene, Hierarchy, Place};
+use crate::base::names;
+use crate::history::RunDetail;
+
+/// Columns of categories, and the columns that name the classes above them.
+const KINDS: [(&str, &str); 3] = [
+    ("surface_category", "surface_kinds"),
+    ("target_category", "target_kinds"),
+    ("neighbour_category", "neighbour_kinds"),
+];
+
+/// Rows of runs, column by column.
+#[derive(Debug, Default)]
+pub(super) struct Rows {
+    cells: Vec<Vec<Cell>>,
+    height: usize,
+}
+
+impl Rows {
+    /// Adds a row for each outcome of a run.
+    pub fn add(&mut self, run: &RunDetail) {
+        self.cells.resize_with(columns().len(), Vec::new);
+        for action in &run.actions {
+            let scene = ActionScene::of(run, action);
+            for judgement in &action.judgements {
+                let place = Place { run, action, judgement, scene: &scene };
+                for (cells, column) in self.cells.iter_mut().zip(columns()) {
+                    cells.push((column.cell)(&place));
+                }
+                self.height += 1;
+            }
+        }
+    }
+
+    /// As a table of the library.
+    pub fn frame(mut self) -> Result<DataFrame, PolarsError> {
+        self.cells.resize_with(columns().len(), Vec::new);
+        let series = columns().iter().zip(self.cells).map(|(column, cells)| series(column, cells));
+        DataFrame::new(self.height, series.collect())
+    }
+}
+
+fn series(column: &Column, cells: Vec<Cell>) -> Series {
+    let name = column.name.into();
+    let cells = cells.into_iter();
+    match column.kind {
+        ColumnKind::Text => {
+            let text = |cell| if let Cell::Text(text) = cell { text } else { None };
+            Values::new(name, cells.map(text).collect::<Vec<Option<String>>>())
+        }
+        ColumnKind::Number => {
+            let number = |cell| if let Cell::Number(number) = cell { number } else { None };
+            Values::new(name, cells.map(number).collect::<Vec<Option<f64>>>())
+        }
+        ColumnKind::Count => {
+            let count = |cell| if let Cell::Count(count) = cell { count } else { None };
+            Values::new(name, cells.map(count).collect::<Vec<Option<i64>>>())
+        }
+        ColumnKind::Truth => {
+            let truth = |cell| if let Cell::Truth(truth) = cell { truth } else { None };
+            Values::new(name, cells.map(truth).collect::<Vec<Option<bool>>>())
+        }
+    }
+    .into()
+}
+
+/// Adds the classes above each category: local names, the nearest first, joined by a space, the category itself before them.
+pub(super) fn with_kinds(frame: &mut DataFrame, hierarchy: &Hierarchy) -> Result<(), PolarsError> {
+    for (from, to) in KINDS {
+        let mut known: BTreeMap<&str, String> = BTreeMap::new();
+        let categories = frame.column(from)?.str()?.clone();
+        let kinds: Vec<Option<String>> = categories
+            .iter()
+            .map(|category| {
+                category.map(|category| known.entry(category).or_insert_with(|| told(category, hierarchy)).clone())
+            })
+            .collect();
+        frame.with_column(Values::new(to.into(), kinds).into())?;
+    }
+    Ok(())
+}
+
+/// What the columns that [`with_kinds`] adds are called, and what they say.
+pub(super) fn kinds_columns() -> impl Iterator<Item = (&'static str, String)> {
+    KINDS.into_iter().map(|(from, to)| (to, format!("{from} and the classes above it, local names, the nearest first")))
+}
+
+fn told(category: &str, hierarchy: &Hierarchy) -> String {
+    let above = hierarchy.get(category).into_iter().flatten().map(String::as_str);
+    std::iter::once(names::local(category)).chain(above).collect::<Vec<&str>>().join(" ")
+}

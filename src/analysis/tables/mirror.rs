@@ -1,0 +1,203 @@
+//! The table beside a history, in as many files as it was written in pieces.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _};
+
+use crate::analysis::tables::columns::columns;
+use crate::analysis::tables::frames::Rows;
+use crate::base::{Diagnostic, Diagnostics, digest_of};
+use crate::history::History;
+
+/// Runs of a file at most: so many are in memory at once.
+const RUNS_IN_A_FILE: usize = 2_000;
+/// Says which columns the files have.
+const SCHEMA: &str = "SCHEMA";
+
+/// The mirror of a history that is as the store is.
+#[derive(Debug)]
+pub struct Mirror {
+    folder: PathBuf,
+    /// Its files, by campaign in the order of their starts, then in the order in which they were written.
+    files: Vec<(String, PathBuf)>,
+}
+
+/// What bringing a mirror up to date took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MirrorChange {
+    /// Runs that were written.
+    pub added: usize,
+    /// Runs that had been there already.
+    pub kept: usize,
+}
+
+impl Mirror {
+    /// Brings the mirror of a history up to date: writes the runs that it lacks, and anew what the store does not have or what can't be
+    /// read.
+    ///
+    /// Campaigns that hold the smaller form of a run are left out: their scenes are chosen to fail.
+    ///
+    /// # Errors
+    /// `A001` it can't be written; the history can't be read. What is there is whole.
+    pub fn update(history: &History) -> Result<(Self, MirrorChange), Diagnostics> {
+        let folder = history.dir().join("tables");
+        fs::create_dir_all(&folder).map_err(|error| unwritten(&folder, &error))?;
+        let digest = schema_digest();
+        if fs::read_to_string(folder.join(SCHEMA)).ok().as_deref() != Some(digest.as_str()) {
+            clear(&folder)?;
+            fs::write(folder.join(SCHEMA), digest).map_err(|error| unwritten(&folder, &error))?;
+        }
+        let mut mirror = Self { folder, files: Vec::new() };
+        let mut change = MirrorChange::default();
+        let mut present = mirror.present()?;
+        for (campaign, runs) in history.run_ids()? {
+            let files = present.remove(&campaign).unwrap_or_default();
+            mirror.update_campaign(history, &campaign, &runs, files, &mut change)?;
+        }
+        for file in present.into_values().flatten() {
+            fs::remove_file(&file).map_err(|error| unwritten(&file, &error))?;
+        }
+        Ok((mirror, change))
+    }
+
+    /// Makes the mirror of a history anew.
+    ///
+    /// # Errors
+    /// As [`Mirror::update`].
+    pub fn rebuild(history: &History) -> Result<(Self, MirrorChange), Diagnostics> {
+        let folder = history.dir().join("tables");
+        if folder.is_dir() {
+            clear(&folder)?;
+        }
+        Self::update(history)
+    }
+
+    /// Its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Its files with their campaigns.
+    pub(super) fn files(&self) -> impl Iterator<Item = (&str, &Path)> {
+        self.files.iter().map(|(campaign, file)| (campaign.as_str(), file.as_path()))
+    }
+
+    /// Files by campaign, in the order in which they were written. What was being written when a process was killed is removed.
+    fn present(&self) -> Result<BTreeMap<String, Vec<PathBuf>>, Diagnostics> {
+        let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+        let entries = fs::read_dir(&self.folder).map_err(|error| unwritten(&self.folder, &error))?;
+        for path in entries.filter_map(Result::ok).map(|entry| entry.path()) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            if let Some((campaign, _)) = name.strip_suffix(".parquet").and_then(|stem| stem.rsplit_once('.')) {
+                found.entry(campaign.to_owned()).or_default().push(path);
+            } else if name.ends_with(".tmp") {
+                // Harmless where it stays.
+                let _ = fs::remove_file(&path);
+            }
+        }
+        found.values_mut().for_each(|files| files.sort());
+        Ok(found)
+    }
+
+    fn update_campaign(
+        &mut self,
+        history: &History,
+        campaign: &str,
+        runs: &[String],
+        files: Vec<PathBuf>,
+        change: &mut MirrorChange,
+    ) -> Result<(), Diagnostics> {
+        let known: BTreeSet<&String> = runs.iter().collect();
+        let mut there = BTreeSet::new();
+        for file in files {
+            match runs_of(&file) {
+                Ok(runs) if runs.iter().all(|run| known.contains(run)) && there.is_disjoint(&runs) => {
+                    there.extend(runs);
+                    self.files.push((campaign.to_owned(), file));
+                }
+                // Another history's, twice, or damaged: the store has it.
+                _ => fs::remove_file(&file).map_err(|error| unwritten(&file, &error))?,
+            }
+        }
+        change.kept += there.len();
+        let missing: Vec<&String> = runs.iter().filter(|run| !there.contains(*run)).collect();
+        for runs in missing.chunks(RUNS_IN_A_FILE) {
+            let file = self.write(history, campaign, runs)?;
+            self.files.push((campaign.to_owned(), file));
+            change.added += runs.len();
+        }
+        Ok(())
+    }
+
+    /// Writes some runs as a file of their own, which is there whole or not at all.
+    fn write(&self, history: &History, campaign: &str, runs: &[&String]) -> Result<PathBuf, Diagnostics> {
+        let mut rows = Rows::default();
+        for run in runs {
+            rows.add(&history.run(run)?);
+        }
+        let taken = |number: &usize| self.files.iter().any(|(_, file)| *file == self.file(campaign, *number));
+        let number = (0..).find(|number| !taken(number)).unwrap_or_default();
+        let file = self.file(campaign, number);
+        let temporary = file.with_extension("tmp");
+        let written = || -> Result<(), PolarsError> {
+            let mut frame = rows.frame()?;
+            ParquetWriter::new(File::create(&temporary)?).finish(&mut frame)?;
+            Ok(fs::rename(&temporary, &file)?)
+        };
+        written().map_err(|error| unwritten(&file, &error))?;
+        Ok(file)
+    }
+
+    fn file(&self, campaign: &str, number: usize) -> PathBuf {
+        self.folder.join(format!("{campaign}.{number:06}.parquet"))
+    }
+}
+
+/// Some columns of a file, or all.
+pub(super) fn read(file: &Path, wanted: Option<&[&str]>) -> Result<DataFrame, PolarsError> {
+    let wanted = wanted.map(|names| names.iter().map(|name| (*name).to_owned()).collect());
+    ParquetReader::new(File::open(file)?).with_columns(wanted).finish()
+}
+
+/// A fault of reading a file of a mirror.
+pub(super) fn unread(file: &Path, error: &PolarsError) -> Diagnostics {
+    Diagnostic::error("A002", format!("the table `{}` can't be read: {}", file.display(), plain(error)))
+        .help("`actcheck export --rebuild-mirror` makes it again")
+        .into()
+}
+
+/// A fault of writing a table.
+pub(super) fn unwritten(file: &Path, error: &impl ToString) -> Diagnostics {
+    Diagnostic::error("A001", format!("the table `{}` can't be written: {}", file.display(), plain(error)))
+        .help("look at the folder's permissions and the room on the disk")
+        .into()
+}
+
+fn plain(error: &impl ToString) -> String {
+    error.to_string().to_lowercase()
+}
+
+fn runs_of(file: &Path) -> Result<BTreeSet<String>, PolarsError> {
+    let frame = read(file, Some(&["run"]))?;
+    let runs = frame.column("run")?.str()?.iter().flatten().map(str::to_owned).collect();
+    Ok(runs)
+}
+
+/// What tells tables apart that were written by programs with other columns.
+fn schema_digest() -> String {
+    let told: Vec<String> =
+        columns().iter().map(|column| format!("{} {:?} {}", column.name, column.kind, column.description)).collect();
+    digest_of(&told.join("\n"))
+}
+
+/// Removes the files of a mirror.
+fn clear(folder: &Path) -> Result<(), Diagnostics> {
+    for path in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok).map(|entry| entry.path()) {
+        if path.extension().is_some_and(|ending| ending == "parquet" || ending == "tmp") {
+            fs::remove_file(&path).map_err(|error| unwritten(&path, &error))?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,118 @@
+//! What a row is about: one property of one action of a run, in its scene.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+use crate::history::{ActionDetail, ObjectDetail, Role, RunDetail};
+use crate::verdict::Judgement;
+
+/// Of each class (an IRI) the local names of all classes above it, the nearest first.
+pub type Hierarchy = BTreeMap<String, Vec<String>>;
+
+/// The scene of one action.
+#[derive(Debug, Clone)]
+pub(super) struct Place<'a> {
+    pub run: &'a RunDetail,
+    pub action: &'a ActionDetail,
+    pub judgement: &'a Judgement,
+    pub scene: &'a ActionScene<'a>,
+}
+
+/// The things that an action has to do with.
+#[derive(Debug, Clone)]
+pub(super) struct ActionScene<'a> {
+    /// The first target that the action's designators name, or the first of the scene.
+    pub target: Option<&'a ObjectDetail>,
+    /// The platform that the designators name, or the one whose middle is nearest to the target.
+    pub surface: Option<&'a ObjectDetail>,
+    /// The nearest thing to the target that is no platform, with the distance. Unit: metres.
+    pub neighbour: Option<(&'a ObjectDetail, f64)>,
+    /// Smallest horizontal distance of an obstacle's middle from the straight way to the target. Unit: metres.
+    pub obstacle_distance_m: Option<f64>,
+}
+
+impl<'a> ActionScene<'a> {
+    pub fn of(run: &'a RunDetail, action: &ActionDetail) -> Self {
+        let named = |object: &&ObjectDetail| action.parameters.values().flatten().any(|value| *value == object.id);
+        let first = |role: Role| {
+            let of_role = || run.objects.iter().filter(move |object| object.role == role);
+            of_role().find(named).or_else(|| of_role().next())
+        };
+        let target = first(Role::Target);
+        let platforms = || run.objects.iter().filter(|object| object.role == Role::Platform);
+        let surface = platforms().find(named).or_else(|| match target {
+            Some(target) => platforms().min_by(|a, b| distance(a, target).total_cmp(&distance(b, target))),
+            None => platforms().next(),
+        });
+        let others = |target: &'a ObjectDetail| {
+            let loose = run.objects.iter().filter(|object| object.role != Role::Platform);
+            loose.filter(move |object| object.id != target.id).map(move |object| (object, distance(object, target)))
+        };
+        let neighbour = target.and_then(|target| others(target).min_by(|a, b| a.1.total_cmp(&b.1)));
+        let obstacles = || run.objects.iter().filter(|object| object.role == Role::Obstacle);
+        let way = |target: &ObjectDetail| [[run.robot_base[0], run.robot_base[1]], [target.x, target.y]];
+        let from_way = |target| obstacles().map(move |object| from_segment([object.x, object.y], way(target)));
+        let obstacle_distance_m = target.and_then(|target| from_way(target).min_by(f64::total_cmp));
+        Self { target, surface, neighbour, obstacle_distance_m }
+    }
+
+    /// Where the target lies, seen from the robot's base. Units: metres. Shape: ahead, to the left.
+    pub fn target_from_base(&self, base: [f64; 3]) -> Option<[f64; 2]> {
+        self.target.map(|target| turned([target.x - base[0], target.y - base[1]], -base[2]))
+    }
+
+    /// Where the target lies on its surface, from the surface's middle, along its own axes. Unit: metres.
+    pub fn target_on_surface(&self) -> Option<[f64; 2]> {
+        let (target, surface) = (self.target?, self.surface?);
+        Some(turned([target.x - surface.x, target.y - surface.y], -surface.yaw))
+    }
+
+    /// Which way the neighbour lies, seen from above the target: 0 towards the robot's base, positive counter-clockwise. Unit: radians,
+    /// in [-π, π).
+    pub fn neighbour_direction(&self, base: [f64; 3]) -> Option<f64> {
+        let (target, (neighbour, _)) = (self.target?, self.neighbour?);
+        let to_robot = libm::atan2(base[1] - target.y, base[0] - target.x);
+        Some(angle(libm::atan2(neighbour.y - target.y, neighbour.x - target.x) - to_robot))
+    }
+}
+
+/// An angle in [-π, π). Unit: radians.
+pub(super) fn angle(radians: f64) -> f64 {
+    let turned = (radians + PI).rem_euclid(TAU) - PI;
+    // Rounding may reach π itself.
+    if turned < PI { turned } else { -PI }
+}
+
+fn distance(a: &ObjectDetail, b: &ObjectDetail) -> f64 {
+    libm::hypot(a.x - b.x, a.y - b.y)
+}
+
+fn turned([x, y]: [f64; 2], radians: f64) -> [f64; 2] {
+    let (sin, cos) = libm::sincos(radians);
+    [cos * x - sin * y, sin * x + cos * y]
+}
+
+fn from_segment(point: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
+    let (along, away) = ([to[0] - from[0], to[1] - from[1]], [point[0] - from[0], point[1] - from[1]]);
+    let length = along[0] * along[0] + along[1] * along[1];
+    let share = if length > 0.0 { ((away[0] * along[0] + away[1] * along[1]) / length).clamp(0.0, 1.0) } else { 0.0 };
+    libm::hypot(away[0] - share * along[0], away[1] - share * along[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_and_distances_are_as_on_paper() {
+        assert_eq!(angle(1.5 * PI), -0.5 * PI);
+        assert_eq!(angle(PI), -PI);
+        assert_eq!(angle(-0.0), 0.0);
+        let way = [[0.0, 0.0], [2.0, 0.0]];
+        assert_eq!(from_segment([1.0, 0.5], way), 0.5);
+        assert_eq!(from_segment([5.0, 4.0], way), 5.0);
+        assert_eq!(from_segment([3.0, 4.0], [[0.0, 0.0]; 2]), 5.0);
+        let [x, y] = turned([1.0, 0.0], PI / 2.0);
+        assert!(x.abs() < 1e-15 && (y - 1.0).abs() < 1e-15);
+    }
+}

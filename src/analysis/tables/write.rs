@@ -1,0 +1,110 @@
+//! The table for others: one file in Parquet or CSV, and the description of its columns.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use polars::prelude::{CsvWriter, DataFrame, ParquetWriter, PolarsError, SerWriter as _};
+use serde_json::{Value, json};
+
+use crate::analysis::tables::columns::{ColumnKind, columns};
+use crate::analysis::tables::frames::{Rows, kinds_columns, with_kinds};
+use crate::analysis::tables::mirror::{Mirror, read, unread, unwritten};
+use crate::analysis::tables::{Hierarchy, TableFilter};
+use crate::base::Diagnostics;
+
+/// Writes `outcomes.parquet` and `schema.json` into a folder, which is made. Returns the files and how many rows there are.
+///
+/// # Errors
+/// `A001` they can't be written, `A002` the mirror can't be read.
+pub fn export_parquet(
+    mirror: &Mirror,
+    filter: &TableFilter,
+    hierarchy: &Hierarchy,
+    folder: &Path,
+) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
+    export(folder, "outcomes.parquet", |file| {
+        let schema = empty(hierarchy).map_err(|error| unwritten(file, &error))?;
+        let writer = File::create(file).map_err(|error| unwritten(file, &error))?;
+        let mut writer =
+            ParquetWriter::new(writer).batched(schema.schema()).map_err(|error| unwritten(file, &error))?;
+        let rows = each(mirror, filter, hierarchy, |frame| {
+            writer.write_batch(frame).map_err(|error| unwritten(file, &error))
+        })?;
+        writer.finish().map_err(|error| unwritten(file, &error))?;
+        Ok(rows)
+    })
+}
+
+/// Writes `outcomes.csv` and `schema.json` into a folder, which is made. Returns the files and how many rows there are.
+///
+/// # Errors
+/// As [`export_parquet`].
+pub fn export_csv(
+    mirror: &Mirror,
+    filter: &TableFilter,
+    hierarchy: &Hierarchy,
+    folder: &Path,
+) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
+    export(folder, "outcomes.csv", |file| {
+        let schema = empty(hierarchy).map_err(|error| unwritten(file, &error))?;
+        let writer = File::create(file).map_err(|error| unwritten(file, &error))?;
+        let mut writer = CsvWriter::new(writer).batched(schema.schema()).map_err(|error| unwritten(file, &error))?;
+        let rows = each(mirror, filter, hierarchy, |frame| {
+            writer.write_batch(frame).map_err(|error| unwritten(file, &error))
+        })?;
+        writer.finish().map_err(|error| unwritten(file, &error))?;
+        Ok(rows)
+    })
+}
+
+fn export(
+    folder: &Path,
+    name: &str,
+    write: impl FnOnce(&Path) -> Result<usize, Diagnostics>,
+) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
+    fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+    let (table, described) = (folder.join(name), folder.join("schema.json"));
+    let rows = write(&table)?;
+    fs::write(&described, format!("{:#}\n", schema())).map_err(|error| unwritten(&described, &error))?;
+    Ok((vec![table, described], rows))
+}
+
+/// What every column says.
+fn schema() -> Value {
+    let mut described: Vec<Value> = columns().iter().map(|column| json!(column)).collect();
+    described.extend(kinds_columns().map(|(name, description)| {
+        json!({ "name": name, "type": ColumnKind::Text, "unit": "", "parameter": true, "description": description })
+    }));
+    json!({ "rows": "one for each run, action and property", "columns": described })
+}
+
+/// A table without rows: its columns are those of all others.
+fn empty(hierarchy: &Hierarchy) -> Result<DataFrame, PolarsError> {
+    let mut frame = Rows::default().frame()?;
+    with_kinds(&mut frame, hierarchy)?;
+    Ok(frame)
+}
+
+/// Hands on the rows that a filter lets through, file by file.
+fn each(
+    mirror: &Mirror,
+    filter: &TableFilter,
+    hierarchy: &Hierarchy,
+    mut take: impl FnMut(&DataFrame) -> Result<(), Diagnostics>,
+) -> Result<usize, Diagnostics> {
+    let mut rows = 0;
+    for (_, file) in mirror.files().filter(|(campaign, _)| filter.takes_campaign(campaign)) {
+        let read = || -> Result<DataFrame, PolarsError> {
+            let mut frame = filter.rows_of(read(file, None)?)?;
+            with_kinds(&mut frame, hierarchy)?;
+            frame.rechunk_mut();
+            Ok(frame)
+        };
+        let frame = read().map_err(|error| unread(file, &error))?;
+        rows += frame.height();
+        if frame.height() > 0 {
+            take(&frame)?;
+        }
+    }
+    Ok(rows)
+}

@@ -1,0 +1,57 @@
+//! The history as RDF files, for other people's tools.
+
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
+
+use oxigraph::io::{RdfFormat, RdfSerializer};
+use oxigraph::model::GraphNameRef;
+
+use crate::base::{Diagnostic, Diagnostics, names};
+use crate::history::History;
+
+impl History {
+    /// Writes everything, facts and later judgements in their named graphs included, as N-Quads.
+    ///
+    /// # Errors
+    /// `H016` the file can't be written, or the store can't be read.
+    pub fn write_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
+        let store = self.store()?;
+        let write = || -> Result<(), String> {
+            let writer = BufWriter::new(File::create(file).map_err(|error| error.to_string())?);
+            let mut writer = store.dump_to_writer(RdfFormat::NQuads, writer).map_err(|error| error.to_string())?;
+            writer.flush().map_err(|error| error.to_string())
+        };
+        write().map_err(|why| unwritten(file, &why))
+    }
+
+    /// Writes the default graph (campaigns, runs, executions, scenes and outcomes; Turtle has no place for the named graphs) as Turtle.
+    ///
+    /// # Errors
+    /// As [`History::write_nquads`].
+    pub fn write_turtle(&self, file: &Path) -> Result<(), Diagnostics> {
+        let store = self.store()?;
+        let mut serializer = RdfSerializer::from_format(RdfFormat::Turtle);
+        for (prefix, namespace) in names::PREFIXES {
+            // Our namespaces are valid IRIs, so that none is left out.
+            serializer = match serializer.clone().with_prefix(prefix, namespace) {
+                Ok(with) => with,
+                Err(_) => serializer,
+            };
+        }
+        let write = || -> Result<(), String> {
+            let writer = BufWriter::new(File::create(file).map_err(|error| error.to_string())?);
+            let mut writer = store
+                .dump_graph_to_writer(GraphNameRef::DefaultGraph, serializer, writer)
+                .map_err(|error| error.to_string())?;
+            writer.flush().map_err(|error| error.to_string())
+        };
+        write().map_err(|why| unwritten(file, &why))
+    }
+}
+
+fn unwritten(file: &Path, why: &str) -> Diagnostics {
+    Diagnostic::error("H016", format!("{} can't be written: {}", file.display(), why.to_lowercase()))
+        .help("name a file in a folder that exists and may be written")
+        .into()
+}
