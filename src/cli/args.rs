@@ -25,6 +25,18 @@ pub struct Arguments {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Look for when and why things fail: conditions on scenes, and combinations of them, that go with failures beyond chance
+    ///
+    /// For each property: patterns of up to three conditions (kinds through the ontology's hierarchy, ranges with bounds found in the
+    /// runs), folded into the simplest, corrected for everything that was tried, and confirmed on a third of the runs that took no part in
+    /// finding them; how margins are spread; changes from campaign to campaign; flaky scenes. For all together: the ways in which
+    /// runs fail, and which failure leads to which later one. Only passed and failed outcomes count; all others are told.
+    ///
+    /// Reads the tables beside the history, which are brought up to date first.
+    #[command(
+        after_help = "Examples:\n  actcheck analyse    (after `actcheck run configs/pick.toml --runs 300`)\n  actcheck analyse --property ObjectInGripper --by target_category,target_turned_rad"
+    )]
+    Analyse(crate::cli::analyse::AnalyseArgs),
     /// Run a campaign: generate scenes, perform the actions, judge them, keep every run
     ///
     /// It ends with the last planned run, or when a budget is spent: of time, of failures, or because every rate is
@@ -131,7 +143,9 @@ pub enum Command {
     ///
     /// The prefixes act, w, obj, run, campaign, rdf, rdfs, owl, xsd, earl and prov are known. Facts about the world
     /// lie in named graphs, one for each moment: `?execution act:before ?g . GRAPH ?g { … }`.
-    #[command(after_help = "Example:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'")]
+    #[command(
+        after_help = "Examples:\n  actcheck query 'SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }'\n  actcheck query --list-named\n  actcheck query --named failure-rates"
+    )]
     Query(QueryArgs),
     /// Judge stored runs by today's rules, without simulating
     ///
@@ -273,11 +287,18 @@ pub struct ShowArgs {
 #[derive(Debug, Args)]
 pub struct QueryArgs {
     /// The query's text
-    #[arg(value_name = "SPARQL", required_unless_present = "file", conflicts_with = "file")]
+    #[arg(value_name = "SPARQL", required_unless_present_any = ["file", "named", "list_named"])]
+    #[arg(conflicts_with_all = ["file", "named", "list_named"])]
     pub text: Option<String>,
     /// A file with the query
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", conflicts_with_all = ["named", "list_named"])]
     pub file: Option<PathBuf>,
+    /// A query by its name: one that the program carries, or `ontology/queries/NAME.rq` here
+    #[arg(long, value_name = "NAME", conflicts_with = "list_named")]
+    pub named: Option<String>,
+    /// List the queries that have names, and what they answer
+    #[arg(long)]
+    pub list_named: bool,
     /// Where the history lies.
     #[command(flatten)]
     pub history: HistoryArgs,

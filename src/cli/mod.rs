@@ -5,6 +5,7 @@
 mod replay;
 mod replay_text;
 
+mod analyse;
 mod args;
 mod case;
 mod check;
@@ -18,6 +19,7 @@ mod health;
 mod history_dir;
 mod list;
 mod merge;
+mod named_queries;
 mod new;
 mod output;
 mod picture;

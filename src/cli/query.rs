@@ -4,12 +4,15 @@ use std::io::Read as _;
 
 use crate::base::{Diagnostic, Diagnostics, Files, Source, Term, names};
 use crate::cli::args::{QueryArgs, QueryFormat};
-use crate::cli::{history_dir, output, stop};
+use crate::cli::{history_dir, named_queries, output, stop};
 use crate::history::{Cancel, QueryAnswer};
-use crate::report::{TableFormat, answer_table};
+use crate::report::{Table, TableFormat, answer_table};
 
 /// Asks and prints the answer. Ctrl-C stops a query that takes long.
 pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
+    if args.list_named {
+        return list_named(args.format);
+    }
     let text = text(args)?;
     let history = history_dir::open(&args.history)?;
     let cancel = Cancel::new();
@@ -34,8 +37,31 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// The query's text, from the command line, a file, or (`-f -`) the input stream.
+/// Prints the queries that have names. Needs no history.
+fn list_named(format: QueryFormat) -> Result<(), Diagnostics> {
+    let format = match format {
+        QueryFormat::Table => TableFormat::Table,
+        QueryFormat::Csv => TableFormat::Csv,
+        QueryFormat::Json => TableFormat::Json,
+        QueryFormat::Turtle => {
+            return Err(Diagnostic::error("X004", "the list of queries is a table, and Turtle is for graphs")
+                .help("use `--format table`, `csv` or `json`")
+                .into());
+        }
+    };
+    let mut table = Table::new(["name", "title", "description"]);
+    for query in named_queries::all()? {
+        table.rows.push(vec![query.name.into(), query.title.into(), query.description.into()]);
+    }
+    output::print(&table.render(format));
+    Ok(())
+}
+
+/// The query's text, by its name, from the command line, a file, or (`-f -`) the input stream.
 fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
+    if let Some(name) = &args.named {
+        return named_queries::named(name);
+    }
     match (&args.text, &args.file) {
         (Some(text), _) => Ok(Source::new("query", text.as_str())),
         (None, Some(file)) if file.as_os_str() == "-" => {

@@ -1,0 +1,160 @@
+//! `actcheck analyse`
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::analysis::{
+    FINDING_COLUMNS, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns,
+    flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+};
+use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
+use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::{export, history_dir, output, since, why};
+use crate::ontology::{self, Ontology};
+use crate::report::{FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table};
+use crate::verdict::Counts;
+
+/// Heat maps that are made of a property that was asked for: where on its surface the target stood, and what it was and how it was turned.
+const USUAL_MAPS: [[&str; 2]; 2] = [["surface_y_m", "surface_x_m"], ["target_category", "target_turned_rad"]];
+
+/// `actcheck analyse`
+#[derive(Debug, Args)]
+pub struct AnalyseArgs {
+    /// Only this property, by its name in the ontology (may be given several times); tells heat maps too
+    #[arg(long, value_name = "P")]
+    pub property: Vec<String>,
+    /// Only runs of this campaign (may be given several times) [default: all but the smaller forms of runs]
+    #[arg(long, value_name = "ID")]
+    pub campaign: Vec<String>,
+    /// Only runs since then, such as 2026-11-21, 2026-11-21T18:00:00Z or 12h ago as 12h
+    #[arg(long, value_name = "WHEN", value_parser = since::moment)]
+    pub since: Option<String>,
+    /// Failures by one or two parameters, such as `target_category,target_turned_rad`, instead of the usual heat maps
+    #[arg(long, value_name = "DOWN[,ACROSS]", value_delimiter = ',', num_args = 1..=2)]
+    pub by: Vec<String>,
+    /// Conditions of a pattern at most
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=3))]
+    pub depth: u8,
+    /// Share of false patterns that is bearable on average, after correction for everything that was tried
+    #[arg(long, value_name = "LEVEL", default_value_t = 0.05, value_parser = level)]
+    pub level: f64,
+    /// The ontology that says which kinds belong to which [default: ontology/actions.ttl here, or the one that the program carries]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How it is printed (csv: the patterns, or with --by the cells of the map; json: everything)
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+fn level(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(level) if level > 0.0 && level < 1.0 => Ok(level),
+        _ => Err("a probability above 0 and below 1 is needed, such as 0.05".to_owned()),
+    }
+}
+
+/// Looks for what goes with failures and prints it.
+pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
+    check_parameters(&args.by)?;
+    let history = history_dir::open(&args.history)?;
+    let filter = export::filter(&history, &args.campaign, args.since.clone())?;
+    let hierarchy = export::hierarchy(args.ontology.as_deref())?;
+    let (files, path) = why::ontology_file(args.ontology.as_deref());
+    let ontology = ontology::load(&files, &path)?;
+    let (mirror, _) = Mirror::update(&history)?;
+    let table = read(&mirror, &filter)?;
+    if table.is_empty() {
+        return Err(Diagnostic::error("X044", format!("the history `{}` has no such runs", history.dir().display()))
+            .help("`actcheck list` shows the runs that it has; `actcheck run CONFIG` makes some")
+            .into());
+    }
+    let wanted = wanted(judged(&table), &args.property)?;
+    let properties = wanted.iter().map(|of| report(args, &table, of, &hierarchy, &ontology)).collect();
+    let summary = FindingsSummary {
+        history: history.dir().display().to_string(),
+        program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
+        campaigns: table.text("campaign").texts.clone(),
+        runs: table.text("run").texts.len() as u64,
+        counts: judged(&table).iter().fold(Counts::default(), |mut sum, of| {
+            sum.add_all(of.counts);
+            sum
+        }),
+        modes: table_failure_modes(&table),
+        cascades: cascades(&table, args.level),
+        properties,
+        level: args.level,
+    };
+    output::print(&match args.format {
+        Format::Table => findings_text(&summary),
+        Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into()),
+        Format::Csv => findings_table(&summary).render(args.format.into()),
+        Format::Json => format!("{:#}\n", findings_json(&summary)),
+    });
+    Ok(())
+}
+
+fn read(mirror: &Mirror, filter: &TableFilter) -> Result<OutcomeTable, Diagnostics> {
+    let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
+    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).collect();
+    OutcomeTable::read(mirror, filter, &names)
+}
+
+fn report(
+    args: &AnalyseArgs,
+    table: &OutcomeTable,
+    of: &JudgedProperty,
+    hierarchy: &Hierarchy,
+    ontology: &Ontology,
+) -> PropertyReport {
+    let options =
+        PatternOptions { most_conditions: usize::from(args.depth), level: args.level, ..PatternOptions::default() };
+    let findings = property_findings(table, of, hierarchy, &options);
+    let (flaky, repeated_scenes) = flaky_scenes(table, of);
+    let asked: Vec<&str> = args.by.iter().map(String::as_str).collect();
+    let maps: Vec<&[&str]> = match (asked.is_empty(), args.property.is_empty() && args.format == Format::Table) {
+        (false, _) => vec![&asked],
+        // Of all properties at once they would be too much to read.
+        (true, true) => Vec::new(),
+        (true, false) => USUAL_MAPS.iter().map(<[&str; 2]>::as_slice).collect(),
+    };
+    PropertyReport {
+        maps: maps.into_iter().filter_map(|by| two_way(&findings.subject, by)).collect(),
+        unit: ontology.properties.get(&of.property).and_then(|property| property.unit.clone()),
+        trend: trend(table, of, args.level),
+        flaky,
+        repeated_scenes,
+        findings,
+    }
+}
+
+/// The properties that were asked for; all where none was.
+fn wanted(all: Vec<JudgedProperty>, names: &[String]) -> Result<Vec<JudgedProperty>, Diagnostics> {
+    let is = |of: &JudgedProperty, name: &String| names::local(&of.property) == name || of.property == *name;
+    let mut faults = Diagnostics::new();
+    for name in names.iter().filter(|name| !all.iter().any(|of| is(of, name))) {
+        let known: BTreeSet<&str> = all.iter().map(|of| names::local(&of.property)).collect();
+        faults.push(
+            Diagnostic::error("X045", format!("no property `{name}` was judged in these runs"))
+                .help(did_you_mean(name, known)),
+        );
+    }
+    faults.or(())?;
+    Ok(all.into_iter().filter(|of| names.is_empty() || names.iter().any(|name| is(of, name))).collect())
+}
+
+fn check_parameters(by: &[String]) -> Result<(), Diagnostics> {
+    let known: Vec<&str> = columns().iter().filter(|column| column.parameter).map(|column| column.name).collect();
+    let mut faults = Diagnostics::new();
+    for name in by.iter().filter(|name| !known.contains(&name.as_str())) {
+        faults.push(
+            Diagnostic::error("X046", format!("scenes have no parameter `{name}`"))
+                .help(did_you_mean(name, known.iter().copied())),
+        );
+    }
+    faults.or(())
+}

@@ -1,0 +1,243 @@
+//! What analysis found, for people at a terminal.
+
+use std::fmt::Write as _;
+
+use crate::analysis::{Judged, Pattern, TwoWay, TwoWayCell};
+use crate::base::names;
+use crate::report::Share;
+use crate::report::findings_summary::{FindingsSummary, PropertyReport, percent};
+use crate::report::table::ruled;
+use crate::verdict::{Counts, Outcome};
+
+/// Runs and scenes told in one line; `--format json` has all.
+const TOLD: usize = 8;
+/// Failure modes and cascades told.
+const TOLD_LINES: usize = 10;
+/// How dark a cell of a heat map is, by fifths of failures.
+const SHADES: [char; 5] = ['·', '░', '▒', '▓', '█'];
+
+/// Counts first, then the ways in which runs fail, then each property: its patterns, margins, trend, flaky scenes and maps.
+pub fn findings_text(summary: &FindingsSummary) -> String {
+    let mut out = String::new();
+    let campaigns = list(summary.campaigns.iter().map(String::as_str));
+    let _ = writeln!(out, "{} runs of {} campaigns ({campaigns})", summary.runs, summary.campaigns.len());
+    let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
+    modes(&mut out, summary);
+    cascades(&mut out, summary);
+    for report in &summary.properties {
+        property(&mut out, report, summary);
+    }
+    out
+}
+
+fn counts(counts: Counts) -> String {
+    Outcome::ALL.map(|outcome| format!("{} {outcome}", counts.get(outcome))).join(", ")
+}
+
+fn list<'a>(ids: impl ExactSizeIterator<Item = &'a str>) -> String {
+    let more = ids.len().saturating_sub(TOLD);
+    let told: Vec<&str> = ids.take(TOLD).collect();
+    let rest = if more > 0 { format!(", … ({more} more)") } else { String::new() };
+    format!("{}{rest}", told.join(", "))
+}
+
+fn modes(out: &mut String, summary: &FindingsSummary) {
+    if summary.modes.is_empty() {
+        return;
+    }
+    out.push_str("\nhow runs fail\n");
+    let mut table = ruled();
+    table.set_header(["share", "runs", "failed properties", "such as"]);
+    for mode in summary.modes.iter().take(TOLD_LINES) {
+        let failed: Vec<&str> = mode.failed.iter().map(|iri| names::local(iri)).collect();
+        let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
+        let share =
+            format!("{} [{:.0}–{:.0}]", percent(mode.share.rate), mode.share.low * 100.0, mode.share.high * 100.0);
+        table.add_row([share, mode.runs.len().to_string(), failed, mode.runs.first().cloned().unwrap_or_default()]);
+    }
+    let _ = writeln!(out, "{table}");
+    rest(out, summary.modes.len());
+}
+
+fn rest(out: &mut String, all: usize) {
+    if all > TOLD_LINES {
+        let _ = writeln!(out, "and {} more (--format json has all)", all - TOLD_LINES);
+    }
+}
+
+fn cascades(out: &mut String, summary: &FindingsSummary) {
+    if summary.cascades.is_empty() {
+        return;
+    }
+    out.push_str("\nwhat leads to what\n");
+    let name = |of: &Judged| format!("{} ({} {})", names::local(&of.property), of.step, names::local(&of.action));
+    for cascade in summary.cascades.iter().take(TOLD_LINES) {
+        let table = cascade.table;
+        let share = |failed: u64, of: u64| if of == 0 { "none".to_owned() } else { percent(failed as f64 / of as f64) };
+        let _ = writeln!(
+            out,
+            "where {} fails, {} fails in {} of {} runs; where it passes, in {} of {} (p adjusted {})",
+            name(&cascade.first),
+            name(&cascade.later),
+            share(table.failed_in, table.failed_in + table.passed_in),
+            table.failed_in + table.passed_in,
+            share(table.failed_out, table.failed_out + table.passed_out),
+            table.failed_out + table.passed_out,
+            probability(cascade.q)
+        );
+    }
+    rest(out, summary.cascades.len());
+}
+
+fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
+    let found = &report.findings;
+    let _ = write!(out, "\n{} ({}): ", report.name(), names::local(&found.action));
+    match Share::new(found.counts.failed, found.counts.decided()) {
+        Some(share) => {
+            let _ = writeln!(out, "fails in {share}");
+        }
+        None => out.push_str("was never decided\n"),
+    }
+    let undecided = found.counts.total() - found.counts.decided();
+    if undecided > 0 {
+        let _ = writeln!(out, "  {}", counts(found.counts));
+    }
+    if found.counts.failed > 0 {
+        patterns(out, report, summary);
+    }
+    margins(out, report);
+    trend(out, report);
+    if !report.flaky.is_empty() {
+        let scenes: Vec<String> = report
+            .flaky
+            .iter()
+            .map(|scene| format!("{} scene {} ({} of {} passed)", scene.campaign, scene.scene, scene.passed, scene.of))
+            .collect();
+        let (flaky, all) = (scenes.len(), report.repeated_scenes);
+        let _ = writeln!(out, "  flaky in {flaky} of {all} scenes: {}", list(scenes.iter().map(String::as_str)));
+    }
+    report.maps.iter().for_each(|shown| map(out, shown));
+}
+
+fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
+    let (found, patterns) = (&report.findings, &report.findings.patterns);
+    for (number, pattern) in patterns.confirmed().enumerate() {
+        let _ = writeln!(out, "  {}. {}", number + 1, report.sentence(pattern));
+        evidence(out, report, pattern);
+    }
+    let confirmed = patterns.confirmed().count();
+    if confirmed == 0 {
+        out.push_str("  no condition on the scenes goes with its failures beyond chance\n");
+    }
+    let unconfirmed = patterns.patterns.len() - confirmed;
+    if unconfirmed > 0 {
+        let _ = writeln!(out, "  {unconfirmed} more did not hold on the runs kept aside (--format json has them)");
+    }
+    let _ = writeln!(
+        out,
+        "  (tried {} conditions and combinations of {} parameters on {} runs; {} were kept aside to confirm; level {})",
+        patterns.tried,
+        patterns.parameters,
+        patterns.runs - patterns.held_out,
+        patterns.held_out,
+        summary.level
+    );
+    if patterns.combined < patterns.parameters && patterns.parameters > 2 {
+        let _ = writeln!(out, "  (three at a time only of the {} most promising parameters)", patterns.combined);
+    }
+    if found.twins + found.repeated > 0 {
+        let _ = writeln!(
+            out,
+            "  ({} runs went bit for bit like a later one, {} had the scene of an earlier one: each counts once)",
+            found.twins, found.repeated
+        );
+    }
+    if found.steered > 0 {
+        let _ = writeln!(
+            out,
+            "  (a search chose the scenes of {} runs: shares are of these runs, not of what the configuration's ranges give)",
+            found.steered
+        );
+    }
+}
+
+fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
+    let held_out = pattern.held_out;
+    let _ = writeln!(
+        out,
+        "     {:.1} times as often as all runs; WRAcc {:.3}; p {}, adjusted {}; kept aside: {} of {} fail, p {}",
+        pattern.lift,
+        pattern.wracc,
+        probability(pattern.p),
+        probability(pattern.q),
+        held_out.failed_in,
+        held_out.failed_in + held_out.passed_in,
+        probability(pattern.p_held_out)
+    );
+    let _ = writeln!(out, "     runs: {}", list(report.runs(pattern).into_iter()));
+}
+
+/// A probability, such as `0.03` or `2e-7`.
+fn probability(p: f64) -> String {
+    match p {
+        p if p <= 0.0 => "< 1e-300".to_owned(),
+        p if p < 0.001 => format!("{p:.0e}"),
+        p => format!("{p:.3}"),
+    }
+}
+
+fn margins(out: &mut String, report: &PropertyReport) {
+    if let Some(margins) = report.findings.margins {
+        let unit = report.unit.as_deref().unwrap_or("");
+        let _ = writeln!(
+            out,
+            "  margin {unit}: least {:.4}, 5 % {:.4}, 25 % {:.4}, median {:.4}, 75 % {:.4}, 95 % {:.4}, most {:.4}",
+            margins.least, margins.p05, margins.p25, margins.p50, margins.p75, margins.p95, margins.most
+        );
+    }
+}
+
+fn trend(out: &mut String, report: &PropertyReport) {
+    let points = &report.trend.points;
+    if points.len() < 2 {
+        return;
+    }
+    let told: Vec<String> = points
+        .iter()
+        .map(|point| format!("{} {}", point.campaign, percent(point.failed as f64 / point.runs.max(1) as f64)))
+        .collect();
+    let _ = writeln!(out, "  over campaigns: {}", list(told.iter().map(String::as_str)));
+    for change in &report.trend.changes {
+        let _ = writeln!(
+            out,
+            "  changed with {}: from {} to {} (p adjusted {})",
+            points[change.at].campaign,
+            percent(change.before.rate),
+            percent(change.behind.rate),
+            probability(change.p)
+        );
+    }
+}
+
+fn map(out: &mut String, map: &TwoWay) {
+    let (down, across) = (map.by.first().map_or("", String::as_str), map.by.get(1).map_or("", String::as_str));
+    let title = if across.is_empty() { down.to_owned() } else { format!("{down} (down) and {across} (across)") };
+    let _ = writeln!(out, "\n  failures by {title}");
+    let mut table = ruled();
+    table.set_header(std::iter::once(String::new()).chain(map.across.iter().cloned()));
+    for (label, cells) in map.down.iter().zip(&map.cells) {
+        table.add_row(std::iter::once(label.clone()).chain(cells.iter().map(shaded)));
+    }
+    let _ = writeln!(out, "{table}");
+}
+
+/// A cell, such as `▒ 45 % of 40`.
+fn shaded(cell: &TwoWayCell) -> String {
+    match cell.failing {
+        None => String::new(),
+        Some(failing) => {
+            let shade = SHADES[((failing.rate * SHADES.len() as f64) as usize).min(SHADES.len() - 1)];
+            format!("{shade} {} of {}", percent(failing.rate), cell.runs)
+        }
+    }
+}
