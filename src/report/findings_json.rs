@@ -64,7 +64,7 @@ fn property(report: &PropertyReport) -> Value {
         "margin": { "unit": report.unit, "quantiles": found.margins },
         "patterns": {
             "runs": patterns.runs, "failed": patterns.failed, "held_out": patterns.held_out, "tried": patterns.tried,
-            "parameters": patterns.parameters, "combined": patterns.combined,
+            "parameters": patterns.parameters, "depth": patterns.depth, "combined": patterns.combined,
             "twins": found.twins, "repeated": found.repeated, "steered": found.steered,
             "found": patterns.patterns.iter().map(|one| pattern(report, one)).collect::<Vec<Value>>(),
         },

@@ -20,7 +20,8 @@ const SHADES: [char; 5] = ['·', '░', '▒', '▓', '█'];
 pub fn findings_text(summary: &FindingsSummary) -> String {
     let mut out = String::new();
     let campaigns = list(summary.campaigns.iter().map(String::as_str));
-    let _ = writeln!(out, "{} runs of {} campaigns ({campaigns})", summary.runs, summary.campaigns.len());
+    let plural = if summary.campaigns.len() == 1 { "" } else { "s" };
+    let _ = writeln!(out, "{} runs of {} campaign{plural} ({campaigns})", summary.runs, summary.campaigns.len());
     let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
     modes(&mut out, summary);
     cascades(&mut out, summary);
@@ -133,16 +134,22 @@ fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
     if unconfirmed > 0 {
         let _ = writeln!(out, "  {unconfirmed} more did not hold on the runs kept aside (--format json has them)");
     }
+    if patterns.tried == 0 {
+        let _ =
+            writeln!(out, "  (too few runs failed, or passed, to look for one; {} were kept aside)", patterns.held_out);
+        return;
+    }
     let _ = writeln!(
         out,
-        "  (tried {} conditions and combinations of {} parameters on {} runs; {} were kept aside to confirm; level {})",
+        "  (tried {} conditions, up to {} together, on {} parameters of {} runs; {} were kept aside to confirm; level {})",
         patterns.tried,
+        patterns.depth,
         patterns.parameters,
         patterns.runs - patterns.held_out,
         patterns.held_out,
         summary.level
     );
-    if patterns.combined < patterns.parameters && patterns.parameters > 2 {
+    if patterns.depth == 3 && patterns.combined < patterns.parameters {
         let _ = writeln!(out, "  (three at a time only of the {} most promising parameters)", patterns.combined);
     }
     if found.twins + found.repeated > 0 {

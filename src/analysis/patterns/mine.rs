@@ -80,6 +80,8 @@ pub struct Patterns {
     pub tried: u64,
     /// Parameters that take more than one value.
     pub parameters: usize,
+    /// Conditions of a pattern at most: fewer than were asked for where so many more chances to err would hide every pattern.
+    pub depth: usize,
     /// Parameters of which every three were combined.
     pub combined: usize,
 }
@@ -160,7 +162,7 @@ fn search(
         let likelihood =
             Likelihood::new((0..open.len()).filter(|run| open[*run]).map(|run| one(subject.failed[run])).sum());
         let runs = Runs::new(axes, &subject.failed, &open, &likelihood);
-        let mut best = runs.best(options.most_conditions, options.work);
+        let mut best = runs.best(depth, options.work);
         found.tried += best.tried;
         found.combined = found.combined.max(best.combined);
         if best.conditions.is_empty() {
@@ -180,4 +182,24 @@ fn search(
         rounds.push((best.conditions, table));
     }
     rounds
+}
+
+/// As many conditions as still let a pattern be told from chance that has half of all failures and no pass; at least one.
+///
+/// It depends on how many runs there are and how many failed, not on which: looking deeper in many runs and less deep in few is no
+/// choice by result.
+fn affordable_depth(axes: &[Axis], whole: TwoByTwo, options: &PatternOptions) -> usize {
+    let failed_in = whole.failed_in.div_ceil(2);
+    let ideal =
+        TwoByTwo { failed_in, passed_in: 0, failed_out: whole.failed_in - failed_in, passed_out: whole.passed_in };
+    let p = ideal.fisher().greater;
+    // How many boxes there are of one, two and three conditions: sums of products of the conditions on different parameters.
+    let mut boxes = [1.0, 0.0, 0.0, 0.0];
+    for axis in axes {
+        for conditions in (1..boxes.len()).rev() {
+            boxes[conditions] += boxes[conditions - 1] * axis.len() as f64;
+        }
+    }
+    let affordable = |depth: &usize| p * boxes[1..=*depth].iter().sum::<f64>() <= options.level;
+    (2..=options.most_conditions.min(3)).rev().find(affordable).unwrap_or(1)
 }

@@ -9,7 +9,7 @@ use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerR
 use crate::analysis::tables::columns::columns;
 use crate::analysis::tables::frames::Rows;
 use crate::base::{Diagnostic, Diagnostics, digest_of};
-use crate::history::History;
+use crate::history::{History, RunDetail};
 
 /// Runs of a file at most: so many are in memory at once.
 const RUNS_IN_A_FILE: usize = 2_000;
@@ -74,6 +74,27 @@ impl Mirror {
         Self::update(history)
     }
 
+    /// A mirror of runs that come from elsewhere than a history, in a folder of its own.
+    ///
+    /// # Errors
+    /// `A001` it can't be written.
+    pub fn of_runs(
+        folder: &Path,
+        campaign: &str,
+        runs: impl IntoIterator<Item = RunDetail>,
+    ) -> Result<Self, Diagnostics> {
+        fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+        let mut mirror = Self { folder: folder.to_path_buf(), files: Vec::new() };
+        let mut runs = runs.into_iter().peekable();
+        while runs.peek().is_some() {
+            let mut rows = Rows::default();
+            runs.by_ref().take(RUNS_IN_A_FILE).for_each(|run| rows.add(&run));
+            let file = mirror.write(campaign, rows)?;
+            mirror.files.push((campaign.to_owned(), file));
+        }
+        Ok(mirror)
+    }
+
     /// Its folder.
     pub fn folder(&self) -> &Path {
         &self.folder
@@ -124,19 +145,19 @@ impl Mirror {
         change.kept += there.len();
         let missing: Vec<&String> = runs.iter().filter(|run| !there.contains(*run)).collect();
         for runs in missing.chunks(RUNS_IN_A_FILE) {
-            let file = self.write(history, campaign, runs)?;
+            let mut rows = Rows::default();
+            for run in runs {
+                rows.add(&history.run(run)?);
+            }
+            let file = self.write(campaign, rows)?;
             self.files.push((campaign.to_owned(), file));
             change.added += runs.len();
         }
         Ok(())
     }
 
-    /// Writes some runs as a file of their own, which is there whole or not at all.
-    fn write(&self, history: &History, campaign: &str, runs: &[&String]) -> Result<PathBuf, Diagnostics> {
-        let mut rows = Rows::default();
-        for run in runs {
-            rows.add(&history.run(run)?);
-        }
+    /// Writes some rows as a file of their own, which is there whole or not at all.
+    fn write(&self, campaign: &str, rows: Rows) -> Result<PathBuf, Diagnostics> {
         let taken = |number: &usize| self.files.iter().any(|(_, file)| *file == self.file(campaign, *number));
         let number = (0..).find(|number| !taken(number)).unwrap_or_default();
         let file = self.file(campaign, number);

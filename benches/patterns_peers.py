@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+"""Which of the planted patterns do pysubgroup and SliceLine find, and how long do they take beside actcheck?
+
+Run from the top of the checkout, with Cargo at hand: `python3 benches/patterns_peers.py`. It makes a virtual environment in
+`target/patterns_peers`, installs both from PyPI there, has `cargo bench --bench patterns -- tables DIR` write the planted tables
+(10,000 runs, twelve parameters, the classes above kinds as columns of their own), and asks each for patterns of up to three
+conditions. Numbers are cut into eight cells for both, as actcheck does to begin with; actcheck besides tries all ranges of
+cells, refines bounds, folds, corrects and confirms, which the others leave to their users. `--tables DIR TIMES` takes tables and
+what the benchmark printed from elsewhere.
+"""
+
+import subprocess
+import sys
+import time
+import venv
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ENVIRONMENT = HERE.parent / "target" / "patterns_peers"
+PACKAGES = ["pysubgroup==0.8.0", "sliceline==0.3.0", "pandas", "numpy"]
+DEPTH = 3
+CELLS = 8
+TOP = 5
+
+
+def main():
+    if sys.argv[1:2] == ["--tables"]:
+        folder, times = Path(sys.argv[2]), Path(sys.argv[3]).read_text()
+    else:
+        folder = ENVIRONMENT / "tables"
+        command = ["cargo", "bench", "--bench", "patterns", "--", "tables", str(folder)]
+        times = subprocess.run(command, check=True, capture_output=True, text=True, cwd=HERE.parent).stdout
+    ours = {line.split("\t")[0]: line.split("\t")[1:] for line in times.splitlines() if line.count("\t") == 2}
+    for name, (secs, patterns) in ours.items():
+        print(f"\n{name}: actcheck {float(secs):.3f} s, {patterns} patterns")
+        table = read(folder / f"{name.replace(' ', '_')}.csv")
+        for peer, ask in {"pysubgroup": pysubgroup_finds, "SliceLine": sliceline_finds}.items():
+            start = time.perf_counter()
+            found = ask(table)
+            took = time.perf_counter() - start
+            print(f"  {peer}: {took:.2f} s, {took / float(secs):.0f} times as long")
+            for pattern in found:
+                print(f"    {pattern}")
+
+
+def read(file):
+    import pandas
+
+    return pandas.read_csv(file)
+
+
+def pysubgroup_finds(table):
+    """Best first by weighted relative accuracy, by its own exhaustive search with optimistic estimates."""
+    import pysubgroup
+
+    target = pysubgroup.BinaryTarget("failed", 1)
+    selectors = pysubgroup.create_selectors(table, nbins=CELLS, ignore=["failed"])
+    task = pysubgroup.SubgroupDiscoveryTask(
+        table, target, selectors, result_set_size=TOP, depth=DEPTH, qf=pysubgroup.WRAccQF()
+    )
+    result = pysubgroup.SimpleDFS().execute(task)
+    return [f"{quality:.4f} {subgroup}" for quality, subgroup, *_ in result.results]
+
+
+def sliceline_finds(table):
+    import numpy
+    import pandas
+    from sliceline.slicefinder import Slicefinder
+
+    cut = table.drop(columns="failed")
+    for column in cut.select_dtypes("number"):
+        cut[column] = pandas.qcut(cut[column], CELLS, duplicates="drop").astype(str)
+    finder = Slicefinder(alpha=0.95, k=TOP, max_l=DEPTH, min_sup=30, verbose=False)
+    finder.fit(cut.astype(str).to_numpy(), table["failed"].to_numpy(dtype=float))
+    slices = numpy.asarray(finder.top_slices_)
+    return [
+        " AND ".join(f"{name}={value}" for name, value in zip(cut.columns, row) if value is not None) for row in slices
+    ]
+
+
+if __name__ == "__main__":
+    python = ENVIRONMENT / "bin" / "python"
+    if Path(sys.prefix).resolve() != ENVIRONMENT.resolve() and "--tables" not in sys.argv:
+        if not python.exists():
+            venv.create(ENVIRONMENT, with_pip=True)
+            subprocess.run([python, "-m", "pip", "install", "--quiet", *PACKAGES], check=True)
+        sys.exit(subprocess.run([python, __file__, *sys.argv[1:]]).returncode)
+    main()

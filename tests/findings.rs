@@ -1,0 +1,155 @@
+//! From runs to what is told of them: made-up runs through the tables on disk, and real ones through the program.
+
+use std::collections::BTreeMap;
+
+use actcheck::analysis::{
+    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns, flaky_scenes,
+    judged, property_findings, table_failure_modes, trend, two_way,
+};
+use actcheck::history::{Repetition, RunDetail};
+use actcheck::verdict::Outcome::{self, Failed, Inapplicable, Passed, Untested};
+
+use crate::support::made_up;
+use crate::support::planted::Dice;
+
+fn outcome(failed: bool) -> Outcome {
+    if failed { Failed } else { Passed }
+}
+
+/// Bottles that slip are not in the hand, and what is not in the hand can't be placed.
+fn runs(campaign: &str, count: u64, slippery: f64) -> Vec<RunDetail> {
+    let mut dice = Dice::new(campaign.len() as u64 * 1000 + count);
+    (0..count)
+        .map(|index| {
+            let lost = std::cell::Cell::new(false);
+            made_up::run(campaign, index, &mut dice, &["Pick", "Place"], |target, step, dice| {
+                if step == 0 {
+                    let slips = target.category.ends_with("Bottle") && target.friction < 0.5;
+                    lost.set(dice.share() < if slips { 0.8 } else { slippery });
+                    vec![("InHand", outcome(lost.get())), ("Near", Passed)]
+                } else {
+                    vec![("Placed", outcome(lost.get() || dice.share() < 0.1)), ("Upright", Inapplicable)]
+                }
+            })
+        })
+        .collect()
+}
+
+fn table(runs: impl IntoIterator<Item = RunDetail>, filter: &TableFilter) -> OutcomeTable {
+    let folder = tempfile::tempdir().unwrap();
+    let mut by_campaign: BTreeMap<String, Vec<RunDetail>> = BTreeMap::new();
+    for run in runs {
+        by_campaign.entry(run.row.campaign.clone()).or_default().push(run);
+    }
+    // One folder of files, as campaigns have beside a history.
+    let all: Vec<RunDetail> = by_campaign.into_values().flatten().collect();
+    let mirror = Mirror::of_runs(folder.path(), "all", all).unwrap();
+    let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
+    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).collect();
+    OutcomeTable::read(&mirror, filter, &names).unwrap()
+}
+
+fn hierarchy() -> Hierarchy {
+    made_up::CLASSES.map(|class| (format!("http://actions#{class}"), vec!["Container".to_owned()])).into()
+}
+
+#[test]
+fn a_pattern_in_runs_is_told_with_its_runs() {
+    let table = table(runs("k", 3_000, 0.05), &TableFilter::default());
+    let judged = judged(&table);
+    let names: Vec<&str> = judged.iter().map(|of| of.property.as_str()).collect();
+    let expected = ["InHand", "Near", "Placed", "Upright"].map(|name| format!("http://actions#{name}"));
+    assert_eq!(names, expected.each_ref().map(String::as_str));
+    let found = property_findings(&table, &judged[0], &hierarchy(), &PatternOptions::default());
+    let patterns: Vec<_> = found.patterns.confirmed().collect();
+    assert_eq!(patterns.len(), 1, "{:#?}", found.patterns);
+    let told: Vec<&str> = patterns[0]
+        .conditions
+        .iter()
+        .map(|condition| found.subject.parameters[condition.parameter()].name.as_str())
+        .collect();
+    assert_eq!(told, ["target_category", "target_friction"]);
+    for run in &patterns[0].runs {
+        let row = found.examples[*run].row as usize;
+        assert_eq!(table.text("target_category").get(row), Some("http://actions#Bottle"));
+        assert!(table.number("target_friction")[row] < 0.52);
+        assert_eq!(table.text("run").get(row), Some(found.examples[*run].run.as_str()));
+    }
+    let margins = found.margins.unwrap();
+    assert_eq!((margins.count, margins.least, margins.most), (3_000, -0.01, 0.02));
+    let never = property_findings(&table, &judged[1], &hierarchy(), &PatternOptions::default());
+    assert_eq!((never.counts.passed, never.patterns.patterns.len()), (3_000, 0));
+    let undecided = property_findings(&table, &judged[3], &hierarchy(), &PatternOptions::default());
+    assert_eq!((undecided.failing, undecided.counts.inapplicable, undecided.subject.len()), (None, 3_000, 0));
+    let map = two_way(&found.subject, &["target_category", "target_friction"]).unwrap();
+    assert_eq!(map.cells.iter().flatten().map(|cell| cell.runs).sum::<u64>(), 3_000);
+    assert_eq!(map.down[0], "Bottle");
+    assert!(map.cells[0][0].failing.unwrap().rate > 0.6 && map.cells[0].last().unwrap().failing.unwrap().rate < 0.3);
+    assert!(two_way(&found.subject, &["nothing"]).is_none());
+}
+
+#[test]
+fn a_failure_that_leads_to_a_later_one_is_told_and_no_other() {
+    let table = table(runs("k", 800, 0.1), &TableFilter::default());
+    let found = cascades(&table, 0.05);
+    assert_eq!(found.len(), 1, "{found:#?}");
+    let (first, later) = (&found[0].first, &found[0].later);
+    assert_eq!((first.step, first.property.as_str()), (1, "http://actions#InHand"));
+    assert_eq!((later.step, later.property.as_str()), (2, "http://actions#Placed"));
+    assert_eq!(found[0].table.passed_in, 0, "what is lost is never placed");
+    let modes = table_failure_modes(&table);
+    assert!(modes[0].failed.is_empty() && modes.len() == 3, "{modes:#?}");
+    assert_eq!(modes.iter().map(|mode| mode.runs.len()).sum::<usize>(), 800);
+}
+
+#[test]
+fn a_change_between_campaigns_is_found_where_it_is() {
+    let campaigns = [("a", 0.05), ("b", 0.05), ("c", 0.05), ("d", 0.4), ("e", 0.4)];
+    let all = campaigns.into_iter().flat_map(|(name, slippery)| runs(name, 150, slippery));
+    let table = table(all, &TableFilter::default());
+    let found = trend(&table, &judged(&table)[0], 0.05);
+    assert_eq!(found.points.iter().map(|point| point.runs).collect::<Vec<_>>(), [150; 5]);
+    assert_eq!(found.changes.iter().map(|change| change.at).collect::<Vec<_>>(), [3], "{found:#?}");
+    assert!(found.changes[0].before.high < found.changes[0].behind.low);
+}
+
+#[test]
+fn runs_that_are_alike_count_once() {
+    let mut all = runs("k", 60, 0.3);
+    let twin = all[10].row.trace_hash.clone();
+    all[40].row.trace_hash = twin;
+    for (index, run) in all.iter_mut().enumerate().take(9) {
+        run.row.repetition = Some(Repetition { scene: index as u64 / 3, number: index as u64 % 3 });
+    }
+    let table = table(all, &TableFilter::default());
+    let judged = judged(&table);
+    let found = property_findings(&table, &judged[0], &hierarchy(), &PatternOptions::default());
+    assert_eq!((found.twins, found.repeated, found.subject.len()), (1, 6, 53));
+    assert!(!found.examples.iter().any(|example| example.run == "k-11"), "of two alike the newer one counts");
+    let (flaky, scenes) = flaky_scenes(&table, &judged[0]);
+    assert_eq!(scenes, 3);
+    assert!(flaky.iter().all(|scene| scene.passed > 0 && scene.passed < scene.of && scene.of == 3), "{flaky:?}");
+}
+
+#[test]
+fn what_was_not_decided_is_no_failure() {
+    let mut dice = Dice::new(3);
+    let all = Outcome::ALL.map(|outcome| {
+        made_up::run("k", u64::from(outcome as u8), &mut dice, &["Pick"], |_, _, _| vec![("InHand", outcome)])
+    });
+    let table = table(all, &TableFilter::default());
+    let of = &judged(&table)[0];
+    assert_eq!((of.counts.total(), of.counts.decided()), (6, 2));
+    assert_eq!(table_failure_modes(&table).iter().map(|mode| mode.runs.len()).sum::<usize>(), 2);
+    assert_eq!(trend(&table, of, 0.05).points[0].runs, 2);
+    assert_eq!(of.counts.get(Untested), 1);
+}
+
+#[test]
+fn rows_are_chosen_by_campaign_and_time() {
+    let all = || runs("k", 56, 0.1);
+    let since = TableFilter { since: Some("2026-01-15T00:00:00Z".to_owned()), ..TableFilter::default() };
+    assert_eq!(table(all(), &since).len(), 4 * 28);
+    let other = TableFilter { campaigns: Some(vec!["other".to_owned()]), ..TableFilter::default() };
+    assert!(table(all(), &other).is_empty());
+}
