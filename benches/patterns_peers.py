@@ -69,9 +69,10 @@ def sliceline_finds(table):
 
     cut = table.drop(columns="failed")
     for column in cut.select_dtypes("number"):
-        cut[column] = pandas.qcut(cut[column], CELLS, duplicates="drop").astype(str)
+        cut[column] = pandas.qcut(cut[column], CELLS, duplicates="drop").astype(object)
+    cut = cut.astype(object).where(cut.notna(), "none")
     finder = Slicefinder(alpha=0.95, k=TOP, max_l=DEPTH, min_sup=30, verbose=False)
-    finder.fit(cut.astype(str).to_numpy(), table["failed"].to_numpy(dtype=float))
+    finder.fit(cut.map(str).to_numpy(dtype=object), table["failed"].to_numpy(dtype=float))
     slices = numpy.asarray(finder.top_slices_)
     return [
         " AND ".join(f"{name}={value}" for name, value in zip(cut.columns, row) if value is not None) for row in slices

@@ -159,6 +159,8 @@ fn search(
         if whole.failed_in.min(whole.passed_in) < LEAST_OF_EACH {
             break;
         }
+        let depth = affordable_depth(axes, whole, options);
+        found.depth = found.depth.max(depth);
         let likelihood =
             Likelihood::new((0..open.len()).filter(|run| open[*run]).map(|run| one(subject.failed[run])).sum());
         let runs = Runs::new(axes, &subject.failed, &open, &likelihood);
