@@ -13,7 +13,9 @@ use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
 use crate::cli::args::{Format, HistoryArgs};
 use crate::cli::{export, history_dir, output, since, why};
 use crate::ontology::{self, Ontology};
-use crate::report::{FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table};
+use crate::report::{
+    FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table, scene_rule,
+};
 use crate::verdict::Counts;
 
 /// Heat maps that are made of a property that was asked for: where on its surface the target stood, and what it was and how it was turned.
@@ -34,6 +36,10 @@ pub struct AnalyseArgs {
     /// Failures by one or two parameters, such as `target_category,target_turned_rad`, instead of the usual heat maps
     #[arg(long, value_name = "DOWN[,ACROSS]", value_delimiter = ',', num_args = 1..=2)]
     pub by: Vec<String>,
+    /// Print the pattern of this number of the one property that was asked for as a rule: `[scene] require` in a configuration
+    /// names the file, and every scene is of that kind
+    #[arg(long, value_name = "N", requires = "property", conflicts_with = "by")]
+    pub scene_rule: Option<usize>,
     /// Conditions of a pattern at most
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=3))]
     pub depth: u8,
@@ -78,6 +84,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     let summary = FindingsSummary {
         history: history.dir().display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
+        options: options(args),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
         counts: judged(&table).iter().fold(Counts::default(), |mut sum, of| {
@@ -89,6 +96,10 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         properties,
         level: args.level,
     };
+    if let Some(number) = args.scene_rule {
+        output::print(&rule(&summary, number)?);
+        return Ok(());
+    }
     output::print(&match args.format {
         Format::Table => findings_text(&summary),
         Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into()),
@@ -96,6 +107,20 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         Format::Json => format!("{:#}\n", findings_json(&summary)),
     });
     Ok(())
+}
+
+/// The options that choose runs and the depth of patterns, as they were typed.
+fn options(args: &AnalyseArgs) -> String {
+    let mut typed = String::new();
+    let mut add = |name: &str, value: String| typed.push_str(&format!(" --{name} {value}"));
+    args.campaign.iter().for_each(|id| add("campaign", id.clone()));
+    args.since.iter().for_each(|since| add("since", since.clone()));
+    args.ontology.iter().for_each(|file| add("ontology", file.display().to_string()));
+    args.history.history.iter().for_each(|folder| add("history", folder.display().to_string()));
+    if args.depth < 3 {
+        add("depth", args.depth.to_string());
+    }
+    typed
 }
 
 fn read(mirror: &Mirror, filter: &TableFilter) -> Result<OutcomeTable, Diagnostics> {
@@ -145,6 +170,25 @@ fn wanted(all: Vec<JudgedProperty>, names: &[String]) -> Result<Vec<JudgedProper
     }
     faults.or(())?;
     Ok(all.into_iter().filter(|of| names.is_empty() || names.iter().any(|name| is(of, name))).collect())
+}
+
+/// A pattern as the rule of a scene; patterns are counted over all properties that were asked for, as the text tells them.
+fn rule(summary: &FindingsSummary, number: usize) -> Result<String, Diagnostics> {
+    let told = |report: &PropertyReport| report.findings.patterns.confirmed().count();
+    let known: usize = summary.properties.iter().map(told).sum();
+    let mut patterns = summary
+        .properties
+        .iter()
+        .flat_map(|report| report.findings.patterns.confirmed().map(move |pattern| (report, pattern)));
+    let Some((report, pattern)) = number.checked_sub(1).and_then(|before| patterns.nth(before)) else {
+        return Err(Diagnostic::error("X049", format!("there is no pattern {number}: {known} were found"))
+            .help("`actcheck analyse` with the same options tells them with their numbers")
+            .into());
+    };
+    scene_rule(&pattern.conditions, &report.findings.subject.parameters, &report.sentence(pattern)).map_err(|unknown| {
+        let message = format!("no rule about a scene can ask for {}", unknown.join(", "));
+        Diagnostic::error("X049", message).help("narrow the configuration's own ranges and lists instead").into()
+    })
 }
 
 fn check_parameters(by: &[String]) -> Result<(), Diagnostics> {

@@ -14,6 +14,8 @@ pub struct FindingsSummary {
     pub history: String,
     /// How the user calls this program.
     pub program: String,
+    /// Options that choose the same runs again, each with a space before it.
+    pub options: String,
     /// Ids of the campaigns, by their starts.
     pub campaigns: Vec<String>,
     /// Runs in the table.

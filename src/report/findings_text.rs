@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use crate::analysis::{Judged, Pattern, TwoWay, TwoWayCell};
 use crate::base::names;
-use crate::report::Share;
 use crate::report::findings_summary::{FindingsSummary, PropertyReport, percent};
 use crate::report::table::ruled;
+use crate::report::{Share, scene_rule};
 use crate::verdict::{Counts, Outcome};
 
 /// Runs and scenes told in one line; `--format json` has all.
@@ -125,6 +125,7 @@ fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
     for (number, pattern) in patterns.confirmed().enumerate() {
         let _ = writeln!(out, "  {}. {}", number + 1, report.sentence(pattern));
         evidence(out, report, pattern);
+        more(out, report, pattern, (number + 1, summary));
     }
     let confirmed = patterns.confirmed().count();
     if confirmed == 0 {
@@ -182,6 +183,21 @@ fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
         probability(pattern.p_held_out)
     );
     let _ = writeln!(out, "     runs: {}", list(report.runs(pattern).into_iter()));
+}
+
+/// How to make more such scenes.
+fn more(out: &mut String, report: &PropertyReport, pattern: &Pattern, (number, summary): (usize, &FindingsSummary)) {
+    let parameters = &report.findings.subject.parameters;
+    if scene_rule(&pattern.conditions, parameters, "").is_ok() {
+        let _ = writeln!(
+            out,
+            "     more such scenes: {} analyse --property {} --scene-rule {number}{} > more.rls, and `require = \"more.rls\"` under \
+             `[scene]` of a configuration beside it",
+            summary.program,
+            report.name(),
+            summary.options
+        );
+    }
 }
 
 /// A probability, such as `0.03` or `2e-7`.

@@ -1,0 +1,122 @@
+//! A pattern as a rule that asks for more scenes of its kind (`[scene] require` of a configuration).
+
+use std::fmt::Write as _;
+
+use crate::analysis::{Condition, Parameter};
+use crate::base::names;
+
+/// What a parameter of the tables is in the facts of a scene: the rest of a rule for `value(?v)`, where `?o` is the target, `?s` its
+/// surface, `?n` any other loose thing. (`ontology/world.ttl` and `rules/lib/geometry.rls` say what the terms mean.)
+const NUMBERS: [(&str, &str); 19] = [
+    ("target_friction", "target(?o), before(?o, w:friction, ?v)"),
+    ("target_mass_kg", "target(?o), before(?o, w:mass, ?v)"),
+    ("target_restitution", "target(?o), before(?o, w:restitution, ?v)"),
+    ("target_x_m", "target(?o), before(?o, w:x, ?v)"),
+    ("target_y_m", "target(?o), before(?o, w:y, ?v)"),
+    ("target_z_m", "target(?o), before(?o, w:z, ?v)"),
+    ("target_yaw_rad", "target(?o), before(?o, w:yaw, ?v)"),
+    ("base_x_m", "before(w:robot, w:baseX, ?v)"),
+    ("base_y_m", "before(w:robot, w:baseY, ?v)"),
+    ("base_yaw_rad", "before(w:robot, w:baseYaw, ?v)"),
+    ("robot_distance_m", "target(?o), from_base(?o, ?x, ?y), ?v = SQRT(?x * ?x + ?y * ?y)"),
+    (
+        "target_ahead_m",
+        "target(?o), from_base(?o, ?x, ?y), before(w:robot, w:baseYaw, ?a), ?v = COS(?a) * ?x + SIN(?a) * ?y",
+    ),
+    (
+        "target_left_m",
+        "target(?o), from_base(?o, ?x, ?y), before(w:robot, w:baseYaw, ?a), ?v = COS(?a) * ?y - SIN(?a) * ?x",
+    ),
+    (
+        "target_turned_rad",
+        "target(?o), before(?o, w:yaw, ?b), before(w:robot, w:baseYaw, ?a), ?v = ATAN2(SIN(?b - ?a), COS(?b - ?a))",
+    ),
+    ("surface_x_m", "on_surface(?x, ?y, ?a), ?v = COS(?a) * ?x + SIN(?a) * ?y"),
+    ("surface_y_m", "on_surface(?x, ?y, ?a), ?v = COS(?a) * ?y - SIN(?a) * ?x"),
+    ("neighbour_distance_m", "nearest(?v)"),
+    (
+        "neighbour_direction_rad",
+        "nearest(?d), target(?o), away(?n, ?dx, ?dy, ?d), from_base(?o, ?x, ?y), ?b = ATAN2(?dy, ?dx) - ATAN2(0.0 - ?y, 0.0 - ?x), \
+         ?v = ATAN2(SIN(?b), COS(?b))",
+    ),
+    ("others", "others(?v)"),
+];
+
+/// Classes of things, in the same way: the rest of a rule for `thing(?t)`.
+const KINDS: [(&str, &str); 3] = [
+    ("target_category", "target(?t)"),
+    ("surface_category", "parameter(act:objectSurface, ?t)"),
+    ("neighbour_category", "nearest(?d), away(?t, _, _, ?d)"),
+];
+
+/// What the rules above build on.
+const DEFINITIONS: &str = "\
+target(?o) :- parameter(act:pickObject, ?o) .
+loose(?n) :- before(?n, w:fixed, false) .
+from_base(?o, ?x, ?y) :- before(?o, w:x, ?ox), before(?o, w:y, ?oy), before(w:robot, w:baseX, ?bx), before(w:robot, w:baseY, ?by),
+    ?x = ?ox - ?bx, ?y = ?oy - ?by .
+on_surface(?x, ?y, ?a) :- target(?o), parameter(act:objectSurface, ?s), before(?o, w:x, ?ox), before(?o, w:y, ?oy),
+    before(?s, w:x, ?sx), before(?s, w:y, ?sy), before(?s, w:yaw, ?a), ?x = ?ox - ?sx, ?y = ?oy - ?sy .
+away(?n, ?dx, ?dy, ?d) :- target(?o), loose(?n), ?n != ?o, before(?o, w:x, ?ox), before(?o, w:y, ?oy),
+    before(?n, w:x, ?nx), before(?n, w:y, ?ny), ?dx = ?nx - ?ox, ?dy = ?ny - ?oy, ?d = SQRT(?dx * ?dx + ?dy * ?dy) .
+nearest(#min(?d)) :- away(_, _, _, ?d) .
+others(#count(?n)) :- away(?n, _, _, _) .
+kind(?t, ?c) :- before(?t, rdf:type, ?c) .
+kind(?t, ?c) :- kind(?t, ?below), ontology(?below, rdfs:subClassOf, ?c) .
+";
+
+/// The rule file that a scene satisfies where all conditions hold.
+///
+/// # Errors
+/// Names of the parameters that facts about a scene do not have.
+pub fn scene_rule(conditions: &[Condition], parameters: &[Parameter], sentence: &str) -> Result<String, Vec<String>> {
+    let mut rules = String::new();
+    let mut asked = Vec::new();
+    let mut unknown = Vec::new();
+    for (number, condition) in conditions.iter().enumerate() {
+        let name = parameters[condition.parameter()].name.as_str();
+        match asked_of(condition, name, number + 1) {
+            Some((rule, literal)) => {
+                rules.push_str(&rule);
+                asked.push(literal);
+            }
+            None => unknown.push(name.to_owned()),
+        }
+    }
+    if !unknown.is_empty() {
+        return Err(unknown);
+    }
+    let mut text = format!("% More scenes like these: {sentence}.\n\n");
+    for (prefix, namespace) in names::PREFIXES.iter().filter(|(prefix, _)| ["act", "w", "rdf", "rdfs"].contains(prefix))
+    {
+        let _ = writeln!(text, "@prefix {prefix}: <{namespace}> .");
+    }
+    let _ = writeln!(text, "\nsuccess(?o) :- target(?o), {} .\n", asked.join(", "));
+    text.push_str(&rules);
+    text.push('\n');
+    text.push_str(DEFINITIONS);
+    Ok(text)
+}
+
+/// The rules of one condition, and the literal that asks for it.
+fn asked_of(condition: &Condition, name: &str, number: usize) -> Option<(String, String)> {
+    let known = |among: &[(&str, &'static str)]| among.iter().find(|(known, _)| *known == name).map(|(_, body)| *body);
+    match condition {
+        Condition::Kind { kind, .. } => {
+            let body = known(&KINDS)?;
+            let rule = format!("thing_{number}(?t) :- {body} .\n");
+            Some((rule, format!("thing_{number}(?t{number}), kind(?t{number}, act:{kind})")))
+        }
+        Condition::Range { low, high, .. } => {
+            let body = known(&NUMBERS)?;
+            let rule = format!("value_{number}(?v) :- {body} .\n");
+            let mut literal = format!("value_{number}(?v{number})");
+            for (sign, bound) in [(">=", low), ("<", high)] {
+                if let Some(bound) = bound {
+                    let _ = write!(literal, ", ?v{number} {sign} {bound:?}");
+                }
+            }
+            Some((rule, literal))
+        }
+    }
+}
