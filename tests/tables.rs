@@ -156,7 +156,7 @@ fn named_queries_answer(here: &Path) {
     );
     let failures = json(here, &["query", "--named", "first-failure-after-rule-change", "--format", "json"]);
     let told: Vec<&str> = failures.as_array().unwrap().iter().map(|row| row["property"].as_str().unwrap()).collect();
-    assert_eq!(told, ["act:MovedObject"], "{failures}");
+    assert_eq!(told, ["http://actions#MovedObject"], "{failures}");
     let unknown = actcheck(here, &["query", "--named", "first-failure"]);
     assert_eq!(unknown.status.code(), Some(2));
     assert!(stderr(&unknown).contains("did you mean `first-failures`?"), "{}", stderr(&unknown));

@@ -1,6 +1,6 @@
 //! History to tables and patterns: rates with intervals, the ways in which runs fail, and campaigns side by side.
 //!
-//! Never: judges, writes to a history, or hands out a type of the table library.
+//! Never: judges, changes what a history keeps (tables lie beside it), or hands out a type of the table library.
 
 mod compare;
 mod consistency;

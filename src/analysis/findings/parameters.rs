@@ -6,8 +6,6 @@ use crate::analysis::{ColumnKind, Hierarchy, OutcomeTable, Parameter, TextColumn
 use crate::base::names;
 
 /// Every parameter of the scenes of some rows, and every designator that has one value in each.
-///
-/// Of several parameters that part the rows in the same way, the first stands for all.
 pub(super) fn parameters(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarchy) -> Vec<Parameter> {
     let mut found: Vec<Parameter> = Vec::new();
     for column in columns().iter().filter(|column| column.parameter) {
@@ -16,27 +14,13 @@ pub(super) fn parameters(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarc
             _ => numbers(table.number(column.name), rows),
         };
         let unit = (!column.unit.is_empty() && column.unit != "1").then(|| column.unit.to_owned());
-        add(&mut found, Parameter { name: column.name.to_owned(), unit, values });
+        found.push(Parameter { name: column.name.to_owned(), unit, values });
     }
     for (name, column) in designators(table.text("designators"), rows) {
         let values = kinds(&column, &(0..rows.len() as u32).collect::<Vec<u32>>(), hierarchy);
-        add(&mut found, Parameter { name, unit: None, values });
+        found.push(Parameter { name, unit: None, values });
     }
     found
-}
-
-fn add(found: &mut Vec<Parameter>, parameter: Parameter) {
-    let same = |known: &Parameter| match (&known.values, &parameter.values) {
-        (Values::Kinds { of_run: a, above, .. }, Values::Kinds { of_run: b, .. }) => {
-            // Classes say more than names of models.
-            a == b && (above.iter().any(|above| !above.is_empty()) || known.name != parameter.name)
-        }
-        (Values::Numbers(a), Values::Numbers(b)) => a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits()),
-        _ => false,
-    };
-    if !found.iter().any(same) {
-        found.push(parameter);
-    }
 }
 
 fn numbers(column: &[f64], rows: &[u32]) -> Values {

@@ -105,12 +105,27 @@ impl Axis {
     }
 }
 
-/// Cells of every parameter that takes more than one value among the runs that take part, and of no other.
+/// Cells of every parameter that takes more than one value among the runs that take part, and of no other. Of several parameters
+/// that are the same in all runs, or part them into kinds in the same way, the first stands for all.
 ///
 /// Numbers are cut so that every cell has about as many runs; where there are few different ones, each has a cell.
 pub(super) fn axes(subject: &Subject, takes_part: &[bool], cells: usize) -> Vec<Axis> {
-    let parameters = subject.parameters.iter().enumerate();
-    parameters.filter_map(|(place, parameter)| axis(place, parameter, takes_part, cells)).collect()
+    let mut axes: Vec<Axis> = Vec::new();
+    for (place, parameter) in subject.parameters.iter().enumerate() {
+        let known = axes.iter().any(|axis| is_same(&subject.parameters[axis.parameter].values, &parameter.values));
+        if !known && let Some(axis) = axis(place, parameter, takes_part, cells) {
+            axes.push(axis);
+        }
+    }
+    axes
+}
+
+fn is_same(known: &Values, values: &Values) -> bool {
+    match (known, values) {
+        (Values::Kinds { of_run: a, .. }, Values::Kinds { of_run: b, .. }) => a == b,
+        (Values::Numbers(a), Values::Numbers(b)) => a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits()),
+        _ => false,
+    }
 }
 
 fn axis(place: usize, parameter: &Parameter, takes_part: &[bool], cells: usize) -> Option<Axis> {

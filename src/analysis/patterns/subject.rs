@@ -29,7 +29,7 @@ pub enum Values {
     Numbers(Vec<f64>),
     /// One of several kinds, each of which may belong to kinds above it.
     Kinds {
-        /// For each run the place of its kind in `names`; nothing where it has none.
+        /// For each run the place of its kind in `names`, which are in the order in which they are met; nothing where it has none.
         of_run: Vec<Option<u32>>,
         /// Names of the kinds that occur.
         names: Vec<String>,

@@ -90,10 +90,10 @@ const COLUMNS: &[Column] = &[
         .of_scene(),
     count("others", "things that stand around: the clutter", |p| Cell::count(with_role(p, Role::Other))).of_scene(),
     count("obstacles", "obstacles on the floor", |p| Cell::count(with_role(p, Role::Obstacle))).of_scene(),
-    text("surface_model", "model of the platform", |p| model(p.scene.surface)).of_scene(),
     text("surface_category", "class of the platform (IRI)", |p| category(p.scene.surface)).of_scene(),
-    text("target_model", "model of the target: what the action handles", |p| model(p.scene.target)).of_scene(),
+    text("surface_model", "model of the platform", |p| model(p.scene.surface)).of_scene(),
     text("target_category", "class of the target (IRI)", |p| category(p.scene.target)).of_scene(),
+    text("target_model", "model of the target: what the action handles", |p| model(p.scene.target)).of_scene(),
     number("target_x_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.x)).of_scene(),
     number("target_y_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.y)).of_scene(),
     number("target_z_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.z)).of_scene(),
@@ -128,8 +128,8 @@ const COLUMNS: &[Column] = &[
         Cell::Number(p.scene.target_on_surface().map(|[_, y]| y))
     })
     .of_scene(),
-    text("neighbour_model", "model of the thing nearest to the target", |p| model(neighbour(p))).of_scene(),
     text("neighbour_category", "class of the thing nearest to the target (IRI)", |p| category(neighbour(p))).of_scene(),
+    text("neighbour_model", "model of the thing nearest to the target", |p| model(neighbour(p))).of_scene(),
     number("neighbour_distance_m", "m", "horizontal distance of the nearest thing's middle from the target's", |p| {
         Cell::Number(p.scene.neighbour.map(|(_, distance)| distance))
     })
