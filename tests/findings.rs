@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use actcheck::analysis::{
-    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns, flaky_scenes,
-    judged, property_findings, table_failure_modes, trend, two_way,
+    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, Parameter, PatternOptions, TableFilter, Values, cascades,
+    columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck::history::{Repetition, RunDetail};
 use actcheck::report::scene_rule;
