@@ -86,7 +86,9 @@ fn bounds(numbers: &[f64]) -> Vec<f64> {
         return vec![least, most];
     }
     // The steps that people read easily are 1, 2 and 5 times a power of ten.
-    let rough = (most - least) / MOST_CELLS as f64;
+    // There is nothing between whole numbers.
+    let finest = if known().all(|number| number.fract() == 0.0) { 1.0 } else { 0.0 };
+    let rough = f64::max((most - least) / MOST_CELLS as f64, finest);
     let power = libm::exp10(libm::floor(libm::log10(rough)));
     let step =
         [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|step| *step >= rough).unwrap_or(rough);
