@@ -68,7 +68,7 @@ fn what_is_told_of_a_pattern_is_what_the_runs_say() {
 #[test]
 fn drawn_by_lot_nothing_is_a_pattern() {
     let planted = plantings().pop().unwrap().1;
-    for runs in [300, 1_000] {
+    for runs in [300, 1_000, 4_000] {
         let subject = subject(runs, 9, &planted);
         let alarms = (0..100)
             .filter(|seed| !mine(&shuffled(&subject, *seed), &PatternOptions::default()).patterns.is_empty())

@@ -36,16 +36,15 @@ pub struct Cascade {
 /// A later action that was not reached, or that could not be judged, counts neither way.
 pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
     let runs = table.text("run");
-    let outcomes = outcomes(table);
     let mut slots: BTreeMap<(u32, u32, u32), usize> = BTreeMap::new();
     let mut counts: BTreeMap<(usize, usize), TwoByTwo> = BTreeMap::new();
     let mut run: Vec<(u32, usize, bool)> = Vec::new();
-    for row in 0..table.len() {
+    for (row, outcome) in outcomes(table).into_iter().enumerate() {
         if row > 0 && runs.of_row[row] != runs.of_row[row - 1] {
             count(&run, &mut counts);
             run.clear();
         }
-        if let (Some(key), Some(failed)) = (key(table, row), failed(outcomes[row])) {
+        if let (Some(key), Some(failed)) = (key(table, row), failed(outcome)) {
             let next = slots.len();
             run.push((key.0, *slots.entry(key).or_insert(next), failed));
         }

@@ -23,10 +23,10 @@ pub fn judged(table: &OutcomeTable) -> Vec<JudgedProperty> {
     let (actions, properties) = (table.text("action"), table.text("property"));
     let outcomes = outcomes(table);
     let mut found: BTreeMap<(u32, u32), (Counts, Vec<u32>)> = BTreeMap::new();
-    for row in 0..table.len() {
+    for (row, outcome) in outcomes.into_iter().enumerate() {
         if let (Some(action), Some(property)) = (actions.of_row[row], properties.of_row[row]) {
             let (counts, rows) = found.entry((action, property)).or_default();
-            counts.add(outcomes[row]);
+            counts.add(outcome);
             // A table has far fewer rows than 2^32.
             rows.push(row as u32);
         }

@@ -135,5 +135,5 @@ fn is_held_out(table: &OutcomeTable, row: usize) -> bool {
         _ => run.to_owned(),
     };
     let digest = digest_of(&key);
-    u64::from_str_radix(&digest[..digest.len().min(12)], 16).unwrap_or_default() % HELD_OUT_EVERY == 0
+    u64::from_str_radix(&digest[..digest.len().min(12)], 16).unwrap_or_default().is_multiple_of(HELD_OUT_EVERY)
 }

@@ -5,14 +5,11 @@ use crate::analysis::patterns::Condition;
 use crate::analysis::patterns::cells::Axis;
 use crate::analysis::patterns::condition::all_hold;
 use crate::analysis::patterns::confirm::count;
-use crate::analysis::patterns::refine::{Field, refine};
+use crate::analysis::patterns::refine::Field;
 
 /// Takes away, one after the other, conditions and ends of ranges that the runs do not ask for: where the runs that one shuts out do not
-/// fail less, beyond what the best of so many conditions shows by chance. Bounds are refined again each time.
-///
-/// Returns how many places of bounds were tried on the way.
-pub(super) fn fold(conditions: &mut Vec<Condition>, field: &Field<'_>, level: f64) -> u64 {
-    let mut tried = 0;
+/// fail less, beyond what the best of so many conditions shows by chance. What is left is one of the boxes that were tried.
+pub(super) fn fold(conditions: &mut Vec<Condition>, field: &Field<'_>, level: f64) {
     // Any of these could have stood there.
     let rivals = field.axes.iter().map(Axis::len).sum::<usize>().max(1) as f64;
     loop {
@@ -24,9 +21,8 @@ pub(super) fn fold(conditions: &mut Vec<Condition>, field: &Field<'_>, level: f6
                 least = Some((p, simpler));
             }
         }
-        let Some((_, simpler)) = least else { return tried };
+        let Some((_, simpler)) = least else { return };
         *conditions = simpler;
-        tried += refine(conditions, field);
     }
 }
 

@@ -171,15 +171,16 @@ fn search(
             break;
         }
         let field = Field { subject, open: &open, axes, likelihood: &likelihood };
-        found.tried += refine(&mut best.conditions, &field);
-        found.tried += fold(&mut best.conditions, &field, options.level);
-        let within = all_hold(&best.conditions, subject);
-        let table = count(subject, &within, |run| open[run]);
+        fold(&mut best.conditions, &field, options.level);
+        let table = count(subject, &all_hold(&best.conditions, subject), |run| open[run]);
         // What comes later is weaker: where this one is no finding, neither are those.
         let rank = rounds.len() as f64 + 1.0;
         if table.fisher().greater * found.tried as f64 / rank > options.level {
             break;
         }
+        // Bounds between the cuts describe better what was found; they take no part in the test, as they were not all tried.
+        refine(&mut best.conditions, &field);
+        let within = all_hold(&best.conditions, subject);
         open.iter_mut().zip(&within).for_each(|(open, within)| *open &= !within);
         rounds.push((best.conditions, table));
     }

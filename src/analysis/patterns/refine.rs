@@ -19,24 +19,20 @@ pub(super) struct Field<'a> {
 }
 
 /// Moves each bound, one after the other while the rest stays, between the cuts on either side of it to where the score is highest.
-/// Returns how many places were tried.
-pub(super) fn refine(conditions: &mut [Condition], field: &Field<'_>) -> u64 {
-    let mut tried = 0;
+pub(super) fn refine(conditions: &mut [Condition], field: &Field<'_>) {
     for _ in 0..MOST_PASSES {
         let before = conditions.to_vec();
         for at in 0..conditions.len() {
             let mut others = conditions.to_vec();
             let condition = others.remove(at);
-            if let Some((better, count)) = refined(&condition, &others, field) {
+            if let Some(better) = refined(&condition, &others, field) {
                 conditions[at] = better;
-                tried += count;
             }
         }
         if *conditions == *before {
             break;
         }
     }
-    tried
 }
 
 /// Different values in order, and before each (and behind the last) the runs below.
@@ -77,7 +73,7 @@ impl Scale {
     }
 }
 
-fn refined(condition: &Condition, others: &[Condition], field: &Field<'_>) -> Option<(Condition, u64)> {
+fn refined(condition: &Condition, others: &[Condition], field: &Field<'_>) -> Option<Condition> {
     let Condition::Range { parameter, low, high } = condition else { return None };
     let Values::Numbers(numbers) = &field.subject.parameters[*parameter].values else { return None };
     let Choices::Ranges(cuts) = &field.axes.iter().find(|axis| axis.parameter == *parameter)?.choices else {
@@ -87,30 +83,28 @@ fn refined(condition: &Condition, others: &[Condition], field: &Field<'_>) -> Op
     let score = |first: usize, last: usize| field.likelihood.gain(scale.below[last] - scale.below[first]);
     let end = scale.values.len();
     let (mut first, last) = (low.map_or(0, |low| scale.place(low)), high.map_or(end, |high| scale.place(high)));
-    let mut tried = 0;
     let (mut low, mut high) = (*low, *high);
     if let Some(bound) = low {
         let window = window(bound, cuts, &scale).filter(|place| *place <= last);
-        let best = best(first, window, |place| score(place, last), &mut tried);
+        let best = best(first, window, |place| score(place, last));
         if best != first {
             (first, low) = (best, scale.bound(best));
         }
     }
     if let Some(bound) = high {
         let window = window(bound, cuts, &scale).filter(|place| *place >= first);
-        let best = best(last, window, |place| score(first, place), &mut tried);
+        let best = best(last, window, |place| score(first, place));
         if best != last {
             high = scale.bound(best);
         }
     }
-    Some((Condition::Range { parameter: *parameter, low, high }, tried))
+    Some(Condition::Range { parameter: *parameter, low, high })
 }
 
 /// The place with the highest score; the one that is taken now where no other has a higher one.
-fn best(now: usize, places: impl Iterator<Item = usize>, score: impl Fn(usize) -> f64, tried: &mut u64) -> usize {
+fn best(now: usize, places: impl Iterator<Item = usize>, score: impl Fn(usize) -> f64) -> usize {
     let mut best = (score(now), now);
     for place in places {
-        *tried += 1;
         let score = score(place);
         if score > best.0 {
             best = (score, place);
