@@ -60,8 +60,11 @@ fn what_is_told_of_a_pattern_is_what_the_runs_say() {
     assert!((pattern.lift - pattern.rate.rate / overall).abs() < 1e-12);
     assert!((pattern.wracc - runs.len() as f64 / 10_000.0 * (pattern.rate.rate - overall)).abs() < 1e-12);
     assert!(pattern.p < pattern.q && pattern.q < 1e-30 && pattern.p_held_out < 1e-10, "{pattern:?}");
-    let split = pattern.searched.failed_in + pattern.held_out.failed_in;
-    assert_eq!(split, failed, "the first pattern's runs were all looked at");
+    let searched = pattern.searched;
+    let looked_at = searched.failed_in + searched.passed_in + searched.failed_out + searched.passed_out;
+    assert_eq!(looked_at, 10_000 - found.held_out, "the first pattern is looked for in all that are not kept aside");
+    let kept = (0..subject.len()).filter(|run| subject.held_out[*run] && pattern.runs.contains(run));
+    assert_eq!(pattern.held_out.failed_in + pattern.held_out.passed_in, kept.count() as u64);
     assert!((3_200..3_500).contains(&found.held_out), "{}", found.held_out);
 }
 

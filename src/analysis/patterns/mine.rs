@@ -43,7 +43,8 @@ pub struct Pattern {
     pub runs: Vec<usize>,
     /// Among all decided runs.
     pub all: TwoByTwo,
-    /// Among the runs that it was found in: without those kept aside, and without those of earlier patterns.
+    /// Among the runs that it was found in (without those kept aside, and without those of earlier patterns), with bounds at the cuts: those
+    /// between them were not all tried, and so are no part of the test.
     pub searched: TwoByTwo,
     /// Among the runs kept aside that no earlier pattern has.
     pub held_out: TwoByTwo,
