@@ -60,8 +60,8 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
     let mut summary = summarise(&env, id.clone(), runs, &end);
     summary.regressions = regressions;
-    mirror(&history);
     if finished.is_ok() {
+        mirror(&history);
         summary.failure_modes = failure_modes(&history, id)?;
     }
     // Where the history failed, that is what has to be told.
