@@ -31,3 +31,7 @@ pub use crate::config::{
     Budget, CONTROL_HZ, Camera, Inertia, Location, Mesh, ObjectModel, Odometry, Part, Physics, RobotProfile, Room,
     Sensing, Shape, Surface,
 };
+
+// Tests of the stages that follow begin with a robot as a configuration reads it.
+#[cfg(test)]
+pub(crate) use crate::config::robot::read as read_robot;

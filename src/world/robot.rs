@@ -254,7 +254,7 @@ pub(super) mod tests {
 
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let profile = Arc::new(crate::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right"));
+        let profile = Arc::new(crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is right"));
         let one = (1.0, 1.0);
         let scene = Scene {
             map: crate::scenario::SceneMap::default(),

@@ -13,7 +13,7 @@ const LEAST: Room = Room { furniture_m: 0.01, things_m: 0.01 };
 
 fn arm() -> (Kinematics, Layout, Vec<f64>) {
     let path = Path::new("models/robots/fixed_arm.toml");
-    let profile = crate::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right");
+    let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is right");
     let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
     geometry(&start).expect("the shipped robot is right")
 }
