@@ -102,9 +102,14 @@ mod tests {
     #[test]
     fn corners_reach_as_far_as_the_shape() {
         let reach = |shape: &Shape| corners(shape).iter().map(|point| point.coords.abs().max()).fold(0.0, f64::max);
-        assert_eq!(reach(&Shape::Box { size: [0.2, 0.4, 0.6] }), 0.3);
-        assert_eq!(reach(&Shape::Cylinder { radius: 0.4, height: 0.2 }), 0.4);
-        assert_eq!(reach(&Shape::Sphere { radius: 0.25 }), 0.25);
-        assert_eq!(reach(&Shape::Capsule { radius: 0.1, height: 0.4 }), 0.3);
+        let expected = [
+            (Shape::Box { size: [0.2, 0.4, 0.6] }, 0.3),
+            (Shape::Cylinder { radius: 0.4, height: 0.2 }, 0.4),
+            (Shape::Sphere { radius: 0.25 }, 0.25),
+            (Shape::Capsule { radius: 0.1, height: 0.4 }, 0.3),
+        ];
+        for (shape, far) in expected {
+            assert!((reach(&shape) - far).abs() < 1e-12, "{shape:?}: {}", reach(&shape));
+        }
     }
 }
