@@ -196,6 +196,11 @@ fn call(name: &str, args: &[Value]) -> Value {
         "SQRT" => Value::Number(numbers[0].sqrt()),
         "MIN" => Value::Number(numbers.iter().copied().fold(f64::INFINITY, f64::min)),
         "MAX" => Value::Number(numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+        "geo3d:distance2d" => Value::Number((numbers[2] - numbers[0]).hypot(numbers[3] - numbers[1])),
+        "geo3d:angleDifference" => {
+            let turn = (numbers[1] - numbers[0]).rem_euclid(std::f64::consts::TAU);
+            Value::Number(if turn > std::f64::consts::PI { turn - std::f64::consts::TAU } else { turn })
+        }
         "STR" => {
             let short = text(0);
             let long = names::PREFIXES
