@@ -412,6 +412,11 @@ fn shipped() -> Vec<(String, Case, actcheck::rules::explain::Explanation)> {
             continue;
         }
         let ontology = ontology_of(&folder);
+        // The checker's own rules know no aggregates. What they derive is compared with the naive evaluator's.
+        let text = &ontology.properties[TESTED].rule.source.text;
+        if ["#min(", "#max(", "#sum(", "#count("].iter().any(|aggregate| text.contains(aggregate)) {
+            continue;
+        }
         let facts = facts_of(&folder);
         let book = RuleBook::prepare(&ontology).unwrap();
         let explanation = book.explain(&facts.action(0).unwrap(), TESTED, &Budget::default()).unwrap();

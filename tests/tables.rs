@@ -96,7 +96,11 @@ fn rdf_is_all_there(here: &Path) {
     assert_eq!(quads.lines().count() as u64, all);
     assert!(quads.lines().any(|line| line.contains("/during> .")), "facts are in their graphs");
     let turtle = std::fs::read_to_string(here.join("h.ttl")).unwrap();
-    assert!(turtle.contains("@prefix act: <http://actions#>") && turtle.contains("a prov:Activity , act:Run"), "{}", &turtle[..500]);
+    assert!(
+        turtle.contains("@prefix act: <http://actions#>") && turtle.contains("a prov:Activity , act:Run"),
+        "{}",
+        &turtle[..500]
+    );
     let refused = actcheck(here, &["export", "--nquads", "nowhere/h.nq"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("H016"), "{}", stderr(&refused));
