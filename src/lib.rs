@@ -30,7 +30,7 @@
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store) |
 //! | [`campaign`] | the conductor; the only module that calls many stages | rayon |
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, campaigns side by side, when it fails | polars, statrs |
-//! | [`report`] | verdicts and tables as text and JSON | |
+//! | [`report`] | verdicts and tables as text and JSON, runs as pictures | |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap |
 //!
 //! A module imports only from modules above it in this table ([`campaign`] and [`cli`] from all), and a library of the field is used

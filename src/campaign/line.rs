@@ -207,17 +207,8 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
     let actions = calls(test, scene)
         .into_iter()
         .map(|call| actions::ActionTrace {
-            action: call.action,
-            parameters: call.parameters,
             end: ActionEnd::Broken(reason.to_owned()),
-            report: None,
-            duration_secs: 0.0,
-            contacts: Vec::new(),
-            percepts: Vec::new(),
-            perceived: None,
-            extremes: Vec::new(),
-            base: None,
-            phases: Vec::new(),
+            ..actions::ActionTrace::not_reached(&call.action, &call.parameters)
         })
         .collect();
     Trace {
