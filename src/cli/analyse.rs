@@ -12,6 +12,7 @@ use crate::analysis::{
 use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
 use crate::cli::args::{Format, HistoryArgs};
 use crate::cli::{export, history_dir, output, since, why};
+use crate::history::History;
 use crate::ontology::{self, Ontology};
 use crate::report::{
     FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table, scene_rule,
@@ -64,16 +65,46 @@ fn level(text: &str) -> Result<f64, String> {
     }
 }
 
+/// What was asked of a history, answered.
+pub(super) struct Analysed {
+    /// The rows that were asked for.
+    pub table: OutcomeTable,
+    /// What they say.
+    pub summary: FindingsSummary,
+    /// What properties are called.
+    pub ontology: Ontology,
+}
+
 /// Looks for what goes with failures and prints it.
 pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     check_parameters(&args.by)?;
     let history = history_dir::open(&args.history)?;
-    let filter = export::filter(&history, &args.campaign, args.since.clone())?;
+    let summary = analysed(args, &history, &[])?.summary;
+    if let Some(number) = args.scene_rule {
+        output::print(&rule(&summary, number)?);
+        return Ok(());
+    }
+    output::print(&match args.format {
+        Format::Table => findings_text(&summary),
+        Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into()),
+        Format::Csv => findings_table(&summary).render(args.format.into()),
+        Format::Json => format!("{:#}\n", findings_json(&summary)),
+    });
+    Ok(())
+}
+
+/// Brings the tables beside a history up to date and looks for what goes with failures; the table has some further columns.
+pub(super) fn analysed(
+    args: &AnalyseArgs,
+    history: &History,
+    further: &[&'static str],
+) -> Result<Analysed, Diagnostics> {
+    let filter = export::filter(history, &args.campaign, args.since.clone())?;
     let hierarchy = export::hierarchy(args.ontology.as_deref())?;
     let (files, path) = why::ontology_file(args.ontology.as_deref());
     let ontology = ontology::load(&files, &path)?;
-    let (mirror, _) = Mirror::update(&history)?;
-    let table = read(&mirror, &filter)?;
+    let (mirror, _) = Mirror::update(history)?;
+    let table = read(&mirror, &filter, further)?;
     if table.is_empty() {
         return Err(Diagnostic::error("X044", format!("the history `{}` has no such runs", history.dir().display()))
             .help("`actcheck list` shows the runs that it has; `actcheck run CONFIG` makes some")
@@ -96,17 +127,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         properties,
         level: args.level,
     };
-    if let Some(number) = args.scene_rule {
-        output::print(&rule(&summary, number)?);
-        return Ok(());
-    }
-    output::print(&match args.format {
-        Format::Table => findings_text(&summary),
-        Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into()),
-        Format::Csv => findings_table(&summary).render(args.format.into()),
-        Format::Json => format!("{:#}\n", findings_json(&summary)),
-    });
-    Ok(())
+    Ok(Analysed { table, summary, ontology })
 }
 
 /// The options that choose runs and the depth of patterns, as they were typed.
@@ -123,9 +144,9 @@ fn options(args: &AnalyseArgs) -> String {
     typed
 }
 
-fn read(mirror: &Mirror, filter: &TableFilter) -> Result<OutcomeTable, Diagnostics> {
+fn read(mirror: &Mirror, filter: &TableFilter, further: &[&'static str]) -> Result<OutcomeTable, Diagnostics> {
     let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
-    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).collect();
+    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).chain(further.iter().copied()).collect();
     OutcomeTable::read(mirror, filter, &names)
 }
 

@@ -162,6 +162,17 @@ pub enum Command {
     /// Judges with the rules of today: those that the ontology links now.
     #[command(after_help = "Example:\n  actcheck why k7f3-3 MovedObject    (an id that `actcheck list` prints)")]
     Why(WhyArgs),
+    /// Write what a history says as one page that opens anywhere, without a network: counts, patterns, every run, failed ones in 3D
+    ///
+    /// Overview with scores and intervals, properties, failure modes, patterns with plots, where targets stood, trends, and each run
+    /// with witnesses, explanations and parameters. Failed runs are replayed as far as there is room for them, so that every failure
+    /// mode and property has some; every other one is told with the command that shows it.
+    ///
+    /// Reads the tables beside the history, which are brought up to date first. Exit code: 0 written, 2 it could not be done.
+    #[command(
+        after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper"
+    )]
+    Report(crate::cli::report::ReportArgs),
     /// List all properties: label, language, rule file, actions, and how often each passed in the history
     #[command(after_help = "Example:\n  actcheck rules --format csv")]
     Rules(crate::cli::rules::RulesArgs),

@@ -17,6 +17,7 @@ pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let done = match arguments.command {
         Command::Analyse(args) => crate::cli::analyse::analyse(&args).map(|()| 0),
+        Command::Report(args) => crate::cli::report::report(&args).map(|()| 0),
         Command::Run(args) => crate::cli::run::run(&args),
         Command::Replay(args) => crate::cli::replay::replay(&args),
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),

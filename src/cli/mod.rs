@@ -27,6 +27,8 @@ mod progress;
 mod query;
 mod recheck;
 mod regressions;
+mod report;
+mod report_html;
 mod rules;
 mod run;
 mod session;

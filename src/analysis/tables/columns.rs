@@ -79,6 +79,7 @@ const COLUMNS: &[Column] = &[
     number("margin", "the property's", "how far the outcome was from flipping; positive: passed", |p| {
         Cell::Number(p.judgement.margin)
     }),
+    text("witness", "what shows the outcome, in words", |p| Cell::text(&p.judgement.witness)),
     truth("held_before", "whether the property held before the action already", |p| {
         Cell::Truth(p.judgement.held_before)
     }),

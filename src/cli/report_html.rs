@@ -1,0 +1,103 @@
+//! `actcheck report --html`: gathers what the page shows.
+
+use std::collections::BTreeMap;
+
+use crate::base::Diagnostics;
+use crate::cli::analyse::{AnalyseArgs, Analysed, analysed};
+use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::clock;
+use crate::cli::report::ReportArgs;
+use crate::history::{History, RunDetail};
+use crate::ontology::Ontology;
+use crate::report::{Explained, HTML_COLUMNS, HtmlReport, PropertyWords, Replays, html, replay_order};
+use crate::rules::{Budget, RuleBook};
+use crate::verdict::Outcome;
+
+/// Patterns have at most so many conditions, and a chance of so much to be false, as `actcheck analyse` has them by default.
+const DEPTH: u8 = 3;
+const LEVEL: f64 = 0.05;
+/// Letters that stand for bytes take a third more room.
+const BYTES_IN_A_MB: f64 = 1e6;
+
+/// The whole page.
+///
+/// # Errors
+/// The history has no such runs, or can't be read.
+pub(super) fn page(args: &ReportArgs, history: &History) -> Result<String, Diagnostics> {
+    let Analysed { table, summary, ontology } = analysed(&asked(args), history, &HTML_COLUMNS)?;
+    let order = replay_order(&summary, &table);
+    let replays = replays(history, &ontology, &order, args.replay_mb * BYTES_IN_A_MB)?;
+    Ok(html(&HtmlReport {
+        version: env!("CARGO_PKG_VERSION"),
+        made: &(clock::system().now)(),
+        findings: &summary,
+        table: &table,
+        campaigns: &history.campaigns()?,
+        words: &words(&ontology),
+        replays: &replays,
+    }))
+}
+
+/// The same question as `actcheck analyse` is asked.
+fn asked(args: &ReportArgs) -> AnalyseArgs {
+    AnalyseArgs {
+        property: args.property.clone(),
+        campaign: args.campaign.clone(),
+        since: args.since.clone(),
+        by: Vec::new(),
+        scene_rule: None,
+        depth: DEPTH,
+        level: LEVEL,
+        ontology: args.ontology.clone(),
+        history: HistoryArgs { history: args.history.history.clone() },
+        // All heat maps are wanted.
+        format: Format::Json,
+    }
+}
+
+fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
+    let told = |property: &crate::ontology::Property| PropertyWords {
+        label: property.label.clone(),
+        comment: property.comment.clone(),
+        rule: property.rule.path.clone(),
+    };
+    ontology.properties.iter().map(|(iri, property)| (iri.clone(), told(property))).collect()
+}
+
+/// As many runs as there is room for.
+fn replays(history: &History, ontology: &Ontology, order: &[String], room: f64) -> Result<Replays, Diagnostics> {
+    let mut replays = Replays::default();
+    if room <= 0.0 || order.is_empty() {
+        return Ok(replays);
+    }
+    let budget = Budget::default();
+    // Rules that can't be read today explain nothing; the outcomes are those of the history.
+    let rules = RuleBook::prepare_within(ontology, &budget).ok();
+    for id in order {
+        if replays.bytes() as f64 >= room {
+            break;
+        }
+        let run = history.run(id)?;
+        // A run that was broken before its first state has no trace; all else is told of it.
+        let trace = history.trace(id).ok();
+        let explained = rules.as_ref().map(|rules| explained(history, rules, &run, &budget)).unwrap_or_default();
+        replays.add(&run, trace.as_ref(), &explained);
+    }
+    Ok(replays)
+}
+
+/// Why the failed properties of a run failed. What today's rules can't explain is left out.
+fn explained(history: &History, rules: &RuleBook, run: &RunDetail, budget: &Budget) -> Vec<Explained> {
+    let Ok(facts) = history.facts(&run.row.run) else { return Vec::new() };
+    let mut found = Vec::new();
+    for (idx, action) in run.actions.iter().enumerate() {
+        let Some(seen) = facts.action(idx) else { continue };
+        for judgement in action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed) {
+            if let Ok(explanation) = rules.explain(&seen, &judgement.property, budget) {
+                let (step, property) = (action.step, judgement.property.clone());
+                found.push(Explained { step, property, text: explanation.to_text() });
+            }
+        }
+    }
+    found
+}

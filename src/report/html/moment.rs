@@ -1,0 +1,80 @@
+//! The moment of a run at which to begin looking, when one of its properties failed.
+
+use crate::history::Trace;
+
+/// What has come so far from its place has been moved. Unit: metres.
+const MOVED_M: f64 = 0.01;
+/// A contact that ends sooner before the end of its action was not lost. Unit: seconds.
+const LOST_SECS: f64 = 0.2;
+/// So long before it something can be seen coming. Unit: seconds.
+const BEFORE_SECS: f64 = 0.3;
+
+/// When what a witness speaks of was decided, since the run began. Unit: seconds.
+///
+/// Of the things that the witness names: the robot touched one that the action has nothing to do with; such a thing moved; the robot
+/// lost hold of what it handles. Otherwise the end of the action, whose state was judged.
+pub(super) fn decided(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
+    let begin = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
+    let (run_begin, start, end) = (begin(0), begin(action_idx), begin(action_idx + 1));
+    let Some(action) = trace.actions.get(action_idx) else { return end - run_begin };
+    let handled = |id: &str| action.parameters.values().flatten().any(|value| value == id);
+    let named: Vec<&str> = trace
+        .snapshots
+        .first()
+        .into_iter()
+        .flat_map(|state| &state.bodies)
+        .filter(|body| !body.fixed && names(witness, &body.id))
+        .map(|body| body.id.as_str())
+        .collect();
+    let others: Vec<&str> = named.iter().copied().filter(|id| !handled(id)).collect();
+    let by_robot = |ids: &[&str]| -> Vec<(f64, f64)> {
+        let touches = action.contacts.iter().filter(|contact| {
+            let [a, b] = &contact.pair;
+            [(a, b), (b, a)].iter().any(|(robot, thing)| robot.starts_with("robot/") && ids.contains(&thing.as_str()))
+        });
+        touches.map(|contact| (contact.start_secs, contact.end_secs)).collect()
+    };
+    let touched = by_robot(&others).into_iter().map(|(start, _)| start).min_by(f64::total_cmp);
+    let moved =
+        || others.iter().filter_map(|id| moved(trace, id, start - run_begin, end - run_begin)).min_by(f64::total_cmp);
+    let lost = || {
+        let last = by_robot(&named).into_iter().map(|(_, end)| end).max_by(f64::total_cmp);
+        last.filter(|last| start + last < end - LOST_SECS)
+    };
+    let since_start = touched.or_else(moved).or_else(lost);
+    let at = since_start.map_or(end, |secs| start + secs - BEFORE_SECS);
+    at.clamp(start, end.max(start)) - run_begin
+}
+
+/// Whether a text has a word.
+fn names(text: &str, word: &str) -> bool {
+    let of_word = |c: char| c.is_alphanumeric() || c == '_';
+    !word.is_empty()
+        && text
+            .match_indices(word)
+            .any(|(at, _)| !text[..at].ends_with(of_word) && !text[at + word.len()..].starts_with(of_word))
+}
+
+/// When a thing had come from its place, since the action began. Units: seconds; `start` and `end` since the run began.
+fn moved(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
+    let frames = &trace.frames;
+    let slot = frames.names.iter().position(|name| name == id)?;
+    let at = |row: &Vec<f32>| row.get(7 * slot..7 * slot + 3).map(|at| [at[0], at[1], at[2]].map(f64::from));
+    let secs = |idx: usize| idx as f64 * frames.period_secs;
+    let mut rows = frames.rows.iter().enumerate().filter(|(idx, _)| (start..=end).contains(&secs(*idx)));
+    let place = at(rows.next()?.1)?;
+    let distance = |now: [f64; 3]| (0..3).map(|axis| (now[axis] - place[axis]).powi(2)).sum::<f64>().sqrt();
+    rows.find(|(_, row)| at(row).is_some_and(|now| distance(now) > MOVED_M)).map(|(idx, _)| secs(idx) - start)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_is_more_than_letters() {
+        assert!(names("glass_1 is 57.5 cm from the gripper", "glass_1"));
+        assert!(names("touched (glass_1)", "glass_1"));
+        assert!(!names("glass_12 fell", "glass_1") && !names("a glass_1b", "glass_1") && !names("x", ""));
+    }
+}

@@ -1,0 +1,136 @@
+//! Columns and courses as bytes that a browser unpacks by itself: a description in JSON, and behind it plain arrays.
+
+use std::io::Write as _;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use serde_json::{Map, Value, json};
+
+/// Stands for a number that is none.
+const NONE: u16 = u16::MAX;
+/// Numbers are told in so many steps between the smallest and the largest of their column.
+const STEPS: f64 = 65_534.0;
+/// Arrays begin at multiples of this, as the browser's need to. Unit: bytes.
+const ALIGNMENT: usize = 4;
+
+/// A description with arrays.
+#[derive(Debug, Default)]
+pub(super) struct Pack {
+    head: Map<String, Value>,
+    body: Vec<u8>,
+}
+
+impl Pack {
+    /// Says something in the description.
+    pub fn say(&mut self, name: &str, value: impl Into<Value>) {
+        self.head.insert(name.to_owned(), value.into());
+    }
+
+    /// Adds an array of bytes; returns where it is.
+    pub fn bytes(&mut self, values: &[u8]) -> Value {
+        self.array("u8", values.len(), values)
+    }
+
+    /// Adds an array of places in a list; returns where it is.
+    pub fn places(&mut self, values: &[u32]) -> Value {
+        let bytes: Vec<u8> = match values.iter().all(|value| *value <= u32::from(u16::MAX)) {
+            true => values.iter().flat_map(|value| value.to_le_bytes().into_iter().take(2)).collect(),
+            false => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
+        };
+        let kind = if bytes.len() == 2 * values.len() { "u16" } else { "u32" };
+        self.array(kind, values.len(), &bytes)
+    }
+
+    /// Adds a column of numbers, which it tells to 1/65534 of their range; returns where it is, or nothing where it has none.
+    pub fn numbers(&mut self, values: &[f64]) -> Option<Value> {
+        let known = || values.iter().copied().filter(|value| value.is_finite());
+        let (low, high) = (known().min_by(f64::total_cmp)?, known().max_by(f64::total_cmp)?);
+        let step = (high - low) / STEPS;
+        let code = |value: &f64| match value.is_finite() {
+            true if step > 0.0 => ((value - low) / step).round() as u16,
+            true => 0,
+            false => NONE,
+        };
+        let bytes: Vec<u8> = values.iter().flat_map(|value| code(value).to_le_bytes()).collect();
+        let whole = known().all(|value| value.fract() == 0.0);
+        let mut placed = self.array("number", values.len(), &bytes);
+        placed["low"] = json!(low);
+        placed["step"] = json!(step);
+        placed["whole"] = json!(whole);
+        Some(placed)
+    }
+
+    /// Adds a course of whole numbers, each by its difference from where it would be going on as before: bodies move evenly. All lower
+    /// bytes stand before all higher ones, which are nearly always alike.
+    pub fn courses(&mut self, columns: &[Vec<i16>]) -> Value {
+        let length = columns.first().map_or(0, Vec::len);
+        let mut lower = Vec::with_capacity(columns.len() * length);
+        let mut higher = Vec::with_capacity(columns.len() * length);
+        for column in columns {
+            let (mut last, mut step) = (0i16, 0i16);
+            for value in column {
+                let [low, high] = value.wrapping_sub(last).wrapping_sub(step).to_le_bytes();
+                lower.push(low);
+                higher.push(high);
+                (step, last) = (value.wrapping_sub(last), *value);
+            }
+        }
+        lower.extend(higher);
+        self.array("courses", length, &lower)
+    }
+
+    fn array(&mut self, kind: &str, length: usize, bytes: &[u8]) -> Value {
+        let at = self.body.len();
+        self.body.extend(bytes);
+        self.body.resize(self.body.len().next_multiple_of(ALIGNMENT), 0);
+        json!({ "kind": kind, "at": at, "length": length })
+    }
+
+    /// All of it as letters that mean nothing in markup.
+    pub fn finish(self) -> String {
+        let mut head = Value::Object(self.head).to_string().into_bytes();
+        head.resize(head.len().next_multiple_of(ALIGNMENT), b' ');
+        let length = u32::try_from(head.len()).unwrap_or(u32::MAX);
+        packed(&[length.to_le_bytes().as_slice(), &head, &self.body].concat())
+    }
+}
+
+/// Bytes deflated, as letters that mean nothing in markup.
+pub(super) fn packed(bytes: &[u8]) -> String {
+    let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 3), Compression::new(7));
+    // Writing into memory does not fail; were it to, the page would say that this part can't be read.
+    let deflated = encoder.write_all(bytes).and_then(|()| encoder.finish()).unwrap_or_default();
+    STANDARD.encode(deflated)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_told_within_half_a_step() {
+        let mut pack = Pack::default();
+        let values = [0.5, -1.5, f64::NAN, 3.25];
+        let told = pack.numbers(&values).expect("there are numbers");
+        let (low, step) = (told["low"].as_f64().unwrap_or_default(), told["step"].as_f64().unwrap_or_default());
+        for (value, code) in values.iter().zip(pack.body.chunks(2)) {
+            let code = u16::from_le_bytes([code[0], code[1]]);
+            match value.is_nan() {
+                true => assert_eq!(code, NONE),
+                false => assert!((low + f64::from(code) * step - value).abs() <= step / 2.0 + 1e-15),
+            }
+        }
+        assert_eq!(pack.numbers(&[f64::NAN, f64::INFINITY]), None);
+        assert_eq!(pack.numbers(&[2.0, 2.0]).map(|told| told["whole"].clone()), Some(json!(true)));
+    }
+
+    #[test]
+    fn no_letter_of_a_pack_means_anything_in_markup() {
+        let mut pack = Pack::default();
+        pack.say("name", "</script><img src=x onerror=alert(1)>");
+        let text = pack.finish();
+        assert!(text.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"+/=".contains(&byte)), "{text}");
+    }
+}

@@ -1,0 +1,57 @@
+//! The page: its frame, style and scripts, and the data behind them.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use sha2::{Digest as _, Sha256};
+
+use crate::report::html::HtmlReport;
+use crate::report::html::columns::{Slots, runs};
+use crate::report::html::pack::packed;
+use crate::report::html::scripts::{SCRIPT, SHELL, STYLE, THREE};
+use crate::report::html::summary::summary;
+
+/// The whole report as one page, which loads nothing from anywhere.
+///
+/// The same report gives the same page. No word of a user's is in its markup: see the module.
+pub fn html(report: &HtmlReport<'_>) -> String {
+    let script = format!("\"use strict\";\n{}", SCRIPT.join("\n"));
+    let slots = Slots::of(report.table, report.findings);
+    let before = data("summary", &summary(report, &slots)) + &data("runs", &runs(report.table, &slots));
+    let mut behind = data("forms", &report.replays.forms());
+    for (name, text) in THREE {
+        behind.push_str(&data(name, &packed(text.as_bytes())));
+    }
+    for (number, (_, replay)) in report.replays.runs().enumerate() {
+        behind.push_str(&data(&format!("replay-{number}"), replay));
+    }
+    let mut page = String::with_capacity(before.len() + behind.len() + script.len() + 64 * 1024);
+    let mut rest = SHELL;
+    for (place, filling) in [
+        ("{{policy}}", policy(&script)),
+        ("{{style}}", STYLE.join("\n")),
+        ("{{before}}", before),
+        ("{{script}}", script),
+        ("{{behind}}", behind),
+    ] {
+        let (head, tail) = rest.split_once(place).unwrap_or((rest, ""));
+        page.push_str(head);
+        page.push_str(&filling);
+        rest = tail;
+    }
+    page.push_str(rest);
+    page
+}
+
+/// Letters that are no script, for the script to read.
+fn data(id: &str, packed: &str) -> String {
+    format!("<script type=\"text/plain\" id=\"data-{id}\">{packed}</script>\n")
+}
+
+/// What may run: this script alone, and the library that it unpacks. Nothing may be loaded.
+fn policy(script: &str) -> String {
+    let digest = STANDARD.encode(Sha256::digest(script.as_bytes()));
+    format!(
+        "default-src 'none'; script-src 'sha256-{digest}' blob:; style-src 'unsafe-inline'; img-src data: blob:; \
+         base-uri 'none'; form-action 'none'"
+    )
+}

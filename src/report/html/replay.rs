@@ -1,0 +1,252 @@
+//! Runs that can be watched: courses of all bodies, contacts, phases and explanations, in few bytes.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use crate::base::names;
+use crate::history::{BodyState, Form, Role, RunDetail, Trace};
+use crate::report::html::Explained;
+use crate::report::html::moment::decided;
+use crate::report::html::pack::{Pack, packed};
+use crate::report::html::shapes::Shapes;
+use crate::verdict::Outcome;
+
+/// The finest step of positions; coarser where a run spans more than 6.5 metres. Unit: metres. Traces are no finer.
+const GRAIN_M: f64 = 1e-4;
+/// Steps of the components of quaternions, as in traces.
+const GRAIN_TURN: f64 = 2e-4;
+/// Contacts of an action that are told at most: the strongest.
+const MOST_CONTACTS: usize = 60;
+
+/// Runs that can be watched, packed.
+#[derive(Debug, Default)]
+pub struct Replays {
+    shapes: Shapes,
+    runs: BTreeMap<String, String>,
+    bytes: usize,
+}
+
+impl Replays {
+    /// Adds a run; one without a state has nothing to be watched, and is told with what else is known.
+    pub fn add(&mut self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) {
+        let mut pack = Pack::default();
+        told(&mut pack, run);
+        let actions: Vec<Value> =
+            run.actions.iter().enumerate().map(|(idx, _)| action(run, trace, idx, explained)).collect();
+        pack.say("actions", actions);
+        if let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) {
+            self.course(&mut pack, run, trace);
+        }
+        let packed = pack.finish();
+        self.bytes += packed.len();
+        self.runs.insert(run.row.run.clone(), packed);
+    }
+
+    /// Bytes in a page.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Ids of the runs with what is packed of each.
+    pub(super) fn runs(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.runs.iter().map(|(run, packed)| (run.as_str(), packed.as_str()))
+    }
+
+    /// All forms, packed.
+    pub(super) fn forms(&self) -> String {
+        packed(json!(self.shapes.all()).to_string().as_bytes())
+    }
+
+    /// The courses of all that moves, and what stands still.
+    fn course(&mut self, pack: &mut Pack, run: &RunDetail, trace: &Trace) {
+        let forms: BTreeMap<&str, &Form> = trace.forms.iter().map(|form| (form.name.as_str(), form)).collect();
+        let bodies: BTreeMap<&str, &BodyState> = trace
+            .snapshots
+            .iter()
+            .take(1)
+            .flat_map(|state| &state.bodies)
+            .map(|body| (body.id.as_str(), body))
+            .collect();
+        let roles: BTreeMap<&str, &str> =
+            run.objects.iter().map(|object| (object.id.as_str(), word(object.role))).collect();
+        let mut form = |name: &str| match (forms.get(name), bodies.get(name)) {
+            (Some(form), _) => Some(self.shapes.of(form)),
+            (None, Some(body)) => Some(self.shapes.around(body)),
+            // A link without a solid can't be seen.
+            (None, None) => None,
+        };
+        let frames = &trace.frames;
+        let shown: Vec<(usize, &str, usize)> = frames
+            .names
+            .iter()
+            .enumerate()
+            .filter_map(|(slot, name)| Some((slot, name.as_str(), form(name)?)))
+            .collect();
+        let tracks: Vec<Value> = shown
+            .iter()
+            .map(|(_, name, form)| json!({ "name": name, "form": form, "role": roles.get(name) }))
+            .collect();
+        let still: Vec<Value> = bodies
+            .values()
+            .filter(|body| !frames.names.contains(&body.id))
+            .filter_map(|body| {
+                let at: Vec<f64> = body.pose.position.iter().chain(&body.pose.rotation).copied().collect();
+                let kind = names::local(&body.category);
+                Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": roles.get(body.id.as_str()) }))
+            })
+            .collect();
+        pack.say("tracks", tracks);
+        pack.say("still", still);
+        pack.say("period", frames.period_secs);
+        let slots: Vec<usize> = shown.iter().map(|(slot, ..)| *slot).collect();
+        let (columns, low, grain) = columns(&frames.rows, &slots);
+        pack.say("low", low.to_vec());
+        pack.say("grain", grain);
+        pack.say("turn", GRAIN_TURN);
+        let courses = pack.courses(&columns);
+        pack.say("courses", courses);
+    }
+}
+
+/// What is known of a run beside its actions.
+fn told(pack: &mut Pack, run: &RunDetail) {
+    pack.say("run", run.row.run.as_str());
+    pack.say("seed", run.seed);
+    pack.say("reason", run.reason.clone());
+    pack.say("discards", run.discards.clone());
+    pack.say("world", run.world.as_str());
+    pack.say("program", run.program_version.as_str());
+    pack.say("base", run.robot_base.to_vec());
+    pack.say("noise", json!(run.noise));
+    let objects: Vec<Value> = run
+        .objects
+        .iter()
+        .map(|object| {
+            json!({
+                "id": object.id, "model": object.model, "kind": names::local(&object.category), "role": word(object.role),
+                "x": object.x, "y": object.y, "yaw": object.yaw, "mass": object.mass_kg, "friction": object.friction,
+                "moved": object.displacement_m, "tilt": object.max_tilt_rad,
+            })
+        })
+        .collect();
+    pack.say("objects", objects);
+}
+
+fn word(role: Role) -> &'static str {
+    match role {
+        Role::Platform => "platform",
+        Role::Target => "target",
+        Role::Other => "other",
+        Role::Obstacle => "obstacle",
+    }
+}
+
+/// One action: its words, its outcomes with what explains them, and when what happened.
+fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explained: &[Explained]) -> Value {
+    let action = &run.actions[idx];
+    let judged: Vec<Value> = action
+        .judgements
+        .iter()
+        .map(|judgement| {
+            let why = explained.iter().find(|why| why.step == action.step && why.property == judgement.property);
+            let failed = judgement.outcome == Outcome::Failed;
+            json!({
+                "property": judgement.property, "outcome": judgement.outcome.word(), "margin": judgement.margin,
+                "witness": judgement.witness, "held": judgement.held_before, "why": why.map(|why| &why.text),
+                "decided": trace.filter(|_| failed).map(|trace| decided(trace, idx, &judgement.witness)),
+            })
+        })
+        .collect();
+    let mut told = json!({
+        "action": action.action, "step": action.step, "reported": action.reported, "message": action.message,
+        "seconds": action.duration_secs, "end": action.end, "parameters": action.parameters, "judged": judged,
+    });
+    if let Some((trace, events)) = trace.and_then(|trace| Some((trace, trace.actions.get(idx)?))) {
+        let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
+        let last = trace.snapshots.last();
+        told["start"] = json!(trace.snapshots.get(idx).or(last).map_or(0.0, |state| state.time_secs - begin));
+        told["phases"] = events.phases.iter().map(|phase| json!([phase.name, phase.start_secs])).collect();
+        told["contacts"] = contacts(events.contacts.iter().map(|contact| {
+            (
+                contact.max_force_n,
+                json!([contact.pair[0], contact.pair[1], contact.start_secs, contact.end_secs, contact.max_force_n]),
+            )
+        }));
+        let seen = events.percepts.iter().map(|percept| (percept.id.clone(), percept.pose, percept.size_m));
+        let things = events.perceived.iter().flat_map(|perceived| &perceived.things);
+        let things = things
+            .map(|thing| (thing.category.as_deref().map_or("?", names::local).to_owned(), thing.pose, thing.size_m));
+        told["seen"] = seen
+            .chain(things)
+            .map(|(name, pose, size)| {
+                let at: Vec<f64> = pose.position.iter().chain(&pose.rotation).copied().collect();
+                json!({ "name": name, "at": at, "size": size })
+            })
+            .collect();
+    }
+    told
+}
+
+/// The strongest contacts, in the order in which they began.
+fn contacts(all: impl Iterator<Item = (f64, Value)>) -> Value {
+    let mut all: Vec<(f64, Value)> = all.collect();
+    if all.len() > MOST_CONTACTS {
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        all.truncate(MOST_CONTACTS);
+        let start = |contact: &Value| contact[2].as_f64().unwrap_or_default();
+        all.sort_by(|a, b| start(&a.1).total_cmp(&start(&b.1)));
+    }
+    all.into_iter().map(|(_, contact)| contact).collect()
+}
+
+/// Seven columns of whole numbers for each track, with the lowest corner and the step of positions. What is not finite stays where it
+/// was before.
+fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64) {
+    let value =
+        |row: &Vec<f32>, column: usize| row.get(column).copied().filter(|value| value.is_finite()).map(f64::from);
+    let mut low = [f64::INFINITY; 3];
+    let mut extent: f64 = 0.0;
+    for axis in 0..3 {
+        let all = || rows.iter().flat_map(|row| slots.iter().filter_map(move |slot| value(row, 7 * slot + axis)));
+        let least = all().fold(f64::INFINITY, f64::min);
+        low[axis] = if least.is_finite() { least } else { 0.0 };
+        extent = all().map(|value| value - low[axis]).fold(extent, f64::max);
+    }
+    let grain = GRAIN_M.max(extent / f64::from(u16::MAX));
+    let mut columns = Vec::with_capacity(7 * slots.len());
+    for slot in slots {
+        for part in 0..7 {
+            let mut last = 0i16;
+            let column = rows.iter().map(|row| {
+                if let Some(value) = value(row, 7 * slot + part) {
+                    let steps = if part < 3 { (value - low[part]) / grain } else { value / GRAIN_TURN };
+                    // Positions use all sixteen bits without a sign, turns are within ±5000.
+                    last = (steps.round().clamp(-32_768.0, 65_535.0) as i32) as i16;
+                }
+                last
+            });
+            columns.push(column.collect());
+        }
+    }
+    (columns, low, grain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_course_is_told_to_a_tenth_of_a_millimetre() {
+        let rows: Vec<Vec<f32>> =
+            (0..50).map(|at| vec![at as f32 * 0.02 - 3.0, 1.5, f32::NAN, 0.0, 0.0, -0.6, 0.8]).collect();
+        let (columns, low, grain) = columns(&rows, &[0]);
+        assert_eq!((columns.len(), grain), (7, GRAIN_M));
+        for (row, told) in rows.iter().zip(&columns[0]) {
+            let value = low[0] + f64::from(*told as u16) * grain;
+            assert!((value - f64::from(row[0])).abs() <= grain / 2.0 + 1e-6);
+        }
+        assert!((f64::from(columns[5][7]) * GRAIN_TURN + 0.6).abs() < GRAIN_TURN);
+        assert_eq!(columns[2], vec![0; 50]);
+    }
+}

@@ -1,0 +1,76 @@
+//! What bodies look like, each different form once.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use crate::history::{BodyState, Form, Part, Shape};
+
+/// Different forms, in the order in which they were met.
+#[derive(Debug, Default)]
+pub(super) struct Shapes {
+    known: BTreeMap<String, usize>,
+    forms: Vec<Value>,
+}
+
+impl Shapes {
+    /// Number of a form.
+    pub fn of(&mut self, form: &Form) -> usize {
+        self.number(form.parts.iter().map(part).collect())
+    }
+
+    /// Number of the box around a body that has no form. Frame: world, about the body's own origin.
+    pub fn around(&mut self, body: &BodyState) -> usize {
+        let size = [0, 1, 2].map(|axis| round(body.aabb_max[axis] - body.aabb_min[axis]));
+        let middle = [0, 1, 2]
+            .map(|axis| round(f64::midpoint(body.aabb_max[axis], body.aabb_min[axis]) - body.pose.position[axis]));
+        let [x, y, z] = middle;
+        self.number(json!([{ "at": [x, y, z, 0, 0, 0, 1], "kind": "box", "size": size }]))
+    }
+
+    fn number(&mut self, form: Value) -> usize {
+        let next = self.forms.len();
+        let number = *self.known.entry(form.to_string()).or_insert(next);
+        if number == next {
+            self.forms.push(form);
+        }
+        number
+    }
+
+    /// All forms, by number.
+    pub fn all(&self) -> &[Value] {
+        &self.forms
+    }
+}
+
+fn part(part: &Part) -> Value {
+    let [x, y, z] = part.pose.position.map(round);
+    let [i, j, k, w] = part.pose.rotation.map(round);
+    let at = [x, y, z, i, j, k, w];
+    match &part.shape {
+        Shape::Box { size } => json!({ "at": at, "kind": "box", "size": size.map(round) }),
+        Shape::Cylinder { radius, height } => {
+            json!({ "at": at, "kind": "cylinder", "radius": round(*radius), "height": round(*height) })
+        }
+        Shape::Sphere { radius } => json!({ "at": at, "kind": "sphere", "radius": round(*radius) }),
+        Shape::Capsule { radius, height } => {
+            json!({ "at": at, "kind": "capsule", "radius": round(*radius), "height": round(*height) })
+        }
+        Shape::Tube { radius_low, radius_high, wall, height, .. } => json!({
+            "at": at, "kind": "tube", "low": round(*radius_low), "high": round(*radius_high), "wall": round(*wall),
+            "height": round(*height),
+        }),
+        Shape::Hull { points, .. } => hull(at, points),
+        // Traces hold the outermost points of a mesh alone.
+        Shape::Mesh { mesh } => hull(at, &mesh.vertices),
+    }
+}
+
+fn hull(at: [f64; 7], points: &[[f64; 3]]) -> Value {
+    json!({ "at": at, "kind": "hull", "points": points.iter().map(|point| point.map(round)).collect::<Vec<_>>() })
+}
+
+/// To a tenth of a millimetre, which is finer than a pixel.
+fn round(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}

@@ -1,0 +1,116 @@
+//! What a page says of all runs together.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use crate::base::names;
+use crate::history::CampaignRow;
+use crate::report::findings_json;
+use crate::report::html::HtmlReport;
+use crate::report::html::columns::{Slot, Slots};
+use crate::report::html::pack::Pack;
+use crate::verdict::{Outcome, mean, wilson};
+
+/// Findings, campaigns and properties. Runs go by their places.
+pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
+    let runs = &report.table.text("run").texts;
+    let places: BTreeMap<&str, usize> = runs.iter().map(String::as_str).zip(0..).collect();
+    let mut findings = findings_json(report.findings);
+    number_runs(&mut findings, &places);
+    let mut pack = Pack::default();
+    pack.say("version", report.version);
+    pack.say("made", report.made);
+    pack.say("history", report.findings.history.as_str());
+    pack.say("program", report.findings.program.as_str());
+    pack.say("options", report.findings.options.as_str());
+    pack.say("outcomes", Outcome::ALL.map(Outcome::word).to_vec());
+    pack.say("scores", scores(report));
+    sentences(&mut findings, report);
+    pack.say("findings", findings);
+    let shown = report.campaigns.iter().filter(|row| report.findings.campaigns.contains(&row.id));
+    pack.say("campaigns", shown.map(campaign).collect::<Vec<Value>>());
+    pack.say("slots", slots.slots.iter().map(|slot| told(slot, report)).collect::<Vec<Value>>());
+    pack.say("replays", report.replays.runs().map(|(run, _)| run).collect::<Vec<&str>>());
+    pack.finish()
+}
+
+/// Ids of runs by their places: a tenth of the room.
+fn number_runs(findings: &mut Value, places: &BTreeMap<&str, usize>) {
+    let number = |runs: &mut Value| {
+        let known = runs.as_array().into_iter().flatten().filter_map(|run| places.get(run.as_str()?));
+        *runs = known.copied().collect();
+    };
+    let modes = findings["failure_modes"].as_array_mut().into_iter().flatten();
+    modes.for_each(|mode| number(&mut mode["runs"]));
+    for property in findings["properties"].as_array_mut().into_iter().flatten() {
+        let patterns = property["patterns"]["found"].as_array_mut().into_iter().flatten();
+        patterns.for_each(|pattern| number(&mut pattern["runs"]));
+    }
+}
+
+/// The command that makes more scenes of each pattern.
+fn sentences(findings: &mut Value, report: &HtmlReport<'_>) {
+    let summary = report.findings;
+    for property in findings["properties"].as_array_mut().into_iter().flatten() {
+        let name = property["property"].as_str().map(names::local).unwrap_or_default().to_owned();
+        let mut number = 0;
+        for pattern in property["patterns"]["found"].as_array_mut().into_iter().flatten() {
+            if pattern["confirmed"] == json!(true) {
+                number += 1;
+                pattern["more"] = json!(format!(
+                    "{} analyse{} --property {name} --scene-rule {number}",
+                    summary.program, summary.options
+                ));
+            }
+        }
+    }
+}
+
+/// T over all runs and over those that were not broken, and how many passed in everything.
+fn scores(report: &HtmlReport<'_>) -> Value {
+    let table = report.table;
+    let (runs, status, score) = (table.text("run"), table.text("status"), table.number("score"));
+    let mut first: BTreeMap<u32, usize> = BTreeMap::new();
+    for (row, run) in runs.of_row.iter().enumerate() {
+        if let Some(run) = run {
+            first.entry(*run).or_insert(row);
+        }
+    }
+    let of = |row: &usize| score.get(*row).copied().filter(|score| score.is_finite());
+    let whole = first.values().filter(|row| status.get(**row) != Some("broken"));
+    let modes = &report.findings.modes;
+    let passed: u64 = modes.iter().filter(|mode| mode.failed.is_empty()).map(|mode| mode.runs.len() as u64).sum();
+    let tested: u64 = modes.iter().map(|mode| mode.runs.len() as u64).sum();
+    let mut statuses: BTreeMap<&str, u64> = BTreeMap::new();
+    first.values().filter_map(|row| status.get(*row)).for_each(|word| *statuses.entry(word).or_default() += 1);
+    json!({
+        "T": mean(first.values().filter_map(of)), "without_broken": mean(whole.filter_map(of)),
+        "runs": first.len(), "all_passed": wilson(passed, tested), "passed": passed, "tested": tested,
+        "statuses": statuses,
+    })
+}
+
+fn campaign(row: &CampaignRow) -> Value {
+    json!({
+        "id": row.id, "name": row.name, "started": row.started, "ended": row.ended, "ended_by": row.ended_by,
+        "interrupted": row.interrupted, "seed": row.seed, "planned": row.planned_runs, "runs": row.runs,
+        "score": row.score, "without_broken": row.score_without_broken, "version": row.program_version,
+        "config": row.config_digest, "ontology": row.ontology_digest,
+    })
+}
+
+fn told(slot: &Slot, report: &HtmlReport<'_>) -> Value {
+    let words = report.words.get(&slot.property);
+    let of = report
+        .findings
+        .properties
+        .iter()
+        .position(|of| of.findings.action == slot.action && of.findings.property == slot.property);
+    json!({
+        "step": slot.step, "action": names::local(&slot.action), "property": names::local(&slot.property),
+        "iri": slot.property, "label": words.map(|words| &words.label),
+        "comment": words.and_then(|words| words.comment.as_ref()), "rule": words.map(|words| &words.rule),
+        "of": of,
+    })
+}

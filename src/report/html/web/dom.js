@@ -1,0 +1,39 @@
+// Elements from plain calls. Text only ever becomes text: nothing here, or anywhere in these scripts, parses markup.
+
+const SVG_NAMES = new Set(["svg", "g", "path", "rect", "line", "circle", "text", "polyline", "polygon", "title", "defs",
+  "pattern", "clipPath"]);
+
+/** An element: `make("button", { class: "flat", onclick: go }, "words", other)`. Empty children are left out. */
+function make(name, attributes = {}, ...children) {
+  const element = name !== "title" && SVG_NAMES.has(name) || attributes.svg
+    ? document.createElementNS("http://www.w3.org/2000/svg", name)
+    : document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === undefined || value === null || value === false || key === "svg") continue;
+    if (key.startsWith("on")) element.addEventListener(key.slice(2), value);
+    else if (key === "style") for (const [name, to] of Object.entries(value)) element.style.setProperty(name, to);
+    else element.setAttribute(key, value === true ? "" : String(value));
+  }
+  put(element, ...children);
+  return element;
+}
+
+/** Adds children: elements, words, lists of them. */
+function put(element, ...children) {
+  for (const child of children.flat(Infinity)) {
+    if (child === undefined || child === null || child === false || child === "") continue;
+    element.append(child instanceof Node ? child : String(child));
+  }
+}
+
+/** The children of an element, made anew. */
+function fill(element, ...children) {
+  element.replaceChildren();
+  put(element, ...children);
+  return element;
+}
+
+/** What is behind the last `#` or `/` of an IRI. */
+function local(iri) {
+  return String(iri ?? "").replace(/^.*[#/]/, "");
+}
