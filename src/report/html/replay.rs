@@ -205,29 +205,27 @@ fn contacts(all: impl Iterator<Item = (f64, Value)>) -> Value {
 fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64) {
     let value =
         |row: &Vec<f32>, column: usize| row.get(column).copied().filter(|value| value.is_finite()).map(f64::from);
-    let mut low = [f64::INFINITY; 3];
-    let mut extent: f64 = 0.0;
-    for axis in 0..3 {
-        let all = || rows.iter().flat_map(|row| slots.iter().filter_map(move |slot| value(row, 7 * slot + axis)));
-        let least = all().fold(f64::INFINITY, f64::min);
-        low[axis] = if least.is_finite() { least } else { 0.0 };
-        extent = all().map(|value| value - low[axis]).fold(extent, f64::max);
-    }
-    let grain = GRAIN_M.max(extent / f64::from(u16::MAX));
+    let along =
+        |axis: usize| rows.iter().flat_map(move |row| slots.iter().filter_map(move |slot| value(row, 7 * slot + axis)));
+    let low = [0, 1, 2].map(|axis| along(axis).min_by(f64::total_cmp).unwrap_or_default());
+    let extent = low.iter().enumerate().map(|(axis, low)| along(axis).map(|value| value - low).fold(0.0, f64::max));
+    let grain = GRAIN_M.max(extent.fold(0.0, f64::max) / f64::from(u16::MAX));
+    // Positions are told from the lowest corner in grains, turns from nothing in theirs.
+    let told = |part: usize, value: f64| match low.get(part) {
+        Some(low) => (value - low) / grain,
+        None => value / GRAIN_TURN,
+    };
     let mut columns = Vec::with_capacity(7 * slots.len());
-    for slot in slots {
-        for part in 0..7 {
-            let mut last = 0i16;
-            let column = rows.iter().map(|row| {
-                if let Some(value) = value(row, 7 * slot + part) {
-                    let steps = if part < 3 { (value - low[part]) / grain } else { value / GRAIN_TURN };
-                    // Positions use all sixteen bits without a sign, turns are within ±5000.
-                    last = (steps.round().clamp(-32_768.0, 65_535.0) as i32) as i16;
-                }
-                last
-            });
-            columns.push(column.collect());
-        }
+    for (slot, part) in slots.iter().flat_map(|slot| (0..7).map(move |part| (slot, part))) {
+        let mut last = 0i16;
+        let column = rows.iter().map(|row| {
+            if let Some(value) = value(row, 7 * slot + part) {
+                // Positions use all sixteen bits without a sign, turns are within ±5000.
+                last = (told(part, value).round().clamp(-32_768.0, 65_535.0) as i32) as i16;
+            }
+            last
+        });
+        columns.push(column.collect());
     }
     (columns, low, grain)
 }
