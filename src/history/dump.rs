@@ -4,11 +4,12 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use oxigraph::io::{RdfFormat, RdfSerializer};
+use oxigraph::io::RdfFormat;
 use oxigraph::model::GraphNameRef;
 
-use crate::base::{Diagnostic, Diagnostics, names};
-use crate::history::History;
+use crate::base::{Diagnostic, Diagnostics};
+use crate::history::rdf_text::serializer;
+use crate::history::{History, RdfSyntax};
 
 impl History {
     /// Writes everything, facts and later judgements in their named graphs included, as N-Quads.
@@ -31,14 +32,7 @@ impl History {
     /// As [`History::write_nquads`].
     pub fn write_turtle(&self, file: &Path) -> Result<(), Diagnostics> {
         let store = self.store()?;
-        let mut serializer = RdfSerializer::from_format(RdfFormat::Turtle);
-        for (prefix, namespace) in names::PREFIXES {
-            // Our namespaces are valid IRIs, so that none is left out.
-            serializer = match serializer.clone().with_prefix(prefix, namespace) {
-                Ok(with) => with,
-                Err(_) => serializer,
-            };
-        }
+        let serializer = serializer(RdfSyntax::Turtle);
         let write = || -> Result<(), String> {
             let writer = BufWriter::new(File::create(file).map_err(|error| error.to_string())?);
             let mut writer = store

@@ -13,6 +13,7 @@ mod lists;
 pub mod merge;
 mod newest;
 mod query;
+mod rdf_text;
 mod read;
 mod read_campaign;
 mod recheck;
@@ -31,6 +32,7 @@ mod write_scene;
 
 pub use answer::{Cancel, QueryAnswer};
 pub use newest::NewestOutcomes;
+pub use rdf_text::{RdfSyntax, rdf_text};
 pub use recheck::{Recheck, StoredJudgement};
 pub use record::{CampaignEnd, CampaignRecord, Repetition, RunRecord, RunStatus};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};

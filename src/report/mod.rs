@@ -14,6 +14,7 @@ mod compare_text;
 mod findings_json;
 mod findings_summary;
 mod findings_text;
+mod formats;
 mod health;
 mod html;
 mod oracles;
@@ -41,6 +42,10 @@ pub use compare_text::compare_text;
 pub use findings_json::findings_json;
 pub use findings_summary::{FindingsSummary, PropertyReport, findings_table, maps_table};
 pub use findings_text::findings_text;
+pub use formats::{
+    Attachment, EarlReport, JunitReport, MarkdownReport, RESULTS_COMMON_FILES, Repetitions, allure_common, allure_results, markdown,
+    observation,
+};
 pub use health::{HealthSummary, health_json, health_lines, health_table, health_text};
 pub use html::{Explained, HTML_COLUMNS, HtmlReport, PropertyWords, Replays, html, replay_order};
 pub use oracles::{OracleSummary, oracles_json, oracles_table, oracles_text};

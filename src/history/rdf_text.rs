@@ -1,0 +1,71 @@
+//! Triples as text.
+
+use oxigraph::io::{RdfFormat, RdfSerializer};
+use oxigraph::model::{NamedOrBlankNode, Term as StoreTerm, Triple};
+
+use crate::base::{Term, names};
+use crate::history::terms::to_store;
+
+/// A text form of a graph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RdfSyntax {
+    /// Turtle, with the known prefixes.
+    Turtle,
+    /// N-Triples.
+    NTriples,
+    /// RDF/XML.
+    RdfXml,
+}
+
+/// The triples as text, in their order. What is no triple (a literal as subject, a property that is no IRI) is left out.
+pub fn rdf_text(triples: &[[Term; 3]], syntax: RdfSyntax) -> String {
+    let mut writer = serializer(syntax).for_writer(Vec::new());
+    for triple in triples.iter().filter_map(to_triple) {
+        // Writing to memory does not fail, and RDF/XML refuses only properties that no XML name can be made of.
+        let _ = writer.serialize_triple(&triple);
+    }
+    let bytes = writer.finish().unwrap_or_default();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// The library's serializer; Turtle and RDF/XML get the known prefixes.
+pub(super) fn serializer(syntax: RdfSyntax) -> RdfSerializer {
+    let mut serializer = RdfSerializer::from_format(match syntax {
+        RdfSyntax::Turtle => RdfFormat::Turtle,
+        RdfSyntax::NTriples => RdfFormat::NTriples,
+        RdfSyntax::RdfXml => RdfFormat::RdfXml,
+    });
+    for (prefix, namespace) in names::PREFIXES {
+        // Our namespaces are valid IRIs, so that none is left out.
+        serializer = match serializer.clone().with_prefix(prefix, namespace) {
+            Ok(with) => with,
+            Err(_) => serializer,
+        };
+    }
+    serializer
+}
+
+fn to_triple([subject, property, object]: &[Term; 3]) -> Option<Triple> {
+    let subject = NamedOrBlankNode::try_from(to_store(subject)).ok()?;
+    let StoreTerm::NamedNode(property) = to_store(property) else { return None };
+    Some(Triple::new(subject, property, to_store(object)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triples_are_written_and_what_is_none_is_left_out() {
+        let (s, p) = (Term::iri("http://actions#a"), Term::iri("http://actions#b"));
+        let triples = [
+            [s.clone(), p.clone(), Term::string("line\n\"quoted\" \\ <tag>")],
+            [Term::Integer(1), p.clone(), s.clone()],
+            [s.clone(), Term::Blank("x".into()), s],
+        ];
+        let text = rdf_text(&triples, RdfSyntax::NTriples);
+        assert_eq!(text, "<http://actions#a> <http://actions#b> \"line\\n\\\"quoted\\\" \\\\ <tag>\" .\n");
+        assert!(rdf_text(&triples, RdfSyntax::Turtle).contains("act:a act:b"));
+        assert!(rdf_text(&triples, RdfSyntax::RdfXml).contains("&lt;tag&gt;"));
+    }
+}

@@ -1,0 +1,231 @@
+//! Results for Allure 2 and 3: one file for each property of each action of a run.
+//!
+//! Allure takes results of the same history id for retries of one another and hides all but the last. Version 2 reads the id,
+//! version 3 makes its own of the test case and its parameters. So the scene and the number among its runs are in both: a
+//! repetition is a result like any other, and the same scene of another campaign continues the history.
+
+use serde_json::{Value, json};
+
+use crate::base::{digest_of, names};
+use crate::history::{ActionDetail, Role, RunDetail};
+use crate::report::formats::identity::{case_name, scene};
+use crate::report::run_text;
+use crate::verdict::{Judgement, Outcome};
+
+/// Names of the files that stand beside the results.
+pub const RESULTS_COMMON_FILES: [&str; 2] = ["categories.json", "environment.properties"];
+
+/// A file that is shown with results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attachment {
+    /// IRI of the property that it is about, and the step of the action; nothing where it is about the whole run.
+    pub about: Option<(u32, String)>,
+    /// What it is called.
+    pub name: String,
+    /// Its media type.
+    pub media_type: &'static str,
+    /// Ending of its file.
+    pub ending: &'static str,
+    /// What is in it.
+    pub bytes: Vec<u8>,
+}
+
+impl Attachment {
+    fn is_about(&self, action: &ActionDetail, judgement: &Judgement) -> bool {
+        self.about.as_ref().is_none_or(|(step, property)| *step == action.step && *property == judgement.property)
+    }
+
+    fn file(&self, run: &RunDetail) -> String {
+        let what = format!("{} {} {:?}", run.row.run, self.name, self.about);
+        format!("{}-attachment.{}", uuid(&what), self.ending)
+    }
+}
+
+/// The files of a run, with their names: a result for each property of each action, and what is shown with them.
+///
+/// `number` is that of the run among those of its scene ([`super::Repetitions`]). Times are simulated ones, from the moment at
+/// which the run began.
+pub fn allure_results(run: &RunDetail, number: u64, attachments: &[Attachment]) -> Vec<(String, Vec<u8>)> {
+    let whole = Attachment {
+        about: None,
+        name: "the whole run".to_owned(),
+        media_type: "text/plain",
+        ending: "txt",
+        bytes: run_text(run).into_bytes(),
+    };
+    let attachments: Vec<&Attachment> = attachments.iter().chain([&whole]).collect();
+    let mut files = Vec::new();
+    for action in &run.actions {
+        for judgement in &action.judgements {
+            let attached: Vec<Value> = attachments
+                .iter()
+                .filter(|attachment| attachment.is_about(action, judgement))
+                .map(|it| json!({ "name": it.name, "source": it.file(run), "type": it.media_type }))
+                .collect();
+            let result = result(run, number, action, judgement, attached);
+            let name = format!("{}-result.json", result["uuid"].as_str().unwrap_or_default());
+            files.push((name, result.to_string().into_bytes()));
+        }
+    }
+    files.extend(attachments.iter().map(|attachment| (attachment.file(run), attachment.bytes.clone())));
+    files
+}
+
+fn result(
+    run: &RunDetail,
+    number: u64,
+    action: &ActionDetail,
+    judgement: &Judgement,
+    attachments: Vec<Value>,
+) -> Value {
+    let (case, scene) = (case_name(run, action, &judgement.property), scene(run));
+    let (name, property) = (names::local(&action.action), names::local(&judgement.property));
+    let [start, stop] = times(run, action.step);
+    let label = |name: &str, value: &str| json!({ "name": name, "value": value });
+    json!({
+        "uuid": uuid(&format!("{} {case}", run.row.run)),
+        "historyId": digest_of(&format!("{case} {scene} {number}")),
+        "testCaseId": digest_of(&case),
+        "fullName": case,
+        "titlePath": [run.row.test, name],
+        "name": format!("{property} ({})", run.row.run),
+        "description": format!("{property} of {name} in run {}, scene {scene}: `actcheck show {}`", run.row.run, run.row.run),
+        "status": status(judgement.outcome),
+        "statusDetails": { "message": message(judgement), "trace": details(judgement), "flaky": false, "known": false, "muted": false },
+        "stage": "finished", "start": start, "stop": stop,
+        "labels": [
+            label("framework", "actcheck"), label("parentSuite", &run.row.test), label("suite", name), label("subSuite", property),
+            label("epic", &run.row.test), label("feature", name), label("story", property), label("testClass", name),
+            label("testMethod", property), label("tag", judgement.outcome.word()), label("host", &run.world),
+        ],
+        "parameters": parameters(run, number, &scene, judgement),
+        "links": [],
+        "steps": steps(run, action, judgement),
+        "attachments": attachments,
+    })
+}
+
+/// Allure's word. It has five: what says nothing (inapplicable, untested) is skipped, and a spent budget is broken.
+fn status(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::Passed => "passed",
+        Outcome::Failed => "failed",
+        Outcome::Broken | Outcome::Timeout => "broken",
+        Outcome::Inapplicable | Outcome::Untested => "skipped",
+    }
+}
+
+/// The outcome in our own word, by which the categories know it, and what proves it.
+fn message(judgement: &Judgement) -> String {
+    format!("{}: {}", judgement.outcome, judgement.witness)
+}
+
+fn details(judgement: &Judgement) -> String {
+    let margin = judgement.margin.map_or_else(|| "no margin".to_owned(), |margin| format!("margin {margin:+.4}"));
+    format!("{}\n{margin}\nrule {}", message(judgement), judgement.rule_digest)
+}
+
+/// What sets a result apart (the scene, and which of its runs it is), and what else is good to know, which does not.
+fn parameters(run: &RunDetail, number: u64, scene: &str, judgement: &Judgement) -> Vec<Value> {
+    let told = |name: &str, value: String| json!({ "name": name, "value": value, "excluded": true });
+    let mut all = vec![
+        json!({ "name": "scene", "value": scene }),
+        json!({ "name": "repetition", "value": number.to_string() }),
+        told("run", run.row.run.clone()),
+        told("campaign", run.row.campaign.clone()),
+        told("world", run.world.clone()),
+    ];
+    if let Some(margin) = judgement.margin {
+        all.push(told("margin", format!("{margin:+.4}")));
+    }
+    for target in run.objects.iter().filter(|object| object.role == Role::Target) {
+        all.push(told("target", names::local(&target.category).to_owned()));
+        all.push(told("target x, y, yaw", format!("{:.3} m, {:.3} m, {:.3} rad", target.x, target.y, target.yaw)));
+        all.push(told("target mass, friction", format!("{:.3} kg, {:.3}", target.mass_kg, target.friction)));
+    }
+    all.push(told("objects", run.objects.len().to_string()));
+    all.extend(run.noise.iter().map(|(name, deviation)| told(name, deviation.to_string())));
+    all
+}
+
+/// The actions up to the judged one, which has a step more: the judgement itself.
+fn steps(run: &RunDetail, judged: &ActionDetail, judgement: &Judgement) -> Vec<Value> {
+    let until_now = run.actions.iter().filter(|action| action.step <= judged.step);
+    until_now
+        .map(|action| {
+            let [start, stop] = times(run, action.step);
+            let parameters: Vec<Value> = action
+                .parameters
+                .iter()
+                .map(|(name, values)| json!({ "name": name, "value": values.join(", ") }))
+                .collect();
+            let judging = json!({
+                "name": format!("judge {}", names::local(&judgement.property)), "status": status(judgement.outcome),
+                "statusDetails": { "message": message(judgement) }, "stage": "finished", "start": stop, "stop": stop,
+                "steps": [], "attachments": [], "parameters": [],
+            });
+            json!({
+                "name": format!("{}. {}: {}", action.step, names::local(&action.action), said(action)),
+                "status": end(action), "statusDetails": { "message": action.message },
+                "stage": "finished", "start": start, "stop": stop, "parameters": parameters, "attachments": [],
+                "steps": if action.step == judged.step { vec![judging] } else { Vec::new() },
+            })
+        })
+        .collect()
+}
+
+fn said(action: &ActionDetail) -> &str {
+    match (action.end.as_str(), action.reported) {
+        ("completed", Some(true)) => "reported success",
+        ("completed", Some(false)) => "reported failure",
+        ("completed", None) => "reported nothing",
+        (end, _) => end,
+    }
+}
+
+/// How an action went by itself, whatever was judged of it.
+fn end(action: &ActionDetail) -> &'static str {
+    match (action.end.as_str(), action.reported) {
+        ("completed", Some(false)) => "failed",
+        ("completed", _) => "passed",
+        ("untested", _) => "skipped",
+        _ => "broken",
+    }
+}
+
+/// When an action began and ended. Unit: milliseconds since 1970.
+fn times(run: &RunDetail, step: u32) -> [i64; 2] {
+    let began: jiff::Timestamp = run.row.started.parse().unwrap_or(jiff::Timestamp::UNIX_EPOCH);
+    let simulated = |until: &dyn Fn(&ActionDetail) -> bool| -> f64 {
+        run.actions.iter().filter(|action| until(action)).map(|action| action.duration_secs).sum()
+    };
+    let after = |secs: f64| began.as_millisecond() + (secs * 1000.0).round() as i64;
+    [after(simulated(&|action| action.step < step)), after(simulated(&|action| action.step <= step))]
+}
+
+/// The files that stand beside the results, whatever these are: the kinds of what did not pass, and who judged.
+pub fn allure_common(program: &str, campaigns: &[String]) -> Vec<(String, Vec<u8>)> {
+    let category =
+        |name: &str, status: &str, word: &str| json!({ "name": name, "matchedStatuses": [status], "messageRegex": format!("(?s)^{word}: .*") });
+    let categories = json!([
+        category("The robot failed a property", "failed", "failed"),
+        category("Simulation or tool was at fault", "broken", "broken"),
+        category("A budget was spent", "broken", "timeout"),
+        category("The property says nothing about this action", "skipped", "inapplicable"),
+        category("The action was never reached", "skipped", "untested"),
+    ]);
+    // Backslashes and line ends mean something in this format; ids and versions have none.
+    let environment = format!("actcheck={program}\ncampaigns={}\n", campaigns.join(" "));
+    let [first, second] = RESULTS_COMMON_FILES;
+    vec![
+        (first.to_owned(), format!("{categories:#}\n").into_bytes()),
+        (second.to_owned(), environment.into_bytes()),
+    ]
+}
+
+/// A name of the form that Allure's files have, the same for the same text.
+fn uuid(text: &str) -> String {
+    let digest = digest_of(text);
+    let part = |from: usize, to: usize| digest.get(from..to).unwrap_or_default();
+    format!("{}-{}-{}-{}-{}", part(0, 8), part(8, 12), part(12, 16), part(16, 20), part(20, 32))
+}

@@ -1,0 +1,174 @@
+//! Results as JUnit's XML, in the form that Jenkins, GitLab and GitHub's actions read.
+
+use std::fmt::Write as _;
+
+use crate::base::names;
+use crate::history::{ActionDetail, RunDetail};
+use crate::verdict::{Counts, Judgement, Outcome};
+
+/// One suite for each campaign and test, one case for each property of each action of each run.
+///
+/// JUnit has four results. What failed is a failure; what is broken or ran out of its budget is an error, with our word as its type; what
+/// says nothing (inapplicable, untested) is skipped, with our word in its text.
+#[derive(Debug, Clone, Default)]
+pub struct JunitReport {
+    suites: Vec<Suite>,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Suite {
+    campaign: String,
+    test: String,
+    started: String,
+    counts: Counts,
+    secs: f64,
+    runs: u64,
+    cases: String,
+}
+
+impl JunitReport {
+    /// A report without results.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a run.
+    pub fn add(&mut self, run: &RunDetail) {
+        let (campaign, test) = (&run.row.campaign, &run.row.test);
+        let known = self.suites.iter().position(|suite| suite.campaign == *campaign && suite.test == *test);
+        let at = known.unwrap_or_else(|| {
+            let (campaign, test, started) = (campaign.clone(), test.clone(), run.row.started.clone());
+            self.suites.push(Suite { campaign, test, started, ..Suite::default() });
+            self.suites.len() - 1
+        });
+        self.suites[at].add(run);
+    }
+
+    /// The whole file.
+    pub fn text(&self) -> String {
+        let mut out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n".to_owned();
+        self.suites.iter().enumerate().for_each(|(idx, suite)| suite.write(idx, &mut out));
+        out.push_str("</testsuites>\n");
+        out
+    }
+}
+
+impl Suite {
+    fn add(&mut self, run: &RunDetail) {
+        self.runs += 1;
+        for action in &run.actions {
+            self.secs += if action.judgements.is_empty() { 0.0 } else { action.duration_secs };
+            for judgement in &action.judgements {
+                self.counts.add(judgement.outcome);
+                self.case(run, action, judgement);
+            }
+        }
+    }
+
+    fn case(&mut self, run: &RunDetail, action: &ActionDetail, judgement: &Judgement) {
+        // The properties of an action share its time, so that sums over cases are right.
+        let secs = action.duration_secs / action.judgements.len().max(1) as f64;
+        let class = format!("{}.{}", run.row.test.replace(' ', "-"), names::local(&action.action));
+        let name = format!("{} ({})", names::local(&judgement.property), run.row.run);
+        let (class, name) = (attribute(&class), attribute(&name));
+        let _ = write!(self.cases, "    <testcase classname=\"{class}\" name=\"{name}\" time=\"{secs:.3}\"");
+        let _ = match element(judgement.outcome) {
+            None => writeln!(self.cases, "/>"),
+            Some("skipped") => {
+                let why = text(&format!("{}: {}", judgement.outcome, judgement.witness));
+                writeln!(self.cases, ">\n      <skipped>{why}</skipped>\n    </testcase>")
+            }
+            Some(element) => {
+                let (kind, message) = (judgement.outcome.word(), attribute(&judgement.witness));
+                let body = text(&body(run, action, judgement));
+                writeln!(
+                    self.cases,
+                    ">\n      <{element} type=\"{kind}\" message=\"{message}\">{body}</{element}>\n    </testcase>"
+                )
+            }
+        };
+    }
+
+    fn write(&self, idx: usize, out: &mut String) {
+        let count = |outcome| self.counts.get(outcome);
+        let _ = writeln!(
+            out,
+            "  <testsuite id=\"{idx}\" name=\"{}\" package=\"{}\" hostname=\"localhost\" timestamp=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3}\">",
+            attribute(&format!("{} {}", self.campaign, self.test)),
+            attribute(&self.campaign),
+            // The schemas know no time zone here; times are in UTC.
+            attribute(self.started.trim_end_matches('Z')),
+            self.counts.total(),
+            count(Outcome::Failed),
+            count(Outcome::Broken) + count(Outcome::Timeout),
+            count(Outcome::Inapplicable) + count(Outcome::Untested),
+            self.secs,
+        );
+        out.push_str("    <properties>\n");
+        let mut property = |name: &str, value: String| {
+            let _ = writeln!(out, "      <property name=\"{name}\" value=\"{}\"/>", attribute(&value));
+        };
+        property("campaign", self.campaign.clone());
+        property("runs", self.runs.to_string());
+        for outcome in Outcome::ALL {
+            property(outcome.word(), count(outcome).to_string());
+        }
+        out.push_str("    </properties>\n");
+        out.push_str(&self.cases);
+        out.push_str("    <system-out/>\n    <system-err/>\n  </testsuite>\n");
+    }
+}
+
+/// JUnit's element for an outcome; none for what passed.
+fn element(outcome: Outcome) -> Option<&'static str> {
+    match outcome {
+        Outcome::Passed => None,
+        Outcome::Failed => Some("failure"),
+        Outcome::Broken | Outcome::Timeout => Some("error"),
+        Outcome::Inapplicable | Outcome::Untested => Some("skipped"),
+    }
+}
+
+fn body(run: &RunDetail, action: &ActionDetail, judgement: &Judgement) -> String {
+    let mut out = format!("{}: {}\n", judgement.outcome, judgement.witness);
+    if let Some(margin) = judgement.margin {
+        let _ = writeln!(out, "margin {margin:+.4}");
+    }
+    if let Some(message) = &action.message {
+        let _ = writeln!(out, "{} said: {message}", names::local(&action.action));
+    }
+    let _ = write!(out, "more: actcheck show {}", run.row.run);
+    out
+}
+
+/// Characters of an element's text. XML 1.0 has no way to write most control characters: they become U+FFFD.
+fn text(raw: &str) -> String {
+    raw.chars().fold(String::with_capacity(raw.len()), |mut out, letter| {
+        match letter {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '\t' | '\n' => out.push(letter),
+            '\r' => out.push_str("&#13;"),
+            '\u{0}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
+            _ => out.push(letter),
+        }
+        out
+    })
+}
+
+/// Characters of an attribute's value, which loses line ends that are not written as numbers.
+fn attribute(raw: &str) -> String {
+    text(raw).replace('"', "&quot;").replace('\t', "&#9;").replace('\n', "&#10;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_model_says_can_not_become_markup() {
+        assert_eq!(text("a<b>&\u{1}\r\n"), "a&lt;b&gt;&amp;\u{fffd}&#13;\n");
+        assert_eq!(attribute("\"'\n]]>"), "&quot;'&#10;]]&gt;");
+    }
+}

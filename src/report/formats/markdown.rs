@@ -1,0 +1,193 @@
+//! A summary for a pull request, as the comment boxes of forges show it.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use crate::base::names;
+use crate::history::{RunDetail, RunStatus};
+use crate::verdict::{Counts, Judgement, Outcome, wilson};
+
+/// Failed runs that are told; the rest is counted.
+const MOST_FAILURES: usize = 10;
+
+/// What is gathered for the summary, run by run.
+#[derive(Debug, Clone, Default)]
+pub struct MarkdownReport {
+    counts: Counts,
+    /// By action and property, in the order of the actions.
+    properties: Vec<((String, String), Counts)>,
+    campaigns: Vec<String>,
+    statuses: BTreeMap<RunStatus, u64>,
+    scores: Vec<f64>,
+    passed_runs: u64,
+    failures: Vec<String>,
+    failed_runs: u64,
+}
+
+impl MarkdownReport {
+    /// A summary of nothing.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a run.
+    pub fn add(&mut self, run: &RunDetail) {
+        if !self.campaigns.contains(&run.row.campaign) {
+            self.campaigns.push(run.row.campaign.clone());
+        }
+        *self.statuses.entry(run.row.status).or_default() += 1;
+        self.scores.push(run.row.score);
+        let mut of_run = Counts::default();
+        for action in &run.actions {
+            for judgement in &action.judgements {
+                of_run.add(judgement.outcome);
+                self.property(names::local(&action.action), names::local(&judgement.property)).add(judgement.outcome);
+            }
+        }
+        self.counts.add_all(of_run);
+        self.passed_runs += u64::from(of_run.passed > 0 && of_run.passed + of_run.inapplicable == of_run.total());
+        if of_run.failed > 0 {
+            self.failed_runs += 1;
+            if self.failures.len() < MOST_FAILURES {
+                self.failures.push(failure(run));
+            }
+        }
+    }
+
+    fn property(&mut self, action: &str, property: &str) -> &mut Counts {
+        let known = self.properties.iter().position(|((a, p), _)| a == action && p == property);
+        let at = known.unwrap_or_else(|| {
+            self.properties.push(((action.to_owned(), property.to_owned()), Counts::default()));
+            self.properties.len() - 1
+        });
+        &mut self.properties[at].1
+    }
+}
+
+/// The summary: counts first, then the properties with their intervals, then the first failures.
+pub fn markdown(report: &MarkdownReport) -> String {
+    let runs = report.scores.len() as u64;
+    let mut out = format!("## {}\n\n", headline(report));
+    let _ = writeln!(
+        out,
+        "{runs} {} of {} {}: {}. Outcomes: {}.",
+        word(runs, "run", "runs"),
+        word(report.campaigns.len() as u64, "campaign", "campaigns"),
+        report.campaigns.iter().map(|id| code(id)).collect::<Vec<String>>().join(", "),
+        listed(report.statuses.iter().map(|(status, count)| (status.word(), *count))),
+        listed(Outcome::ALL.map(|outcome| (outcome.word(), report.counts.get(outcome)))),
+    );
+    if runs > 0 {
+        let mean = report.scores.iter().sum::<f64>() / runs as f64;
+        let _ = writeln!(out, "\nT = {mean:.4}; runs in which everything passed: {}.", rate(report.passed_runs, runs));
+    }
+    if !report.properties.is_empty() {
+        out.push_str("\n| action | property | pass rate [95 % interval] |");
+        Outcome::ALL.iter().for_each(|outcome| out.push_str(&format!(" {} |", outcome.word())));
+        out.push_str("\n| --- | --- | --- |");
+        out.push_str(&" ---: |".repeat(Outcome::ALL.len()));
+        out.push('\n');
+    }
+    for ((action, property), counts) in &report.properties {
+        let decided = counts.decided();
+        let _ = write!(out, "| {} | {} | {} |", cell(action), cell(property), rate(counts.passed, decided));
+        Outcome::ALL.iter().for_each(|outcome| out.push_str(&format!(" {} |", counts.get(*outcome))));
+        out.push('\n');
+    }
+    failures(report, &mut out);
+    out
+}
+
+fn headline(report: &MarkdownReport) -> String {
+    let counts = report.counts;
+    match (counts.failed, counts.broken + counts.timeout, counts.passed) {
+        (0, 0, 0) => "actcheck: nothing was judged".to_owned(),
+        (0, 0, _) => "actcheck: no property failed".to_owned(),
+        (0, unknown, _) => format!("actcheck: no property failed, {unknown} could not be judged"),
+        (failed, _, _) => {
+            let of = word(report.failed_runs, "run", "runs");
+            format!("actcheck: {failed} {} failed in {} {of}", word(failed, "property", "properties"), report.failed_runs)
+        }
+    }
+}
+
+fn failures(report: &MarkdownReport, out: &mut String) {
+    if report.failures.is_empty() {
+        return;
+    }
+    out.push_str("\n<details><summary>What failed</summary>\n\n");
+    report.failures.iter().for_each(|failure| out.push_str(failure));
+    let left_out = report.failed_runs - report.failures.len() as u64;
+    if left_out > 0 {
+        let _ = writeln!(out, "- {left_out} more {}", word(left_out, "run", "runs"));
+    }
+    out.push_str("\n</details>\n");
+}
+
+fn failure(run: &RunDetail) -> String {
+    let mut out = format!("- {} ({})\n", code(&run.row.run), cell(&run.row.test));
+    for action in &run.actions {
+        for judgement in action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed) {
+            let Judgement { property, witness, .. } = judgement;
+            let (action, property) = (names::local(&action.action), names::local(property));
+            let _ = writeln!(out, "  - {} **{}**: {}", cell(action), cell(property), cell(witness));
+        }
+    }
+    out
+}
+
+fn rate(passed: u64, of: u64) -> String {
+    let Some(interval) = wilson(passed, of) else { return "nothing was decided".to_owned() };
+    let percent = |share: f64| format!("{:.0}", 100.0 * share);
+    let (rate, low, high) = (percent(interval.rate), percent(interval.low), percent(interval.high));
+    format!("{rate} % [{low}–{high}] ({passed} of {of})")
+}
+
+fn listed<'a>(counts: impl IntoIterator<Item = (&'a str, u64)>) -> String {
+    counts.into_iter().map(|(word, count)| format!("{count} {word}")).collect::<Vec<String>>().join(", ")
+}
+
+fn word<'a>(count: u64, one: &'a str, several: &'a str) -> &'a str {
+    if count == 1 { one } else { several }
+}
+
+/// Text as one line in which nothing is markup, in a table too.
+fn cell(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '&' => out.push_str("&amp;"),
+            // Whoever is named behind it would get a message.
+            '@' => out.push_str("&#64;"),
+            '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '#' | '~' | '!' => {
+                out.push('\\');
+                out.push(letter);
+            }
+            letter if letter.is_control() => out.push(' '),
+            letter => out.push(letter),
+        }
+    }
+    out
+}
+
+/// An id of ours in the font of programs.
+fn code(id: &str) -> String {
+    format!("`{}`", id.replace('`', "'"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn witnesses_can_not_become_markup() {
+        assert_eq!(cell("a|b\n<img> @all [x](y) *z*"), "a\\|b &lt;img&gt; &#64;all \\[x\\](y) \\*z\\*");
+    }
+
+    #[test]
+    fn nothing_is_never_a_success() {
+        assert!(markdown(&MarkdownReport::new()).starts_with("## actcheck: nothing was judged"));
+    }
+}
