@@ -15,6 +15,7 @@ mod extra;
 mod facts;
 mod findings;
 mod floors;
+mod formats;
 mod fuzz_corpus;
 mod health;
 mod history;

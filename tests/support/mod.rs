@@ -1,5 +1,6 @@
 //! What several tests need: the built program, and folders of their own.
 
+pub mod foreign;
 pub mod made_up;
 pub mod planted;
 

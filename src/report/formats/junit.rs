@@ -97,7 +97,7 @@ impl Suite {
             attribute(&format!("{} {}", self.campaign, self.test)),
             attribute(&self.campaign),
             // The schemas know no time zone here; times are in UTC.
-            attribute(self.started.trim_end_matches('Z')),
+            attribute(self.started.get(..19).unwrap_or_default()),
             self.counts.total(),
             count(Outcome::Failed),
             count(Outcome::Broken) + count(Outcome::Timeout),
