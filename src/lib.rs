@@ -31,6 +31,7 @@
 //! | [`campaign`] | the conductor; the only module that calls many stages | rayon |
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, campaigns side by side, when it fails | polars, statrs |
 //! | [`report`] | verdicts and tables as text and JSON, runs as pictures | |
+//! | [`serve`] | a history over HTTP: SPARQL endpoint, a page to ask from, the report | oxhttp |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap |
 //!
 //! A module imports only from modules above it in this table ([`campaign`] and [`cli`] from all), and a library of the field is used
@@ -66,5 +67,7 @@ pub mod campaign;
 pub mod analysis;
 
 pub mod report;
+
+pub mod serve;
 
 pub mod cli;

@@ -40,6 +40,7 @@ mod robots;
 mod rules;
 mod scenario;
 mod search;
+mod serve;
 mod shrink;
 mod shrunk;
 mod statistics;

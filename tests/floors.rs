@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Each module, the modules that it may import, in the order of the line. `cli` may import all.
-const FLOORS: [(&str, &[&str]); 14] = [
+const FLOORS: [(&str, &[&str]); 15] = [
     ("base", &[]),
     ("search", &["base"]),
     ("config", &["base", "search"]),
@@ -26,10 +26,11 @@ const FLOORS: [(&str, &[&str]); 14] = [
     ),
     ("analysis", &["base", "history", "verdict"]),
     ("report", &["base", "verdict", "history", "analysis"]),
+    ("serve", &["base", "history"]),
 ];
 
 /// Libraries of the field and where they may be named.
-const FENCES: [(&str, &[&str]); 12] = [
+const FENCES: [(&str, &[&str]); 13] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh_loader", &["config"]),
@@ -42,6 +43,7 @@ const FENCES: [(&str, &[&str]); 12] = [
     ("polars", &["analysis"]),
     ("rayon", &["campaign"]),
     ("clap", &["cli"]),
+    ("oxhttp", &["serve"]),
 ];
 
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {

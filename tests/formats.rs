@@ -17,7 +17,7 @@ use oxigraph::io::{RdfFormat, RdfParser};
 use serde_json::Value;
 
 use crate::support::planted::Dice;
-use crate::support::{foreign, made_up, root};
+use crate::support::{actcheck, foreign, made_up, project, root, stderr, stdout};
 
 /// Fifteen outcomes: 11 passed, 3 failed, 1 broken. The runs 4 and 5 are of the scene of run 3, with other outcomes.
 fn fifteen() -> Vec<RunDetail> {
@@ -194,7 +194,8 @@ fn junit_counts_and_is_valid() {
     let document = roxmltree::Document::parse(&text).unwrap();
     let suites: Vec<_> = document.descendants().filter(|node| node.has_tag_name("testsuite")).collect();
     let counts = |suite: usize| {
-        ["tests", "failures", "errors", "skipped"].map(|name| suites[suite].attribute(name).unwrap().parse::<usize>().unwrap())
+        ["tests", "failures", "errors", "skipped"]
+            .map(|name| suites[suite].attribute(name).unwrap().parse::<usize>().unwrap())
     };
     assert_eq!(counts(0), [15, 3, 1, 0]);
     assert_eq!(counts(1), [6, 1, 2, 2]);
@@ -239,8 +240,7 @@ fn observations_follow_the_schema() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("runs.jsonl");
     std::fs::write(&file, observations.iter().map(|it| format!("{it}\n")).collect::<String>()).unwrap();
-    let Some((valid, said)) =
-        checked(&[Path::new("jsonl"), &file, &of_tests("data/formats/observation.schema.json")])
+    let Some((valid, said)) = checked(&[Path::new("jsonl"), &file, &of_tests("data/formats/observation.schema.json")])
     else {
         return;
     };
@@ -346,4 +346,47 @@ fn markdown_tells_counts_first_and_lets_no_markup_in() {
     let text = markdown(&report);
     insta::assert_snapshot!(text);
     assert!(!text.contains("<b>") && !text.contains("@all"));
+}
+
+/// The flags of `actcheck report`, on a history that simulation made.
+#[test]
+fn report_writes_what_was_asked_for() {
+    let project = project();
+    let here = project.path();
+    let ran = actcheck(here, &["run", "configs/quick.toml", "--runs", "2", "--jobs", "1"]);
+    assert!(ran.status.code().is_some_and(|code| code < 2), "{}", stderr(&ran));
+    let report = |arguments: &[&str]| {
+        let output = actcheck(here, &[&["report"], arguments].concat());
+        (output.status.code(), stdout(&output), stderr(&output))
+    };
+    let files = ["--allure", "a", "--junit", "j.xml", "--earl", "e.ttl", "--jsonl", "o.jsonl", "--markdown"];
+    let (code, printed, told) = report(&files);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(printed.starts_with("## actcheck: "), "{printed}");
+    assert!(!printed.contains("holds") && told.contains("j.xml holds"), "only the summary is printed: {printed}{told}");
+    let read = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
+    // Three properties of PerceivePlane, five of Pick.
+    let names: Vec<String> = std::fs::read_dir(here.join("a"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    assert_eq!(names.iter().filter(|name| name.ends_with("-result.json")).count(), 2 * 8);
+    assert!(read("j.xml").contains("tests=\"16\""));
+    assert_eq!(read("o.jsonl").lines().count(), 2);
+    assert!(!turtle(&read("e.ttl")).is_empty());
+
+    // Formats can be printed, one at a time, of one property.
+    let (code, printed, _) = report(&["--junit", "-", "--property", "MovedObject"]);
+    assert!(code == Some(0) && printed.contains("tests=\"2\""), "{printed}");
+    for (wrong, fault) in [
+        (vec!["--junit", "-", "--markdown"], "X051"),
+        (vec!["--markdown", "--property", "MovedObjekt"], "X045"),
+        (vec!["--markdown", "--since", "2999-01-01"], "X044"),
+        (vec!["--markdown", "--campaign", "none"], "H014"),
+        (vec!["--junit", "no/folder/j.xml"], "X007"),
+        (vec![], "--allure"),
+    ] {
+        let (code, _, told) = report(&wrong);
+        assert!(code == Some(2) && told.contains(fault), "{wrong:?}: {told}");
+    }
 }

@@ -125,6 +125,20 @@ pub enum Command {
         after_help = "Example:\n  actcheck run configs/pick.toml --shard 1/2 --history /tmp/h1\n  actcheck run configs/pick.toml --shard 2/2 --history /tmp/h2\n  actcheck merge /tmp/h1 /tmp/h2 --into /tmp/all"
     )]
     Merge(crate::cli::merge::MergeArgs),
+    /// Serve a history over HTTP: a read-only SPARQL 1.1 endpoint, a page to ask from, and the report as it is now
+    ///
+    /// Each query is answered by a process of its own and ended when its time, memory or room is spent. There are no updates, no
+    /// `SERVICE`, no files, and no answers for pages of other sites. The history is held only while somebody asks: other commands can
+    /// have it in between, and while one writes, the answer is to come back soon (503).
+    ///
+    /// Exit code: 0 ended by Ctrl-C, 2 it could not be served.
+    #[command(
+        after_help = "Examples:\n  actcheck serve    (after `actcheck run configs/pick.toml`)\n  curl -H 'Accept: text/csv' --data-urlencode 'query=SELECT ?run { ?run a act:Run }' http://localhost:7878/sparql"
+    )]
+    Serve(crate::cli::serve::ServeArgs),
+    /// Answer one query of `actcheck serve`
+    #[command(hide = true, after_help = "Example:\n  actcheck serve    (starts this for each query)")]
+    ServeQuery(crate::cli::serve::ServeQueryArgs),
     /// Show one run: its scene, and every property's outcome with margin and witness
     #[command(
         after_help = "Example:\n  actcheck show k7f3-3    (an id that `actcheck list` prints; its beginning is enough)"
@@ -162,7 +176,9 @@ pub enum Command {
     /// Judges with the rules of today: those that the ontology links now.
     #[command(after_help = "Example:\n  actcheck why k7f3-3 MovedObject    (an id that `actcheck list` prints)")]
     Why(WhyArgs),
-    /// Write what a history says as one page that opens anywhere, without a network: counts, patterns, every run, failed ones in 3D
+    /// Write what a history says as one page that opens anywhere, without a network, or as results for Allure, JUnit's readers, EARL, …
+    ///
+    /// The page has counts, patterns, every run, and failed ones in 3D.
     ///
     /// Overview with scores and intervals, properties, failure modes, patterns with plots, where targets stood, trends, and each run
     /// with witnesses, explanations and parameters. Failed runs are replayed as far as there is room for them, so that every failure
@@ -170,7 +186,7 @@ pub enum Command {
     ///
     /// Reads the tables beside the history, which are brought up to date first. Exit code: 0 written, 2 it could not be done.
     #[command(
-        after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper"
+        after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper\n  actcheck report --allure allure-results --junit junit.xml --markdown"
     )]
     Report(crate::cli::report::ReportArgs),
     /// List all properties: label, language, rule file, actions, and how often each passed in the history

@@ -27,6 +27,8 @@ pub fn run() -> ExitCode {
         Command::Health(args) => crate::cli::health::health(&args),
         Command::List(args) => list::list(&args).map(|()| 0),
         Command::Merge(args) => crate::cli::merge::merge(&args),
+        Command::Serve(args) => crate::cli::serve::serve(&args).map(|()| 0),
+        Command::ServeQuery(args) => crate::cli::serve::serve_query(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Shrink(args) => shrink::shrink(&args),
         Command::Query(args) => query::query(&args).map(|()| 0),

@@ -17,6 +17,8 @@ pub struct NamedQuery {
     pub title: String,
     /// The rest of that comment.
     pub description: String,
+    /// The whole of it.
+    pub text: String,
 }
 
 /// All of them by name; one of the project stands before a carried one of the same name.
@@ -63,7 +65,12 @@ fn sources() -> Result<BTreeMap<String, Source>, Diagnostics> {
 fn described(name: String, text: &str) -> NamedQuery {
     let mut lines = text.lines().map_while(|line| line.strip_prefix('#')).map(str::trim);
     let title = lines.next().unwrap_or_default().to_owned();
-    NamedQuery { name, title, description: lines.collect::<Vec<&str>>().join(" ").trim().to_owned() }
+    NamedQuery {
+        name,
+        title,
+        description: lines.collect::<Vec<&str>>().join(" ").trim().to_owned(),
+        text: text.to_owned(),
+    }
 }
 
 #[cfg(test)]

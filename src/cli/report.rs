@@ -4,17 +4,21 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::base::{Diagnostic, Diagnostics};
+use crate::base::{Diagnostic, Diagnostics, names};
 use crate::cli::args::HistoryArgs;
+use crate::cli::report_formats::{self, FormatArgs};
 use crate::cli::{history_dir, output, report_html, since};
 
 /// `actcheck report`
 #[derive(Debug, Args)]
-#[group(id = "written", required = true, multiple = true, args = ["html"])]
+#[group(id = "written", required = true, multiple = true, args = ["html", "allure", "junit", "earl", "jsonl", "markdown"])]
 pub struct ReportArgs {
     /// Write the report as one page (HTML); `-` prints it
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
+    /// The same for other tools.
+    #[command(flatten)]
+    pub formats: FormatArgs,
     /// Only this property, by its name in the ontology (may be given several times)
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
@@ -43,20 +47,39 @@ fn megabytes(text: &str) -> Result<f64, String> {
     }
 }
 
+impl ReportArgs {
+    /// Whether a property was asked for by its name or IRI.
+    pub(super) fn wants(&self, property: &str) -> bool {
+        self.property.iter().any(|name| name == property || name == names::local(property))
+    }
+
+    /// Whether a report goes to the output stream.
+    fn prints(&self) -> Result<bool, Diagnostics> {
+        let page = self.html.as_deref().is_some_and(|file| file.as_os_str() == "-");
+        match self.formats.printed() + usize::from(page) {
+            0 => Ok(false),
+            1 => Ok(true),
+            _ => Err(Diagnostic::error("X051", "several reports can't share the output stream")
+                .help("print one of them, and name files for the others")
+                .into()),
+        }
+    }
+}
+
 /// Writes the reports that were asked for.
 pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
+    let printed = args.prints()?;
     let history = history_dir::open(&args.history)?;
+    let mut told = report_formats::write(args, &history)?;
     if let Some(file) = &args.html {
         let page = report_html::page(args, &history)?;
         if file.as_os_str() == "-" {
             output::print(&page);
         } else {
-            std::fs::write(file, &page).map_err(|error| {
-                Diagnostic::error("X007", format!("{} can't be written: {error}", file.display()))
-                    .help("name a file in a folder that exists and may be written")
-            })?;
-            output::print(&format!("{} holds the report ({:.1} MB)\n", file.display(), page.len() as f64 / 1e6));
+            std::fs::write(file, &page).map_err(|error| report_formats::unwritten(file, &error))?;
+            told.push(format!("{} holds the report ({:.1} MB)", file.display(), page.len() as f64 / 1e6));
         }
     }
+    report_formats::tell(&told, printed);
     Ok(())
 }

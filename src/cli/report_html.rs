@@ -87,7 +87,7 @@ fn replays(history: &History, ontology: &Ontology, order: &[String], room: f64) 
 }
 
 /// Why the failed properties of a run failed. What today's rules can't explain is left out.
-fn explained(history: &History, rules: &RuleBook, run: &RunDetail, budget: &Budget) -> Vec<Explained> {
+pub(super) fn explained(history: &History, rules: &RuleBook, run: &RunDetail, budget: &Budget) -> Vec<Explained> {
     let Ok(facts) = history.facts(&run.row.run) else { return Vec::new() };
     let mut found = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {

@@ -15,7 +15,7 @@ use crate::history::fault;
 pub(super) const FORMAT: u64 = 1;
 const TITLE: &str = "actcheck history";
 
-/// A folder that this process owns until the value is dropped.
+/// A folder that this process owns, or reads with others, until the value is dropped.
 #[derive(Debug)]
 pub(super) struct Folder {
     dir: PathBuf,
@@ -39,13 +39,21 @@ impl Folder {
             }
             fs::create_dir_all(dir).map_err(|error| fault::io(dir, "making the folder", &error))?;
         }
-        let folder = Self { dir: dir.to_path_buf(), _lock: lock(dir)? };
+        let folder = Self { dir: dir.to_path_buf(), _lock: lock(dir, File::try_lock)? };
         if !known {
             write_whole(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
                 .map_err(|error| fault::io(dir, "writing its version", &error))?;
         }
         fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "making the folder of traces", &error))?;
         Ok(folder)
+    }
+
+    /// Takes a part in a folder that is there: others may read it meanwhile, and nobody may write.
+    pub(super) fn share(dir: &Path) -> Result<Self, Diagnostics> {
+        if !has_version(dir)? {
+            return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
+        }
+        Ok(Self { dir: dir.to_path_buf(), _lock: lock(dir, File::try_lock_shared)? })
     }
 
     /// The folder as the user gave it.
@@ -93,14 +101,14 @@ fn holds_other_things(dir: &Path) -> bool {
         .any(|entry| !entry.file_name().to_str().is_some_and(|name| ours.contains(name)))
 }
 
-fn lock(dir: &Path) -> Result<File, Diagnostics> {
+fn lock(dir: &Path, how: fn(&File) -> Result<(), TryLockError>) -> Result<File, Diagnostics> {
     let file = OpenOptions::new()
         .create(true)
         .truncate(false)
         .write(true)
         .open(dir.join("lock"))
         .map_err(|error| fault::io(dir, "locking it", &error))?;
-    match file.try_lock() {
+    match how(&file) {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(fault::in_use(dir)),
         // Some network file systems know no locks; the store's own still guards.

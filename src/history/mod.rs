@@ -26,6 +26,7 @@ mod syntax_fault;
 mod terms;
 mod trace_file;
 mod vitals;
+mod wire;
 mod write_campaign;
 mod write_run;
 mod write_scene;
@@ -39,6 +40,7 @@ pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, R
 pub use scene_digest::SceneDigest;
 pub use store::History;
 pub use vitals::RunVitals;
+pub use wire::{WireFault, WireSyntax};
 
 // What the readers of a history meet in its products.
 pub use crate::actions::{BodyState, Form, Snapshot, Trace};

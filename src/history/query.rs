@@ -86,7 +86,7 @@ fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationErro
     })
 }
 
-fn evaluation_fault(text: &Source, error: &QueryEvaluationError) -> Diagnostic {
+pub(super) fn evaluation_fault(text: &Source, error: &QueryEvaluationError) -> Diagnostic {
     match error {
         QueryEvaluationError::Cancelled => stopped(text),
         QueryEvaluationError::UnsupportedService(_) | QueryEvaluationError::Service(_) => {
@@ -98,7 +98,7 @@ fn evaluation_fault(text: &Source, error: &QueryEvaluationError) -> Diagnostic {
     }
 }
 
-fn refuse_update(text: &Source) -> Result<(), Diagnostics> {
+pub(super) fn refuse_update(text: &Source) -> Result<(), Diagnostics> {
     let Some((word, span)) = first_keyword(&text.text) else { return Ok(()) };
     let word = word.to_uppercase();
     if !UPDATES.contains(&word.as_str()) {

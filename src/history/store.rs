@@ -23,7 +23,7 @@ use crate::history::{
 };
 use crate::history::{lists, read_campaign};
 
-/// A history that this process has open, and no other.
+/// A history that this process has open, and no other (but for reading: [`History::open_to_read`]).
 ///
 /// A run that [`History::commit`] took is there whole after the process was killed, and after [`History::flush`] also after a
 /// power cut. The file of its trace is written before, so that a run in the store always has one.
@@ -49,6 +49,17 @@ impl History {
     /// As [`History::open`]; `H003` also where there is none.
     pub fn open_existing(dir: &Path) -> Result<Self, Diagnostics> {
         Self::open_folder(Folder::take(dir, false)?)
+    }
+
+    /// Opens the history in a folder for queries alone, beside others that do the same. Nothing can be written.
+    ///
+    /// # Errors
+    /// As [`History::open_existing`]; `H002` while another process has it to write.
+    pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
+        let folder = Folder::share(dir)?;
+        let store = Store::open_read_only(folder.store());
+        let store = store.map_err(|error| fault::store(dir, "opening its store", &error))?;
+        Ok(Self { store: RwLock::new(Some(store)), folder })
     }
 
     fn open_folder(folder: Folder) -> Result<Self, Diagnostics> {

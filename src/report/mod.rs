@@ -43,8 +43,8 @@ pub use findings_json::findings_json;
 pub use findings_summary::{FindingsSummary, PropertyReport, findings_table, maps_table};
 pub use findings_text::findings_text;
 pub use formats::{
-    Attachment, EarlReport, JunitReport, MarkdownReport, RESULTS_COMMON_FILES, Repetitions, allure_common, allure_results, markdown,
-    observation,
+    Attachment, EarlReport, JunitReport, MarkdownReport, RESULTS_COMMON_FILES, Repetitions, allure_common,
+    allure_results, markdown, observation,
 };
 pub use health::{HealthSummary, health_json, health_lines, health_table, health_text};
 pub use html::{Explained, HTML_COLUMNS, HtmlReport, PropertyWords, Replays, html, replay_order};

@@ -64,3 +64,17 @@ pub fn edit(file: &Path, from: &str, to: &str) {
     assert!(text.contains(from), "{} has no `{from}`", file.display());
     std::fs::write(file, text.replacen(from, to, 1)).unwrap();
 }
+
+/// A history of four runs that simulation made, for tests that only read it.
+pub fn made_history() -> &'static Path {
+    static MADE: std::sync::OnceLock<PathBuf> = std::sync::OnceLock::new();
+    MADE.get_or_init(|| {
+        // Statics are never dropped: a folder of the system for passing files would stay.
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made-history");
+        let _ = std::fs::remove_dir_all(&folder);
+        let name = folder.display().to_string();
+        let output = actcheck(root(), &["run", "configs/quick.toml", "--runs", "4", "--jobs", "2", "--history", &name]);
+        assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
+        folder
+    })
+}

@@ -205,8 +205,7 @@ fn times(run: &RunDetail, step: u32) -> [i64; 2] {
 
 /// The files that stand beside the results, whatever these are: the kinds of what did not pass, and who judged.
 pub fn allure_common(program: &str, campaigns: &[String]) -> Vec<(String, Vec<u8>)> {
-    let category =
-        |name: &str, status: &str, word: &str| json!({ "name": name, "matchedStatuses": [status], "messageRegex": format!("(?s)^{word}: .*") });
+    let category = |name: &str, status: &str, word: &str| json!({ "name": name, "matchedStatuses": [status], "messageRegex": format!("(?s)^{word}: .*") });
     let categories = json!([
         category("The robot failed a property", "failed", "failed"),
         category("Simulation or tool was at fault", "broken", "broken"),
@@ -217,10 +216,7 @@ pub fn allure_common(program: &str, campaigns: &[String]) -> Vec<(String, Vec<u8
     // Backslashes and line ends mean something in this format; ids and versions have none.
     let environment = format!("actcheck={program}\ncampaigns={}\n", campaigns.join(" "));
     let [first, second] = RESULTS_COMMON_FILES;
-    vec![
-        (first.to_owned(), format!("{categories:#}\n").into_bytes()),
-        (second.to_owned(), environment.into_bytes()),
-    ]
+    vec![(first.to_owned(), format!("{categories:#}\n").into_bytes()), (second.to_owned(), environment.into_bytes())]
 }
 
 /// A name of the form that Allure's files have, the same for the same text.

@@ -105,8 +105,9 @@ fn headline(report: &MarkdownReport) -> String {
         (0, 0, _) => "actcheck: no property failed".to_owned(),
         (0, unknown, _) => format!("actcheck: no property failed, {unknown} could not be judged"),
         (failed, _, _) => {
-            let of = word(report.failed_runs, "run", "runs");
-            format!("actcheck: {failed} {} failed in {} {of}", word(failed, "property", "properties"), report.failed_runs)
+            let runs = report.scores.len() as u64;
+            let failures = word(failed, "failure", "failures");
+            format!("actcheck: {failed} {failures} in {} of {runs} {}", report.failed_runs, word(runs, "run", "runs"))
         }
     }
 }

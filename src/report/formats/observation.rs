@@ -60,9 +60,10 @@ fn result(run: &RunDetail, counts: Counts) -> (&'static str, String) {
         return ("failed", told(run, |judgement| judgement.outcome == Outcome::Failed));
     }
     if run.row.status != RunStatus::Completed || counts.broken + counts.timeout > 0 {
-        let first = run.reason.clone().unwrap_or_else(|| {
-            told(run, |judgement| matches!(judgement.outcome, Outcome::Broken | Outcome::Timeout))
-        });
+        let first = run
+            .reason
+            .clone()
+            .unwrap_or_else(|| told(run, |judgement| matches!(judgement.outcome, Outcome::Broken | Outcome::Timeout)));
         return ("gave_up", first);
     }
     match counts.passed {

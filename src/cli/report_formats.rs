@@ -1,0 +1,270 @@
+//! `actcheck report` in other people's formats: reads run after run and hands each to the formats that were asked for.
+
+use std::collections::BTreeSet;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
+use crate::cli::report::ReportArgs;
+use crate::cli::{export, output, report_html, why};
+use crate::history::{CampaignRow, History, RunDetail, RunFilter, RunRow};
+use crate::ontology;
+use crate::report::{
+    Attachment, Caption, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results, markdown,
+    observation, run_picture,
+};
+use crate::rules::{Budget, RuleBook};
+use crate::verdict::Outcome;
+
+/// Formats that are not a page of our own.
+#[derive(Debug, Args)]
+pub struct FormatArgs {
+    /// Write results for Allure 2 and 3 into this folder, which may hold others: one for each run, action and property, with
+    /// steps, parameters, explanations, and pictures of runs in which not everything passed
+    #[arg(long, value_name = "DIR")]
+    pub allure: Option<PathBuf>,
+    /// Write JUnit's XML; `-` prints it
+    #[arg(long, value_name = "FILE.xml")]
+    pub junit: Option<PathBuf>,
+    /// Write outcomes in EARL and where they came from in PROV (Turtle); `-` prints it
+    #[arg(long, value_name = "FILE.ttl")]
+    pub earl: Option<PathBuf>,
+    /// Write one observation a run, in the schema of Hypothesis's observability (JSON lines); `-` prints them
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub jsonl: Option<PathBuf>,
+    /// Print a summary for a pull request (Markdown)
+    #[arg(long)]
+    pub markdown: bool,
+}
+
+impl FormatArgs {
+    fn any(&self) -> bool {
+        self.markdown || [&self.allure, &self.junit, &self.earl, &self.jsonl].iter().any(|file| file.is_some())
+    }
+
+    /// How many of them go to the output stream.
+    pub(super) fn printed(&self) -> usize {
+        let files = [&self.junit, &self.earl, &self.jsonl];
+        files.iter().filter(|file| file.as_deref() == Some(Path::new("-"))).count() + usize::from(self.markdown)
+    }
+}
+
+/// Writes what was asked for. Returns what there is to say of it.
+pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>, Diagnostics> {
+    if !args.formats.any() {
+        return Ok(Vec::new());
+    }
+    let (campaigns, rows) = chosen(args, history)?;
+    let mut sinks = Sinks::open(args, history, &campaigns)?;
+    let mut judged = BTreeSet::new();
+    for row in &rows {
+        let mut run = history.run(&row.run)?;
+        for action in &mut run.actions {
+            judged.extend(action.judgements.iter().map(|judgement| judgement.property.clone()));
+            action.judgements.retain(|judgement| args.property.is_empty() || args.wants(&judgement.property));
+        }
+        sinks.take(&run)?;
+    }
+    known(&args.property, &judged)?;
+    sinks.finish(&args.formats, &campaigns)
+}
+
+/// The campaigns and runs that were asked for, in their order; smaller forms of runs only where their campaign is named.
+fn chosen(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
+    let filter = export::filter(history, &args.campaign, args.since.clone())?;
+    let shrunk = history.shrunk_campaigns()?;
+    let wanted = |id: &String| match &filter.campaigns {
+        Some(named) => named.contains(id),
+        None => !shrunk.contains(id),
+    };
+    let since = filter.since.as_deref().unwrap_or_default();
+    let mut rows = history.runs(&RunFilter::default())?;
+    rows.retain(|row| wanted(&row.campaign) && row.started.as_str() >= since);
+    if rows.is_empty() {
+        return Err(Diagnostic::error("X044", format!("the history `{}` has no such runs", history.dir().display()))
+            .help("`actcheck list` shows the runs that it has; `actcheck run CONFIG` makes some")
+            .into());
+    }
+    let met: BTreeSet<&String> = rows.iter().map(|row| &row.campaign).collect();
+    let campaigns = history.campaigns()?.into_iter().filter(|row| met.contains(&row.id)).collect();
+    Ok((campaigns, rows))
+}
+
+/// A property that was never judged was misspelt.
+fn known(wanted: &[String], judged: &BTreeSet<String>) -> Result<(), Diagnostics> {
+    let mut faults = Diagnostics::new();
+    for name in wanted.iter().filter(|name| !judged.iter().any(|iri| iri == *name || names::local(iri) == *name)) {
+        let message = format!("no property `{name}` was judged in these runs");
+        let help = did_you_mean(name, judged.iter().map(|iri| names::local(iri)));
+        faults.push(Diagnostic::error("X045", message).help(help));
+    }
+    faults.or(())
+}
+
+/// What has been made so far of each format.
+#[derive(Default)]
+struct Sinks<'a> {
+    allure: Option<AllureFolder<'a>>,
+    junit: Option<JunitReport>,
+    earl: Option<EarlReport>,
+    jsonl: Option<String>,
+    markdown: Option<MarkdownReport>,
+    campaigns: Vec<CampaignRow>,
+}
+
+impl<'a> Sinks<'a> {
+    fn open(args: &'a ReportArgs, history: &'a History, campaigns: &[CampaignRow]) -> Result<Self, Diagnostics> {
+        let asked = &args.formats;
+        let allure = asked.allure.as_deref();
+        Ok(Self {
+            allure: allure.map(|folder| AllureFolder::open(folder, args, history, campaigns)).transpose()?,
+            junit: asked.junit.as_ref().map(|_| JunitReport::new()),
+            earl: asked.earl.as_ref().map(|_| EarlReport::new()),
+            jsonl: asked.jsonl.as_ref().map(|_| String::new()),
+            markdown: asked.markdown.then(MarkdownReport::new),
+            campaigns: campaigns.to_vec(),
+        })
+    }
+
+    fn take(&mut self, run: &RunDetail) -> Result<(), Diagnostics> {
+        if let Some(report) = &mut self.junit {
+            report.add(run);
+        }
+        if let Some(report) = &mut self.earl {
+            report.add(run);
+        }
+        if let Some(report) = &mut self.markdown {
+            report.add(run);
+        }
+        if let Some(lines) = &mut self.jsonl {
+            let campaign = self.campaigns.iter().find(|row| row.id == run.row.campaign);
+            let started = campaign.map_or("", |row| row.started.as_str());
+            lines.push_str(&format!("{}\n", observation(run, started)));
+        }
+        self.allure.as_mut().map_or(Ok(()), |folder| folder.take(run))
+    }
+
+    fn finish(self, asked: &FormatArgs, campaigns: &[CampaignRow]) -> Result<Vec<String>, Diagnostics> {
+        let texts = [
+            (&asked.junit, self.junit.map(|report| report.text()), "JUnit's XML"),
+            (&asked.earl, self.earl.map(|report| report.text(campaigns)), "outcomes in EARL"),
+            (&asked.jsonl, self.jsonl, "observations"),
+        ];
+        let mut told = Vec::new();
+        for (file, text, what) in texts {
+            let (Some(file), Some(text)) = (file, text) else { continue };
+            if file.as_os_str() == "-" {
+                output::print(&text);
+            } else {
+                std::fs::write(file, text).map_err(|error| unwritten(file, &error))?;
+                told.push(format!("{} holds {what}", file.display()));
+            }
+        }
+        if let Some(report) = &self.markdown {
+            output::print(&markdown(report));
+        }
+        told.extend(self.allure.map(|folder| folder.told()));
+        Ok(told)
+    }
+}
+
+/// A folder of Allure's results.
+struct AllureFolder<'a> {
+    folder: &'a Path,
+    history: &'a History,
+    rules: Option<RuleBook>,
+    budget: Budget,
+    repetitions: Repetitions,
+    results: usize,
+}
+
+impl<'a> AllureFolder<'a> {
+    fn open(
+        folder: &'a Path,
+        args: &ReportArgs,
+        history: &'a History,
+        campaigns: &[CampaignRow],
+    ) -> Result<Self, Diagnostics> {
+        let budget = Budget::default();
+        let (files, path) = why::ontology_file(args.ontology.as_deref());
+        // Rules that can't be read today explain nothing; the outcomes are those of the history.
+        let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget).ok();
+        std::fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+        let ids: Vec<String> = campaigns.iter().map(|row| row.id.clone()).collect();
+        let made = Self { folder, history, rules, budget, repetitions: Repetitions::new(), results: 0 };
+        made.write(&allure_common(env!("CARGO_PKG_VERSION"), &ids))?;
+        Ok(made)
+    }
+
+    fn take(&mut self, run: &RunDetail) -> Result<(), Diagnostics> {
+        let number = self.repetitions.number(run);
+        self.results += run.actions.iter().map(|action| action.judgements.len()).sum::<usize>();
+        self.write(&allure_results(run, number, &self.attachments(run)))
+    }
+
+    /// Explanations of what failed, and a picture where not everything passed.
+    fn attachments(&self, run: &RunDetail) -> Vec<Attachment> {
+        let judgements = || run.actions.iter().flat_map(|action| &action.judgements);
+        if judgements().all(|judgement| judgement.outcome == Outcome::Passed) {
+            return Vec::new();
+        }
+        let rules = self.rules.as_ref();
+        let explained = rules.map(|rules| report_html::explained(self.history, rules, run, &self.budget));
+        let mut attachments: Vec<Attachment> = explained
+            .unwrap_or_default()
+            .into_iter()
+            .map(|explained| Attachment {
+                about: Some((explained.step, explained.property)),
+                name: "why it failed".to_owned(),
+                media_type: "text/plain",
+                ending: "txt",
+                bytes: explained.text.into_bytes(),
+            })
+            .collect();
+        // A run that was broken before its first state has nothing to draw.
+        let picture = self.history.trace(&run.row.run).ok().and_then(|trace| run_picture(&Caption::of(run), &trace));
+        attachments.extend(picture.map(|drawing| Attachment {
+            about: None,
+            name: "before and after".to_owned(),
+            media_type: "image/svg+xml",
+            ending: "svg",
+            bytes: drawing.to_svg().into_bytes(),
+        }));
+        attachments
+    }
+
+    fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Diagnostics> {
+        for (name, bytes) in files {
+            let file = self.folder.join(name);
+            std::fs::write(&file, bytes).map_err(|error| unwritten(&file, &error))?;
+        }
+        Ok(())
+    }
+
+    fn told(&self) -> String {
+        format!(
+            "{} holds {} results: npx allure generate {}",
+            self.folder.display(),
+            self.results,
+            self.folder.display()
+        )
+    }
+}
+
+/// Says something that is no result: to the error stream where the output stream has a report.
+pub(super) fn tell(lines: &[String], printed: bool) {
+    let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
+    if printed {
+        // Nobody is left to tell when the error stream itself fails.
+        let _ = std::io::stderr().lock().write_all(text.as_bytes());
+    } else {
+        output::print(&text);
+    }
+}
+
+pub(super) fn unwritten(file: &Path, error: &std::io::Error) -> Diagnostic {
+    Diagnostic::error("X007", format!("{} can't be written: {error}", file.display()))
+        .help("name a file in a folder that exists and may be written")
+}

@@ -1,0 +1,128 @@
+//! `actcheck serve`
+
+use std::net::{IpAddr, Ipv4Addr};
+use std::path::Path;
+use std::sync::mpsc::channel;
+
+use clap::Args;
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::args::HistoryArgs;
+use crate::cli::{history_dir, named_queries, output, stop};
+use crate::history::History;
+use crate::serve::{self, Example, Options};
+
+/// `actcheck serve`
+#[derive(Debug, Args)]
+pub struct ServeArgs {
+    /// Address to listen at; others than this machine's own let the network in
+    #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+    pub bind: IpAddr,
+    /// Port to listen at; 0 takes a free one, which is printed
+    #[arg(long, value_name = "PORT", default_value_t = 7878)]
+    pub port: u16,
+    /// A name by which clients call this server, beside addresses and localhost (may be given several times)
+    #[arg(long, value_name = "NAME")]
+    pub allow_host: Vec<String>,
+    /// Time for a query, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    pub max_secs: f64,
+    /// Rows of an answer, or triples
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    pub max_rows: u64,
+    /// Size of an answer
+    #[arg(long, value_name = "MB", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub max_mb: u64,
+    /// Memory for a query
+    #[arg(long, value_name = "MB", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(100..=1_000_000))]
+    pub max_memory_mb: u64,
+    /// Queries at a time
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..))]
+    pub max_queries: u16,
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+}
+
+/// `actcheck serve-query`, which [`serve`] starts for each query.
+#[derive(Debug, Args)]
+pub struct ServeQueryArgs {
+    /// Where the history lies.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 86_400.0 => Ok(seconds),
+        _ => Err("a number of seconds above 0 is needed, and at most 86400, such as 10".to_owned()),
+    }
+}
+
+/// Serves until Ctrl-C.
+pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
+    let folder = history_dir::folder(&args.history)?;
+    // A wrong folder is told now; one that a campaign has is served when the campaign has ended.
+    if let Err(faults) = History::open_to_read(&folder)
+        && faults.iter().any(|fault| fault.code != "H002")
+    {
+        return Err(faults);
+    }
+    let (asked, waiting) = channel();
+    let _flag = stop::on_interrupt(move || {
+        // The receiver is there as long as the process.
+        let _ = asked.send(());
+    });
+    let serving = serve::serve(options(args, &folder)?).map_err(|error| unheard(args, &error))?;
+    let address = serving.address;
+    output::print(&format!(
+        "http://{address}/ asks {}, http://{address}/report reports it, http://{address}/sparql is for programs; Ctrl-C ends\n",
+        folder.display()
+    ));
+    // Only Ctrl-C sends, and it ends the waiting as well when it is gone.
+    let _ = waiting.recv();
+    Ok(())
+}
+
+/// Answers the query that comes on the input stream.
+pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
+    let folder = history_dir::folder(&args.history)?;
+    serve::answer(&folder, std::io::stdin().lock(), std::io::stdout().lock())
+        .map_err(|error| Diagnostic::error("X005", format!("the query can't be read or answered: {error}")).into())
+}
+
+fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
+    let program = std::env::current_exe().map_err(|error| {
+        Diagnostic::error("X052", format!("this program does not find itself: {error}")).help("start it by its path")
+    })?;
+    let history = folder.display().to_string();
+    let with_history = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).chain([history.clone()]).collect();
+    let named = named_queries::all()?;
+    let example = |query: named_queries::NamedQuery| Example {
+        name: query.name,
+        title: query.title,
+        description: query.description,
+        query: query.text,
+    };
+    Ok(Options {
+        history: folder.to_owned(),
+        program,
+        query_arguments: with_history(&["serve-query", "--history"]),
+        report_arguments: with_history(&["report", "--html", "-", "--history"]),
+        address: args.bind,
+        port: args.port,
+        hosts: args.allow_host.clone(),
+        most_secs: args.max_secs,
+        most_rows: args.max_rows,
+        most_bytes: args.max_mb * 1_000_000,
+        most_memory: args.max_memory_mb * 1_000_000,
+        most_queries: usize::from(args.max_queries),
+        examples: named.into_iter().map(example).collect(),
+    })
+}
+
+fn unheard(args: &ServeArgs, error: &std::io::Error) -> Diagnostics {
+    Diagnostic::error("X053", format!("{} port {} can't be listened at: {error}", args.bind, args.port))
+        .help("name another port with `--port`, or 0 for any; another address with `--bind`")
+        .into()
+}

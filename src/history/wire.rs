@@ -1,0 +1,245 @@
+//! Answers of queries in the forms in which the SPARQL protocol sends them.
+
+use std::io;
+
+use oxigraph::sparql::results::{QueryResultsFormat, QueryResultsSerializer};
+use oxigraph::sparql::{QueryEvaluationError, QueryResults, QuerySolutionIter, QueryTripleIter};
+
+use crate::base::{Diagnostic, Diagnostics, Source, Span};
+use crate::history::query::{evaluation_fault, evaluator, refuse_update};
+use crate::history::rdf_text::serializer;
+use crate::history::syntax_fault::syntax_fault;
+use crate::history::{Cancel, History, RdfSyntax};
+
+/// A form in which an answer is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WireSyntax {
+    /// SPARQL 1.1 query results in JSON.
+    Json,
+    /// SPARQL query results in XML.
+    Xml,
+    /// SPARQL 1.1 query results in CSV.
+    Csv,
+    /// SPARQL 1.1 query results in TSV.
+    Tsv,
+    /// A graph in Turtle.
+    Turtle,
+    /// A graph in N-Triples.
+    NTriples,
+    /// A graph in RDF/XML.
+    RdfXml,
+}
+
+impl WireSyntax {
+    /// Those of `SELECT` and `ASK`, the usual one first.
+    pub const TABLES: [Self; 4] = [Self::Json, Self::Xml, Self::Csv, Self::Tsv];
+    /// Those of `CONSTRUCT` and `DESCRIBE`, the usual one first.
+    pub const GRAPHS: [Self; 3] = [Self::Turtle, Self::NTriples, Self::RdfXml];
+
+    /// Its media types: the one that it is sent as, then others by which it is asked for.
+    pub fn media_types(self) -> &'static [&'static str] {
+        match self {
+            Self::Json => &["application/sparql-results+json", "application/json"],
+            Self::Xml => &["application/sparql-results+xml", "application/xml", "text/xml"],
+            Self::Csv => &["text/csv"],
+            Self::Tsv => &["text/tab-separated-values"],
+            Self::Turtle => &["text/turtle", "application/x-turtle"],
+            Self::NTriples => &["application/n-triples", "text/plain"],
+            Self::RdfXml => &["application/rdf+xml", "application/xml", "text/xml"],
+        }
+    }
+}
+
+/// Why there is no answer.
+#[derive(Debug, Clone)]
+pub enum WireFault {
+    /// The text is no query.
+    Malformed(Diagnostics),
+    /// It asks for what is not done here.
+    Refused(Diagnostics),
+    /// None of the forms of its answer is wanted.
+    NotAcceptable,
+    /// It failed.
+    Failed(Diagnostics),
+}
+
+impl History {
+    /// Answers a query in a form that `choose` takes from those that there are; with more rows or triples than `most_rows` it is
+    /// refused. Runs until it has the answer: who wants it to end sooner ends the process.
+    ///
+    /// # Errors
+    /// See [`WireFault`].
+    pub fn wire_answer(
+        &self,
+        text: &Source,
+        choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
+        most_rows: u64,
+    ) -> Result<(WireSyntax, Vec<u8>), WireFault> {
+        refuse_update(text).map_err(WireFault::Refused)?;
+        if let Some(span) = service(&text.text) {
+            let fault = Diagnostic::error("H017", "`SERVICE` asks another endpoint, which is not done here");
+            return Err(WireFault::Refused(fault.at(text, span).into()));
+        }
+        let prepared = evaluator(&Cancel::new())
+            .parse_query(&*text.text)
+            .map_err(|error| WireFault::Malformed(syntax_fault(text, &error.to_string()).into()))?;
+        let failed = |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
+        let store = self.store().map_err(WireFault::Failed)?;
+        let written = match prepared.on_store(&store).execute().map_err(failed)? {
+            QueryResults::Boolean(value) => {
+                let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
+                let serializer = QueryResultsSerializer::from_format(table_format(syntax));
+                serializer.serialize_boolean_to_writer(Vec::new(), value).map(|body| (syntax, body)).map_err(Into::into)
+            }
+            QueryResults::Solutions(solutions) => {
+                let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
+                table(solutions, syntax, most_rows).map(|body| (syntax, body))
+            }
+            QueryResults::Graph(triples) => {
+                let syntax = choose(&WireSyntax::GRAPHS).ok_or(WireFault::NotAcceptable)?;
+                graph(triples, syntax, most_rows).map(|body| (syntax, body))
+            }
+        };
+        written.map_err(|stop| match stop {
+            Stop::TooMany => {
+                let message = format!("the answer has more than {most_rows} rows");
+                let fault =
+                    Diagnostic::error("H018", message).help("ask for less, or in parts with `LIMIT` and `OFFSET`");
+                WireFault::Refused(fault.into())
+            }
+            Stop::Evaluation(error) => failed(error),
+            Stop::Writing(error) => WireFault::Failed(Diagnostic::error("H012", error.to_string()).into()),
+        })
+    }
+}
+
+/// Why an answer was not written to its end.
+enum Stop {
+    TooMany,
+    Evaluation(QueryEvaluationError),
+    Writing(io::Error),
+}
+
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        Self::Writing(error)
+    }
+}
+
+impl From<QueryEvaluationError> for Stop {
+    fn from(error: QueryEvaluationError) -> Self {
+        Self::Evaluation(error)
+    }
+}
+
+fn table_format(syntax: WireSyntax) -> QueryResultsFormat {
+    match syntax {
+        WireSyntax::Xml => QueryResultsFormat::Xml,
+        WireSyntax::Csv => QueryResultsFormat::Csv,
+        WireSyntax::Tsv => QueryResultsFormat::Tsv,
+        _ => QueryResultsFormat::Json,
+    }
+}
+
+fn table(solutions: QuerySolutionIter<'_>, syntax: WireSyntax, most_rows: u64) -> Result<Vec<u8>, Stop> {
+    let serializer = QueryResultsSerializer::from_format(table_format(syntax));
+    let mut writer = serializer.serialize_solutions_to_writer(Vec::new(), solutions.variables().to_vec())?;
+    for (solution, number) in solutions.zip(1u64..) {
+        if number > most_rows {
+            return Err(Stop::TooMany);
+        }
+        writer.serialize(&solution?)?;
+    }
+    Ok(writer.finish()?)
+}
+
+fn graph(triples: QueryTripleIter<'_>, syntax: WireSyntax, most_rows: u64) -> Result<Vec<u8>, Stop> {
+    let syntax = match syntax {
+        WireSyntax::NTriples => RdfSyntax::NTriples,
+        WireSyntax::RdfXml => RdfSyntax::RdfXml,
+        _ => RdfSyntax::Turtle,
+    };
+    let mut writer = serializer(syntax).for_writer(Vec::new());
+    for (triple, number) in triples.zip(1u64..) {
+        if number > most_rows {
+            return Err(Stop::TooMany);
+        }
+        writer.serialize_triple(&triple?)?;
+    }
+    Ok(writer.finish()?)
+}
+
+/// Where the keyword `SERVICE` stands outside of texts, IRIs, names and comments.
+///
+/// A query that hides it in escapes is not found here, and gets no answer from elsewhere either: nothing is there that could ask.
+fn service(text: &str) -> Option<Span> {
+    let bytes = text.as_bytes();
+    let is_name = |byte: &u8| byte.is_ascii_alphanumeric() || *byte > 127 || b"_:-.?$@%".contains(byte);
+    let mut at = 0;
+    while at < bytes.len() {
+        let rest = &bytes[at..];
+        at += match rest[0] {
+            b'#' => rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len()),
+            b'"' | b'\'' => quoted(rest),
+            b'<' => iri(rest),
+            byte if is_name(&byte) => {
+                let length = rest.iter().position(|byte| !is_name(byte)).unwrap_or(rest.len());
+                if rest[..length].eq_ignore_ascii_case(b"SERVICE") {
+                    return Some(at..at + length);
+                }
+                length
+            }
+            _ => 1,
+        };
+    }
+    None
+}
+
+/// Length of a text in quotes, in three of them too.
+fn quoted(rest: &[u8]) -> usize {
+    let quote = rest[0];
+    let long = rest.len() >= 3 && rest[1] == quote && rest[2] == quote;
+    let width = if long { 3 } else { 1 };
+    let mut at = width;
+    while at < rest.len() {
+        match rest[at] {
+            b'\\' => at += 2,
+            byte if byte == quote && (!long || rest[at..].starts_with(&[quote; 3])) => return at + width,
+            _ => at += 1,
+        }
+    }
+    rest.len()
+}
+
+/// Length of an IRI in angle brackets; of the bracket alone where it is a comparison.
+fn iri(rest: &[u8]) -> usize {
+    let end = rest[1..].iter().position(|byte| *byte <= b' ' || b"<>\"{}|^`".contains(byte));
+    match end {
+        Some(length) if rest[1 + length] == b'>' => length + 2,
+        _ => 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_keyword_is_found_where_it_is_one() {
+        for text in
+            ["SELECT * { SERVICE <http://a> {} }", "ASK{service silent ?x{}}", "ASK { FILTER(1<2) SERVICE<a>{} }"]
+        {
+            assert!(service(text).is_some(), "{text}");
+        }
+        for text in [
+            "# SERVICE\nSELECT ?service { ?s <http://SERVICE> 'SERVICE' , \"\"\"a\"SERVICE\"\"\" , 'it\\'s SERVICE' }",
+            "PREFIX service: <a> SELECT * { ?a service:b service:SERVICE ; x:SERVICE 'a'@service }",
+            "\"\"\"SERVICE",
+            "'\\",
+            "<",
+            "",
+        ] {
+            assert_eq!(service(text), None, "{text}");
+        }
+    }
+}

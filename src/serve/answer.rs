@@ -1,0 +1,79 @@
+//! The process that answers one query: the question comes on its input stream, the answer goes to its output stream.
+
+use std::io::{Read, Write};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::base::{Diagnostics, Source};
+use crate::history::{History, WireFault};
+use crate::serve::{accept, watch};
+
+/// What the process is told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Question {
+    pub query: String,
+    /// The client's header.
+    pub accept: String,
+    pub most_rows: u64,
+    /// Unit: seconds.
+    pub most_secs: f64,
+    /// Unit: bytes.
+    pub most_memory: u64,
+}
+
+/// What goes back before the body, on a line of its own.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Head {
+    pub status: u16,
+    pub media_type: String,
+}
+
+/// Answers the question that comes from `input`. Ends the process when its time or memory is spent.
+///
+/// # Errors
+/// The streams fail: then there is nobody left to tell.
+pub fn answer(history: &Path, mut input: impl Read, mut output: impl Write) -> std::io::Result<()> {
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes)?;
+    let question: Question = serde_json::from_slice(&bytes)?;
+    watch::limit(question.most_secs, question.most_memory);
+    let (status, media_type, body) = answered(history, &question);
+    let head = Head { status, media_type: media_type.to_owned() };
+    writeln!(output, "{}", serde_json::to_string(&head)?)?;
+    output.write_all(&body)?;
+    output.flush()
+}
+
+fn answered(history: &Path, question: &Question) -> (u16, &'static str, Vec<u8>) {
+    let source = Source::new("query", question.query.as_str());
+    let history = match History::open_to_read(history) {
+        Ok(history) => history,
+        // A campaign is running: it can be asked again soon.
+        Err(faults) => return told(503, &faults),
+    };
+    let choose = |offered: &[_]| accept::choose(&question.accept, offered);
+    match history.wire_answer(&source, choose, question.most_rows) {
+        Ok((syntax, body)) => (200, syntax.media_types()[0], body),
+        Err(WireFault::Malformed(faults)) => told(400, &faults),
+        Err(WireFault::Refused(faults)) => told(403, &faults),
+        Err(WireFault::Failed(faults)) => told(500, &faults),
+        Err(WireFault::NotAcceptable) => {
+            let why = format!("no form of the answer is among `{}`\n", question.accept);
+            (406, "text/plain", why.into_bytes())
+        }
+    }
+}
+
+/// Faults as lines, with their places.
+fn told(status: u16, faults: &Diagnostics) -> (u16, &'static str, Vec<u8>) {
+    let mut text = String::new();
+    for fault in faults.iter() {
+        let place = fault.place().map_or_else(String::new, |place| format!("{place}: "));
+        text.push_str(&format!("{place}{} ({})\n", fault.message, fault.code));
+        if let Some(help) = &fault.help {
+            text.push_str(&format!("  {help}\n"));
+        }
+    }
+    (status, "text/plain", text.into_bytes())
+}

@@ -1,0 +1,82 @@
+//! The page to ask from. It works without scripts too: then the form leads to the endpoint.
+
+use std::fmt::Write as _;
+
+use crate::base::names;
+
+/// Its looks.
+pub(super) const STYLE: &str = include_str!("web/style.css");
+/// What shows answers as tables and downloads them.
+pub(super) const SCRIPT: &str = include_str!("web/query.js");
+
+/// A query that can be chosen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Example {
+    /// Its name.
+    pub name: String,
+    /// What it is, in a line.
+    pub title: String,
+    /// What it answers.
+    pub description: String,
+    /// Its text.
+    pub query: String,
+}
+
+/// The whole page.
+pub(super) fn page(history: &str, examples: &[Example]) -> String {
+    let mut options = String::new();
+    for example in examples {
+        // Writing to a text does not fail.
+        let _ = write!(
+            options,
+            "<option value=\"{}\" data-about=\"{}\" data-query=\"{}\">{}</option>",
+            escape(&example.name),
+            escape(&example.description),
+            escape(&example.query),
+            escape(&example.title),
+        );
+    }
+    let prefixes: String = names::PREFIXES
+        .iter()
+        .map(|(prefix, namespace)| {
+            let (prefix, namespace) = (escape(prefix), escape(namespace));
+            format!(
+                "<li data-prefix=\"{prefix}\" data-namespace=\"{namespace}\"><code>{prefix}: {namespace}</code></li>"
+            )
+        })
+        .collect();
+    let first = "SELECT ?property ?outcome (COUNT(*) AS ?runs) WHERE {\n  ?assertion earl:test ?property ; earl:result/act:outcome ?outcome\n} GROUP BY ?property ?outcome ORDER BY ?property ?outcome";
+    let (history, first) = (escape(history), escape(first));
+    format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <title>Ask {history}</title><link rel=\"stylesheet\" href=\"/style.css\"><script src=\"/query.js\" defer></script></head><body>\
+         <header><h1>Ask the history <code>{history}</code></h1><a href=\"/report\">Report</a></header>\
+         <p>SPARQL 1.1, for reading. Programs ask at <code>/sparql</code>. The prefixes below need no declaration.</p>\
+         <form id=\"form\" action=\"/sparql\" method=\"post\">\
+         <label for=\"example\">Examples</label><select id=\"example\"><option value=\"\">choose a question …</option>{options}</select>\
+         <p id=\"about\" aria-live=\"polite\"></p>\
+         <label for=\"query\">Query</label><textarea id=\"query\" name=\"query\" spellcheck=\"false\" required>{first}</textarea>\
+         <div class=\"row\"><button type=\"submit\">Ask</button><span class=\"faint\">or Ctrl+Enter</span></div></form>\
+         <div id=\"said\" role=\"status\"></div><div class=\"row\" id=\"downloads\"></div><div class=\"wide\" id=\"answer\"></div>\
+         <details><summary>Prefixes</summary><ul id=\"prefixes\">{prefixes}</ul></details></body></html>\n"
+    )
+}
+
+/// Text in which nothing is markup, in attributes too.
+pub(super) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_is_shown_becomes_markup() {
+        let nasty = "\"><script>alert('1')</script>&".to_owned();
+        let example =
+            Example { name: nasty.clone(), title: nasty.clone(), description: nasty.clone(), query: nasty.clone() };
+        let page = page(&nasty, &[example]);
+        assert!(!page.contains("<script>") && !page.contains("'1'") && page.matches("<script").count() == 1, "{page}");
+    }
+}

@@ -1,0 +1,72 @@
+//! The report of the history as it is now. Making it takes seconds, so it is made anew only when the history has changed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError, RwLock};
+use std::time::{Duration, SystemTime};
+
+use crate::serve::question::Refusal;
+use crate::serve::worker::{Ended, Worker};
+
+/// A report takes longer than a query may.
+const MOST_TIME: Duration = Duration::from_secs(300);
+/// Room for the page. Unit: bytes.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// The names, sizes and times of a history's files.
+type State = BTreeMap<PathBuf, (u64, Option<SystemTime>)>;
+
+/// Makes the report, and keeps the last one.
+#[derive(Debug)]
+pub(super) struct LiveReport {
+    pub worker: Worker,
+    pub history: PathBuf,
+    pub kept: Mutex<Option<(State, Vec<u8>)>>,
+}
+
+impl LiveReport {
+    /// The page. `history` is held while it is made.
+    pub fn page(&self, history: &RwLock<()>) -> Result<Vec<u8>, Refusal> {
+        // Whoever comes meanwhile waits for the same page.
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((of, page)) = &*kept
+            && *of == state(&self.history)
+        {
+            return Ok(page.clone());
+        }
+        let ended = {
+            let _alone = history.write().unwrap_or_else(PoisonError::into_inner);
+            self.worker.run(&[], MOST_TIME, MOST_BYTES)
+        };
+        match ended {
+            Ended::Itself { code: Some(0), output, .. } => {
+                // Making it updates the tables beside the history.
+                *kept = Some((state(&self.history), output.clone()));
+                Ok(output)
+            }
+            Ended::Itself { errors, .. } => {
+                let why = String::from_utf8_lossy(&errors).into_owned();
+                // An older page is better than none while a campaign has the history.
+                match &*kept {
+                    Some((_, page)) => Ok(page.clone()),
+                    None => Err(Refusal::new(503, why)),
+                }
+            }
+            Ended::Late => Err(Refusal::new(504, "the report took too long")),
+            Ended::TooMuch => Err(Refusal::new(500, "the report is too large to be sent")),
+            Ended::NotStarted(why) => Err(Refusal::new(500, format!("the report could not be made: {why}"))),
+        }
+    }
+}
+
+fn state(history: &Path) -> State {
+    // The log that the store writes for its own developers changes with every look.
+    let files = ["store", "tables", "traces"]
+        .iter()
+        .flat_map(|part| std::fs::read_dir(history.join(part)).into_iter().flatten());
+    files
+        .filter_map(Result::ok)
+        .filter(|entry| !entry.file_name().to_string_lossy().starts_with("LOG"))
+        .filter_map(|entry| entry.metadata().ok().map(|data| (entry.path(), (data.len(), data.modified().ok()))))
+        .collect()
+}
