@@ -1,12 +1,13 @@
 # make         what the machine lacks, then the program, as ./actcheck
 # make test    all tests
 # make bench   what things cost, as ratios
+# make notebooks   runs the notebooks on fresh campaigns and keeps their outputs (RUNS=200)
 #
 # RocksDB and polars are compiled once, in one profile, into a folder that outlives this checkout.
 
 export CARGO_TARGET_DIR ?= $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/actcheck/target
 
-.PHONY: build test bench system
+.PHONY: build test bench notebooks system
 
 build: system
 	cargo build --release --locked
@@ -17,6 +18,14 @@ test: build
 
 bench: system
 	cargo bench --locked
+
+RUNS ?= 200
+PYTHON_FOR_NOTEBOOKS := $(CARGO_TARGET_DIR)/tmp/python
+
+notebooks: build
+	python3 -m venv "$(PYTHON_FOR_NOTEBOOKS)"
+	"$(PYTHON_FOR_NOTEBOOKS)/bin/python" -m pip install --quiet --disable-pip-version-check -r tests/foreign/requirements.txt
+	"$(PYTHON_FOR_NOTEBOOKS)/bin/python" notebooks/regenerate.py --runs $(RUNS)
 
 system:
 	@sh .ci/system

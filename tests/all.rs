@@ -23,6 +23,7 @@ mod merge;
 mod models;
 mod move_to;
 mod no_panic;
+mod notebooks;
 mod ontology;
 mod oracle;
 mod patterns;

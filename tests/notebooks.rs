@@ -1,0 +1,71 @@
+//! The notebooks run from top to bottom on fresh campaigns, and what is committed of them is what a run leaves.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::support::{foreign, root, stderr};
+
+fn notebooks() -> Vec<(String, Value)> {
+    let mut found: Vec<(String, Value)> = std::fs::read_dir(root().join("notebooks"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "ipynb"))
+        .map(|path| {
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            (name, serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap())
+        })
+        .collect();
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    found
+}
+
+fn code(book: &Value) -> Vec<&Value> {
+    book["cells"].as_array().unwrap().iter().filter(|cell| cell["cell_type"] == "code").collect()
+}
+
+#[test]
+fn committed_notebooks_have_been_run_in_order() {
+    let found = notebooks();
+    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["comparing.ipynb", "failure_patterns.ipynb", "first_look.ipynb", "sparql.ipynb"]);
+    for (name, book) in &found {
+        for (number, cell) in (1..).zip(code(book)) {
+            assert_eq!(cell["execution_count"], number, "{name}");
+            let outputs = cell["outputs"].as_array().unwrap();
+            assert!(outputs.iter().all(|output| output["output_type"] != "error"), "{name}: cell {number}");
+            assert!(outputs.iter().all(|output| output["name"] != "stderr"), "{name}: cell {number} warns");
+        }
+        let text = book.to_string();
+        assert!(
+            !text.contains("/tmp/") && !text.contains("/home/") && !text.contains("/root/"),
+            "{name} names a machine"
+        );
+    }
+    let pictures = |book: &Value| book.to_string().matches("image/png").count();
+    assert!(found.iter().map(|(_, book)| pictures(book)).sum::<usize>() >= 5);
+}
+
+#[test]
+fn notebooks_run_on_fresh_campaigns() {
+    let Some(python) = foreign::python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(python)
+        .arg(root().join("notebooks/regenerate.py"))
+        .args(["--actcheck", env!("CARGO_BIN_EXE_actcheck"), "--runs", "8", "--into"])
+        .arg(folder.path())
+        // No settings of the user's.
+        .env("HOME", folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    for (name, committed) in notebooks() {
+        let text = std::fs::read_to_string(folder.path().join(&name)).unwrap();
+        let run: Value = serde_json::from_str(&text).unwrap();
+        assert!(code(&run).iter().all(|cell| cell["execution_count"].is_u64()), "{name} did not run to its end");
+        let sources = |book: &Value| {
+            book["cells"].as_array().unwrap().iter().map(|cell| cell["source"].clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(sources(&run), sources(&committed), "{name}");
+    }
+}
