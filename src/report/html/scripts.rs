@@ -1,11 +1,41 @@
 //! The scripts and the style, each file with one idea, in the order in which they stand in the page.
 
-/// What is drawn with.
-pub(super) const STYLE: [&str; 1] = [include_str!("web/style.css")];
+/// How it looks: colours of both themes, the page, outcomes and plots, the list and a run.
+pub(super) const STYLE: [&str; 4] = [
+    include_str!("web/colours.css"),
+    include_str!("web/page.css"),
+    include_str!("web/parts.css"),
+    include_str!("web/runs.css"),
+];
 
-/// What runs. All of it shares one scope.
-pub(super) const SCRIPT: [&str; 3] =
-    [include_str!("web/dom.js"), include_str!("web/unpack.js"), include_str!("web/main.js")];
+/// What runs. All of it shares one scope; the last one begins.
+pub(super) const SCRIPT: [&str; 25] = [
+    include_str!("web/dom.js"),
+    include_str!("web/unpack.js"),
+    include_str!("web/words.js"),
+    include_str!("web/outcomes.js"),
+    include_str!("web/runs.js"),
+    include_str!("web/filter.js"),
+    include_str!("web/list.js"),
+    include_str!("web/plots.js"),
+    include_str!("web/scatter.js"),
+    include_str!("web/overview.js"),
+    include_str!("web/properties.js"),
+    include_str!("web/modes.js"),
+    include_str!("web/patterns.js"),
+    include_str!("web/map.js"),
+    include_str!("web/trends.js"),
+    include_str!("web/theme.js"),
+    include_str!("web/three.js"),
+    include_str!("web/solids.js"),
+    include_str!("web/course.js"),
+    include_str!("web/orbit.js"),
+    include_str!("web/stage.js"),
+    include_str!("web/timeline.js"),
+    include_str!("web/player.js"),
+    include_str!("web/run.js"),
+    include_str!("web/main.js"),
+];
 
 /// The frame of the page, with places for the rest.
 pub(super) const SHELL: &str = include_str!("web/page.html");

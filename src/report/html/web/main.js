@@ -1,13 +1,73 @@
-// From data to what is shown.
+// From data to what is shown, and from addresses to views.
+
+const VIEWS = [["", "Overview"], ["properties", "Properties"], ["modes", "Failure modes"], ["patterns", "Patterns"], ["map", "From above"],
+  ["history", "History"], ["runs", "Runs"]];
+
+/** The parts of a view, what follows the filter, and what ends it. */
+function view(report, [name, chosen]) {
+  switch (name) {
+    case "properties": return { parts: properties(report, chosen) };
+    case "modes": return { parts: modes(report) };
+    case "patterns": return { parts: patterns(report) };
+    case "map": return tableMap(report);
+    case "history": return { parts: trends(report) };
+    case "run": return runView(report, decodeURIComponent(chosen ?? ""));
+    case "runs": {
+      const [bar, follow] = report.filter.bar(), [list, anew] = runList(report.runs, report.filter);
+      return { parts: [make("h1", {}, "Runs"), bar, list], follow: () => { follow(); anew(); }, wide: true };
+    }
+    default: return { parts: overview(report) };
+  }
+}
+
+function frame(summary, main) {
+  const links = VIEWS.map(([name, words]) => make("a", { href: `#/${name}`, "data-view": name }, words));
+  const header = make("header", { class: "top" },
+    make("a", { class: "mark", href: "#/" }, "actcheck"),
+    make("span", { class: "faint whence" }, `${summary.history} · ${moment(summary.made)}`), themeButton(),
+    make("nav", { "aria-label": "Views" }, links));
+  const footer = make("footer", { class: "faint" }, `actcheck ${summary.version} · made ${summary.made} from ${summary.history}. Drawn in 3D by three.js (MIT).`);
+  document.body.prepend(make("a", { class: "skip", href: "#main", onclick: (event) => { event.preventDefault(); main.focus(); } }, "To the report"), header);
+  main.after(footer);
+  return links;
+}
 
 async function main() {
-  const summary = await unpack("summary");
-  const table = make("table", {}, make("tr", {}, ["property", ...summary.outcomes].map((word) => make("th", {}, word))));
-  for (const property of summary.findings.properties) {
-    const counts = summary.outcomes.map((word) => make("td", {}, property.outcomes[word]));
-    put(table, make("tr", {}, make("td", {}, `${local(property.action)} ${local(property.property)}`), counts));
+  const element = document.getElementById("main");
+  try {
+    const [summary, columns] = await Promise.all([unpack("summary"), unpack("runs")]);
+    const runs = new Runs(columns, summary), filter = new Filter(runs);
+    const report = { runs, summary, filter, open: (run) => { location.hash = `#/run/${encodeURIComponent(runs.runs[run])}`; } };
+    const links = frame(summary, element);
+    let shown = {};
+    const go = (first) => {
+      const way = location.hash.replace(/^#\/?/, "").split("/");
+      filter.listeners.delete(shown.follow);
+      shown.end?.();
+      shown = { ...view(report, way) };
+      if (Array.isArray(shown.parts)) fill(element, shown.parts);
+      if (shown.follow) filter.listeners.add(shown.follow);
+      element.className = shown.wide ? `wide ${way[0]}` : way[0];
+      for (const link of links) {
+        const here = link.dataset.view === (way[0] === "run" ? "runs" : way[0]);
+        if (here) link.setAttribute("aria-current", "page");
+        else link.removeAttribute("aria-current");
+        if (here) link.scrollIntoView({ block: "nearest", inline: "center" });
+      }
+      if (way[0] !== "properties") scrollTo(0, 0);
+      if (!first) element.focus({ preventScroll: true });
+    };
+    addEventListener("hashchange", () => go(false));
+    // Parts that are drawn from stand at the end of the file.
+    if (document.readyState === "loading" && location.hash.startsWith("#/run/")) {
+      document.addEventListener("DOMContentLoaded", () => go(true), { once: true });
+    } else go(true);
+    document.documentElement.dataset.ready = "true";
+  } catch (error) {
+    fill(element, make("h1", {}, "The report can't be read"), make("p", {}, error.message),
+      make("p", {}, "The file may be cut off, or this browser older than 2023."));
+    throw error;
   }
-  fill(document.getElementById("main"), make("h1", {}, `${summary.scores.runs} runs`), table);
 }
 
 main();

@@ -1,0 +1,76 @@
+// The matrix of runs × properties: only the rows that can be seen exist.
+
+const ROW = 32;
+const MORE = 12;
+
+function runList(runs, filter) {
+  const body = make("div", { class: "rows", role: "rowgroup" });
+  const head = make("div", { class: "row head", role: "row" },
+    ["run", "S"].map((word, i) => make("span", { class: i ? "score" : "id", role: "columnheader" }, word)),
+    runs.slots.map((slot) => make("span", { class: "cell", role: "columnheader", title: `${slot.action}: ${slot.property}` },
+      make("span", { class: "turned" }, slot.property))),
+    make("span", { class: "words", role: "columnheader" }, "what happened"));
+  const list = make("div", { class: "list", role: "grid", tabindex: "0", "aria-label": "Runs and their outcomes",
+    "aria-rowcount": runs.count }, head, body);
+  let active = -1;
+  const shownRows = new Map();
+
+  const row = (at) => {
+    const run = filter.shown[at], id = runs.runs[run];
+    const told = runs.failures(run).map((slot) => runs.why(run, slot)).find(Boolean)
+      ?? runs.steps.map((step) => runs.text(step.message, run)).filter(Boolean).at(-1) ?? "";
+    return make("a", { class: "row", role: "row", href: `#/run/${encodeURIComponent(id)}`, tabindex: "-1", id: `row-${at}`,
+      "aria-rowindex": at + 1, style: { top: `${at * ROW}px` } },
+      make("span", { class: "id", role: "rowheader" }, id, runs.replayed.has(id) && make("span", { class: "can", title: "can be watched" }, "▶")),
+      make("span", { class: "score", role: "gridcell" }, Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)),
+      runs.slots.map((slot, i) => {
+        const outcome = runs.outcome(run, i);
+        return make("span", { class: "cell", role: "gridcell" },
+          outcome !== NO_OUTCOME && sign(OUTCOMES[outcome], `${slot.property}: ${OUTCOMES[outcome]}`));
+      }),
+      make("span", { class: "words", role: "gridcell" }, told));
+  };
+  const draw = () => {
+    body.style.height = `${filter.shown.length * ROW}px`;
+    const first = Math.max(0, Math.floor(list.scrollTop / ROW) - MORE);
+    const last = Math.min(filter.shown.length, Math.ceil((list.scrollTop + list.clientHeight) / ROW) + MORE);
+    for (const [at, element] of shownRows) {
+      if (at < first || at >= last) {
+        element.remove();
+        shownRows.delete(at);
+      }
+    }
+    for (let at = first; at < last; at++) {
+      if (!shownRows.has(at)) {
+        shownRows.set(at, row(at));
+        body.append(shownRows.get(at));
+      }
+      shownRows.get(at).classList.toggle("active", at === active);
+    }
+  };
+  const anew = () => {
+    for (const element of shownRows.values()) element.remove();
+    shownRows.clear();
+    active = -1;
+    list.scrollTop = 0;
+    draw();
+  };
+  list.addEventListener("scroll", () => requestAnimationFrame(draw), { passive: true });
+  list.addEventListener("keydown", (event) => {
+    const page = Math.max(1, Math.floor(list.clientHeight / ROW) - 2);
+    const step = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity }[event.key];
+    if (step !== undefined) {
+      active = Math.min(filter.shown.length - 1, Math.max(0, active + step));
+      const top = active * ROW;
+      if (top < list.scrollTop) list.scrollTop = top;
+      if (top + 3 * ROW > list.scrollTop + list.clientHeight) list.scrollTop = top + 3 * ROW - list.clientHeight;
+      list.setAttribute("aria-activedescendant", `row-${active}`);
+      draw();
+      event.preventDefault();
+    } else if (event.key === "Enter" && active >= 0) {
+      location.hash = `#/run/${encodeURIComponent(runs.runs[filter.shown[active]])}`;
+    }
+  });
+  new ResizeObserver(draw).observe(list);
+  return [list, anew];
+}

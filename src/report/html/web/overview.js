@@ -1,0 +1,55 @@
+// The first thing that is read: counts, then scores, then what fails most.
+
+function overview({ runs, summary, filter, open }) {
+  const all = Array.from({ length: runs.count }, (_, run) => run);
+  const counts = runs.counts(all);
+  const { scores, findings } = summary;
+  const statuses = Object.entries(scores.statuses).map(([word, times]) => `${count(times)} ${word}`).join(", ");
+  const tile = (word) => make("button", {
+    type: "button", class: `tile ${word}`, title: MEANING[word],
+    onclick: () => { filter.set({ ...ANY, outcome: word }); location.hash = "#/runs"; },
+  }, make("span", { class: "large" }, count(counts[word])), make("span", {}, `${SIGNS[word]} ${word}`));
+  const score = (name, value, told) => make("div", { class: "score" },
+    make("span", { class: "large" }, value), make("b", {}, name), make("span", { class: "faint" }, told));
+  return [
+    make("section", {},
+      make("h1", {}, `${count(scores.runs)} runs, ${count(findings.properties.length)} properties`),
+      make("p", { class: "lead" }, `Every property of every action of every run came to one of six outcomes. Runs: ${statuses}.`),
+      make("div", { class: "tiles" }, OUTCOMES.map(tile)),
+      shares(counts, "Outcomes")),
+    make("section", { class: "scores" },
+      score("T", scores.T === null ? "–" : scores.T.toFixed(4), `mean score of ${count(scores.runs)} runs`),
+      score("T without broken runs", scores.without_broken === null ? "–" : scores.without_broken.toFixed(4), "the robot's alone"),
+      score("everything passed", scores.all_passed ? percent(scores.all_passed.rate) : "–",
+        scores.all_passed ? `[${(scores.all_passed.low * 100).toFixed(0)}–${(scores.all_passed.high * 100).toFixed(0)}] · ${count(scores.passed)} of ${count(scores.tested)} runs that tested anything` : "no run tested anything")),
+    make("div", { class: "columns" },
+      make("section", {}, make("h2", {}, "Properties"), propertyTable(summary, runs),
+        make("p", { class: "more" }, make("a", { href: "#/properties" }, "margins and heat maps →"))),
+      make("section", {}, make("h2", {}, "How runs fail"), modeBars(summary, filter, 6),
+        make("p", { class: "more" }, make("a", { href: "#/modes" }, "all failure modes →")))),
+    make("section", {}, make("h2", {}, "When they fail"), patternList(summary, 5),
+      make("p", { class: "more" }, make("a", { href: "#/patterns" }, "patterns with plots →"))),
+  ];
+}
+
+/** One line for each property: pass rate with its interval and the six counts. */
+function propertyTable(summary) {
+  const passing = ({ failing }) => failing && { rate: 1 - failing.rate, low: 1 - failing.high, high: 1 - failing.low };
+  return make("div", { class: "scroll", tabindex: "0" }, make("table", { class: "properties" },
+    make("thead", {}, make("tr", {}, ["property", "pass rate [95 %]", "", ...OUTCOMES.map((word) =>
+      make("span", { title: `${word}: ${MEANING[word]}` }, sign(word)))].map((head) => make("th", { scope: "col" }, head)))),
+    make("tbody", {}, summary.findings.properties.map((property, i) => make("tr", {},
+      make("th", { scope: "row" }, make("a", { href: `#/properties/${i}` },
+        make("small", {}, `${local(property.action)} `), breakable(local(property.property)))),
+      make("td", { class: "rate" }, interval(passing(property))),
+      make("td", {}, intervalPlot(passing(property))),
+      OUTCOMES.map((word) => make("td", { class: property.outcomes[word] ? "" : "faint" }, count(property.outcomes[word]))))))));
+}
+
+function patternList(summary, most) {
+  const found = summary.findings.properties.flatMap((property) => property.patterns.found.filter((pattern) => pattern.confirmed));
+  if (!found.length) {
+    return make("p", {}, "No condition on scenes goes with failures beyond chance, in these runs. More runs show more: `actcheck run --runs N`.");
+  }
+  return make("ul", { class: "sentences" }, found.sort((a, b) => b.wracc - a.wracc).slice(0, most).map((pattern) => make("li", {}, pattern.sentence)));
+}

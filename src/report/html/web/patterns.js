@@ -1,0 +1,59 @@
+// When things fail: conditions on scenes, with the evidence, and a picture of where they lie.
+
+function patterns({ runs, summary, filter, open }) {
+  const cards = summary.findings.properties.flatMap((property, of) =>
+    property.patterns.found.filter((pattern) => pattern.confirmed).map((pattern) => patternCard(runs, property, of, pattern, filter, open)));
+  const tried = summary.findings.properties.reduce((sum, property) => sum + property.patterns.tried, 0);
+  return [
+    make("h1", {}, "When they fail"),
+    make("p", { class: "lead" }, `Conditions on scenes under which a property fails more often than elsewhere: corrected for all ${count(tried)} that were tried, and confirmed on a third of the runs that took no part in finding them.`),
+    cards.length ? cards : make("p", {}, "There is none that holds, in these runs."),
+  ];
+}
+
+function patternCard(runs, property, of, pattern, filter, open) {
+  const told = pattern.sentence.replace(/^.* runs with /, "").replace(/; elsewhere.*$/, "");
+  const facts = [
+    ["runs in it", count(pattern.all.failed_in + pattern.all.passed_in)], ["lift", number(pattern.lift)],
+    ["confirmed on", `${count(pattern.held_out.failed_in)} of ${count(pattern.held_out.failed_in + pattern.held_out.passed_in)} held out`],
+    ["q", pattern.q < 1e-4 ? pattern.q.toExponential(0) : number(pattern.q)],
+  ];
+  const show = () => { filter.set({ ...ANY, pattern: { runs: pattern.runs, told } }); location.hash = "#/runs"; };
+  return make("section", { class: "card pattern" },
+    make("h2", {}, pattern.sentence),
+    make("dl", { class: "facts" }, facts.map(([name, value]) => make("div", {}, make("dt", {}, name), make("dd", {}, value)))),
+    make("div", { class: "rates" },
+      make("span", {}, "with it"), intervalPlot(pattern.rate, "failed"), make("span", {}, interval(pattern.rate)),
+      pattern.elsewhere && [make("span", {}, "elsewhere"), intervalPlot(pattern.elsewhere, "failed"), make("span", {}, interval(pattern.elsewhere))]),
+    patternPlot(runs, of, pattern, open),
+    make("p", {}, make("button", { type: "button", onclick: show }, `Show its ${count(pattern.runs.length)} runs`)),
+    pattern.more && make("p", { class: "faint" }, "More such scenes: ", make("code", {}, pattern.more), " prints the rule for ", make("code", {}, "[scene] require"), "."));
+}
+
+/** Failed and other runs over the parameters of the pattern, or over the surface where it has fewer than two numbers. */
+function patternPlot(runs, of, pattern, open) {
+  const ranges = pattern.conditions.filter((condition) => !("kind" in condition) && varies(runs.parameter.get(condition.parameter)));
+  const box = Object.fromEntries(ranges.map((range) => [range.parameter, range]));
+  const others = ["surface_x_m", "surface_y_m", "robot_distance_m", "target_turned_rad", "target_friction", "target_mass_kg"]
+    .filter((name) => !box[name] && varies(runs.parameter.get(name)));
+  const place = planes(runs)[0];
+  const axes = ranges.length >= 2 ? [ranges[0].parameter, ranges[1].parameter]
+    : ranges.length === 1 && others.length ? [ranges[0].parameter, others.find((name) => runs.parameter.get(name).unit === runs.parameter.get(ranges[0].parameter).unit) ?? others[0]]
+      : place ? [place[1], place[2]] : null;
+  if (!axes) return null;
+  const within = new Set(pattern.runs);
+  const slots = runs.slots.map((slot, at) => [slot, at]).filter(([slot]) => slot.of === of).map(([, at]) => at);
+  // Runs that a kind leaves out would hide what the ranges show.
+  const kinds = pattern.conditions.filter((condition) => "kind" in condition);
+  const shown = (run) => !kinds.length || within.has(run) || ranges.length > 0;
+  const outcome = (run) => {
+    const found = slots.map((slot) => runs.outcome(run, slot));
+    if (found.includes(FAILED)) return "failed";
+    return found.includes(PASSED) ? "passed" : null;
+  };
+  const kindOf = (run) => !kinds.length || within.has(run) ? outcome(run) : ranges.length ? null : null;
+  const [element, draw] = scatter(runs, { height: 300, open, box, label: `Where it lies: ${pattern.sentence}` });
+  requestAnimationFrame(() => draw(axes[0], axes[1], false, kinds.length ? (run) => shown(run) && kindOf(run) : outcome));
+  return make("figure", {}, element, make("figcaption", { class: "faint" },
+    `${kinds.length ? `Runs with ${kinds.map((condition) => condition.kind).join(" and ")} that the pattern holds for` : "All runs"}: crosses failed, dots passed${ranges.length ? "; marked is the range" : ""}. A dot opens its run.`));
+}

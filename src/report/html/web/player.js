@@ -1,0 +1,69 @@
+// Watching a run: the stage, the slider, the timeline, before and after.
+
+async function player(replay) {
+  const forms = await formsOf();
+  const canvas = make("canvas", { class: "stage", tabindex: "0", "aria-label": "The run in 3D: drag or arrow keys turn, wheel or + and − zoom" });
+  const slider = make("input", { type: "range", min: 0, step: "any", value: 0, "aria-label": "Moment of the run", class: "slider" });
+  const play = make("button", { type: "button", class: "play", "aria-label": "Play" }, "▶");
+  const clock = make("output", { class: "clock" });
+  const pace = make("select", { "aria-label": "Speed" }, [["0.25", "¼×"], ["1", "1×"], ["2", "2×"], ["5", "5×"]].map(([value, words]) => make("option", { value }, words)));
+  pace.value = "1";
+  const three = await loadThree();
+  const stage = new Stage(three, replay, forms, canvas);
+  const seconds = stage.course.seconds;
+  slider.max = seconds;
+  const [line, mark] = timeline(replay, seconds, (secs) => seek(secs));
+  let secs = 0, playing = false, last = 0;
+  const seek = (to, settled = true) => {
+    secs = Math.min(seconds, Math.max(0, to));
+    stage.near = !settled;
+    slider.value = secs;
+    slider.setAttribute("aria-valuetext", `${secs.toFixed(1)} seconds`);
+    clock.textContent = `${secs.toFixed(1)} / ${seconds.toFixed(1)} s`;
+    stage.show(secs);
+    mark(secs);
+  };
+  const set = (on) => {
+    playing = on;
+    play.textContent = on ? "❚❚" : "▶";
+    play.setAttribute("aria-label", on ? "Pause" : "Play");
+    if (on && secs >= seconds) seek(0);
+    last = performance.now();
+    if (on) requestAnimationFrame(step);
+  };
+  const step = (now) => {
+    if (!playing || !canvas.isConnected) return;
+    seek(secs + (now - last) / 1000 * Number(pace.value), false);
+    last = now;
+    if (secs >= seconds) set(false);
+    else requestAnimationFrame(step);
+  };
+  play.addEventListener("click", () => set(!playing));
+  slider.addEventListener("input", () => { set(false); seek(Number(slider.value)); });
+  const sight = make("input", { type: "checkbox", onchange: () => { stage.seen.visible = sight.checked; stage.draw(); } });
+  const pictures = ["before", "after"].map((name) => [name, make("canvas", { role: "img", "aria-label": name })]);
+  const element = make("div", { class: "player" },
+    make("div", { class: "stagebox" }, canvas),
+    make("div", { class: "controls" }, play, slider, clock, pace,
+      stage.seen.children.length > 0 && make("label", { class: "check" }, sight, " what it perceived")),
+    make("div", { class: "scroll" }, line),
+    make("div", { class: "pictures" }, pictures.map(([name, picture]) => make("figure", {},
+      make("button", { type: "button", class: "flat", onclick: () => { set(false); seek(name === "before" ? 0 : seconds); } }, picture), make("figcaption", {}, name)))));
+  const themed = () => { stage.theme(); snap(); };
+  const snap = () => { stage.picture(0, pictures[0][1]); stage.picture(seconds, pictures[1][1]); };
+  const resized = new ResizeObserver(() => stage.draw());
+  resized.observe(canvas);
+  document.addEventListener("theme", themed);
+  return {
+    element, seek: (to) => { set(false); seek(to); }, toggle: () => set(!playing),
+    begin: (at) => { seek(at); themed(); seek(at); },
+    end: () => { set(false); resized.disconnect(); document.removeEventListener("theme", themed); stage.end(); },
+  };
+}
+
+let formsLoaded;
+
+function formsOf() {
+  formsLoaded ??= unpackText("forms").then(JSON.parse);
+  return formsLoaded;
+}

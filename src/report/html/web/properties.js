@@ -1,0 +1,27 @@
+// Each property: what it means, its outcomes, its margins, where it fails, and how that went over time.
+
+function properties({ runs, summary, filter }, chosen) {
+  const cards = summary.findings.properties.map((property, i) => {
+    const slots = runs.slots.map((slot, at) => [slot, at]).filter(([slot]) => slot.of === i);
+    const words = slots[0]?.[0] ?? {};
+    const margins = slots.flatMap(([, at]) => Array.from(runs.margins[at] ?? []));
+    const unit = property.margin.unit ?? "";
+    const look = (outcome) => { filter.set({ ...ANY, slot: String(slots[0]?.[1] ?? ""), outcome }); location.hash = "#/runs"; };
+    const card = make("section", { class: "card", id: `property-${i}` },
+      make("h2", {}, make("small", {}, `${local(property.action)} `), local(property.property)),
+      make("p", { class: "lead" }, words.comment || words.label),
+      words.rule && make("p", { class: "faint" }, "rule: ", make("code", {}, words.rule)),
+      make("p", {}, make("b", {}, property.failing ? `fails in ${interval(property.failing)}` : "never decided"),
+        ` of ${count(property.outcomes.passed + property.outcomes.failed)} decided runs`),
+      shares(property.outcomes, local(property.property)),
+      make("p", { class: "counts" }, OUTCOMES.map((word) => make("button", { type: "button", class: "flat", onclick: () => look(word),
+        disabled: !property.outcomes[word] }, sign(word), ` ${count(property.outcomes[word])} ${word}`))),
+      margins.some((value) => !Number.isNaN(value)) && make("figure", {},
+        make("figcaption", {}, `Margins${unit ? ` in ${unit}` : ""}: how far from flipping; below 0 it failed`), histogram(margins, unit, local(property.property))),
+      property.maps.length > 0 && make("div", { class: "maps" }, property.maps.map(heatMap)),
+      property.flaky.scenes > 0 && make("p", {}, `Of ${count(property.flaky.scenes)} scenes that were run more than once, ${count(property.flaky.both_ways.length)} went both ways.`));
+    return card;
+  });
+  queueMicrotask(() => chosen !== undefined && document.getElementById(`property-${chosen}`)?.scrollIntoView());
+  return [make("h1", {}, "Properties"), cards];
+}

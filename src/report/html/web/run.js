@@ -1,0 +1,122 @@
+// One run: what failed and why, what happened when, its scene, and the run itself.
+
+function runView({ runs, summary, filter }, id) {
+  const run = runs.place.get(id);
+  if (run === undefined) return { parts: [make("h1", {}, "No such run"), make("p", {}, `This report has no run ${id}.`)] };
+  const at = filter.shown.indexOf(run);
+  const step = (by, words) => {
+    const other = at >= 0 ? filter.shown[at + by] : undefined;
+    return other !== undefined && make("a", { class: "button", href: `#/run/${encodeURIComponent(runs.runs[other])}` }, words);
+  };
+  const place = make("div", { class: "watch" });
+  const details = make("div", { class: "details" });
+  const worst = OUTCOMES[runs.worst[run]];
+  const failed = runs.failures(run);
+  const parts = [
+    make("header", { class: "runhead" },
+      make("h1", {}, id, " ", badge(worst, worst === "passed" ? "nothing failed" : worst)),
+      make("nav", { "aria-label": "Other runs" }, step(-1, "← previous"), step(1, "next →"), make("a", { class: "button", href: "#/runs" }, "all runs"))),
+    make("p", { class: "lead" }, `${runs.text(runs.test, run)} · S = ${Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)} · campaign ${runs.text(runs.campaign, run)} · ${moment(runs.text(runs.started, run))} · ${runs.text(runs.status, run)}`),
+    make("div", { class: "run" }, place, details),
+    parameterTable(runs, run),
+  ];
+  fill(details, runs.slots.map((slot, i) => [slot, i]).filter(([, i]) => failed.includes(i)).map(([slot, i]) => failure(runs, run, slot, i)),
+    allOutcomes(runs, run));
+  const known = { end: () => {} };
+  if (!runs.replayed.has(id)) {
+    put(place, notHere(summary, id));
+    return { parts, end: () => known.end() };
+  }
+  put(place, make("p", { class: "waiting" }, "Unpacking the run …"));
+  watch(known, place, details, { runs, run, id }).catch((error) =>
+    fill(place, make("p", { class: "note" }, `It can't be shown in 3D here: ${error.message}`), notHere(summary, id)));
+  return { parts, end: () => known.end() };
+}
+
+async function watch(known, place, details, { runs, run, id }) {
+  const replay = await unpack(`replay-${runs.replayed.get(id)}`);
+  let ended = false, shown = null;
+  known.end = () => { ended = true; shown?.end(); };
+  const seek = (secs) => shown?.seek(secs);
+  fill(details, replay.actions.map((action) => action.judged.filter((judged) => judged.outcome === "failed").map((judged) =>
+    explained(action, judged, seek))), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
+  if (!replay.courses || !replay.courses.frames) {
+    fill(place, make("p", { class: "note" }, replay.reason ? `It was ${runs.text(runs.status, run)}: ${replay.reason}` : "It has no state to be shown."));
+    return;
+  }
+  const made = await player(replay);
+  if (ended) return made.end();
+  shown = made;
+  fill(place, made.element);
+  const decided = replay.actions.flatMap((action) => action.judged).map((judged) => judged.decided).filter((secs) => typeof secs === "number");
+  made.begin(decided.length ? Math.min(...decided) : 0);
+  place.dataset.ready = "true";
+}
+
+/** A failed property as the tables tell it. */
+function failure(runs, run, slot, i) {
+  return make("section", { class: "card failure" }, make("h2", {}, sign("failed"), make("small", {}, ` ${slot.action} `), slot.property),
+    make("p", {}, runs.why(run, i)),
+    make("p", { class: "faint" }, slot.comment || slot.label, runs.margins[i] && !Number.isNaN(runs.margins[i][run]) && ` · margin ${number(runs.margins[i][run])}`));
+}
+
+/** The same with its explanation and its moment. */
+function explained(action, judged, seek) {
+  return make("section", { class: "card failure" },
+    make("h2", {}, sign("failed"), make("small", {}, ` ${local(action.action)} `), local(judged.property)),
+    make("p", {}, judged.witness),
+    make("p", { class: "faint" }, judged.margin !== null && `margin ${number(judged.margin)} · `,
+      typeof judged.decided === "number" && make("button", { type: "button", class: "flat", onclick: () => seek(judged.decided) }, `show the moment (${judged.decided.toFixed(1)} s)`)),
+    judged.why && make("details", {}, make("summary", {}, "Why"), make("div", { class: "proof", tabindex: "0" }, judged.why.split("\n").filter((line) => line.trim()).map(proofLine))));
+}
+
+/** A line of an explanation: what is missing stands out, what is cited steps back. */
+function proofLine(line) {
+  const text = line.trimStart(), depth = (line.length - text.length) / 2;
+  const kind = /^(missing|missed|blocked)/.test(text) ? "missing" : /^ok /.test(text) ? "ok" : /^nearest/.test(text) ? "nearest" : "";
+  const [said, cited] = text.split(/ (?=(?:came closest )?by \S+:\d+)/);
+  return make("div", { class: `line ${kind}`, style: { "padding-left": `${depth * 1.1 + 1}em` } }, said, cited && make("span", { class: "faint" }, ` ${cited}`));
+}
+
+function actionsOf(replay) {
+  return make("section", {}, make("h2", {}, "Actions"), make("ol", { class: "actions" }, replay.actions.map((action) => make("li", {},
+    make("b", {}, local(action.action)), ` ${action.end}, ${number(action.seconds, "s")}`,
+    make("div", { class: "faint" }, action.reported === null ? "" : action.reported ? "reported success" : "reported failure", action.message && `: ${action.message}`),
+    Object.entries(action.parameters).map(([name, values]) => make("div", { class: "faint" }, `${name} = ${values.map(local).join(", ")}`))))));
+}
+
+function allOutcomes(runs, run) {
+  return make("section", {}, make("h2", {}, "Outcomes"), make("ul", { class: "outcomes" }, runs.slots.map((slot, i) => {
+    const outcome = runs.outcome(run, i);
+    if (outcome === NO_OUTCOME) return null;
+    const margin = runs.margins[i]?.[run];
+    return make("li", { title: slot.comment ?? "" }, sign(OUTCOMES[outcome]), make("small", {}, ` ${slot.action} `), slot.property,
+      margin !== undefined && !Number.isNaN(margin) && make("span", { class: "faint" }, ` ${number(margin)}`));
+  })));
+}
+
+function objectTable(replay) {
+  return make("section", {}, make("h2", {}, "Scene"), make("p", { class: "faint" }, `world ${replay.world}, seed ${replay.seed}, program ${replay.program}`),
+    make("div", { class: "scroll", tabindex: "0" }, make("table", {},
+      make("thead", {}, make("tr", {}, ["thing", "kind", "role", "mass (kg)", "friction", "came from its place (m)", "tilt (rad)"].map((word) => make("th", { scope: "col" }, word)))),
+      make("tbody", {}, replay.objects.map((object) => make("tr", { class: object.role === "target" ? "strong" : "" },
+        make("th", { scope: "row" }, object.id), make("td", {}, object.kind), make("td", {}, object.role),
+        [object.mass, object.friction, object.moved, object.tilt].map((value) => make("td", {}, number(value)))))))));
+}
+
+function discards(replay) {
+  return replay.discards.length > 0 && make("p", { class: "faint" }, `${replay.discards.length} scenes before it could not be used: ${[...new Set(replay.discards)].join("; ")}`);
+}
+
+function parameterTable(runs, run) {
+  const known = runs.parameters.map((parameter) => [parameter, runs.value(parameter.name, run)]).filter(([, value]) => value !== "" && !Number.isNaN(value));
+  return make("section", {}, make("h2", {}, "Parameters of the scene"), make("dl", { class: "parameters" }, known.map(([parameter, value]) => make("div", { title: parameter.told },
+    make("dt", {}, parameter.name.replace(/_(m|rad|kg)$/, "").replaceAll("_", " ")), make("dd", {}, typeof value === "number" ? number(value, parameter.unit) : value)))));
+}
+
+/** What shows a run that this file has no room for. */
+function notHere(summary, id) {
+  const { program, history } = summary, asked = `${quoted(id)} --history ${quoted(history)}`;
+  return make("div", { class: "note card" }, make("p", {}, "This run is not in the file, which has room for some of each failure mode and property. These show it:"),
+    [`show ${asked} --picture ${quoted(`${id}.png`)}`, `why ${asked}`, `replay ${asked}`].map((words) => make("p", {}, make("code", {}, `${program} ${words}`))));
+}

@@ -1,0 +1,75 @@
+// Forms to what three.js draws. The counterpart of `shapes.rs`. Lengths in metres, z up.
+
+/** The geometry of one part of a form, in the part's own frame. */
+function geometryOf(three, part) {
+  const upright = (geometry) => geometry.rotateX(Math.PI / 2);
+  switch (part.kind) {
+    case "box": return new three.BoxGeometry(...part.size);
+    case "sphere": return new three.SphereGeometry(part.radius, 24, 16);
+    case "cylinder": return upright(new three.CylinderGeometry(part.radius, part.radius, part.height, 32));
+    case "capsule": return upright(new three.CapsuleGeometry(part.radius, part.height, 8, 20));
+    case "tube": return upright(tube(three, part));
+    case "hull": return hull(three, part.points);
+    default: return new three.BoxGeometry(0.01, 0.01, 0.01);
+  }
+}
+
+function tube(three, { low, high, wall, height }) {
+  const corner = (radius, y) => new three.Vector2(Math.max(radius, 1e-4), y);
+  return new three.LatheGeometry([corner(low, -height / 2), corner(high, height / 2), corner(high - wall, height / 2),
+    corner(low - wall, -height / 2), corner(low, -height / 2)], 32);
+}
+
+/** The hull of a few points: every plane through three of them that has no point beyond it. */
+function hull(three, points) {
+  const at = points.map((point) => new three.Vector3(...point));
+  const middle = at.reduce((sum, point) => sum.add(point), new three.Vector3()).divideScalar(Math.max(1, at.length));
+  const corners = [], faces = new Set();
+  const [side, other, normal] = [new three.Vector3(), new three.Vector3(), new three.Vector3()];
+  for (let i = 0; i < at.length; i++) for (let j = i + 1; j < at.length; j++) for (let k = j + 1; k < at.length; k++) {
+    normal.crossVectors(side.subVectors(at[j], at[i]), other.subVectors(at[k], at[i]));
+    if (normal.length() < 1e-12) continue;
+    normal.normalize();
+    if (normal.dot(side.subVectors(at[i], middle)) < 0) normal.negate();
+    const reach = normal.dot(at[i]) + 1e-6;
+    if (at.some((point) => normal.dot(point) > reach)) continue;
+    const face = [normal.x, normal.y, normal.z, normal.dot(at[i])].map((value) => Math.round(value * 1e4)).join();
+    if (faces.has(face)) continue;
+    faces.add(face);
+    corners.push(...fan(three, at.filter((point) => normal.dot(point) > reach - 2e-6), normal));
+  }
+  const geometry = new three.BufferGeometry().setFromPoints(corners);
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
+/** Triangles of a flat convex face, counter-clockwise seen from outside. */
+function fan(three, points, normal) {
+  const middle = points.reduce((sum, point) => sum.add(point), new three.Vector3()).divideScalar(points.length);
+  const u = new three.Vector3().subVectors(points[0], middle).normalize(), v = new three.Vector3().crossVectors(normal, u);
+  const turn = (point) => { const away = point.clone().sub(middle); return Math.atan2(away.dot(v), away.dot(u)); };
+  const around = [...points].sort((a, b) => turn(a) - turn(b));
+  return around.slice(2).flatMap((point, i) => [around[0], around[i + 1], point]);
+}
+
+const LOOKS = {
+  robot: [0x6f8fb0, 0.45, 0.35], target: [0x2f7fe0, 0.35, 0.0], other: [0x9aa3ae, 0.55, 0.0],
+  obstacle: [0xd08a2e, 0.6, 0.0], platform: [0xd9c29a, 0.8, 0.0], wall: [0xb9c0c9, 0.9, 0.0],
+};
+
+/** A body with its form: a group to be moved. */
+function bodyOf(three, form, look) {
+  const [colour, roughness, metalness] = LOOKS[look] ?? LOOKS.other;
+  const material = new three.MeshStandardMaterial({ color: colour, roughness, metalness, side: three.DoubleSide });
+  if (look === "wall") Object.assign(material, { transparent: true, opacity: 0.16, depthWrite: false });
+  const group = new three.Group();
+  for (const part of form) {
+    const mesh = new three.Mesh(geometryOf(three, part), material);
+    mesh.position.set(...part.at.slice(0, 3));
+    mesh.quaternion.set(...part.at.slice(3)).normalize();
+    mesh.castShadow = look !== "wall";
+    mesh.receiveShadow = look !== "wall";
+    group.add(mesh);
+  }
+  return group;
+}

@@ -1,0 +1,153 @@
+// A run in 3D: what stands still, what moves, light and a camera.
+
+class Stage {
+  constructor(three, replay, forms, canvas) {
+    this.three = three;
+    this.course = new Course(replay);
+    this.canvas = canvas;
+    this.target = replay.objects.find((object) => object.role === "target" && this.course.slot.has(object.id))?.id;
+    this.renderer = new three.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = three.PCFShadowMap;
+    this.renderer.toneMapping = three.ACESFilmicToneMapping;
+    this.scene = new three.Scene();
+    this.camera = new three.PerspectiveCamera(38, 1, 0.02, 60);
+    this.camera.up.set(0, 0, 1);
+    this.lights();
+    this.fill(replay, forms);
+    this.orbit = new Orbit(this.camera, canvas, () => this.draw());
+    this.begin();
+  }
+
+  lights() {
+    const { three, scene } = this;
+    scene.add(new three.HemisphereLight(0xffffff, 0x9a938a, 1.7));
+    this.sun = new three.DirectionalLight(0xfff4e4, 2.6);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(1024, 1024);
+    Object.assign(this.sun.shadow.camera, { left: -2.2, right: 2.2, top: 2.2, bottom: -2.2, near: 0.5, far: 12 });
+    this.sun.shadow.bias = -0.0006;
+    this.sun.shadow.normalBias = 0.01;
+    scene.add(this.sun, this.sun.target);
+  }
+
+  fill(replay, forms) {
+    const { three, scene } = this;
+    this.floor = new three.Mesh(new three.PlaneGeometry(60, 60), new three.MeshStandardMaterial({ roughness: 1 }));
+    this.floor.receiveShadow = true;
+    this.floor.position.z = -0.001;
+    this.grid = new three.GridHelper(60, 120);
+    this.grid.rotation.x = Math.PI / 2;
+    this.grid.material.transparent = true;
+    this.grid.material.opacity = 0.35;
+    scene.add(this.floor, this.grid);
+    for (const body of replay.still) {
+      const group = bodyOf(three, forms[body.form], body.kind === "Wall" ? "wall" : body.role ?? "platform");
+      group.position.set(...body.at.slice(0, 3));
+      group.quaternion.set(...body.at.slice(3)).normalize();
+      scene.add(group);
+    }
+    this.moving = this.course.tracks.map((track) => {
+      const group = bodyOf(three, forms[track.form], track.name.startsWith("robot/") ? "robot" : track.role ?? "other");
+      scene.add(group);
+      return group;
+    });
+    this.seen = new three.Group();
+    for (const thing of replay.actions.flatMap((action) => action.seen ?? [])) {
+      const box = new three.LineSegments(new three.EdgesGeometry(new three.BoxGeometry(...thing.size)), new three.LineBasicMaterial({ color: 0xb43cb0 }));
+      const [x, y, z] = thing.at;
+      box.quaternion.set(...thing.at.slice(3)).normalize();
+      box.position.set(x, y, z + thing.size[2] / 2);
+      this.seen.add(box);
+    }
+    this.seen.visible = false;
+    scene.add(this.seen, this.trail());
+  }
+
+  /** The way of the target. */
+  trail() {
+    const { three, course, target } = this;
+    const points = target ? Array.from({ length: course.frames }, (_, frame) => new three.Vector3(...course.position(target, frame * course.period))) : [];
+    return new three.Line(new three.BufferGeometry().setFromPoints(points), new three.LineBasicMaterial({ color: LOOKS.target[0], transparent: true, opacity: 0.7 }));
+  }
+
+  /** What is worth looking at: the target while the robot is near it, else the robot. */
+  focus(secs) {
+    const robot = this.course.robot(secs), target = this.target && this.course.position(this.target, secs);
+    if (!robot) return target ?? [0, 0, 0.5];
+    if (!target || Math.hypot(target[0] - robot[0], target[1] - robot[1]) > 1.6) return [robot[0], robot[1], 0.55];
+    return target.map((value, i) => value + (robot[i] - value) * 0.22);
+  }
+
+  /** The first view: from the side of the way from the robot to the target. */
+  begin() {
+    const robot = this.course.robot(0) ?? [0, 0, 0], target = (this.target && this.course.position(this.target, 0)) ?? [1, 0, 0];
+    const way = Math.atan2(target[1] - robot[1], target[0] - robot[0]);
+    Object.assign(this.orbit, { turn: way - 2.0, height: 0.48, distance: 2.3, centre: this.focus(0) });
+  }
+
+  theme() {
+    const dark = colourOf("scheme") === "dark";
+    this.scene.background = new this.three.Color(dark ? 0x171d26 : 0xeef0f2);
+    this.scene.fog = new this.three.Fog(this.scene.background, 9, 24);
+    this.floor.material.color.set(dark ? 0x27303c : 0xd9dcdf);
+    this.grid.material.color.set(dark ? 0x8090a4 : 0x8b95a1);
+    this.draw();
+  }
+
+  /** Shows a moment. */
+  show(secs, follow = true) {
+    this.secs = secs;
+    this.course.tracks.forEach((_, slot) => {
+      const pose = this.course.pose(slot, secs), group = this.moving[slot];
+      group.position.set(...pose.slice(0, 3));
+      group.quaternion.set(...pose.slice(3)).normalize();
+    });
+    const focus = this.focus(secs);
+    if (follow && !this.orbit.held) {
+      this.orbit.centre = this.near ? this.orbit.centre.map((value, i) => value + (focus[i] - value) * 0.12) : focus;
+    }
+    this.sun.position.set(focus[0] + 1.6, focus[1] - 2.2, focus[2] + 4.2);
+    this.sun.target.position.set(...focus);
+    this.draw();
+  }
+
+  draw() {
+    this.waiting ??= requestAnimationFrame(() => { this.waiting = null; this.paint(); });
+  }
+
+  paint() {
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (!width || !height) return;
+    const size = this.renderer.getSize(new this.three.Vector2());
+    if (size.x !== width || size.y !== height) {
+      this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+      this.renderer.setSize(width, height, false);
+      this.camera.aspect = width / height;
+      this.camera.updateProjectionMatrix();
+    }
+    this.orbit.place();
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  /** A moment as a picture, in its own view. */
+  picture(secs, into) {
+    const before = [this.secs ?? 0, this.orbit.centre, this.near];
+    this.near = false;
+    this.show(secs, true);
+    this.paint();
+    const [width, height] = [this.canvas.width, this.canvas.height], pen = into.getContext("2d");
+    into.width = 480;
+    into.height = Math.round(480 * height / Math.max(1, width));
+    pen.drawImage(this.canvas, 0, 0, into.width, into.height);
+    [this.orbit.centre, this.near] = [before[1], before[2]];
+    this.show(before[0], false);
+  }
+
+  end() {
+    cancelAnimationFrame(this.waiting);
+    this.scene.traverse((thing) => { thing.geometry?.dispose(); thing.material?.dispose?.(); });
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+  }
+}

@@ -1,0 +1,15 @@
+// Light and dark: as the system has it, until one is chosen.
+
+function themeButton() {
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const button = make("button", { type: "button", class: "flat theme", onclick: () => set(now() === "dark" ? "light" : "dark") });
+  const now = () => document.documentElement.dataset.theme ?? (dark.matches ? "dark" : "light");
+  const set = (theme) => {
+    if (theme) document.documentElement.dataset.theme = theme;
+    button.textContent = now() === "dark" ? "☀ Light" : "☾ Dark";
+    document.dispatchEvent(new Event("theme"));
+  };
+  dark.addEventListener("change", () => set());
+  set();
+  return button;
+}

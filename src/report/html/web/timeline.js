@@ -1,0 +1,62 @@
+// What happened when: actions with their phases, contacts with their forces, and the moments that decided.
+
+const LANE = 15;
+const MOST_LANES = 12;
+
+/** Contacts worth a lane: of the robot with things, and of things that move with others; the same pair in one. */
+function lanes(replay, seconds) {
+  const found = new Map();
+  for (const action of replay.actions) {
+    for (const [a, b, start, end, force] of action.contacts ?? []) {
+      const robot = a.startsWith("robot/") || b.startsWith("robot/");
+      const name = (thing) => thing.startsWith("robot/") ? "robot" : thing;
+      const pair = [name(a), name(b)].sort((x, y) => (x === "robot" ? -1 : y === "robot" ? 1 : x.localeCompare(y))).join(" – ");
+      if (!found.has(pair)) found.set(pair, { pair, robot, episodes: [], most: 0, length: 0 });
+      const lane = found.get(pair);
+      lane.episodes.push([action.start + start, action.start + end, force]);
+      lane.most = Math.max(lane.most, force);
+      lane.length += end - start;
+    }
+  }
+  return [...found.values()]
+    // What touches all the time tells nothing.
+    .filter((lane) => lane.robot || lane.length < 0.9 * seconds)
+    .sort((a, b) => b.robot - a.robot || b.most - a.most).slice(0, MOST_LANES);
+}
+
+/** The timeline and a function that marks a moment. `seek` is told where it is clicked. */
+function timeline(replay, seconds, seek) {
+  const rows = lanes(replay, seconds), left = 150, width = 1000, inner = width - left - 10;
+  const x = (secs) => left + (seconds ? secs / seconds : 0) * inner;
+  const top = 42, height = top + rows.length * LANE + 8;
+  const marks = replay.actions.flatMap((action) => action.judged.filter((judged) => judged.decided !== null && judged.decided !== undefined));
+  const now = make("line", { class: "now", x1: left, x2: left, y1: 0, y2: height });
+  const drawing = make("svg", { class: "timeline", viewBox: `0 0 ${width} ${height}`, role: "img",
+    "aria-label": "Actions, contacts and failures over time",
+    onclick: (event) => {
+      const at = drawing.getBoundingClientRect();
+      seek(Math.min(seconds, Math.max(0, ((event.clientX - at.left) / at.width * width - left) / inner * seconds)));
+    } },
+    replay.actions.filter((action) => action.start !== undefined && action.seconds > 0).map((action, i) => [
+      make("rect", { class: `action of${i % 6}`, x: x(action.start), y: 2, width: Math.max(2, x(action.start + action.seconds) - x(action.start) - 1), height: 16, rx: 3 },
+        make("title", { svg: true }, `${local(action.action)}: ${number(action.seconds, "s")}`)),
+      make("text", { class: "name", x: x(action.start) + 5, y: 14 }, x(action.start + action.seconds) - x(action.start) > 40 ? local(action.action) : ""),
+      (action.phases ?? []).map(([name, start], j, all) => {
+        const [from, to] = [x(action.start + start), x(action.start + (all[j + 1]?.[1] ?? action.seconds))];
+        return [
+          make("line", { class: "phase", x1: from, x2: from, y1: 20, y2: 34 }, make("title", { svg: true }, name)),
+          to - from > name.length * 5.4 + 6 && make("text", { class: "small", x: from + 3, y: 31 }, name)];
+      })]),
+    rows.map((lane, i) => [
+      make("text", { class: "small", x: left - 8, y: top + i * LANE + 10, "text-anchor": "end" }, lane.pair.length > 26 ? `${lane.pair.slice(0, 25)}…` : lane.pair,
+        make("title", { svg: true }, lane.pair)),
+      make("line", { class: "lane", x1: left, x2: width - 10, y1: top + i * LANE + 7, y2: top + i * LANE + 7 }),
+      lane.episodes.map(([from, to, force]) => make("rect", {
+        class: lane.robot ? "contact robot" : "contact", x: x(from), width: Math.max(2, x(to) - x(from)), y: top + i * LANE + 2, height: 10, rx: 2,
+        "fill-opacity": 0.35 + 0.65 * Math.min(1, force / 20),
+      }, make("title", { svg: true }, `${lane.pair}: ${number(from, "s")} to ${number(to, "s")}, up to ${number(force, "N")}`)))]),
+    marks.map((judged) => make("path", { class: "decided", d: `M${x(judged.decided)} 0 V${height} M${x(judged.decided) - 4} 0 h8 l-4 6 z` },
+      make("title", { svg: true }, `${local(judged.property)} failed`))),
+    now);
+  return [drawing, (secs) => { now.setAttribute("x1", x(secs)); now.setAttribute("x2", x(secs)); }];
+}

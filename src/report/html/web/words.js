@@ -1,0 +1,51 @@
+// Numbers, shares and names as people read them.
+
+const THIN = "\u2009";
+
+/** A number with four digits that mean something. */
+function number(value, unit = "") {
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  const digits = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(4)));
+  const shown = digits.replace("-", "\u2212");
+  return unit && unit !== "1" ? `${shown}${THIN}${unit}` : shown;
+}
+
+/** A count with its thousands apart. */
+function count(value) {
+  return String(value).replace(/\B(?=(\d{3})+$)/g, THIN);
+}
+
+function percent(share) {
+  const value = share * 100;
+  return `${value > 0 && value < 9.95 ? value.toFixed(1) : value.toFixed(0)}${THIN}%`;
+}
+
+/** `71 % [58–82]` */
+function interval(found) {
+  if (!found) return "–";
+  return `${percent(found.rate)} [${(found.low * 100).toFixed(0)}–${(found.high * 100).toFixed(0)}]`;
+}
+
+/** Wilson's score interval of 95 % (1927), as everywhere in actcheck. */
+function wilson(successes, trials) {
+  if (!trials) return null;
+  const z = 1.959963984540054;
+  const rate = successes / trials, denominator = 1 + z * z / trials;
+  const centre = (rate + z * z / (2 * trials)) / denominator;
+  const half = z / denominator * Math.sqrt(rate * (1 - rate) / trials + z * z / (4 * trials * trials));
+  return { rate, low: rate === 0 ? 0 : Math.max(0, centre - half), high: rate === 1 ? 1 : Math.min(1, centre + half) };
+}
+
+/** `ObjectInGripper` as `Object In Gripper` with places where a line may break. */
+function breakable(name) {
+  return name.replace(/([a-z0-9])([A-Z])/g, "$1\u200b$2").replace(/_/g, "_\u200b");
+}
+
+function moment(text) {
+  return String(text ?? "").replace("T", " ").replace(/:\d\d(\.\d+)?Z$/, "");
+}
+
+/** A word for a shell. */
+function quoted(word) {
+  return /^[\w./:@%+=,-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
+}
