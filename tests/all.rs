@@ -2,6 +2,7 @@
 
 mod bounds;
 mod broken;
+mod browser;
 mod budgets;
 mod campaign;
 mod cases;

@@ -7,7 +7,7 @@ use crate::cli::analyse::{AnalyseArgs, Analysed, analysed};
 use crate::cli::args::{Format, HistoryArgs};
 use crate::cli::clock;
 use crate::cli::report::ReportArgs;
-use crate::history::{History, RunDetail};
+use crate::history::{History, RunDetail, Trace};
 use crate::ontology::Ontology;
 use crate::report::{Explained, HTML_COLUMNS, HtmlReport, PropertyWords, Replays, html, replay_order};
 use crate::rules::{Budget, RuleBook};
@@ -18,6 +18,12 @@ const DEPTH: u8 = 3;
 const LEVEL: f64 = 0.05;
 /// Letters that stand for bytes take a third more room.
 const BYTES_IN_A_MB: f64 = 1e6;
+
+/// Runs that a worker reads before they are packed.
+const RUNS_OF_A_WORKER: usize = 8;
+
+/// A run with its trace and what explains its failures.
+type Watched = (RunDetail, Option<Trace>, Vec<Explained>);
 
 /// The whole page.
 ///
@@ -64,7 +70,7 @@ fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
     ontology.properties.iter().map(|(iri, property)| (iri.clone(), told(property))).collect()
 }
 
-/// As many runs as there is room for.
+/// As many runs as there is room for: what they are read and explained with takes most of the time, so it is shared out.
 fn replays(history: &History, ontology: &Ontology, order: &[String], room: f64) -> Result<Replays, Diagnostics> {
     let mut replays = Replays::default();
     if room <= 0.0 || order.is_empty() {
@@ -73,15 +79,30 @@ fn replays(history: &History, ontology: &Ontology, order: &[String], room: f64) 
     let budget = Budget::default();
     // Rules that can't be read today explain nothing; the outcomes are those of the history.
     let rules = RuleBook::prepare_within(ontology, &budget).ok();
-    for id in order {
-        if replays.bytes() as f64 >= room {
-            break;
-        }
+    let read = |id: &String| -> Result<Watched, Diagnostics> {
         let run = history.run(id)?;
         // A run that was broken before its first state has no trace; all else is told of it.
         let trace = history.trace(id).ok();
         let explained = rules.as_ref().map(|rules| explained(history, rules, &run, &budget)).unwrap_or_default();
-        replays.add(&run, trace.as_ref(), &explained);
+        Ok((run, trace, explained))
+    };
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    for runs in order.chunks(workers * RUNS_OF_A_WORKER) {
+        let shares: Vec<Vec<Result<Watched, Diagnostics>>> = std::thread::scope(|scope| {
+            let share = |runs: &'_ [String]| runs.iter().map(read).collect();
+            let started: Vec<_> = runs.chunks(RUNS_OF_A_WORKER).map(|runs| scope.spawn(move || share(runs))).collect();
+            started
+                .into_iter()
+                .map(|share| share.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
+        });
+        for watched in shares.into_iter().flatten() {
+            if replays.bytes() as f64 >= room {
+                return Ok(replays);
+            }
+            let (run, trace, explained) = watched?;
+            replays.add(&run, trace.as_ref(), &explained);
+        }
     }
     Ok(replays)
 }

@@ -75,7 +75,7 @@ pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
         let column = kinds(table, name, &first_rows, &mut pack);
         pack.say(name, column);
     }
-    for name in ["score", "scene", "repetition"] {
+    for name in ["index", "score", "scene", "repetition"] {
         let column = pack.numbers(&of_rows(table, name, &first_rows));
         pack.say(name, column);
     }
@@ -99,17 +99,21 @@ pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
     pack.finish()
 }
 
-/// For each run the row that tells its scene: the first one that knows a target, or else the first.
+/// For each run the row that tells its scene: the one whose platform the target stands on, or nearest to; actions that go elsewhere
+/// have another platform.
 fn first_rows(table: &OutcomeTable) -> Vec<usize> {
     let runs = table.text("run");
-    let target = table.text("target_model");
-    let mut rows: Vec<Option<(usize, bool)>> = vec![None; runs.texts.len()];
+    let (x, y) = (table.number("surface_x_m"), table.number("surface_y_m"));
+    let away = |row: usize| match (x.get(row), y.get(row)) {
+        (Some(x), Some(y)) if !x.is_nan() && !y.is_nan() => x.hypot(*y),
+        _ => f64::INFINITY,
+    };
+    let mut rows: Vec<Option<(usize, f64)>> = vec![None; runs.texts.len()];
     for (row, run) in runs.of_row.iter().enumerate() {
         let Some(run) = run else { continue };
-        let has_target = target.get(row).is_some();
         let known = &mut rows[*run as usize];
-        if known.is_none_or(|(_, had_target)| has_target && !had_target) {
-            *known = Some((row, has_target));
+        if known.is_none_or(|(_, least)| away(row) < least) {
+            *known = Some((row, away(row)));
         }
     }
     rows.into_iter().map(|row| row.map_or(0, |(row, _)| row)).collect()

@@ -45,3 +45,50 @@ pub(super) const THREE: [(&str, &str); 2] = [
     ("three-core", include_str!("vendor/three/three.core.min.js")),
     ("three-module", include_str!("vendor/three/three.module.min.js")),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What would make markup of text, or run text.
+    const PARSERS: [&str; 10] = [
+        "innerHTML",
+        "outerHTML",
+        "insertAdjacentHTML",
+        "document.write",
+        "DOMParser",
+        "createContextualFragment",
+        "srcdoc",
+        "eval(",
+        "new Function",
+        "javascript:",
+    ];
+
+    #[test]
+    fn no_script_makes_markup_of_text() {
+        for script in SCRIPT {
+            for parser in PARSERS {
+                assert!(!script.contains(parser), "{parser} in {}", script.lines().next().unwrap_or_default());
+            }
+            // It would end the element that the script stands in.
+            assert!(!script.to_lowercase().contains("</script"));
+        }
+    }
+
+    #[test]
+    fn the_page_names_no_other_host() {
+        for text in SCRIPT.iter().chain(&STYLE).chain([&SHELL]) {
+            let hosts: Vec<&str> =
+                text.split("://").skip(1).map(|rest| rest.split(['/', '"']).next().unwrap_or_default()).collect();
+            // The namespace of drawings is a name, not an address.
+            assert!(hosts.iter().all(|host| *host == "www.w3.org"), "{hosts:?}");
+        }
+    }
+
+    #[test]
+    fn the_library_comes_with_its_licence() {
+        let licence = include_str!("vendor/three/LICENSE");
+        assert!(licence.contains("MIT License") && licence.contains("three.js authors"));
+        assert!(THREE.iter().all(|(_, text)| text.contains("SPDX-License-Identifier: MIT")));
+    }
+}

@@ -28,7 +28,7 @@ class Filter {
     const campaign = this.campaign === "" ? -1 : runs.campaign.texts.indexOf(this.campaign) + 1;
     const pattern = this.pattern && new Set(this.pattern.runs);
     const found = [];
-    for (let run = 0; run < runs.count; run++) {
+    for (const run of runs.order) {
       if (outcome >= 0 && (slot >= 0 ? runs.outcome(run, slot) : runs.worst[run]) !== outcome) continue;
       if (slot >= 0 && runs.outcome(run, slot) === NO_OUTCOME) continue;
       if (mode >= 0 && runs.modeOf[run] !== mode) continue;

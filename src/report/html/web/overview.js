@@ -22,13 +22,13 @@ function overview({ runs, summary, filter, open }) {
       score("T without broken runs", scores.without_broken === null ? "–" : scores.without_broken.toFixed(4), "the robot's alone"),
       score("everything passed", scores.all_passed ? percent(scores.all_passed.rate) : "–",
         scores.all_passed ? `[${(scores.all_passed.low * 100).toFixed(0)}–${(scores.all_passed.high * 100).toFixed(0)}] · ${count(scores.passed)} of ${count(scores.tested)} runs that tested anything` : "no run tested anything")),
+    make("section", { class: "card" }, make("h2", {}, "Properties"), propertyTable(summary),
+      make("p", { class: "more" }, make("a", { href: "#/properties" }, "margins and heat maps →"))),
     make("div", { class: "columns" },
-      make("section", {}, make("h2", {}, "Properties"), propertyTable(summary, runs),
-        make("p", { class: "more" }, make("a", { href: "#/properties" }, "margins and heat maps →"))),
       make("section", {}, make("h2", {}, "How runs fail"), modeBars(summary, filter, 6),
-        make("p", { class: "more" }, make("a", { href: "#/modes" }, "all failure modes →")))),
-    make("section", {}, make("h2", {}, "When they fail"), patternList(summary, 5),
-      make("p", { class: "more" }, make("a", { href: "#/patterns" }, "patterns with plots →"))),
+        make("p", { class: "more" }, make("a", { href: "#/modes" }, "all failure modes →"))),
+      make("section", {}, make("h2", {}, "When they fail"), patternList(summary, 6),
+        make("p", { class: "more" }, make("a", { href: "#/patterns" }, "patterns with plots →")))),
   ];
 }
 

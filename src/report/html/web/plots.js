@@ -23,7 +23,7 @@ function histogram(values, unit, label) {
   low -= cut;
   high -= cut;
   for (const value of known) sums[Math.min(bins - 1, Math.max(0, Math.floor((value - low) / step)))]++;
-  const most = Math.max(...sums), width = 384, height = 96, x = (value) => ((value - low) / (high - low)) * width;
+  const most = Math.max(...sums), width = 560, height = 120, x = (value) => ((value - low) / (high - low)) * width;
   return make("svg", { class: "histogram", viewBox: `0 -6 ${width} ${height + 26}`, role: "img", "aria-label": `${label}: how margins are spread` },
     sums.map((sum, i) => sum > 0 && make("rect", {
       class: low + (i + 0.5) * step < 0 ? "failed" : "passed", x: i * width / bins + 0.5, width: width / bins - 1,

@@ -38,8 +38,9 @@ async function watch(known, place, details, { runs, run, id }) {
   let ended = false, shown = null;
   known.end = () => { ended = true; shown?.end(); };
   const seek = (secs) => shown?.seek(secs);
-  fill(details, replay.actions.map((action) => action.judged.filter((judged) => judged.outcome === "failed").map((judged) =>
-    explained(action, judged, seek))), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
+  const asked = new Set(runs.slots.map((slot) => slot.iri));
+  const told = (judged) => judged.outcome === "failed" && asked.has(judged.property);
+  fill(details, replay.actions.map((action) => action.judged.filter(told).map((judged) => explained(action, judged, seek))), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
   if (!replay.courses || !replay.courses.frames) {
     fill(place, make("p", { class: "note" }, replay.reason ? `It was ${runs.text(runs.status, run)}: ${replay.reason}` : "It has no state to be shown."));
     return;
@@ -48,7 +49,7 @@ async function watch(known, place, details, { runs, run, id }) {
   if (ended) return made.end();
   shown = made;
   fill(place, made.element);
-  const decided = replay.actions.flatMap((action) => action.judged).map((judged) => judged.decided).filter((secs) => typeof secs === "number");
+  const decided = replay.actions.flatMap((action) => action.judged).filter(told).map((judged) => judged.decided).filter((secs) => typeof secs === "number");
   made.begin(decided.length ? Math.min(...decided) : 0);
   place.dataset.ready = "true";
 }

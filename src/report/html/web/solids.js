@@ -53,7 +53,7 @@ function fan(three, points, normal) {
 }
 
 const LOOKS = {
-  robot: [0x6f8fb0, 0.45, 0.35], target: [0x2f7fe0, 0.35, 0.0], other: [0x9aa3ae, 0.55, 0.0],
+  robot: [0x86a5c6, 0.5, 0.15], target: [0x2f7fe0, 0.35, 0.0], other: [0xaab3bd, 0.55, 0.0],
   obstacle: [0xd08a2e, 0.6, 0.0], platform: [0xd9c29a, 0.8, 0.0], wall: [0xb9c0c9, 0.9, 0.0],
 };
 

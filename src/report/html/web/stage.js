@@ -76,14 +76,14 @@ class Stage {
     const robot = this.course.robot(secs), target = this.target && this.course.position(this.target, secs);
     if (!robot) return target ?? [0, 0, 0.5];
     if (!target || Math.hypot(target[0] - robot[0], target[1] - robot[1]) > 1.6) return [robot[0], robot[1], 0.55];
-    return target.map((value, i) => value + (robot[i] - value) * 0.22);
+    return target.map((value, i) => value + (robot[i] - value) * (i < 2 ? 0.36 : 0.1));
   }
 
   /** The first view: from the side of the way from the robot to the target. */
   begin() {
     const robot = this.course.robot(0) ?? [0, 0, 0], target = (this.target && this.course.position(this.target, 0)) ?? [1, 0, 0];
     const way = Math.atan2(target[1] - robot[1], target[0] - robot[0]);
-    Object.assign(this.orbit, { turn: way - 2.0, height: 0.48, distance: 2.3, centre: this.focus(0) });
+    Object.assign(this.orbit, { turn: way - 1.95, height: 0.46, distance: 2.75, centre: this.focus(0) });
   }
 
   theme() {

@@ -1,0 +1,175 @@
+//! A browser without a window, spoken to over two pipes (the DevTools protocol), with nothing but what Debian's package has.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+/// Names that the browser goes by.
+const NAMES: [&str; 6] =
+    ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "chromium-headless-shell"];
+/// A slow machine draws in software.
+const PATIENCE: Duration = Duration::from_secs(90);
+/// What is asked again and again is asked so often.
+const PAUSE: Duration = Duration::from_millis(30);
+
+/// A browser with one page. It ends with this value.
+pub struct Chromium {
+    child: Child,
+    input: ChildStdin,
+    answers: Receiver<Value>,
+    session: Option<String>,
+    asked: u64,
+    /// Faults that the page told of.
+    pub complaints: Vec<String>,
+    _profile: tempfile::TempDir,
+}
+
+/// The browser's file: the one that `ACTCHECK_CHROMIUM` names, or one that is installed.
+fn program() -> PathBuf {
+    if let Some(named) = std::env::var_os("ACTCHECK_CHROMIUM") {
+        return named.into();
+    }
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    let file = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    file.into_iter().find(|file| file.is_file()).unwrap_or_else(|| {
+        panic!("this needs the browser Chromium: `apt-get install chromium`, or name one in ACTCHECK_CHROMIUM")
+    })
+}
+
+impl Chromium {
+    pub fn start() -> Self {
+        let profile = tempfile::tempdir().unwrap();
+        // The browser reads from its third and writes to its fourth pipe.
+        let mut child = Command::new("sh")
+            .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null"])
+            .arg(program())
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-dev-shm-usage",
+                "--remote-debugging-pipe",
+                "--hide-scrollbars",
+            ])
+            .args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run", "about:blank"])
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (input, output) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+        let (send, answers) = channel();
+        std::thread::spawn(move || {
+            for message in BufReader::new(output).split(0).map_while(Result::ok) {
+                let Ok(message) = serde_json::from_slice(&message) else { break };
+                if send.send(message).is_err() {
+                    break;
+                }
+            }
+        });
+        let mut browser =
+            Self { child, input, answers, session: None, asked: 0, complaints: Vec::new(), _profile: profile };
+        let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"].clone();
+        let attached = browser.call("Target.attachToTarget", json!({ "targetId": target, "flatten": true }));
+        browser.session = Some(attached["sessionId"].as_str().unwrap().to_owned());
+        for domain in ["Page", "Runtime", "Log"] {
+            browser.call(&format!("{domain}.enable"), json!({}));
+        }
+        browser
+    }
+
+    /// Asks the browser for something.
+    pub fn call(&mut self, method: &str, params: Value) -> Value {
+        self.asked += 1;
+        let mut message = json!({ "id": self.asked, "method": method, "params": params });
+        if let Some(session) = &self.session {
+            message["sessionId"] = json!(session);
+        }
+        self.input.write_all(format!("{message}\0").as_bytes()).unwrap();
+        self.input.flush().unwrap();
+        loop {
+            let answer = self.answers.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no answer to {method}"));
+            if answer["id"] == json!(self.asked) {
+                assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
+                return answer["result"].clone();
+            }
+            self.listen(&answer);
+        }
+    }
+
+    fn listen(&mut self, event: &Value) {
+        let bad = |word: &Value| ["error", "warning", "assert"].contains(&word.as_str().unwrap_or_default());
+        let params = &event["params"];
+        let complaint = match event["method"].as_str().unwrap_or_default() {
+            "Runtime.exceptionThrown" => true,
+            "Runtime.consoleAPICalled" => bad(&params["type"]),
+            "Log.entryAdded" => bad(&params["entry"]["level"]),
+            _ => false,
+        };
+        if complaint {
+            self.complaints.push(params.to_string());
+        }
+    }
+
+    /// The value of an expression in the page, which may be a promise.
+    pub fn value(&mut self, expression: &str) -> Value {
+        let asked = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
+        let answer = self.call("Runtime.evaluate", asked);
+        assert!(answer["exceptionDetails"].is_null(), "{expression}: {}", answer["exceptionDetails"]);
+        answer["result"]["value"].clone()
+    }
+
+    /// Waits until an expression is true.
+    pub fn until(&mut self, expression: &str) {
+        let start = Instant::now();
+        while self.value(&format!("Boolean({expression})")) != json!(true) {
+            assert!(start.elapsed() < PATIENCE, "it never came to {expression}; {:?}", self.complaints);
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    /// Opens a report at a view, such as `/runs`.
+    pub fn open(&mut self, file: &Path, view: &str) {
+        self.call("Page.navigate", json!({ "url": "about:blank" }));
+        self.call("Page.navigate", json!({ "url": format!("file://{}#{view}", file.display()) }));
+        self.until("document.documentElement.dataset.ready === 'true'");
+    }
+
+    /// Width and height of the page. Unit: pixels.
+    pub fn size(&mut self, width: u32, height: u32) {
+        let asked = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
+        self.call("Emulation.setDeviceMetricsOverride", asked);
+    }
+
+    /// What the system prefers: `light` or `dark`.
+    pub fn theme(&mut self, theme: &str) {
+        let features = json!([{ "name": "prefers-color-scheme", "value": theme }]);
+        self.call("Emulation.setEmulatedMedia", json!({ "features": features }));
+    }
+
+    /// Presses a key such as `ArrowDown`.
+    pub fn press(&mut self, key: &str) {
+        for kind in ["keyDown", "keyUp"] {
+            self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "code": key }));
+        }
+    }
+
+    /// What can be seen, as PNG.
+    pub fn picture(&mut self) -> Vec<u8> {
+        use base64::Engine as _;
+        let letters = self.call("Page.captureScreenshot", json!({ "format": "png" }))["data"].clone();
+        base64::engine::general_purpose::STANDARD.decode(letters.as_str().unwrap()).unwrap()
+    }
+}
+
+impl Drop for Chromium {
+    fn drop(&mut self) {
+        // It may have gone already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,71 @@
+//! Pages of made-up runs: the whole way from tables to HTML without a history.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use actcheck::analysis::{
+    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns, flaky_scenes,
+    judged, property_findings, table_failure_modes, trend, two_way,
+};
+use actcheck::history::RunDetail;
+use actcheck::report::{FindingsSummary, HTML_COLUMNS, HtmlReport, PropertyReport, PropertyWords, Replays, html};
+use actcheck::verdict::Counts;
+
+/// Chance of a false finding that is borne.
+const LEVEL: f64 = 0.05;
+
+/// What analysis says of a table.
+pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
+    let all = judged(table);
+    let property = |of| {
+        let findings = property_findings(table, of, &Hierarchy::new(), &PatternOptions::default());
+        let (flaky, repeated_scenes) = flaky_scenes(table, of);
+        PropertyReport {
+            maps: [["surface_y_m", "surface_x_m"], ["target_category", "target_turned_rad"]]
+                .iter()
+                .filter_map(|by| two_way(&findings.subject, by))
+                .collect(),
+            unit: Some("m".to_owned()),
+            trend: trend(table, of, LEVEL),
+            flaky,
+            repeated_scenes,
+            findings,
+        }
+    };
+    FindingsSummary {
+        history: history.to_owned(),
+        program: "actcheck".to_owned(),
+        options: String::new(),
+        campaigns: table.text("campaign").texts.clone(),
+        runs: table.text("run").texts.len() as u64,
+        counts: all.iter().fold(Counts::default(), |mut sum, of| {
+            sum.add_all(of.counts);
+            sum
+        }),
+        modes: table_failure_modes(table),
+        cascades: cascades(table, LEVEL),
+        properties: all.iter().map(property).collect(),
+        level: LEVEL,
+    }
+}
+
+/// Writes runs as a mirror into a folder.
+pub fn mirror(folder: &Path, campaign: &str, runs: impl IntoIterator<Item = RunDetail>) -> Mirror {
+    Mirror::of_runs(folder, campaign, runs).unwrap()
+}
+
+/// The page of a mirror.
+pub fn page(mirror: &Mirror, history: &str, words: &BTreeMap<String, PropertyWords>, replays: &Replays) -> String {
+    let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
+    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).chain(HTML_COLUMNS).collect();
+    let table = OutcomeTable::read(mirror, &TableFilter::default(), &names).unwrap();
+    html(&HtmlReport {
+        version: "0.1.0",
+        made: "2026-01-01T00:00:00Z",
+        findings: &findings(&table, history),
+        table: &table,
+        campaigns: &[],
+        words,
+        replays,
+    })
+}
