@@ -1,5 +1,5 @@
 # make         what the machine lacks, then the program, as ./actcheck
-# make test    all tests
+# make test    all tests (the report's in Chromium, which is installed where it is missing)
 # make bench   what things cost, as ratios
 # make notebooks   runs the notebooks on fresh campaigns and keeps their outputs (RUNS=200)
 #
@@ -14,9 +14,11 @@ build: system
 	ln -sfn "$(CARGO_TARGET_DIR)/release/actcheck" actcheck
 
 test: build
+	@sh .ci/system browser
 	cargo test --release --locked
 
 bench: system
+	@sh .ci/system browser
 	cargo bench --locked
 
 RUNS ?= 200

@@ -22,7 +22,7 @@ pub struct Chromium {
     input: ChildStdin,
     answers: Receiver<Value>,
     session: Option<String>,
-    asked: u64,
+    number: u64,
     /// Faults that the page told of.
     pub complaints: Vec<String>,
     _profile: tempfile::TempDir,
@@ -72,7 +72,7 @@ impl Chromium {
             }
         });
         let mut browser =
-            Self { child, input, answers, session: None, asked: 0, complaints: Vec::new(), _profile: profile };
+            Self { child, input, answers, session: None, number: 0, complaints: Vec::new(), _profile: profile };
         let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"].clone();
         let attached = browser.call("Target.attachToTarget", json!({ "targetId": target, "flatten": true }));
         browser.session = Some(attached["sessionId"].as_str().unwrap().to_owned());
@@ -84,8 +84,12 @@ impl Chromium {
 
     /// Asks the browser for something.
     pub fn call(&mut self, method: &str, params: Value) -> Value {
-        self.asked += 1;
-        let mut message = json!({ "id": self.asked, "method": method, "params": params });
+        self.asked(method, params).unwrap_or_else(|fault| panic!("{method}: {fault}"))
+    }
+
+    fn asked(&mut self, method: &str, params: Value) -> Result<Value, String> {
+        self.number += 1;
+        let mut message = json!({ "id": self.number, "method": method, "params": params });
         if let Some(session) = &self.session {
             message["sessionId"] = json!(session);
         }
@@ -93,9 +97,9 @@ impl Chromium {
         self.input.flush().unwrap();
         loop {
             let answer = self.answers.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no answer to {method}"));
-            if answer["id"] == json!(self.asked) {
-                assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
-                return answer["result"].clone();
+            if answer["id"] == json!(self.number) {
+                let fault = &answer["error"];
+                return if fault.is_null() { Ok(answer["result"].clone()) } else { Err(fault.to_string()) };
             }
             self.listen(&answer);
         }
@@ -117,17 +121,28 @@ impl Chromium {
 
     /// The value of an expression in the page, which may be a promise.
     pub fn value(&mut self, expression: &str) -> Value {
-        let asked = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
-        let answer = self.call("Runtime.evaluate", asked);
-        assert!(answer["exceptionDetails"].is_null(), "{expression}: {}", answer["exceptionDetails"]);
-        answer["result"]["value"].clone()
+        self.evaluated(expression).unwrap_or_else(|fault| panic!("{expression}: {fault}"))
     }
 
-    /// Waits until an expression is true.
+    fn evaluated(&mut self, expression: &str) -> Result<Value, String> {
+        let asked = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
+        let answer = self.asked("Runtime.evaluate", asked)?;
+        if answer["exceptionDetails"].is_null() {
+            Ok(answer["result"]["value"].clone())
+        } else {
+            Err(answer["exceptionDetails"].to_string())
+        }
+    }
+
+    /// Waits until an expression is true. Between two pages there is nothing that it could be true of.
     pub fn until(&mut self, expression: &str) {
         let start = Instant::now();
-        while self.value(&format!("Boolean({expression})")) != json!(true) {
-            assert!(start.elapsed() < PATIENCE, "it never came to {expression}; {:?}", self.complaints);
+        loop {
+            let found = self.evaluated(&format!("Boolean({expression})"));
+            if found == Ok(json!(true)) {
+                return;
+            }
+            assert!(start.elapsed() < PATIENCE, "it never came to {expression}: {found:?}, {:?}", self.complaints);
             std::thread::sleep(PAUSE);
         }
     }
@@ -136,7 +151,7 @@ impl Chromium {
     pub fn open(&mut self, file: &Path, view: &str) {
         self.call("Page.navigate", json!({ "url": "about:blank" }));
         self.call("Page.navigate", json!({ "url": format!("file://{}#{view}", file.display()) }));
-        self.until("document.documentElement.dataset.ready === 'true'");
+        self.until("document.documentElement.dataset.ready");
     }
 
     /// Width and height of the page. Unit: pixels.

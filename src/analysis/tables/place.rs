@@ -23,7 +23,7 @@ pub(super) struct Place<'a> {
 pub(super) struct ActionScene<'a> {
     /// The first target that the action's designators name, or the first of the scene.
     pub target: Option<&'a ObjectDetail>,
-    /// The platform that the designators name, or the one whose middle is nearest to the target.
+    /// The platform that the designators name, or any; of several the one whose middle is nearest to the target.
     pub surface: Option<&'a ObjectDetail>,
     /// The nearest thing to the target that is no platform, with the distance. Unit: metres.
     pub neighbour: Option<(&'a ObjectDetail, f64)>,
@@ -39,11 +39,15 @@ impl<'a> ActionScene<'a> {
             of_role().find(named).or_else(|| of_role().next())
         };
         let target = first(Role::Target);
+        // Tests that carry things name several: where the target stands is nearest.
         let platforms = || run.objects.iter().filter(|object| object.role == Role::Platform);
-        let surface = platforms().find(named).or_else(|| match target {
-            Some(target) => platforms().min_by(|a, b| distance(a, target).total_cmp(&distance(b, target))),
-            None => platforms().next(),
-        });
+        let among = |wanted: &dyn Fn(&&'a ObjectDetail) -> bool| match target {
+            Some(target) => {
+                platforms().filter(|it| wanted(it)).min_by(|a, b| distance(a, target).total_cmp(&distance(b, target)))
+            }
+            None => platforms().find(|it| wanted(it)),
+        };
+        let surface = among(&named).or_else(|| among(&|_| true));
         let others = |target: &'a ObjectDetail| {
             let loose = run.objects.iter().filter(|object| object.role != Role::Platform);
             loose.filter(move |object| object.id != target.id).map(move |object| (object, distance(object, target)))

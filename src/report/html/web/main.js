@@ -62,7 +62,7 @@ async function main() {
     if (document.readyState === "loading" && location.hash.startsWith("#/run/")) {
       document.addEventListener("DOMContentLoaded", () => go(true), { once: true });
     } else go(true);
-    document.documentElement.dataset.ready = "true";
+    document.documentElement.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
     fill(element, make("h1", {}, "The report can't be read"), make("p", {}, error.message),
       make("p", {}, "The file may be cut off, or this browser older than 2023."));

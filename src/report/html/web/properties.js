@@ -16,9 +16,10 @@ function properties({ runs, summary, filter }, chosen) {
       shares(property.outcomes, local(property.property)),
       make("p", { class: "counts" }, OUTCOMES.map((word) => make("button", { type: "button", class: "flat", onclick: () => look(word),
         disabled: !property.outcomes[word] }, sign(word), ` ${count(property.outcomes[word])} ${word}`))),
-      margins.some((value) => !Number.isNaN(value)) && make("figure", {},
-        make("figcaption", {}, `Margins${unit ? ` in ${unit}` : ""}: how far from flipping; below 0 it failed`), histogram(margins, unit, local(property.property))),
-      property.maps.length > 0 && make("div", { class: "maps" }, property.maps.map(heatMap)),
+      make("div", { class: "maps" },
+        margins.some((value) => !Number.isNaN(value)) && make("figure", {},
+          make("figcaption", {}, `Margins${unit ? ` in ${unit}` : ""}: how far from flipping; below 0 it failed`), histogram(margins, unit, local(property.property))),
+        property.maps.map(heatMap)),
       property.flaky.scenes > 0 && make("p", {}, `Of ${count(property.flaky.scenes)} scenes that were run more than once, ${count(property.flaky.both_ways.length)} went both ways.`));
     return card;
   });

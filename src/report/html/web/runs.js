@@ -13,6 +13,9 @@ class Runs {
     columns.witnesses.at.forEach((at, i) => this.witness.set(at, columns.witnesses.texts[i]));
     this.modeOf = new Int32Array(this.count).fill(-1);
     summary.findings.failure_modes.forEach((mode, number) => mode.runs.forEach((run) => { this.modeOf[run] = number; }));
+    const none = new Float64Array(this.count).fill(NaN);
+    this.score ??= none;
+    this.index ??= none;
     // By campaign, then as they were drawn: ids in the order of their letters are in none.
     this.order = Array.from({ length: this.count }, (_, run) => run)
       .sort((a, b) => this.campaign.of[a] - this.campaign.of[b] || this.index[a] - this.index[b] || a - b);

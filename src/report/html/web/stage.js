@@ -21,8 +21,8 @@ class Stage {
 
   lights() {
     const { three, scene } = this;
-    scene.add(new three.HemisphereLight(0xffffff, 0x9a938a, 1.7));
-    this.sun = new three.DirectionalLight(0xfff4e4, 2.6);
+    scene.add(new three.HemisphereLight(0xffffff, 0xa89f94, 2.1));
+    this.sun = new three.DirectionalLight(0xfff4e4, 2.2);
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(1024, 1024);
     Object.assign(this.sun.shadow.camera, { left: -2.2, right: 2.2, top: 2.2, bottom: -2.2, near: 0.5, far: 12 });

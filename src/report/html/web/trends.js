@@ -14,8 +14,9 @@ function trends({ summary, filter }) {
         make("td", {}, row.name), make("td", {}, moment(row.started)), make("td", {}, `${count(row.runs)} of ${count(row.planned)}`),
         make("td", {}, row.score === null ? "–" : row.score.toFixed(4)), make("td", {}, row.without_broken === null ? "–" : row.without_broken.toFixed(4)),
         make("td", {}, String(row.seed)), make("td", {}, ended(row)), make("td", {}, row.version))))))),
-    findings.properties.filter((property) => property.trend.campaigns.length).map((property) => make("section", { class: "card" },
-      make("h2", {}, make("small", {}, `${local(property.action)} `), local(property.property)),
-      trendPlot(property.trend), changed(property))),
+    campaigns.length < 2 ? make("p", {}, "There is one campaign. From the second on, this shows how often each property fails from campaign to campaign, and where that changed.")
+      : [make("h2", {}, "How often each property fails, from campaign to campaign"),
+        make("div", { class: "maps" }, findings.properties.filter((property) => property.trend.campaigns.length).map((property) => make("section", { class: "card" },
+          make("h2", {}, make("small", {}, `${local(property.action)} `), local(property.property)), trendPlot(property.trend), changed(property))))],
   ];
 }

@@ -1,0 +1,135 @@
+//! How large is the report of 10,000 runs, how long does it take to make, and how fast is it in a browser?
+//!
+//! `cargo bench --bench report`: made-up outcomes of five properties in tables on disk, replays of real runs that are simulated first, and
+//! Debian's Chromium without a window. Demanded: under 10 MB, made in under 5 s from the tables, first paint under 1 s, an answer to a
+//! filter under 100 ms. Every line tells its share of that.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+use actcheck::history::{History, RunDetail, Trace};
+use actcheck::report::Replays;
+use actcheck::verdict::Outcome;
+use support::chromium::Chromium;
+use support::{made_up, paged, planted};
+
+#[path = "../tests/support"]
+mod support {
+    #[expect(dead_code, reason = "tests ask the browser for more")]
+    pub mod chromium;
+    pub mod made_up;
+    pub mod paged;
+    #[expect(dead_code, reason = "only its dice are needed")]
+    pub mod planted;
+}
+
+const RUNS: u64 = 10_000;
+const PROPERTIES: [&str; 5] = ["CloseObject", "MovedObject", "NoGraspCollisions", "ObjectGrasped", "ObjectInGripper"];
+/// Room for replays, as `actcheck report` has by default. Unit: bytes.
+const ROOM: usize = 5_000_000;
+/// Runs that are simulated to be replayed under many names.
+const WATCHED: &str = "12";
+
+fn main() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let watched = simulated(folder.path());
+    let mut dice = planted::Dice::new(1);
+    let runs = (0..RUNS).map(|index| {
+        made_up::run("k", index, &mut dice, &["Pick"], |target, _, dice| {
+            let slips = target.category.ends_with("Bottle") && target.friction < 0.5;
+            let of = |(at, name): (usize, &'static str)| {
+                let rate = if slips && at > 2 { 0.6 } else { 0.03 * (at + 1) as f64 };
+                (name, if dice.share() < rate { Outcome::Failed } else { Outcome::Passed })
+            };
+            PROPERTIES.into_iter().enumerate().map(of).collect()
+        })
+    });
+    let runs = runs.map(|mut run| {
+        let judged = run.actions.iter_mut().flat_map(|action| &mut action.judgements);
+        judged.for_each(|judgement| {
+            judgement.witness = format!("{} is {} cm from the gripper", run.row.run, run.row.index)
+        });
+        run
+    });
+    let mirror = paged::mirror(&folder.path().join("tables"), "k", runs);
+    let start = Instant::now();
+    let mut replays = Replays::default();
+    let mut embedded = 0;
+    while replays.bytes() < ROOM {
+        let (run, trace) = &watched[embedded % watched.len()];
+        let mut run = run.clone();
+        embedded += 1;
+        run.row.run = format!("k-{embedded}");
+        replays.add(&run, Some(trace), &[]);
+    }
+    let packed = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let page = paged::page(&mirror, "made up", &BTreeMap::new(), &replays);
+    let secs = start.elapsed().as_secs_f64();
+    let file = folder.path().join("report.html");
+    std::fs::write(&file, &page).expect("the folder is there");
+    println!("{RUNS} runs × {} properties, {embedded} of them replayed", PROPERTIES.len());
+    tell("size", page.len() as f64 / 1e6, 10.0, "MB");
+    tell("to pack the replays", packed, 5.0, "s");
+    tell("from the tables to the page", secs, 5.0, "s");
+    in_a_browser(&file);
+}
+
+fn tell(name: &str, value: f64, demanded: f64, unit: &str) {
+    println!("{name:28} {value:>9.2} {unit:3} {:>6.2} of the {demanded} {unit} demanded", value / demanded);
+}
+
+/// Real runs with their traces.
+fn simulated(folder: &Path) -> Vec<(RunDetail, Trace)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let history = folder.join("h");
+    let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(["run", "configs/pick.toml", "--runs", WATCHED, "--history"])
+        .arg(&history)
+        .current_dir(root)
+        .output()
+        .expect("the program is built");
+    assert!(output.status.code().is_some_and(|code| code < 2), "{}", String::from_utf8_lossy(&output.stderr));
+    let history = History::open_existing(&history).expect("it was just written");
+    let runs = history.runs(&actcheck::history::RunFilter::default()).expect("it can be read");
+    let read = |id: &str| Some((history.run(id).ok()?, history.trace(id).ok()?));
+    runs.iter().filter_map(|row| read(&row.run)).collect()
+}
+
+fn in_a_browser(file: &Path) {
+    let mut browser = Chromium::start();
+    browser.size(1280, 860);
+    browser.open(file, "/");
+    let paint = browser.value(
+        "new Promise((done) => { const told = () => { const it = performance.getEntriesByName('first-contentful-paint')[0]; \
+         if (it) done(it.startTime); else setTimeout(told, 10); }; told(); })",
+    );
+    tell("first paint", paint.as_f64().unwrap_or(f64::NAN) / 1e3, 1.0, "s");
+    // Paint comes before the numbers do.
+    tell(
+        "the overview is there",
+        browser.value("Number(document.documentElement.dataset.ready)").as_f64().unwrap_or(f64::NAN) / 1e3,
+        1.0,
+        "s",
+    );
+    browser.open(file, "/runs");
+    for (name, control, value, event) in [
+        ("filter: failed", "outcome", "failed", "change"),
+        ("filter: one property", "slot", "2", "change"),
+        ("filter: any outcome", "outcome", "", "change"),
+        ("search, the first letter", "text", "b", "input"),
+        ("search, the next letters", "text", "bottle 77", "input"),
+        ("worst first", "sort", "score", "change"),
+        ("nothing chosen", "text", "", "input"),
+    ] {
+        // Until the next picture is on the screen.
+        let millis = browser.value(&format!(
+            "new Promise((done) => {{ const it = document.querySelector('[data-filter={control}]'); const start = performance.now(); \
+             it.value = '{value}'; it.dispatchEvent(new Event('{event}')); \
+             requestAnimationFrame(() => setTimeout(() => done(performance.now() - start), 0)); }})"
+        ));
+        tell(name, millis.as_f64().unwrap_or(f64::NAN), 100.0, "ms");
+    }
+}
