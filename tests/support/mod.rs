@@ -1,3 +1,82 @@
 //! What several tests need: the built program, and folders of their own.
 
 pub mod chromium;
+pub mod foreign;
+pub mod made_up;
+pub mod paged;
+pub mod planted;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The checkout's root.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The built program, started in a folder.
+pub fn actcheck(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(arguments)
+        .current_dir(folder)
+        .env("NO_COLOR", "1")
+        .output()
+        .unwrap()
+}
+
+/// Its output stream as text.
+pub fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+/// Its error stream as text.
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// A copy of what a project of a user's has: configurations, ontology, rules and models.
+pub fn project() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["configs", "ontology", "rules", "models"] {
+        copy(&root().join(name), &folder.path().join(name));
+    }
+    folder
+}
+
+/// Copies a folder without histories.
+pub fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target: PathBuf = to.join(entry.file_name());
+        if entry.file_name() == ".actcheck" {
+            continue;
+        }
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+/// Replaces a piece of a file that must be there.
+pub fn edit(file: &Path, from: &str, to: &str) {
+    let text = std::fs::read_to_string(file).unwrap();
+    assert!(text.contains(from), "{} has no `{from}`", file.display());
+    std::fs::write(file, text.replacen(from, to, 1)).unwrap();
+}
+
+/// A history of four runs that simulation made, for tests that only read it.
+pub fn made_history() -> &'static Path {
+    static MADE: std::sync::OnceLock<PathBuf> = std::sync::OnceLock::new();
+    MADE.get_or_init(|| {
+        // Statics are never dropped: a folder of the system for passing files would stay.
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made-history");
+        let _ = std::fs::remove_dir_all(&folder);
+        let name = folder.display().to_string();
+        let output = actcheck(root(), &["run", "configs/quick.toml", "--runs", "4", "--jobs", "2", "--history", &name]);
+        assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
+        folder
+    })
+}
