@@ -13,6 +13,7 @@ mod engine;
 mod error;
 mod fault;
 mod forms;
+mod fresh;
 pub mod ik;
 mod kinematics;
 mod layout;

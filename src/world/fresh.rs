@@ -1,0 +1,98 @@
+//! Contacts found anew in every step.
+//!
+//! The engine's geometry keeps contact points until they have moved by about a millimetre or the normal has turned by a
+//! degree. On a rim that rolls, the kept point trails the true one; the push then acts behind where the thing rests and
+//! drives it on: a bottle that was tipped a little on a table rocked for ever wider until it fell. Points found anew
+//! take that energy out of nowhere away.
+
+use parry3d::math::{Pose, Real, Vector};
+use parry3d::query::details::NormalConstraints;
+use parry3d::query::{
+    ClosestPoints, Contact, ContactManifold, ContactManifoldsWorkspace, DefaultQueryDispatcher, NonlinearRigidMotion,
+    PersistentQueryDispatcher, QueryDispatcher, ShapeCastHit, ShapeCastOptions, ShapeDistance, ShapeIntersection,
+    Unsupported,
+};
+use parry3d::shape::Shape;
+use rapier3d::prelude::{ContactData, ContactManifoldData, NarrowPhase};
+
+/// A narrow phase that keeps no contact point of the step before.
+pub fn narrow_phase() -> NarrowPhase {
+    NarrowPhase::with_query_dispatcher(Forget.chain(DefaultQueryDispatcher))
+}
+
+/// Makes each contact be found anew, and leaves every answer to the next in the chain. What warms the solver up is kept:
+/// impulses are matched by feature.
+struct Forget;
+
+impl QueryDispatcher for Forget {
+    fn intersection_test(&self, _: &Pose, _: &dyn Shape, _: &dyn Shape) -> Result<ShapeIntersection, Unsupported> {
+        Err(Unsupported)
+    }
+
+    fn distance(&self, _: &Pose, _: &dyn Shape, _: &dyn Shape) -> Result<ShapeDistance, Unsupported> {
+        Err(Unsupported)
+    }
+
+    fn contact(&self, _: &Pose, _: &dyn Shape, _: &dyn Shape, _: Real) -> Result<Option<Contact>, Unsupported> {
+        Err(Unsupported)
+    }
+
+    fn closest_points(&self, _: &Pose, _: &dyn Shape, _: &dyn Shape, _: Real) -> Result<ClosestPoints, Unsupported> {
+        Err(Unsupported)
+    }
+
+    fn cast_shapes(
+        &self,
+        _: &Pose,
+        _: Vector,
+        _: &dyn Shape,
+        _: &dyn Shape,
+        _: ShapeCastOptions,
+    ) -> Result<Option<ShapeCastHit>, Unsupported> {
+        Err(Unsupported)
+    }
+
+    fn cast_shapes_nonlinear(
+        &self,
+        _: &NonlinearRigidMotion,
+        _: &dyn Shape,
+        _: &NonlinearRigidMotion,
+        _: &dyn Shape,
+        _: Real,
+        _: Real,
+        _: bool,
+    ) -> Result<Option<ShapeCastHit>, Unsupported> {
+        Err(Unsupported)
+    }
+}
+
+impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for Forget {
+    fn contact_manifolds(
+        &self,
+        _: &Pose,
+        _: &dyn Shape,
+        _: &dyn Shape,
+        _: Real,
+        manifolds: &mut Vec<ContactManifold<ContactManifoldData, ContactData>>,
+        _: &mut Option<ContactManifoldsWorkspace>,
+    ) -> Result<(), Unsupported> {
+        for manifold in manifolds {
+            manifold.mark_shapes_deformed();
+        }
+        Err(Unsupported)
+    }
+
+    fn contact_manifold_convex_convex(
+        &self,
+        _: &Pose,
+        _: &dyn Shape,
+        _: &dyn Shape,
+        _: Option<&dyn NormalConstraints>,
+        _: Option<&dyn NormalConstraints>,
+        _: Real,
+        manifold: &mut ContactManifold<ContactManifoldData, ContactData>,
+    ) -> Result<(), Unsupported> {
+        manifold.mark_shapes_deformed();
+        Err(Unsupported)
+    }
+}
