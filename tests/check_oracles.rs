@@ -39,7 +39,15 @@ fn matrix(env: &Env, faults: &[Fault]) -> OracleMatrix {
         })
         .collect();
     let names: Vec<&str> = faults.iter().map(|fault| fault.name).collect();
-    oracle_matrix(&names, &env.ontology.actions["Pick"].success_properties, &trials)
+    let actions = env.campaign.tests.iter().flatten();
+    let properties: Vec<String> =
+        actions.flat_map(|action| env.ontology.actions[action].success_properties.clone()).collect();
+    oracle_matrix(&names, &properties, &trials)
+}
+
+/// The faults that can come about in a pick.
+fn of_pick() -> usize {
+    FAULTS.iter().filter(|fault| fault.concerns(&["Pick".to_owned()])).count()
 }
 
 /// On the shipped campaign: no gap, so every fault is noticed, every property notices one, and a robot that does nothing
@@ -51,7 +59,7 @@ fn the_shipped_properties_notice_every_fault() {
     assert_eq!(output.status.code(), Some(0), "{}", told["gaps"]);
     assert_eq!(told["gaps"], serde_json::json!([]));
     let faults = told["faults"].as_array().unwrap();
-    assert_eq!(faults.len(), FAULTS.len());
+    assert_eq!(faults.len(), of_pick());
     let notices = |fault: &Value, idx: usize| fault["properties"][idx]["verdict"] == "noticed";
     for fault in faults {
         assert!((0..5).any(|idx| notices(fault, idx)), "{fault}");
@@ -73,6 +81,46 @@ fn the_shipped_properties_notice_every_fault() {
     assert!(!noticing("false-success").contains(&"ObjectGrasped"));
     assert_eq!(noticing("false-failure"), ["ObjectGrasped"]);
     assert_eq!(noticing("neighbour-falls"), ["NoGraspCollisions"]);
+}
+
+/// The actions of the whole task, each with what it needs before it, in a room with nothing unusual.
+const TASK: &str = "tests = [[\"MoveTo\"], [\"PerceivePlane\"], [\"Pick\", \"Place\"]]\ntest_count = 9\nseed = 3\n\
+    nav_obstacle_list = [\"bottle\"]\nnav_obstacle_count = 1\n[world]\nworlds = [\"empty_room\"]\n\
+    [objectLocation]\nlocation_list = [\"table_front\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n\
+    [placeSurface]\nplace_object_surfaces = [\"coffee_table\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
+    [surfaceObjects]\nmodel_list = [\"box\"]\ncount = 1\n";
+
+/// Each of the seventeen properties notices a fault, and each fault of a drive or of a placement is noticed.
+#[test]
+fn every_property_of_the_whole_task_notices_a_fault() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("task.toml"), TASK).unwrap();
+    let env = Env::prepare(&folder.path().join("task.toml"), &Overrides::default()).unwrap();
+    let faults: Vec<Fault> = FAULTS
+        .into_iter()
+        .filter(|fault| {
+            let of_pick = fault.sabotage.action == Some("Pick") && fault.name != "neighbour-falls";
+            !of_pick && fault.name != "frozen-sensors"
+        })
+        .collect();
+    let matrix = matrix(&env, &faults);
+    assert_eq!(matrix.properties.len(), 17);
+    assert_eq!(matrix.gaps("no-op"), [], "{matrix:#?}");
+    let noticing = |name: &str| -> Vec<&str> {
+        let row = matrix.rows.iter().find(|row| row.fault == name).unwrap();
+        let noticing = row.cells.iter().filter(|cell| cell.notice == Notice::Noticed);
+        noticing.map(|cell| cell.property.rsplit('#').next().unwrap()).collect()
+    };
+    assert_eq!(noticing("obstacle"), ["NoDriveCollisions"]);
+    let carried_off = noticing("carried-off");
+    for property in ["GoalReached", "LocalisationAgrees", "StayedInZone"] {
+        assert!(carried_off.contains(&property), "{carried_off:?}");
+    }
+    // It says that it succeeded: only the world tells.
+    assert_eq!(noticing("placed-in-mid-air"), ["ObjectOnSurface"]);
+    assert_eq!(noticing("placed-and-fallen"), ["ObjectOnSurface"]);
+    assert!(noticing("hand-jams").contains(&"ObjectReleased"));
+    assert_eq!(noticing("place-neighbour-falls"), ["NoPlaceCollisions"]);
 }
 
 /// A report is never believed to be a failure any more: nothing notices a robot that says so.
@@ -103,7 +151,7 @@ fn too_few_scenes_tell_nothing_and_say_so() {
         actcheck(folder.path(), &["check-oracles", config.to_str().unwrap(), "--runs", "1", "--format", "csv"]);
     assert_eq!(output.status.code(), Some(1));
     let (rows, told) = (stdout(&output), stderr(&output));
-    assert_eq!(rows.lines().count(), 1 + 5 * FAULTS.len(), "{rows}");
+    assert_eq!(rows.lines().count(), 1 + 5 * of_pick(), "{rows}");
     assert!(rows.lines().skip(1).all(|line| line.ends_with(",too few")), "{rows}");
     assert!(told.contains("V003") && told.contains("V004") && told.contains("--runs"), "{told}");
     assert!(!told.contains("V001") && !told.contains("V002"), "too few scenes are no proof:\n{told}");
@@ -119,7 +167,7 @@ fn who_only_lies_changes_no_physics() {
     let env = env(root(), 2);
     let choices = || Choices::random(env.campaign.seed, 0);
     let sound = run_line(&env, "k", 0, choices(), &MANNER).unwrap();
-    let mut saboteur = Saboteur::new(Sabotage { robot: None, world: None, report: Some(false) });
+    let mut saboteur = Saboteur::new(Sabotage { action: None, robot: None, world: None, report: Some(false) });
     let lied = run_sabotaged(&env, "k", (0, choices()), &MANNER, &mut saboteur).unwrap();
     assert_eq!(lied.trace.hash, sound.trace.hash);
     assert_eq!(lied.choices, sound.choices);

@@ -10,6 +10,7 @@ use actcheck::campaign::Env;
 use actcheck::config::{self, Campaign, Overrides, Shape};
 use actcheck::rules::Budget;
 
+use crate::support::wrong::all_are_told;
 use crate::support::{actcheck, copy, root, stderr, stdout};
 
 const WRONG: &str = "tests/diagnostics/models";
@@ -33,26 +34,10 @@ const USED: &str = "[objectSurface]\nobject_surfaces = [\"cafe_table\"]\n[pickOb
 
 #[test]
 fn every_wrong_model_is_told_with_its_place() {
-    let bless = std::env::var_os("ACTCHECK_BLESS").is_some();
-    let cases = Files::Disk.folders(Path::new(WRONG));
-    assert!(cases.len() >= 40, "only {} cases", cases.len());
-    let mut wrong = Vec::new();
-    for case in cases {
-        let name = case.file_name().unwrap().to_str().unwrap();
-        let said =
-            campaign(Path::new(WRONG), &format!("model_dir = \"{name}\"\n[pickObject]\nmodel_list = [\"thing\"]\n"))
-                .map_or_else(|found| found.to_string(), |_| String::new());
-        let expected_path = case.join("expected");
-        if bless {
-            std::fs::write(&expected_path, &said).unwrap();
-        }
-        let expected = std::fs::read_to_string(&expected_path).unwrap_or_default();
-        if said.is_empty() || said != expected {
-            wrong.push(format!("== {}\n-- expected\n{expected}-- said\n{said}", case.display()));
-        }
-        assert_eq!(said.matches("  help: ").count(), said.lines().count() / 2, "each fault has its help:\n{said}");
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    all_are_told(WRONG, 40, |name| {
+        campaign(Path::new(WRONG), &format!("model_dir = \"{name}\"\n[pickObject]\nmodel_list = [\"thing\"]\n"))
+            .map_or_else(|found| found.to_string(), |_| String::new())
+    });
 }
 
 /// Sizes, masses and centres as they follow from the files by hand.

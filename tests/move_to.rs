@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use actcheck::actions::ActionReport;
-use actcheck::base::{Choices, Pose, names};
-use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
+use actcheck::base::{Choices, Pose};
+use actcheck::campaign::{Disturbance, Env};
 use actcheck::config::Overrides;
 use actcheck::history::RunRecord;
 use actcheck::verdict::Outcome;
 use actcheck::world::{Poison, World};
 
+use crate::support::line::{self, env_of, run};
 use crate::support::{actcheck, project, stderr, stdout};
 
 /// The front of a table in the kitchen, and a table in the living room: the way leads through the passage.
@@ -22,15 +23,7 @@ const FLOOR: &str =
 const TABLE: &str = "nav_obstacle_list = [\"mini_coffee_table\"]\nnav_obstacle_count = 1\n";
 
 fn env(before: &str, tables: &str) -> Env {
-    let folder = tempfile::tempdir().unwrap();
-    let config = folder.path().join("config.toml");
-    std::fs::write(&config, format!("tests = [[\"MoveTo\"]]\ntest_count = 1\nseed = 5\n{before}{tables}")).unwrap();
-    Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"))
-}
-
-fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
-    let clock = Clock { now: String::new, secs: || 0.0 };
-    run_line(env, "test", 0, choices, &Manner { clock, disturb }).unwrap()
+    env_of(&format!("tests = [[\"MoveTo\"]]\ntest_count = 1\nseed = 5\n{before}{tables}"))
 }
 
 /// The scene with nothing special but what is said, and no noise.
@@ -41,11 +34,11 @@ fn nominal(env: &Env, choices: &[(&str, f64)], disturb: Option<Disturbance>) -> 
 }
 
 fn report(run: &RunRecord) -> &ActionReport {
-    run.trace.actions[0].report.as_ref().expect("it came to its end")
+    line::report(run, 0)
 }
 
 fn outcomes(run: &RunRecord) -> BTreeMap<&str, Outcome> {
-    run.judgements[0].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
+    line::outcomes(run, 0)
 }
 
 /// Where there are no rooms, there is no zone to stay in.

@@ -1,47 +1,24 @@
 //! What the robot makes of its depth camera, from scenes to verdicts, and that it acts on that and nothing else.
 
-use std::collections::BTreeMap;
-
-use actcheck::actions::{ActionReport, PerceivedThing};
-use actcheck::base::{Choice, Choices, Pose, names};
-use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
-use actcheck::config::Overrides;
+use actcheck::actions::PerceivedThing;
+use actcheck::base::{Choice, Choices, Pose};
+use actcheck::campaign::Env;
 use actcheck::history::RunRecord;
 use actcheck::verdict::Outcome;
 use actcheck::world::{Poison, World};
 
+use crate::support::line::{env_of, nominal, outcomes, report, run};
+
 /// A table with a glass on it and what a test adds.
 fn env(actions: &str, more: &str) -> Env {
-    let folder = tempfile::tempdir().unwrap();
-    let config = folder.path().join("config.toml");
-    let text = format!(
+    env_of(&format!(
         "tests = [{actions}]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
         [pickObject]\nmodel_list = [\"glass\"]\n{more}"
-    );
-    std::fs::write(&config, text).unwrap();
-    Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"))
-}
-
-fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
-    let clock = Clock { now: String::new, secs: || 0.0 };
-    run_line(env, "test", 0, choices, &Manner { clock, disturb }).unwrap()
-}
-
-/// The scene with nothing special and senses without noise.
-fn nominal(env: &Env, disturb: Option<Disturbance>) -> RunRecord {
-    run(env, Choices::recorded(&[]), disturb)
+    ))
 }
 
 fn things(run: &RunRecord) -> &[PerceivedThing] {
     &run.trace.actions[0].perceived.as_ref().expect("it looked").things
-}
-
-fn report(run: &RunRecord, step: usize) -> &ActionReport {
-    run.trace.actions[step].report.as_ref().expect("it came to its end")
-}
-
-fn outcomes(run: &RunRecord, step: usize) -> BTreeMap<&str, Outcome> {
-    run.judgements[step].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
 }
 
 fn off(seen: &Pose, x: f64, y: f64) -> f64 {
@@ -85,8 +62,11 @@ fn what_was_perceived_is_picked() {
     let run = nominal(&env, None);
     assert_eq!(outcomes(&run, 1).len(), 5);
     assert!(outcomes(&run, 1).values().all(|outcome| *outcome == Outcome::Passed), "{:?}", run.judgements);
-    let [percept] = run.trace.actions[1].percepts.as_slice() else { panic!("one thing is what is asked for") };
-    assert_eq!((percept.id.as_str(), percept.pose), ("glass_1", things(&run)[0].pose));
+    // As it was perceived, and again with the hand before it.
+    let [first, again] = run.trace.actions[1].percepts.as_slice() else { panic!("one thing is what is asked for") };
+    assert_eq!((first.id.as_str(), first.pose), ("glass_1", things(&run)[0].pose));
+    assert_eq!(again.id, "glass_1");
+    assert!(off(&again.pose, first.pose.position[0], first.pose.position[1]) < 0.015, "{again:?} after {first:?}");
 }
 
 /// Sensors see the glass elsewhere than it is.

@@ -1,55 +1,30 @@
 //! Placing what was picked, from scenes to verdicts: by what the robot sees and feels, and by nothing else.
 
-use std::collections::BTreeMap;
-
-use actcheck::actions::ActionReport;
-use actcheck::base::{Choices, Pose, names};
-use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
-use actcheck::config::Overrides;
+use actcheck::base::{Choices, Pose};
+use actcheck::campaign::{Disturbance, Env};
 use actcheck::history::RunRecord;
 use actcheck::verdict::Outcome;
 use actcheck::world::{Mishap, Poison, World};
 use serde_json::Value;
 
+use crate::support::line::{env_of, nominal, outcomes, report, run};
 use crate::support::{actcheck, edit, project, stderr, stdout};
 
 /// Two tables, a glass on the first, and what a test adds.
 fn env(actions: &str, more: &str) -> Env {
-    let folder = tempfile::tempdir().unwrap();
-    let config = folder.path().join("config.toml");
-    let text = format!(
+    env_of(&format!(
         "tests = [{actions}]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
         [placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n{more}"
-    );
-    std::fs::write(&config, text).unwrap();
-    Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"))
+    ))
 }
 
-fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
-    let clock = Clock { now: String::new, secs: || 0.0 };
-    run_line(env, "test", 0, choices, &Manner { clock, disturb }).unwrap()
-}
-
-/// The scene with nothing special and senses without noise.
-fn nominal(env: &Env, disturb: Option<Disturbance>) -> RunRecord {
-    run(env, Choices::recorded(&[]), disturb)
-}
-
-/// The same with the target of a model, by its number.
+/// The nominal scene with the target of a model, by its number.
 fn with_target(env: &Env, model: usize) -> RunRecord {
     let mut choices = Choices::recorded(&[]);
     choices.index("target.model", 2);
     let mut made = choices.into_made();
     made[0].value = model as f64;
     run(env, Choices::recorded(&made), None)
-}
-
-fn report(run: &RunRecord, step: usize) -> &ActionReport {
-    run.trace.actions[step].report.as_ref().expect("it came to its end")
-}
-
-fn outcomes(run: &RunRecord, step: usize) -> BTreeMap<&str, Outcome> {
-    run.judgements[step].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
 }
 
 fn all_passed(run: &RunRecord, step: usize) {
@@ -98,7 +73,8 @@ fn an_empty_hand_reports_failure_at_once() {
     assert!(run.trace.actions[0].duration_secs < 1.0);
     let outcomes = outcomes(&run, 0);
     assert_eq!((outcomes["PlaceReported"], outcomes["ObjectOnSurface"]), (Outcome::Failed, Outcome::Failed));
-    assert_eq!((outcomes["ObjectReleased"], outcomes["NoPlaceCollisions"]), (Outcome::Passed, Outcome::Passed));
+    // What was not held can't be let go.
+    assert_eq!((outcomes["ObjectReleased"], outcomes["NoPlaceCollisions"]), (Outcome::Inapplicable, Outcome::Passed));
 }
 
 /// Sensors see the table where the glass shall go half a metre farther to the side and 5 cm higher than it is.
@@ -107,19 +83,61 @@ fn deceive(_: u64, world: &mut World) {
     assert!(world.poison("table_1", Poison::Decoy(decoy)));
 }
 
+/// The same, but only 5 cm higher: by the floor plan it is where it is expected.
+fn raise(_: u64, world: &mut World) {
+    let decoy = Pose::upright([0.0, 1.91, 0.05], 0.0);
+    assert!(world.poison("table_1", Poison::Decoy(decoy)));
+}
+
 #[test]
 fn it_acts_on_what_it_perceives_and_not_on_what_is() {
-    for actions in ["[\"Pick\", \"Place\"]", "[\"PerceivePlane\", \"Pick\", \"Place\"]"] {
+    let cases: [(&str, Disturbance); 2] =
+        [("[\"Pick\", \"Place\"]", deceive), ("[\"PerceivePlane\", \"Pick\", \"Place\"]", raise)];
+    for (actions, disturb) in cases {
         let env = env(actions, "");
-        let run = nominal(&env, Some(deceive));
+        let run = nominal(&env, Some(disturb));
         let last = run.trace.actions.len() - 1;
         // The hand opens where the table seems to be: the glass falls, and nothing was felt below it.
         assert!(!report(&run, last).succeeded, "{}", report(&run, last).message);
         assert!(report(&run, last).message.contains("was not felt"), "{}", report(&run, last).message);
         assert_eq!(outcomes(&run, last)["PlaceReported"], Outcome::Failed);
-        let seen = run.trace.actions[last].percepts.iter().find(|percept| percept.id == "table_1").unwrap();
-        assert_eq!((seen.pose.position[1], seen.pose.position[2]), (2.41, 0.05));
     }
+    let run = nominal(&env("[\"Pick\", \"Place\"]", ""), Some(deceive));
+    let seen = run.trace.actions[1].percepts.iter().find(|percept| percept.id == "table_1").unwrap();
+    assert_eq!((seen.pose.position[1], seen.pose.position[2]), (2.41, 0.05));
+}
+
+/// The whole task with something on the floor, with pictures.
+const TASK: &str = "[\"MoveTo\", \"PerceivePlane\", \"Pick\", \"Place\"]";
+const OBSTACLES: &str = "[surfaceObjects]\nmodel_list = [\"can\"]\ncount = 2\n";
+
+/// Once a robot uses its camera, it uses nothing else to see: what the abstract detector would give, and how wrong that is, makes no
+/// difference to anything, and it is never asked.
+#[test]
+fn with_a_camera_nothing_is_known_by_the_abstract_detector() {
+    let runs =
+        ["", "[sensing]\nposition_noise_m = 0.4\nheight_noise_m = 0.4\nyaw_noise_rad = 1.5\nsize_noise_m = 0.4\n"];
+    let runs = runs.map(|sensing| {
+        let text = format!(
+            "nav_obstacle_list = [\"bottle\", \"mini_coffee_table\"]\nnav_obstacle_count = 4\n\
+            tests = [{TASK}]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
+            [placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
+            {OBSTACLES}{sensing}"
+        );
+        (0..3).map(|index| run(&env_of(&text), Choices::random(5, index), None)).collect::<Vec<RunRecord>>()
+    });
+    let [quiet, noisy] = &runs;
+    for (quiet, noisy) in quiet.iter().zip(noisy) {
+        let ids = || quiet.scene.objects.iter().map(|object| format!("sense.{}.", object.id));
+        let asked: Vec<&str> = noisy.choices.iter().map(|choice| choice.name.as_str()).collect();
+        assert!(!asked.iter().any(|name| ids().any(|id| name.starts_with(&id))), "{asked:?}");
+        assert_eq!(quiet.trace.hash, noisy.trace.hash);
+        let percepts = quiet.trace.actions.iter().flat_map(|action| &action.percepts);
+        let targets = &quiet.scene.designators["pickObject"];
+        assert!(percepts.clone().all(|percept| targets.contains(&percept.id)), "{:?}", percepts.collect::<Vec<_>>());
+    }
+    let placed = quiet.iter().filter(|run| run.trace.actions[3].phases.iter().any(|phase| phase.name == "look"));
+    assert!(placed.count() > 0, "no run came so far that the robot looked at where to place something");
 }
 
 /// The glass has no friction at all.

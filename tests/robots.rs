@@ -7,10 +7,11 @@
 use std::path::Path;
 use std::process::Command;
 
-use actcheck::base::{Files, Source};
+use actcheck::base::Source;
 use actcheck::config::{self, Overrides};
 use serde_json::Value;
 
+use crate::support::wrong::all_are_told;
 use crate::support::{actcheck, copy, project, root, stderr, stdout};
 
 const WRONG: &str = "tests/diagnostics/robots";
@@ -25,24 +26,7 @@ fn said_of(folder: &Path, profile: &str) -> String {
 #[test]
 fn every_wrong_robot_is_told_with_its_place() {
     assert_eq!(said_of(Path::new("tests/models"), "crane/robot.toml"), "");
-    let bless = std::env::var_os("ACTCHECK_BLESS").is_some();
-    let cases = Files::Disk.folders(Path::new(WRONG));
-    assert!(cases.len() >= 30, "only {} cases", cases.len());
-    let mut wrong = Vec::new();
-    for case in cases {
-        let name = case.file_name().unwrap().to_str().unwrap();
-        let said = said_of(Path::new(WRONG), &format!("{name}/robot.toml"));
-        let expected_path = case.join("expected");
-        if bless {
-            std::fs::write(&expected_path, &said).unwrap();
-        }
-        let expected = std::fs::read_to_string(&expected_path).unwrap_or_default();
-        if said.is_empty() || said != expected {
-            wrong.push(format!("== {}\n-- expected\n{expected}-- said\n{said}", case.display()));
-        }
-        assert_eq!(said.matches("  help: ").count(), said.lines().count() / 2, "each fault has its help:\n{said}");
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    all_are_told(WRONG, 30, |name| said_of(Path::new(WRONG), &format!("{name}/robot.toml")));
     let said = said_of(Path::new(WRONG), "fixed_amr");
     assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
 }

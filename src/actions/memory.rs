@@ -1,5 +1,7 @@
 //! What the robot knows from earlier actions of a run.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Vector3};
 
 use crate::actions::{Perceived, PerceivedPlane, PerceivedThing};
@@ -14,6 +16,17 @@ pub struct Memory {
     pub perceived: Option<Perceived>,
     /// What the hand holds; nothing where it is believed to be empty.
     pub held: Option<Held>,
+    /// What the last drive saw on the floor that is not on the map.
+    pub floor: Vec<Standing>,
+}
+
+/// A piece of the floor, as large as a cell of a grid, on which something was seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Its middle. Unit: metres. Frame: world, by the base's belief at that moment.
+    pub at_m: [f64; 2],
+    /// Height of the highest that was seen of it. Unit: metres.
+    pub top_m: f64,
 }
 
 /// What was taken, by what was perceived of it and felt when the hand closed.
@@ -84,6 +97,26 @@ pub fn furniture(id: &str, plane: &PerceivedPlane) -> Sighting {
     Sighting { id: id.to_owned(), pose, size_m: [width, depth, height], furniture: true }
 }
 
+/// Edge of the squares in which pieces of the floor are gathered. Unit: metres. Two cells of a grid.
+const PIECE_M: f64 = 0.1;
+
+/// What was seen on the floor, as things that the arm and the base keep clear of: one for each square that has any.
+pub fn obstacles(floor: &[Standing]) -> Vec<Sighting> {
+    let mut tops: BTreeMap<[i64; 2], f64> = BTreeMap::new();
+    for Standing { at_m, top_m } in floor {
+        #[expect(clippy::cast_possible_truncation, reason = "a few metres of decimetres")]
+        let square = at_m.map(|along| (along / PIECE_M).floor() as i64);
+        let top = tops.entry(square).or_default();
+        *top = top.max(*top_m);
+    }
+    let piece = |(number, (square, top)): (usize, ([i64; 2], f64))| {
+        let [x, y] = square.map(|along| (along as f64 + 0.5) * PIECE_M);
+        let pose = Pose::upright([x, y, 0.0], 0.0);
+        Sighting { id: format!("obstacle_{}", number + 1), pose, size_m: [PIECE_M, PIECE_M, top], furniture: false }
+    };
+    tops.into_iter().enumerate().map(piece).collect()
+}
+
 /// A thing as the abstract detector would give it.
 pub fn sighting(id: String, thing: &PerceivedThing) -> Sighting {
     Sighting { id, pose: thing.pose, size_m: thing.size_m, furniture: false }
@@ -129,6 +162,18 @@ mod tests {
         let perceived = Perceived { plane: Some(plane), things: Vec::new() };
         assert_eq!(elsewhere(vec![table(1.1), table(3.0)], &perceived), [table(3.0)]);
         assert_eq!(elsewhere(vec![table(1.1)], &Perceived::default()).len(), 1);
+    }
+
+    #[test]
+    fn pieces_of_the_floor_are_gathered_in_squares_as_high_as_the_highest() {
+        let piece = |x: f64, top_m: f64| Standing { at_m: [x, -0.025], top_m };
+        let found = obstacles(&[piece(0.125, 0.2), piece(0.175, 0.4), piece(0.225, 0.1)]);
+        let told: Vec<([f64; 3], f64)> = found.iter().map(|thing| (thing.pose.position, thing.size_m[2])).collect();
+        assert_eq!(found.iter().filter(|thing| thing.furniture).count(), 0);
+        assert_eq!(told.len(), 2);
+        for (told, known) in told.iter().zip([([0.15, -0.05, 0.0], 0.4), ([0.25, -0.05, 0.0], 0.1)]) {
+            assert!((Vector3::from(told.0) - Vector3::from(known.0)).norm() < 1e-9 && told.1 == known.1, "{told:?}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use crate::actions::grip::GripWatch;
-use crate::actions::memory::{Held, Memory};
+use crate::actions::memory::{Held, Memory, Standing};
 use crate::actions::sabotage::IDLE_SECS;
 use crate::actions::{ActionReport, Cut, Interference, Perceived, Percept, Phase, Saboteur};
 use crate::base::Choices;
@@ -187,6 +187,11 @@ impl<'a> Operator<'a> {
         self.perceived = Some(perceived);
     }
 
+    /// Keeps what a drive saw on the floor, for later drives and for the arm.
+    pub fn remember_floor(&mut self, floor: Vec<Standing>) {
+        self.memory.floor = floor;
+    }
+
     /// Keeps what the hand holds now, for later actions: nothing once it is empty.
     pub fn hold(&mut self, held: Option<Held>) {
         if held.is_none() {
@@ -205,7 +210,12 @@ impl<'a> Operator<'a> {
         self.grip.as_ref().is_some_and(GripWatch::slipped)
     }
 
-    /// What stands in the world for good, by the robot's map; nothing where it has none.
+    /// What stands in the world for good and what shall be driven to, by the plan that the base drives with.
+    pub fn known_furniture(&self) -> Vec<Sighting> {
+        self.world.known_furniture()
+    }
+
+    /// The same, where the world is one that the robot has a map of; otherwise nothing.
     pub fn map_of_furniture(&self) -> Option<Vec<Sighting>> {
         self.world.map_of_furniture()
     }

@@ -3,7 +3,8 @@
 use crate::actions::grip::{EMPTY_M, close, feels};
 use crate::actions::memory::Held;
 use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::plan::{self, Wanted};
+use crate::actions::perceive::look_again;
+use crate::actions::plan::{self, Plan, Wanted};
 use crate::actions::{ActionCall, ActionReport, grasp, memory};
 use crate::base::Pose;
 use crate::world::Sighting;
@@ -48,6 +49,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.follow(&way.reach, 0.0)?;
     robot.begin("approach");
     robot.follow(&way.near, 0.0)?;
+    let (way, seen) = put_right(way, seen, robot)?;
     robot.follow(&way.approach, APPROACH_SECS)?;
     robot.begin("close");
     robot.hold(None);
@@ -73,13 +75,35 @@ fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sightin
     if let Some(perceived) = &robot.memory().perceived {
         let kind = robot.kind_of(target).ok_or_else(|| format!("{target} is of no known kind"))?;
         let (seen, mut others) = memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
-        others.extend(memory::elsewhere(robot.map_of_furniture().unwrap_or_default(), perceived));
+        others.extend(memory::elsewhere(robot.known_furniture(), perceived));
+        others.extend(memory::obstacles(&robot.memory().floor));
         robot.take_for(&seen);
         return Ok((seen, others));
     }
     let seen = robot.see(target).ok_or_else(|| format!("{target} was not seen"))?;
     let others = robot.see_others(target);
     Ok((seen, others))
+}
+
+/// Looks again with the hand before the thing, and moves the rest of the way by what the base turns out to be astray since the
+/// look around. What was seen in pictures can be looked at again; the abstract detector would only draw another error.
+fn put_right(mut way: Plan, seen: Sighting, robot: &mut Operator<'_>) -> Result<(Plan, Sighting), Interrupt> {
+    let plane = robot.memory().perceived.as_ref().and_then(|perceived| perceived.plane);
+    let (Some(plane), Some(kind), Some([x, y, _])) = (plane, robot.kind_of(&seen.id), robot.layout().base) else {
+        return Ok((way, seen));
+    };
+    robot.begin("look again");
+    let Some(again) = look_again(&seen, &kind, &plane, robot)? else { return Ok((way, seen)) };
+    let [dx, dy] = [0, 1].map(|axis| again.pose.position[axis] - seen.pose.position[axis]);
+    let Plan { near, approach, lift, retreat, .. } = &mut way;
+    for posture in near.iter_mut().chain(approach).chain(lift).chain(retreat) {
+        posture[x] += dx;
+        posture[y] += dy;
+    }
+    robot.take_for(&again);
+    robot.begin("approach");
+    robot.follow(&[way.near.last().cloned().unwrap_or_default()], 0.0)?;
+    Ok((way, again))
 }
 
 /// Keeps what the hand closed on, for later actions.

@@ -69,10 +69,8 @@ pub struct Wanted<'a> {
 /// # Errors
 /// A sentence for the action's report.
 pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]) -> Result<Plan, String> {
-    if operator.layout().base.is_none() {
-        return standing::plan(operator, wanted, others);
-    }
-    if let Some(plan) = best(&Planner::new(operator, others), wanted.grasps, &mut Samples::new(0.0, 0)) {
+    let Some(base) = operator.layout().base else { return standing::plan(operator, wanted, others) };
+    if let Some(plan) = best(&Planner::new(operator, base, others), wanted.grasps, &mut Samples::new(0.0, 0)) {
         return Ok(plan);
     }
     if wanted.all.is_empty() {
@@ -80,7 +78,7 @@ pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]
     }
     let mut samples = Samples::new(operator.choose_samples(), MOST_SAMPLES);
     let all = [wanted.grasps, wanted.all].concat();
-    best(&Planner::new(operator, others), &all, &mut samples).ok_or_else(|| NO_WAY.to_owned())
+    best(&Planner::new(operator, base, others), &all, &mut samples).ok_or_else(|| NO_WAY.to_owned())
 }
 
 /// The best plan among some grasps.
@@ -108,9 +106,9 @@ fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples) -> Optio
 
 /// A way of the base to a place (x, y, heading), with the arm as it is; nothing if there is none.
 pub fn drive(operator: &Operator<'_>, to: [f64; 3], others: &[Sighting]) -> Option<Vec<Vec<f64>>> {
-    let planner = Planner::new(operator, others);
+    let [x, y, heading] = operator.layout().base?;
+    let planner = Planner::new(operator, [x, y, heading], others);
     let mut posture = planner.start.clone();
-    let [x, y, heading] = planner.layout.base?;
     (posture[x], posture[y]) = (to[0], to[1]);
     posture[heading] += wrapped(to[2] - posture[heading]);
     planner.drive(&posture)
@@ -120,6 +118,8 @@ pub fn drive(operator: &Operator<'_>, to: [f64; 3], others: &[Sighting]) -> Opti
 pub(super) struct Planner<'a> {
     pub(super) kinematics: &'a Kinematics,
     pub(super) layout: &'a Layout,
+    /// The joints of the base: x, y, heading.
+    pub(super) base: [usize; 3],
     /// Joint positions to begin with.
     pub(super) start: Vec<f64>,
     postures: Vec<Vec<f64>>,
@@ -132,17 +132,17 @@ pub(super) struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    fn new(operator: &'a Operator<'_>, others: &[Sighting]) -> Self {
+    fn new(operator: &'a Operator<'_>, base: [usize; 3], others: &[Sighting]) -> Self {
         let (kinematics, layout) = (operator.kinematics(), operator.layout());
         let start = operator.commanded().to_vec();
         let points = kinematics.surface_points(CHECK_M);
         let furniture: Vec<Block> = others.iter().filter(|seen| seen.furniture).map(Block::new).collect();
         let things: Vec<Pillar> = others.iter().filter(|seen| !seen.furniture).map(Pillar::new).collect();
-        let ground = Ground::new(&furniture, &things, radius(kinematics, layout, &start, &points));
+        let ground = Ground::new(&furniture, &things, radius(kinematics, base, &start, &points));
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
         let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
-        Self { kinematics, layout, start, postures, points, furniture, things, ground, itself }
+        Self { kinematics, layout, base, start, postures, points, furniture, things, ground, itself }
     }
 
     /// A plan that costs less than `bound`, if there is one near the seed.
@@ -185,10 +185,9 @@ impl<'a> Planner<'a> {
 
     /// What driving to a posture's base pose costs.
     pub(super) fn travel_cost(&self, positions: &[f64]) -> f64 {
-        self.layout.base.map_or(0.0, |[x, y, heading]| {
-            let way = length(positions[x] - self.start[x], positions[y] - self.start[y]);
-            0.4 * way + 0.12 * (positions[heading] - self.start[heading]).abs()
-        })
+        let [x, y, heading] = self.base;
+        let way = length(positions[x] - self.start[x], positions[y] - self.start[y]);
+        0.4 * way + 0.12 * (positions[heading] - self.start[heading]).abs()
     }
 
     /// The posture with the base put so that the hand is over the thing, heading as the grasp wants it.
@@ -200,12 +199,11 @@ impl<'a> Planner<'a> {
         for idx in self.layout.fingers {
             positions[idx] = grasp.opening_m / 2.0;
         }
-        if let Some([x, y, heading]) = self.layout.base {
-            positions[heading] += wrapped(grasp.heading - positions[heading]);
-            let miss = grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;
-            positions[x] += miss.x;
-            positions[y] += miss.y;
-        }
+        let [x, y, heading] = self.base;
+        positions[heading] += wrapped(grasp.heading - positions[heading]);
+        let miss = grasp.pose.translation.vector - self.kinematics.grasp(&positions).translation.vector;
+        positions[x] += miss.x;
+        positions[y] += miss.y;
         positions
     }
 
@@ -214,17 +212,14 @@ impl<'a> Planner<'a> {
         for idx in &self.layout.arm {
             mobility[*idx] = 1.0;
         }
-        for idx in self.layout.base.iter().flatten() {
-            mobility[*idx] = base_mobility;
+        for idx in self.base {
+            mobility[idx] = base_mobility;
         }
         ik::solve(self.kinematics, seed, &ik::Reach { target: *target, mobility })
     }
 
     /// Distance back from the thing at which the hand is in front of all furniture. Unit: metres.
     fn way_out(&self, from: &Vector3<f64>, back: &Vector3<f64>) -> Option<f64> {
-        if self.layout.base.is_none() {
-            return Some(APPROACH_M);
-        }
         let mut way = APPROACH_M;
         while way < LONGEST_WAY_M {
             let point = Point3::from(from + back * way);
@@ -236,17 +231,13 @@ impl<'a> Planner<'a> {
         None
     }
 
-    /// The same posture moved level: by the base where there is one, otherwise by the arm.
+    /// The same posture moved level, by the base.
     fn moved(&self, positions: &[f64], by: &Vector3<f64>) -> Vec<f64> {
         let mut positions = positions.to_vec();
-        if let Some([x, y, _]) = self.layout.base {
-            positions[x] += by.x;
-            positions[y] += by.y;
-            return positions;
-        }
-        let mut target = self.kinematics.grasp(&positions);
-        target.translation.vector += by;
-        self.solve(&positions, &target, 0.0).unwrap_or(positions)
+        let [x, y, _] = self.base;
+        positions[x] += by.x;
+        positions[y] += by.y;
+        positions
     }
 
     /// Postures on a straight way up, a few centimetres apart, with the base where it is.
@@ -264,7 +255,7 @@ impl<'a> Planner<'a> {
 
     /// The way of the base to where a posture has it, with the arm as it is at the start.
     fn drive(&self, to: &[f64]) -> Option<Vec<Vec<f64>>> {
-        let Some([x, y, heading]) = self.layout.base else { return Some(vec![self.start.clone()]) };
+        let [x, y, heading] = self.base;
         let route = self.ground.route(Point2::new(self.start[x], self.start[y]), Point2::new(to[x], to[y]))?;
         let n_legs = route.len() as f64;
         let legs = route.iter().enumerate().map(|(idx, point)| {
@@ -280,8 +271,7 @@ impl<'a> Planner<'a> {
 }
 
 /// Radius of the circle around the base in which the whole robot is. Unit: metres.
-fn radius(kinematics: &Kinematics, layout: &Layout, positions: &[f64], points: &[(usize, Point3<f64>)]) -> f64 {
-    let Some([x, y, _]) = layout.base else { return 0.0 };
+fn radius(kinematics: &Kinematics, [x, y, _]: [usize; 3], positions: &[f64], points: &[(usize, Point3<f64>)]) -> f64 {
     let links = kinematics.links(positions);
     let far = |(link, point): &(usize, Point3<f64>)| {
         let point = links[*link] * point;

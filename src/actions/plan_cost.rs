@@ -68,7 +68,7 @@ impl Planner<'_> {
 
     /// How much longer the drive is than the straight line. Unit: metres.
     fn detour(&self, drive: &[Vec<f64>]) -> f64 {
-        let (Some([x, y, _]), Some(end)) = (self.layout.base, drive.last()) else { return 0.0 };
+        let ([x, y, _], Some(end)) = (self.base, drive.last()) else { return 0.0 };
         let way = |a: &[f64], b: &[f64]| length(b[x] - a[x], b[y] - a[y]);
         let legs = std::iter::once(&self.start).chain(drive);
         legs.zip(drive).map(|(a, b)| way(a, b)).sum::<f64>() - way(&self.start, end)

@@ -6,8 +6,9 @@ use crate::actions::{ActionCall, ActionReport};
 use crate::base::Pose;
 use crate::world::{BodyState, Command, Mishap, Observation, Sighting, Snapshot, World};
 
-/// Designator of the thing that the action is about.
+/// Designators of the thing that the action is about, and of what it shall be placed on.
 const OBJECT: &str = "pickObject";
+const PLACE: &str = "placeSurface";
 /// Distance of the hand from the box around the object at which it counts as reaching for it. Unit: metres. Every hand
 /// comes so near before it closes, and no neighbour that falls then was seen lying.
 const REACHING_M: f64 = 0.1;
@@ -16,6 +17,16 @@ const REACHING_M: f64 = 0.1;
 const CARRIED_M: f64 = 0.05;
 /// How far a teleported object goes. Unit: metres. Out of any hand, and not out of the world.
 const TELEPORT_M: f64 = 0.5;
+/// A base that has gone so far drives. Unit: metres.
+const DRIVEN_M: f64 = 0.5;
+/// How far outside of the rooms a robot is carried off, and how far back where there are none. Unit: metres. Beyond the walls.
+const CARRIED_OFF_M: f64 = 1.0;
+/// Gap between a base and what is put before it. Unit: metres. A base that sees it can't stop any more.
+const BEFORE_BASE_M: f64 = 0.03;
+/// Radius of a base: that of a slim mobile manipulator. Unit: metres.
+const BASE_RADIUS_M: f64 = 0.22;
+/// Height of an object's foot above its new place at which it is let go too early. Unit: metres. What falls so deep topples.
+const TOO_HIGH_M: f64 = 0.05;
 /// How long a robot that does nothing takes for it. Unit: seconds.
 pub(super) const IDLE_SECS: f64 = 1.0;
 /// Room that the widest opening has to leave beside another object for it to be taken by mistake. Unit: metres.
@@ -24,6 +35,8 @@ const ROOM_M: f64 = 0.02;
 /// What goes wrong: every part that is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sabotage {
+    /// During which action: nothing for every one.
+    pub action: Option<&'static str>,
     /// With the robot.
     pub robot: Option<Defect>,
     /// With the world, and when.
@@ -50,6 +63,12 @@ pub enum Moment {
     Reaching,
     /// Both fingers hold the object in the air, and nothing else touches it.
     Carrying,
+    /// The base is half a metre from where it began.
+    Driving,
+    /// The hand holds the object above the surface that it is to be placed on.
+    Lowering,
+    /// The hand has let go of what it held when the action began.
+    LetGo,
 }
 
 /// What can happen to the world.
@@ -63,19 +82,31 @@ pub enum Accident {
     Teleport,
     /// The object's nearest neighbour lies on its side.
     NeighbourFalls,
+    /// The object itself lies on its side.
+    Falls,
+    /// The fingers stay where they are.
+    HandJams,
+    /// Something stands right before the base.
+    InTheWay,
+    /// The robot is outside of its rooms and does not know.
+    CarriedOff,
 }
 
 /// Carries out sabotage in one run, and knows whether it came to it.
 #[derive(Debug, Clone)]
 pub struct Saboteur {
     sabotage: Sabotage,
-    /// The named object.
+    /// Whether this is the action that is sabotaged.
+    armed: bool,
+    /// The named object, and what it is to be placed on.
     object: Option<String>,
+    place: Option<String>,
     /// The world when the action began.
     start: Option<Snapshot>,
     frozen: Option<Observation>,
     first_sights: Vec<Sighting>,
-    hand_open: bool,
+    /// Gap between the fingers, whatever they are told. Unit: metres.
+    opening_m: Option<f64>,
     defective: bool,
     happened: bool,
     lied: bool,
@@ -86,11 +117,13 @@ impl Saboteur {
     pub fn new(sabotage: Sabotage) -> Self {
         Self {
             sabotage,
+            armed: false,
             object: None,
+            place: None,
             start: None,
             frozen: None,
             first_sights: Vec::new(),
-            hand_open: false,
+            opening_m: None,
             defective: false,
             happened: false,
             lied: false,
@@ -108,8 +141,11 @@ impl Saboteur {
     pub(super) fn begin(&mut self, call: &ActionCall, world: &World) -> ActionCall {
         let start = world.snapshot();
         self.object = call.value(OBJECT).map(str::to_owned);
+        self.place = call.value(PLACE).map(str::to_owned);
+        self.armed = self.sabotage.action.is_none_or(|action| action == call.action);
+        self.frozen = None;
         let mut understood = call.clone();
-        match self.sabotage.robot {
+        match self.sabotage.robot.filter(|_| self.armed) {
             Some(Defect::WrongObject) => {
                 let other = self.object.as_deref().and_then(|object| mistaken(&start, object, world));
                 if let Some(other) = other {
@@ -131,21 +167,19 @@ impl Saboteur {
 
     /// Whether the robot does nothing.
     pub(super) fn idles(&self) -> bool {
-        self.sabotage.robot == Some(Defect::Idle)
+        self.armed && self.sabotage.robot == Some(Defect::Idle)
     }
 
     /// One control tick.
     pub(super) fn step(&mut self, world: &mut World, command: &Command) {
-        if let (Some((moment, accident)), false) = (self.sabotage.world, self.happened)
+        if let (Some((moment, accident)), true, false) = (self.sabotage.world, self.armed, self.happened)
             && self.is_time_for(moment, world)
         {
             self.happened = self.happen(accident, world);
         }
-        if self.hand_open {
-            let gripper_opening_m = world.profile().max_opening_m;
-            world.step(&Command { gripper_opening_m, ..command.clone() });
-        } else {
-            world.step(command);
+        match self.opening_m {
+            Some(gripper_opening_m) => world.step(&Command { gripper_opening_m, ..command.clone() }),
+            None => world.step(command),
         }
     }
 
@@ -175,7 +209,7 @@ impl Saboteur {
     /// What the action reports, from what it believes.
     pub(super) fn report(&mut self, honest: ActionReport) -> ActionReport {
         match self.sabotage.report {
-            Some(succeeded) if succeeded != honest.succeeded => {
+            Some(succeeded) if self.armed && succeeded != honest.succeeded => {
                 self.lied = true;
                 ActionReport { succeeded, message: if succeeded { "done" } else { "could not do it" }.to_owned() }
             }
@@ -184,38 +218,84 @@ impl Saboteur {
     }
 
     fn is_time_for(&self, moment: Moment, world: &World) -> bool {
-        let (Some(object), Some(start)) = (&self.object, &self.start) else { return false };
+        let Some(start) = &self.start else { return false };
         let now = world.snapshot();
+        if moment == Moment::Driving {
+            let ([x0, y0, _], [x, y, _]) = (start.robot.base_true, now.robot.base_true);
+            return libm::hypot(x - x0, y - y0) > DRIVEN_M;
+        }
+        let Some(object) = &self.object else { return false };
         let (Some(was), Some(is)) = (body(start, object), body(&now, object)) else { return false };
+        let hangs = holds(&now, object) && is.touches.iter().all(|other| other == "robot");
         match moment {
             Moment::Reaching => box_distance(is, now.robot.gripper.position) < REACHING_M,
-            Moment::Carrying => {
-                let held = now.robot.left_touches.contains(object) && now.robot.right_touches.contains(object);
-                let free = is.touches.iter().all(|other| other == "robot");
-                held && free && is.pose.position[2] - was.pose.position[2] > CARRIED_M
+            Moment::Carrying => hangs && is.pose.position[2] - was.pose.position[2] > CARRIED_M,
+            Moment::Lowering => {
+                let place = self.place.as_deref().and_then(|place| body(&now, place));
+                hangs && place.is_some_and(|place| is_above(is, place))
             }
+            Moment::LetGo => holds(start, object) && !is.touches.iter().any(|other| other == "robot"),
+            Moment::Driving => false,
         }
     }
 
     /// True if it could happen.
     fn happen(&mut self, accident: Accident, world: &mut World) -> bool {
-        let (Some(object), Some(start)) = (&self.object, &self.start) else { return false };
+        let now = world.snapshot();
+        let object = self.object.as_deref().unwrap_or_default();
         match accident {
-            Accident::HandOpens => {
-                self.hand_open = true;
-                true
-            }
-            Accident::Slippery => world.befall(object, Mishap::Friction(0.0)),
+            Accident::HandOpens => self.opening_m = Some(world.profile().max_opening_m),
+            Accident::HandJams => self.opening_m = Some(0.0),
+            Accident::Slippery => return world.befall(object, Mishap::Friction(0.0)),
+            Accident::Falls => return world.befall(object, Mishap::Fall),
             Accident::Teleport => {
-                let now = world.snapshot();
-                body(&now, object)
-                    .is_some_and(|is| world.befall(object, Mishap::Pose(farther(is, now.robot.base_true))))
+                let there = body(&now, object).map(|is| farther(is, now.robot.base_true));
+                return there.is_some_and(|there| world.befall(object, Mishap::Pose(there)));
             }
             Accident::NeighbourFalls => {
-                let neighbour = others_by_distance(start, object).first().map(|body| body.id.clone());
-                neighbour.is_some_and(|id| world.befall(&id, Mishap::Fall))
+                let neighbour = others_by_distance(&now, object).first().map(|body| body.id.clone());
+                return neighbour.is_some_and(|id| world.befall(&id, Mishap::Fall));
             }
+            Accident::InTheWay => {
+                let thing = now.bodies.iter().find(|body| !body.fixed && body.id != object);
+                let there = thing.map(|thing| (thing.id.clone(), before(thing, now.robot.base_true)));
+                return there.is_some_and(|(id, there)| world.befall(&id, Mishap::Pose(there)));
+            }
+            Accident::CarriedOff => return world.carry_off(outside(world, now.robot.base_true)),
         }
+        true
+    }
+}
+
+/// Whether both fingers touch an object.
+fn holds(snapshot: &Snapshot, object: &str) -> bool {
+    let touches = |things: &[String]| things.iter().any(|thing| thing == object);
+    touches(&snapshot.robot.left_touches) && touches(&snapshot.robot.right_touches)
+}
+
+/// Whether the foot of a body is over another, and so high that it must not fall from there.
+fn is_above(body: &BodyState, place: &BodyState) -> bool {
+    let over = |axis: usize| {
+        let middle = f64::midpoint(body.aabb_min[axis], body.aabb_max[axis]);
+        (place.aabb_min[axis]..=place.aabb_max[axis]).contains(&middle)
+    };
+    over(0) && over(1) && body.aabb_min[2] - place.aabb_max[2] > TOO_HIGH_M
+}
+
+/// The pose of a body that stands on the floor right before a base, as it is turned now.
+fn before(body: &BodyState, [x, y, heading]: [f64; 3]) -> Pose {
+    let half = |axis: usize| (body.aabb_max[axis] - body.aabb_min[axis]) / 2.0;
+    let away = BASE_RADIUS_M + libm::hypot(half(0), half(1)) + BEFORE_BASE_M;
+    let foot = body.pose.position[2] - body.aabb_min[2];
+    Pose { position: [x + libm::cos(heading) * away, y + libm::sin(heading) * away, foot], ..body.pose }
+}
+
+/// Where a base is out of all rooms, or well behind where it is.
+fn outside(world: &World, [x, y, heading]: [f64; 3]) -> [f64; 3] {
+    let ends = world.floor_plan().rooms.iter().map(|room| room.high_m[0]);
+    match ends.max_by(f64::total_cmp) {
+        Some(end) => [end + CARRIED_OFF_M, y, heading],
+        None => [x - libm::cos(heading) * CARRIED_OFF_M, y - libm::sin(heading) * CARRIED_OFF_M, heading],
     }
 }
 
@@ -263,6 +343,10 @@ fn mistaken(start: &Snapshot, object: &str, world: &World) -> Option<String> {
 mod tests {
     use super::*;
 
+    fn idle(world: Option<(Moment, Accident)>, report: Option<bool>) -> Saboteur {
+        Saboteur::new(Sabotage { action: None, robot: None, world, report })
+    }
+
     fn report(succeeded: bool) -> ActionReport {
         ActionReport { succeeded, message: "so it is".to_owned() }
     }
@@ -272,7 +356,8 @@ mod tests {
         for (told, honest, lied) in
             [(true, false, true), (true, true, false), (false, true, true), (false, false, false)]
         {
-            let mut saboteur = Saboteur::new(Sabotage { robot: None, world: None, report: Some(told) });
+            let mut saboteur = idle(None, Some(told));
+            saboteur.armed = true;
             assert_eq!(saboteur.report(report(honest)).succeeded, told);
             assert_eq!(saboteur.came_about(), lied);
         }
@@ -280,8 +365,8 @@ mod tests {
 
     #[test]
     fn sabotage_of_which_a_part_is_missing_did_not_come_about() {
-        let world = Some((Moment::Carrying, Accident::HandOpens));
-        let mut saboteur = Saboteur::new(Sabotage { robot: None, world, report: Some(true) });
+        let mut saboteur = idle(Some((Moment::Carrying, Accident::HandOpens)), Some(true));
+        saboteur.armed = true;
         saboteur.report(report(false));
         assert!(!saboteur.came_about(), "nothing was dropped");
     }

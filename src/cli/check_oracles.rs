@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 
 use crate::analysis::{OracleTrial, oracle_matrix};
 use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::oracles::{FAULTS, Trial, TrialOptions, try_faults};
+use crate::campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
 use crate::campaign::{Env, Manner};
 use crate::cli::args::Format;
 use crate::cli::run::{all_cores, quietly};
@@ -44,11 +44,13 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     let stop = stop::on_interrupt(|| {});
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let env = Env::prepare_within(&args.config, &overrides, budget)?;
-    let steps = env.planned_runs() * (FAULTS.len() as u64 + 1);
+    let concerns = |fault: &Fault| env.campaign.tests.iter().any(|test| fault.concerns(test));
+    let faults: Vec<Fault> = FAULTS.into_iter().filter(concerns).collect();
+    let steps = env.planned_runs() * (faults.len() as u64 + 1);
     let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
     let manner = Manner { clock: clock::system(), disturb: None };
     let options = TrialOptions { jobs: args.jobs.map_or_else(all_cores, usize::from), manner };
-    let trials = quietly(|| try_faults(&env, &FAULTS, &options, &stop, || bar.inc(1)))?;
+    let trials = quietly(|| try_faults(&env, &faults, &options, &stop, || bar.inc(1)))?;
     bar.finish_and_clear();
     if stop.load(Ordering::Relaxed) {
         return Ok(stop::INTERRUPTED);
@@ -58,7 +60,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
             .help("`actcheck run` with the same configuration says why")
             .into());
     }
-    let summary = summarise(args, &env, &trials);
+    let summary = summarise(args, &env, &faults, &trials);
     output::print(&match args.format {
         Format::Table => oracles_text(&summary),
         Format::Csv => oracles_table(&summary).render(Format::Csv.into()),
@@ -68,7 +70,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     Ok(summary.exit_code())
 }
 
-fn summarise(args: &CheckOraclesArgs, env: &Env, trials: &[Trial]) -> OracleSummary {
+fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Trial]) -> OracleSummary {
     let mut properties: Vec<String> = Vec::new();
     for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
         for iri in &action.success_properties {
@@ -78,13 +80,14 @@ fn summarise(args: &CheckOraclesArgs, env: &Env, trials: &[Trial]) -> OracleSumm
         }
     }
     let plain: Vec<OracleTrial> = trials.iter().map(plain).collect();
-    let matrix = oracle_matrix(&FAULTS.map(|fault| fault.name), &properties, &plain);
+    let names: Vec<&str> = faults.iter().map(|fault| fault.name).collect();
+    let matrix = oracle_matrix(&names, &properties, &plain);
     let name = |iri: &String| env.ontology.properties.get(iri).map_or_else(|| iri.clone(), |p| p.name.clone());
     OracleSummary {
         config: args.config.display().to_string(),
         seed: env.campaign.seed,
         planned: env.planned_runs(),
-        faults: FAULTS.iter().map(|fault| (fault.name.to_owned(), fault.what.to_owned())).collect(),
+        faults: faults.iter().map(|fault| (fault.name.to_owned(), fault.what.to_owned())).collect(),
         names: properties.iter().map(name).collect(),
         // The first fault is that of a robot which does nothing.
         gaps: matrix.gaps(FAULTS[0].name),

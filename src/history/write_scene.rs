@@ -23,9 +23,10 @@ pub(super) fn role_of(word: &str) -> Option<Role> {
     [Role::Platform, Role::Target, Role::Other, Role::Obstacle].into_iter().find(|role| role_word(*role) == word)
 }
 
-/// Standard deviations of sensing by local name of their terms.
-pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 8] {
+/// What makes sensing wrong, standard deviations for the most part, by local name of their terms.
+pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
     let sensing = &scene.sensing;
+    let odometry = &sensing.odometry;
     [
         ("positionNoise", sensing.position_noise_m),
         ("heightNoise", sensing.height_noise_m),
@@ -35,6 +36,11 @@ pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 8] {
         ("headingNoise", sensing.heading_noise_rad),
         ("gripperNoise", sensing.gripper_noise_m),
         ("rangeNoise", sensing.camera.range_noise_m),
+        ("odometryDrift", odometry.drift),
+        ("odometryHeadingDrift", odometry.heading_drift),
+        ("landmarkDistance", odometry.landmark_every_m),
+        ("landmarkNoise", odometry.landmark_noise_m),
+        ("landmarkHeadingNoise", odometry.landmark_noise_rad),
     ]
 }
 

@@ -32,6 +32,9 @@ const BASE_HEIGHT_M: f64 = 1.2;
 const DRIVE_M: f64 = 1.0;
 /// Nominal distance of such a start from the place. Unit: metres.
 const NOMINAL_DRIVE_M: f64 = 1.5;
+/// Where there are rooms a base starts at least this far from their ends. Unit: metres. Half a base, half a wall, and room for a
+/// leg between: nearer to an end, no robot was ever inside.
+const OFF_END_M: f64 = 0.5;
 /// Without rooms a base that has to drive starts this far around the front of the surface. Unit: metres. Shape: back and
 /// forwards, to either side.
 const ARENA_M: [[f64; 2]; 2] = [[-2.2, 1.2], [-2.2, 2.2]];
@@ -105,7 +108,8 @@ impl Hand<'_> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);
         }
-        let (low, high) = self.arena(world);
+        let rooms = world.and_then(Surroundings::rooms);
+        let (low, high) = rooms.map_or_else(|| self.arena(world), inside);
         let goal = self.goal(world);
         let ranges = [(low[0], high[0]), (low[1], high[1]), (-PI, PI)];
         let nominal = goal.map_or([0.0; 3], |goal| self.nominal_start(goal, (low, high)));
@@ -232,6 +236,11 @@ impl Hand<'_> {
         !furniture.into_iter().any(|other| other.is_in_the_way_of(solid))
             && !self.solids.iter().any(|other| other.is_in_the_way_of(solid))
     }
+}
+
+/// The part of some rooms in which a base starts: off their ends, of which not every one is a wall.
+fn inside((low, high): ([f64; 2], [f64; 2])) -> ([f64; 2], [f64; 2]) {
+    (low.map(|end| end + OFF_END_M), high.map(|end| end - OFF_END_M))
 }
 
 /// The part of an empty floor that the robot may cross.

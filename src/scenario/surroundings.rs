@@ -46,10 +46,23 @@ impl Surroundings {
 
     /// The rectangle around everything: lowest and highest x and y. Unit: metres.
     pub(super) fn extent(&self) -> ([f64; 2], [f64; 2]) {
-        let corners = self.map.rooms.iter().flat_map(|room| [room.low_m, room.high_m]);
         let middles = self.standing.iter().map(|object| [object.pose.position[0], object.pose.position[1]]);
-        corners.chain(middles).fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), at| {
-            ([low[0].min(at[0]), low[1].min(at[1])], [high[0].max(at[0]), high[1].max(at[1])])
-        })
+        around(self.corners().chain(middles))
     }
+
+    /// Where its rooms begin and end, seen from above; nothing where it has none. Unit: metres. Frame: world.
+    pub(super) fn rooms(&self) -> Option<([f64; 2], [f64; 2])> {
+        (!self.map.rooms.is_empty()).then(|| around(self.corners()))
+    }
+
+    fn corners(&self) -> impl Iterator<Item = [f64; 2]> {
+        self.map.rooms.iter().flat_map(|room| [room.low_m, room.high_m])
+    }
+}
+
+/// The least and the greatest coordinates of some points.
+fn around(points: impl Iterator<Item = [f64; 2]>) -> ([f64; 2], [f64; 2]) {
+    points.fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), at| {
+        ([low[0].min(at[0]), low[1].min(at[1])], [high[0].max(at[0]), high[1].max(at[1])])
+    })
 }

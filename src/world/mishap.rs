@@ -1,7 +1,8 @@
-//! What can happen to an object by no doing of the robot's.
+//! What can happen to an object, or to the robot, by no doing of the robot's.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
+use crate::base::Pose;
 use crate::world::convert::{to_pose, to_real, to_vector};
 use crate::world::{Mishap, World};
 
@@ -33,6 +34,23 @@ impl World {
     }
 }
 
+impl World {
+    /// Somebody carries the robot off to where it does not believe to be: x, y and heading. False if its base does not move.
+    pub fn carry_off(&mut self, to: [f64; 3]) -> bool {
+        if self.robot.layout.base.is_none() {
+            return false;
+        }
+        let from = self.base_true();
+        let [x, y, heading] = self.believed(from);
+        self.robot.shift_base(&mut self.engine, [0, 1, 2].map(|axis| to[axis] - from[axis]));
+        // Its wheels did not turn.
+        let (believed, truth) = (Pose::upright([x, y, 0.0], heading), Pose::upright([to[0], to[1], 0.0], to[2]));
+        self.believed_from_true = believed.to_isometry() * truth.to_isometry().inverse();
+        self.forget_way();
+        true
+    }
+}
+
 /// A standing object of a size, laid on its side about where it stood: its middle stays above the same place.
 fn lying(standing: &Isometry3<f64>, [width, _, height]: [f64; 3]) -> Isometry3<f64> {
     // About its own y axis: what was its top points along its own x axis, its width is what stands up now.
@@ -45,7 +63,6 @@ fn lying(standing: &Isometry3<f64>, [width, _, height]: [f64; 3]) -> Isometry3<f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Pose;
 
     #[test]
     fn what_has_fallen_lies_above_the_place_where_it_stood() {

@@ -47,6 +47,11 @@ impl World {
         self.tracker = Tracker { variances: [place * place, heading * heading], ..Tracker::default() };
     }
 
+    /// The base is elsewhere, and no wheel has turned: the next step begins here.
+    pub(super) fn forget_way(&mut self) {
+        self.tracker.last = None;
+    }
+
     /// Takes into the belief how the base has moved since the last time. To be called after every tick.
     pub fn track_base(&mut self, choices: &mut Choices) {
         if self.sensing.odometry == Odometry::IDEAL || self.robot.layout.base.is_none() {

@@ -216,6 +216,29 @@ impl Robot {
         engine.bodies.propagate_modified_body_positions_to_colliders(&mut engine.colliders);
     }
 
+    /// Moves the base from one moment to the next, with all that it carries; the other joints stay as they are. Units: metres,
+    /// metres, radians.
+    pub fn shift_base(&mut self, engine: &mut PhysicsWorld, by: [f64; 3]) {
+        let Some(base) = self.layout.base else { return };
+        let Some((multibody, _)) = engine.multibody_joints.get(self.motors[base[0]].joint) else { return };
+        let mut displacements = vec![0.0_f32; multibody.ndofs()];
+        for (idx, shift) in base.into_iter().zip(by) {
+            let motor = &mut self.motors[idx];
+            motor.target += shift;
+            motor.setpoint += shift;
+            let link = engine.multibody_joints.get(motor.joint).and_then(|(multibody, link)| multibody.link(link));
+            if let Some(link) = link {
+                displacements[link.assembly_id()] = to_real(shift);
+            }
+        }
+        if let Some((multibody, _)) = engine.multibody_joints.get_mut(self.motors[base[0]].joint) {
+            multibody.apply_displacements(&displacements);
+            multibody.forward_kinematics(&engine.bodies, true);
+            multibody.update_rigid_bodies(&mut engine.bodies, true);
+        }
+        engine.bodies.propagate_modified_body_positions_to_colliders(&mut engine.colliders);
+    }
+
     /// Joints that follow others are held to them as the mechanism does it.
     fn couple_mimics(&self, engine: &mut PhysicsWorld) {
         for (follower, joint) in self.model.joints.iter().enumerate() {

@@ -45,15 +45,20 @@ impl World {
         self.objects.iter().map(|object| object.id.clone()).collect()
     }
 
-    /// Everything that stands for good as a map has it, where the robot has one: without noise, and off by as much as the
-    /// robot is wrong about where it stands itself. Nothing without a map.
-    pub fn map_of_furniture(&self) -> Option<Vec<Sighting>> {
+    /// Everything that stands for good as the floor plan has it: without noise, and off by as much as the robot is wrong about
+    /// where it stands itself.
+    pub fn known_furniture(&self) -> Vec<Sighting> {
         let fixed = self.objects.iter().filter(|object| object.fixed);
         let as_built = fixed.map(|object| {
             let (foot, size_m) = self.foot(object, &object.placed);
             Sighting { id: object.id.clone(), pose: Pose::from_isometry(&foot), size_m, furniture: true }
         });
-        self.has_map.then(|| as_built.collect())
+        as_built.collect()
+    }
+
+    /// The same, where the scene lies in a world that has a map. Nothing without one.
+    pub fn map_of_furniture(&self) -> Option<Vec<Sighting>> {
+        self.has_map.then(|| self.known_furniture())
     }
 
     /// Looks at one object; nothing if there is none of that id.

@@ -2,9 +2,11 @@
 
 pub mod chromium;
 pub mod foreign;
+pub mod line;
 pub mod made_up;
 pub mod paged;
 pub mod planted;
+pub mod wrong;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

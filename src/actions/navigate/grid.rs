@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::actions::memory::Standing;
 use crate::actions::route::length;
 use crate::scenario::{FloorPlan, Outline, Room};
 
@@ -18,6 +19,8 @@ const SEEN_TAKEN: i8 = 3;
 const SEEN_FREE: i8 = -1;
 /// More pictures than that make nobody surer.
 const SUREST: i8 = 6;
+/// What is seen so near to what the map has is taken for that. Unit: metres. What a belief is astray by, three times.
+const MAPPED_M: f64 = 0.12;
 
 /// Square cells of the floor, by rows along x. Frame: world, by the base's belief.
 #[derive(Debug, Clone)]
@@ -29,21 +32,39 @@ pub struct Grid {
     mapped_m: Vec<f64>,
     /// Above 0 where something was seen, below where the floor was.
     seen: Vec<i8>,
+    /// Height of the highest that was seen of it. Unit: metres.
+    tops_m: Vec<f64>,
 }
 
 /// What one picture shows of the floor.
 #[derive(Debug, Clone, Default)]
 pub struct Evidence {
-    /// For each cell: points of things, points of the floor.
-    counts: std::collections::BTreeMap<usize, [u16; 2]>,
+    counts: std::collections::BTreeMap<usize, Shown>,
+}
+
+/// What one picture shows of one cell.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shown {
+    /// Points of things.
+    things: u16,
+    /// Points of the floor.
+    floor: u16,
+    /// Height of the highest point. Unit: metres.
+    top_m: f64,
 }
 
 impl Evidence {
-    /// Adds a point of a thing, or of the floor.
-    pub fn add(&mut self, cell: usize, is_floor: bool) {
-        let counts = self.counts.entry(cell).or_default();
-        let count = &mut counts[usize::from(is_floor)];
-        *count = count.saturating_add(1);
+    /// Adds a point of the floor.
+    pub fn add_floor(&mut self, cell: usize) {
+        let shown = self.counts.entry(cell).or_default();
+        shown.floor = shown.floor.saturating_add(1);
+    }
+
+    /// Adds a point of a thing, at a height. Unit: metres.
+    pub fn add_thing(&mut self, cell: usize, height_m: f64) {
+        let shown = self.counts.entry(cell).or_default();
+        shown.things = shown.things.saturating_add(1);
+        shown.top_m = shown.top_m.max(height_m);
     }
 }
 
@@ -65,7 +86,8 @@ impl Grid {
             count
         });
         let n_cells = columns * rows;
-        let mut grid = Self { low, columns, rows, mapped_m: Vec::new(), seen: vec![0; n_cells] };
+        let (seen, tops_m) = (vec![0; n_cells], vec![0.0; n_cells]);
+        let mut grid = Self { low, columns, rows, mapped_m: Vec::new(), seen, tops_m };
         let outlines: Vec<_> = plan.outlines.iter().map(|o| (o.pose.to_isometry().inverse(), o.size_m)).collect();
         grid.mapped_m = (0..n_cells).map(|cell| mapped(plan, &outlines, grid.middle(cell))).collect();
         grid
@@ -97,11 +119,12 @@ impl Grid {
 
     /// Takes in what a picture shows. A cell in which it shows the floor and nothing else is free: a ray went there.
     pub fn learn(&mut self, evidence: &Evidence) {
-        for (cell, [things, floor]) in &evidence.counts {
-            let Some(seen) = self.seen.get_mut(*cell) else { continue };
-            let change = if *things >= HITS {
+        for (cell, shown) in &evidence.counts {
+            let (Some(seen), Some(top)) = (self.seen.get_mut(*cell), self.tops_m.get_mut(*cell)) else { continue };
+            let change = if shown.things >= HITS {
+                *top = top.max(shown.top_m);
                 SEEN_TAKEN
-            } else if *things == 0 && *floor > 0 {
+            } else if shown.things == 0 && shown.floor > 0 {
                 SEEN_FREE
             } else {
                 0
@@ -113,6 +136,23 @@ impl Grid {
     /// Forgets what was seen.
     pub fn forget(&mut self) {
         self.seen.fill(0);
+        self.tops_m.fill(0.0);
+    }
+
+    /// What was seen on the floor and is not on the map.
+    pub fn standing(&self) -> Vec<Standing> {
+        let taken = (0..self.n_cells()).filter(|cell| self.seen[*cell] > 0 && self.mapped_m[*cell] > MAPPED_M);
+        taken.map(|cell| Standing { at_m: self.middle(cell), top_m: self.tops_m[cell] }).collect()
+    }
+
+    /// Takes in what was seen on an earlier drive.
+    pub fn recall(&mut self, standing: &[Standing]) {
+        for Standing { at_m, top_m } in standing {
+            if let Some(cell) = self.cell(*at_m) {
+                self.seen[cell] = SEEN_TAKEN;
+                self.tops_m[cell] = top_m.max(self.tops_m[cell]);
+            }
+        }
     }
 
     /// Distances of the cells' middles to what is taken by the map. Unit: metres.
@@ -233,7 +273,7 @@ mod tests {
         let taken = [[0.0, 0.0], [0.6, -0.4], [-1.2, 0.7]].map(|at| grid.cell(at).expect("it is on the grid"));
         let mut evidence = Evidence::default();
         for cell in taken {
-            (0..3).for_each(|_| evidence.add(cell, false));
+            (0..3).for_each(|_| evidence.add_thing(cell, 0.3));
         }
         grid.learn(&evidence);
         for (cell, distance) in grid.seen_m().into_iter().enumerate() {
@@ -253,8 +293,8 @@ mod tests {
         let cell = grid.cell([0.0, 0.0]).expect("it is on the grid");
         let picture = |things: u16, floor: u16| {
             let mut evidence = Evidence::default();
-            (0..things).for_each(|_| evidence.add(cell, false));
-            (0..floor).for_each(|_| evidence.add(cell, true));
+            (0..things).for_each(|_| evidence.add_thing(cell, 0.3));
+            (0..floor).for_each(|_| evidence.add_floor(cell));
             evidence
         };
         grid.learn(&picture(2, 40));
@@ -268,5 +308,21 @@ mod tests {
         grid.learn(&picture(9, 0));
         grid.forget();
         assert!(grid.seen_m()[cell].is_infinite());
+    }
+
+    #[test]
+    fn what_was_seen_on_the_floor_is_known_on_the_next_drive_but_not_what_is_on_the_map() {
+        let mut grid = hall();
+        let cells = [[0.0, 0.0], [1.25, 0.0]].map(|at| grid.cell(at).expect("it is on the grid"));
+        let mut evidence = Evidence::default();
+        for cell in cells {
+            (0..3).for_each(|_| evidence.add_thing(cell, 0.3));
+        }
+        grid.learn(&evidence);
+        let standing = grid.standing();
+        assert_eq!(standing, [Standing { at_m: grid.middle(cells[0]), top_m: 0.3 }]);
+        let mut next = hall();
+        next.recall(&standing);
+        assert_eq!(next.standing(), standing);
     }
 }

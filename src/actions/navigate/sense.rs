@@ -67,9 +67,10 @@ pub fn look(robot: &mut Operator<'_>, size: Size, grid: &mut Grid) {
                 continue;
             }
             let Some(cell) = grid.cell([point.x, point.y]) else { continue };
-            let is_floor = point.z < FLOOR_M;
-            if is_floor || !own.is_near(&point, OWN_M) {
-                evidence.add(cell, is_floor);
+            if point.z < FLOOR_M {
+                evidence.add_floor(cell);
+            } else if !own.is_near(&point, OWN_M) {
+                evidence.add_thing(cell, point.z);
             }
         }
     }

@@ -38,6 +38,12 @@ const MOST_WAYS: usize = 12;
 const HELD_UP_M: f64 = 0.15;
 /// The end is reached within this. Units: metres, radians.
 const REACHED: [f64; 2] = [0.03, 0.03];
+/// Distances from a goal that is taken at which another place is looked for, the nearest first, and in how many directions.
+/// Unit of the distances: metres. From farther away no table is within sight.
+const ASIDE_M: [f64; 4] = [0.3, 0.45, 0.6, 0.8];
+const N_ASIDE: u32 = 16;
+/// How far ahead of a goal is what a robot faces there. Unit: metres. The middle of a table.
+const FACED_M: f64 = 1.0;
 /// Time for the base to come to rest. Unit: seconds.
 const ARRIVE_SECS: f64 = 0.5;
 
@@ -54,7 +60,10 @@ pub fn move_to(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionRepo
     let Some(base) = robot.layout().base else { return Ok(failed("the robot has no base that drives")) };
     let mut drive = Drive::new(robot, base, goal);
     match drive.go()? {
-        Some(reason) => Ok(failed(format!("{first}: {reason}"))),
+        Some(reason) => {
+            drive.go_near()?;
+            Ok(failed(format!("{first}: {reason}")))
+        }
         None => drive.report(first),
     }
 }
@@ -91,13 +100,20 @@ impl<'r, 'o> Drive<'r, 'o> {
             turn_speed: fastest(base[2]),
             turn_acceleration: TURN_ACCELERATION,
         };
-        let grid = Grid::new(robot.floor_plan(), &[[at[0], at[1]], [goal[0], goal[1]]]);
+        let mut grid = Grid::new(robot.floor_plan(), &[[at[0], at[1]], [goal[0], goal[1]]]);
+        grid.recall(&robot.memory().floor);
         let size = Size::of(robot);
         Self { robot, base, goal, size, limits, grid, follower: Follower::new(at, Vec::new(), at[2]) }
     }
 
-    /// Drives there. Gives the reason why it did not, if it did not.
+    /// Drives there, and keeps what it saw on the floor. Gives the reason why it did not get there, if it did not.
     fn go(&mut self) -> Result<Option<String>, Interrupt> {
+        let reason = self.go_on();
+        self.robot.remember_floor(self.grid.standing());
+        reason
+    }
+
+    fn go_on(&mut self) -> Result<Option<String>, Interrupt> {
         let mut looked_around = false;
         for _ in 0..MOST_WAYS {
             self.robot.begin("plan");
@@ -117,6 +133,31 @@ impl<'r, 'o> Drive<'r, 'o> {
             }
         }
         Ok(Some("no way stayed free".to_owned()))
+    }
+
+    /// Drives to the nearest free place to a goal that it can't get to, and faces what it would have faced there: what comes next
+    /// may still be done from here. Wherever that leads, the goal was not reached.
+    fn go_near(&mut self) -> Result<(), Interrupt> {
+        let [x, y, heading] = self.goal;
+        let faced = [x + FACED_M * libm::cos(heading), y + FACED_M * libm::sin(heading)];
+        let turns = || (0..N_ASIDE).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_ASIDE));
+        let mut places = ASIDE_M.iter().flat_map(|away| {
+            turns().map(move |turn| {
+                let [x, y] = [x + away * libm::cos(turn), y + away * libm::sin(turn)];
+                [x, y, libm::atan2(faced[1] - y, faced[0] - x)]
+            })
+        });
+        self.robot.begin("plan");
+        let is_way = places.any(|place| {
+            self.goal = place;
+            self.set_out()
+        });
+        if is_way {
+            self.robot.begin("drive near");
+            self.follow()?;
+        }
+        self.robot.remember_floor(self.grid.standing());
+        Ok(())
     }
 
     /// Takes the best way from here, if there is one.

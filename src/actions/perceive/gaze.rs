@@ -9,13 +9,31 @@ const PROBE_RAD: f64 = 1e-4;
 /// Damping of the least squares: where a joint does not turn the gaze, it stays.
 const DAMPING: f64 = 1e-6;
 const N_ROUNDS: usize = 12;
+/// A point that is so near to the middle of the picture is looked at. Unit: radians.
+const SEEN_RAD: f64 = 0.05;
 /// Largest change of a joint in a round. Unit: radians.
 const LARGEST_RAD: f64 = 0.5;
 
 /// The posture with the head turned so that a point is in the middle of the picture, or as near to it as the head's joints
 /// allow. Without such joints, the posture as it is. Frame: world, by the base's belief.
 pub fn towards(kinematics: &Kinematics, layout: &Layout, positions: &[f64], point: &Point3<f64>) -> Vec<f64> {
-    let mut positions = positions.to_vec();
+    let turned = self::turned(kinematics, layout, positions.to_vec(), point);
+    if off(kinematics, &turned, point).norm() < SEEN_RAD {
+        return turned;
+    }
+    // The short way round has come to the end of a joint: the long way may not.
+    let mut ahead = positions.to_vec();
+    for joint in &layout.head {
+        let limits = &kinematics.joints()[*joint];
+        ahead[*joint] = 0.0_f64.clamp(limits.lower, limits.upper);
+    }
+    let other = self::turned(kinematics, layout, ahead, point);
+    let miss = |posture: &[f64]| off(kinematics, posture, point).norm();
+    if miss(&other) < miss(&turned) { other } else { turned }
+}
+
+/// What turning the head towards a point from some posture comes to.
+fn turned(kinematics: &Kinematics, layout: &Layout, mut positions: Vec<f64>, point: &Point3<f64>) -> Vec<f64> {
     for _ in 0..N_ROUNDS {
         let miss = off(kinematics, &positions, point);
         let effects: Vec<Vector2<f64>> = layout
@@ -45,4 +63,31 @@ fn off(kinematics: &Kinematics, positions: &[f64], point: &Point3<f64>) -> Vecto
     let seen = kinematics.camera(positions).inverse() * point;
     let level = (seen.x * seen.x + seen.y * seen.y).sqrt();
     Vector2::new(libm::atan2(seen.y, seen.x), libm::atan2(seen.z, level))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::base::Files;
+    use crate::scenario::RobotStart;
+    use crate::world::geometry;
+
+    /// A head that had turned far to the right could not look ahead any more: the short way there goes over the end of its neck.
+    #[test]
+    fn the_head_finds_a_point_wherever_it_looked_before() {
+        let path = Path::new("models/robots/mobile_manipulator.toml");
+        let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is right");
+        let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
+        let (kinematics, layout, mut posture) = geometry(&start).expect("the shipped robot is right");
+        for pan in [-3.8, -3.0, -1.0, 0.0, 1.7] {
+            posture[layout.head[0]] = pan;
+            for point in [[1.0, 0.0, 0.7], [0.8, 0.6, 0.4], [0.3, -1.0, 0.0], [-0.5, -1.2, 0.7]].map(Point3::from) {
+                let found = towards(&kinematics, &layout, &posture, &point);
+                assert!(off(&kinematics, &found, &point).norm() < SEEN_RAD, "from {pan} to {point}: {found:?}");
+            }
+        }
+    }
 }

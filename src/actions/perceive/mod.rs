@@ -20,4 +20,4 @@ mod survey;
 
 pub use gaze::towards;
 pub use skill::perceive_plane;
-pub use survey::{Survey, survey};
+pub use survey::{Survey, look_again, survey};

@@ -1,13 +1,14 @@
 //! A second look at a surface that the robot knows about: where exactly it is, and what stands on it.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
-use crate::actions::PerceivedPlane;
-use crate::actions::memory::sighting;
+use crate::actions::memory::{furniture, sighting};
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::perceive::interpret::Surface;
 use crate::actions::perceive::sight::Sight;
+use crate::actions::{PerceivedPlane, PerceivedThing};
 use crate::base::Pose;
+use crate::scenario::KnownKind;
 use crate::world::Sighting;
 
 /// Pictures that are taken at most.
@@ -15,6 +16,9 @@ const MOST_VIEWS: usize = 5;
 /// How far beyond where it is expected the surface may reach, and how much higher or lower it may be. Unit: metres. What a
 /// map is off by the error of a heading, and a detector by three times its noise.
 const OFF_M: f64 = 0.15;
+/// A thing that is seen farther from where it is expected is another one. Unit: metres. What a belief is astray by after a
+/// metre's drive, twice.
+const ASTRAY_M: f64 = 0.12;
 
 /// A surface as it was looked at, and what stands on it.
 pub struct Survey {
@@ -57,6 +61,29 @@ pub fn survey(expected: &Sighting, robot: &mut Operator<'_>) -> Result<Option<Su
     Ok(Some(Survey { plane: surface.perceived(), things: things.collect() }))
 }
 
+/// Looks once more at a thing on a surface and gives where it is now by the base's belief, which drives have changed; nothing if
+/// no such thing is seen near where it is expected.
+///
+/// # Errors
+/// [`Interrupt`] if the action has to end.
+pub fn look_again(
+    expected: &Sighting,
+    kind: &KnownKind,
+    plane: &PerceivedPlane,
+    robot: &mut Operator<'_>,
+) -> Result<Option<Sighting>, Interrupt> {
+    let mut sight = Sight::default();
+    let foot = Vector3::from(expected.pose.position);
+    sight.add_look_at(&Point3::from(foot + Vector3::z() * (expected.size_m[2] / 2.0)), robot)?;
+    let top = furniture("surface", plane);
+    let Some(surface) = Surface::find(&near(&sight.points, &top)) else { return Ok(None) };
+    let things = surface.things(&sight.points, &sight.eye(), robot.known_kinds());
+    let off = |thing: &PerceivedThing| (Vector3::from(thing.pose.position) - foot).norm();
+    let alike = things.iter().filter(|thing| thing.category.as_ref() == Some(&kind.category));
+    let nearest = alike.filter(|thing| off(thing) < ASTRAY_M).min_by(|a, b| off(a).total_cmp(&off(b)));
+    Ok(nearest.map(|thing| sighting(expected.id.clone(), thing)))
+}
+
 /// Where the top of a piece of furniture is looked for: its middle, then halfway to its corners, where something is in the way.
 fn places(expected: &Sighting) -> impl Iterator<Item = Point3<f64>> {
     let ([width, depth, height], pose) = (expected.size_m, expected.pose.to_isometry());
@@ -65,7 +92,7 @@ fn places(expected: &Sighting) -> impl Iterator<Item = Point3<f64>> {
 }
 
 /// The points that may belong to the top of a piece of furniture.
-fn near(points: &[Point3<f64>], expected: &Sighting) -> Vec<Point3<f64>> {
+pub(super) fn near(points: &[Point3<f64>], expected: &Sighting) -> Vec<Point3<f64>> {
     let [width, depth, height] = expected.size_m;
     let from_world = expected.pose.to_isometry().inverse();
     let belongs = |point: &&Point3<f64>| {

@@ -1,11 +1,12 @@
-//! How a thing is carried: the hand near the base and low, the base around what stands on the floor.
+//! How a thing is carried: the hand near the base, the base around what stands on the floor.
 
 use nalgebra::Vector3;
 
+use crate::actions::memory::Held;
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::{navigate, plan};
 use crate::base::Pose;
-use crate::world::{Sighting, ik};
+use crate::world::{SelfContact, Sighting, ik};
 
 /// Distance between postures on a straight way of the hand. Unit: metres.
 const STEP_M: f64 = 0.02;
@@ -18,6 +19,10 @@ const LOW_M: f64 = 0.45;
 /// How far the hand goes back before it goes down, by the arm and by the base together. Unit: metres. What it holds clears the
 /// edge of the furniture that it was over.
 const BACK_M: f64 = 0.2;
+/// How far a thing may lean on its way into the hand's place for driving: what it leans in the hand anyway. Unit: radians.
+const LEAN_RAD: f64 = 0.15;
+/// Postures that are checked on the way there.
+const N_CHECKS: u32 = 12;
 /// Distance of the base's middle from the edge of a surface that it looks at. Unit: metres. A head a metre high sees a table's
 /// near edge from there, and what the hand holds in front of the base is clear of it.
 const GAP_M: f64 = 0.69;
@@ -41,6 +46,56 @@ pub fn fold(robot: &Operator<'_>) -> Vec<Vec<f64>> {
     let height = robot.kinematics().grasp(&near).translation.vector.z;
     path.extend(straight(robot, &near, &Vector3::new(0.0, 0.0, -(height - LOW_M).max(0.0))));
     path
+}
+
+/// Postures that bring the arm from where it is to how it is for driving, so that the base with what it holds is slim; none where
+/// what the hand holds would lean on the way, or the arm would go into itself.
+///
+/// The arm goes there straight, or with one joint last: an arm whose upper part stands upright turns about it.
+pub fn tuck(robot: &Operator<'_>, held: &Held) -> Vec<Vec<f64>> {
+    let start = robot.commanded();
+    let home = with_arm(start, &robot.layout().arm, &robot.profile().home);
+    let last = robot.layout().arm.iter().map(|last| {
+        let mut before = home.clone();
+        before[*last] = start[*last];
+        vec![before, home.clone()]
+    });
+    let itself = SelfContact::new(robot.kinematics(), &[start.to_vec(), home.clone()]);
+    let ways = std::iter::once(vec![home.clone()]).chain(last);
+    ways.into_iter().find(|way| stays_upright(robot, held, &itself, way)).unwrap_or_default()
+}
+
+/// The way back from there to how the arm was, with the base where it is now.
+pub fn untuck(robot: &Operator<'_>, tucked: &[Vec<f64>], before: &[f64]) -> Vec<Vec<f64>> {
+    let arm = &robot.layout().arm;
+    let values = |posture: &[f64]| arm.iter().map(|joint| posture[*joint]).collect::<Vec<f64>>();
+    let back = tucked.iter().rev().skip(1).map(Vec::as_slice).chain((!tucked.is_empty()).then_some(before));
+    back.map(|posture| with_arm(robot.commanded(), arm, &values(posture))).collect()
+}
+
+/// A posture with the arm's joints elsewhere.
+fn with_arm(posture: &[f64], arm: &[usize], values: &[f64]) -> Vec<f64> {
+    let mut posture = posture.to_vec();
+    for (joint, value) in arm.iter().zip(values) {
+        posture[*joint] = *value;
+    }
+    posture
+}
+
+/// Whether what the hand holds stays upright on a way from where the arm is, and the arm off itself.
+fn stays_upright(robot: &Operator<'_>, held: &Held, itself: &SelfContact, way: &[Vec<f64>]) -> bool {
+    let kinematics = robot.kinematics();
+    let fits = |posture: &[f64]| {
+        let foot = kinematics.grasp(posture) * held.grasp_from_foot.inverse();
+        (foot.rotation * Vector3::z()).angle(&Vector3::z()) <= LEAN_RAD && !itself.touches(&kinematics.links(posture))
+    };
+    let from = std::iter::once(robot.commanded()).chain(way.iter().map(Vec::as_slice));
+    from.zip(way).all(|(from, to)| {
+        (0..=N_CHECKS).all(|step| {
+            let share = f64::from(step) / f64::from(N_CHECKS);
+            fits(&from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect::<Vec<f64>>())
+        })
+    })
 }
 
 /// Postures on a straight way of the hand, which stays as it is turned, with the base where it is: as far as the arm reaches.

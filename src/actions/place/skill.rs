@@ -20,6 +20,8 @@ const SURFACE: &str = "placeSurface";
 const LOOK_SECS: f64 = 0.5;
 /// Shortest time of folding the arm with something in the hand. Unit: seconds.
 const FOLD_SECS: f64 = 2.0;
+/// Shortest time of bringing the arm into its place for driving, or out of it. Unit: seconds.
+const TUCK_SECS: f64 = 3.0;
 /// Shortest time of going down to a few centimetres above the surface. Unit: seconds.
 const DOWN_SECS: f64 = 3.0;
 /// How far below the place where the surface is expected the hand goes on. Unit: metres. What sight is off by, three times.
@@ -32,8 +34,6 @@ const OPEN_SECS: f64 = 0.8;
 const LEAVE_SECS: f64 = 2.0;
 /// How far a hand goes back from what it let go, where no base takes it there. Unit: metres.
 const LEAVE_M: f64 = 0.12;
-/// Things whose foot is below this stand on the floor. Unit: metres.
-const ON_FLOOR_M: f64 = 0.2;
 
 /// Why the skill ends before its end.
 enum Halt {
@@ -69,6 +69,9 @@ fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, H
     robot.watch_grip();
     robot.begin("fold");
     robot.follow(&carry::fold(robot), FOLD_SECS)?;
+    let folded = robot.commanded().to_vec();
+    let tucked = carry::tuck(robot, &held);
+    robot.follow(&tucked, if tucked.is_empty() { 0.0 } else { TUCK_SECS })?;
     robot.begin("look out");
     robot.wait(LOOK_SECS)?;
     let (seen, others) = look_out(surface, &held, robot)?;
@@ -80,6 +83,9 @@ fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, H
     }
     robot.begin("look");
     let survey = look_at(surface, &seen, &others, robot)?;
+    still_in_hand(&held, robot)?;
+    robot.begin("unfold");
+    robot.follow(&carry::untuck(robot, &tucked, &folded), if tucked.is_empty() { 0.0 } else { TUCK_SECS })?;
     still_in_hand(&held, robot)?;
     let (plan, spot) = choose(surface, &held, &survey, &others, robot)?;
     set_down(surface, &held, &plan, &spot, robot)
@@ -106,19 +112,22 @@ fn still_in_hand(held: &Held, robot: &mut Operator<'_>) -> Result<(), Halt> {
     Err(Halt::Failed(format!("{} slipped out of the hand on the way", held.id)))
 }
 
-/// Where the surface is, roughly, and everything else: furniture by the map where there is one, and things on tables as an
-/// earlier action perceived them where one did; the rest by the abstract detector.
+/// Where the surface is, roughly, and everything else. Where the robot looked around earlier: furniture by its floor plan, and
+/// things on tables as it perceived them then. Otherwise by the abstract detector, but for what is on a map.
 fn look_out(surface: &str, held: &Held, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), Halt> {
-    let map = robot.map_of_furniture();
-    let perceived = robot.memory().perceived.clone();
-    let on_map = |id: &str| map.iter().flatten().any(|piece| piece.id == id);
-    let mut seen: Vec<Sighting> = robot.see_if(|id| id != held.id && !on_map(id));
-    if let Some(perceived) = perceived {
-        seen.retain(|thing| thing.furniture || thing.pose.position[2] < ON_FLOOR_M);
-        let standing = perceived.things.iter().enumerate();
-        seen.extend(standing.map(|(idx, thing)| memory::sighting(format!("thing_{}", idx + 1), thing)));
-    }
-    seen.extend(map.into_iter().flatten());
+    let mut seen = match robot.memory().perceived.clone() {
+        Some(perceived) => {
+            let standing = perceived.things.iter().enumerate();
+            let things = standing.map(|(idx, thing)| memory::sighting(format!("thing_{}", idx + 1), thing));
+            things.chain(robot.known_furniture()).collect()
+        }
+        None => {
+            let map = robot.map_of_furniture().unwrap_or_default();
+            let mut seen = robot.see_if(|id| id != held.id && map.iter().all(|piece| piece.id != id));
+            seen.extend(map);
+            seen
+        }
+    };
     let at = seen.iter().position(|thing| thing.id == surface && thing.furniture);
     let at = at.ok_or_else(|| Halt::Failed(format!("{surface} was not seen")))?;
     let place = seen.remove(at);
@@ -158,6 +167,8 @@ fn choose(
     }
     let mut around: Vec<Sighting> = others.iter().chain(&survey.things).cloned().collect();
     around.push(furniture(surface, &survey.plane));
+    // What the drive saw on the floor.
+    around.extend(memory::obstacles(&robot.memory().floor));
     let ways = spot::ways(held, &spots, robot.profile().max_opening_m);
     // Where the arm can't unfold straight, it goes around itself: what it holds may lean meanwhile.
     let wanted = Wanted { grasps: &ways, all: &ways, taken: None };

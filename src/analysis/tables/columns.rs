@@ -158,6 +158,19 @@ const COLUMNS: &[Column] = &[
     number("heading_noise_rad", "rad", "how wrong the robot's own heading is", |p| noise(p, "headingNoise")).of_scene(),
     number("gripper_noise_m", "m", "how wrong the gripper's opening is", |p| noise(p, "gripperNoise")).of_scene(),
     number("range_noise_m", "m", "how wrong the camera's ranges are", |p| noise(p, "rangeNoise")).of_scene(),
+    number("odometry_drift", "1", "how wrong wheels are about the way, as a share of it", |p| {
+        noise(p, "odometryDrift")
+    })
+    .of_scene(),
+    number("heading_drift_rad", "rad", "how wrong wheels are about the heading, for each radian and metre", |p| {
+        noise(p, "odometryHeadingDrift")
+    })
+    .of_scene(),
+    number("landmark_every_m", "m", "way between landmarks; 0 where there are none", |p| noise(p, "landmarkDistance"))
+        .of_scene(),
+    number("landmark_noise_m", "m", "how wrong positions by landmarks are", |p| noise(p, "landmarkNoise")).of_scene(),
+    number("landmark_noise_rad", "rad", "how wrong headings by landmarks are", |p| noise(p, "landmarkHeadingNoise"))
+        .of_scene(),
     number("target_displacement_m", "m", "how far the target came from its place during the run", |p| {
         Cell::Number(p.scene.target.and_then(|target| target.displacement_m))
     }),

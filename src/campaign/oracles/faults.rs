@@ -13,11 +13,23 @@ pub struct Fault {
     pub sabotage: Sabotage,
 }
 
+impl Fault {
+    /// Whether it can come about in a test of some actions.
+    pub fn concerns(&self, test: &[String]) -> bool {
+        self.sabotage.action.is_none_or(|action| test.iter().any(|name| name == action))
+    }
+}
+
 /// Nothing goes wrong: the rest of a fault that is one thing.
-const NONE: Sabotage = Sabotage { robot: None, world: None, report: None };
+const NONE: Sabotage = Sabotage { action: None, robot: None, world: None, report: None };
+
+/// The actions that a fault may be confined to.
+const MOVE_TO: Option<&str> = Some("MoveTo");
+const PICK: Option<&str> = Some("Pick");
+const PLACE: Option<&str> = Some("Place");
 
 /// All faults, in the order of the table of results. To add one, add a row.
-pub const FAULTS: [Fault; 9] = [
+pub const FAULTS: [Fault; 16] = [
     Fault {
         name: "no-op",
         what: "the robot does nothing and says that it succeeded",
@@ -26,32 +38,37 @@ pub const FAULTS: [Fault; 9] = [
     Fault {
         name: "release",
         what: "the hand opens while it carries the object",
-        sabotage: Sabotage { world: Some((Moment::Carrying, Accident::HandOpens)), ..NONE },
+        sabotage: Sabotage { action: PICK, world: Some((Moment::Carrying, Accident::HandOpens)), ..NONE },
     },
     Fault {
         name: "slip",
         what: "the object loses all friction while it is carried",
-        sabotage: Sabotage { world: Some((Moment::Carrying, Accident::Slippery)), ..NONE },
+        sabotage: Sabotage { action: PICK, world: Some((Moment::Carrying, Accident::Slippery)), ..NONE },
     },
     Fault {
         name: "wrong-object",
         what: "the robot takes the nearest other object for the one that was named",
-        sabotage: Sabotage { robot: Some(Defect::WrongObject), ..NONE },
+        sabotage: Sabotage { action: PICK, robot: Some(Defect::WrongObject), ..NONE },
     },
     Fault {
         name: "teleport",
         what: "the object is half a metre farther away from one moment to the next while it is carried",
-        sabotage: Sabotage { world: Some((Moment::Carrying, Accident::Teleport)), ..NONE },
+        sabotage: Sabotage { action: PICK, world: Some((Moment::Carrying, Accident::Teleport)), ..NONE },
     },
     Fault {
         name: "neighbour-falls",
         what: "the object's nearest neighbour is knocked over while the hand reaches for the object",
-        sabotage: Sabotage { world: Some((Moment::Reaching, Accident::NeighbourFalls)), ..NONE },
+        sabotage: Sabotage { action: PICK, world: Some((Moment::Reaching, Accident::NeighbourFalls)), ..NONE },
     },
     Fault {
         name: "false-success",
         what: "the hand drops the object, and the action says that it succeeded",
-        sabotage: Sabotage { world: Some((Moment::Carrying, Accident::HandOpens)), report: Some(true), ..NONE },
+        sabotage: Sabotage {
+            action: PICK,
+            world: Some((Moment::Carrying, Accident::HandOpens)),
+            report: Some(true),
+            ..NONE
+        },
     },
     Fault {
         name: "false-failure",
@@ -62,6 +79,46 @@ pub const FAULTS: [Fault; 9] = [
         name: "frozen-sensors",
         what: "what the robot senses stays as it was when the action began",
         sabotage: Sabotage { robot: Some(Defect::FrozenSensors), ..NONE },
+    },
+    Fault {
+        name: "obstacle",
+        what: "something stands right before the base from one moment to the next while it drives",
+        sabotage: Sabotage { action: MOVE_TO, world: Some((Moment::Driving, Accident::InTheWay)), ..NONE },
+    },
+    Fault {
+        name: "carried-off",
+        what: "the driving robot is carried out of its rooms, and neither wheels nor landmarks tell it at once",
+        sabotage: Sabotage { action: MOVE_TO, world: Some((Moment::Driving, Accident::CarriedOff)), ..NONE },
+    },
+    Fault {
+        name: "placed-in-mid-air",
+        what: "the hand opens above the surface that the object is to be placed on, and the action says that it succeeded",
+        sabotage: Sabotage {
+            action: PLACE,
+            world: Some((Moment::Lowering, Accident::HandOpens)),
+            report: Some(true),
+            ..NONE
+        },
+    },
+    Fault {
+        name: "placed-and-gone",
+        what: "the object is half a metre farther away from one moment to the next once it is let go",
+        sabotage: Sabotage { action: PLACE, world: Some((Moment::LetGo, Accident::Teleport)), ..NONE },
+    },
+    Fault {
+        name: "placed-and-fallen",
+        what: "the object falls over once it is let go",
+        sabotage: Sabotage { action: PLACE, world: Some((Moment::LetGo, Accident::Falls)), ..NONE },
+    },
+    Fault {
+        name: "hand-jams",
+        what: "the hand does not open any more when the object is to be let go",
+        sabotage: Sabotage { action: PLACE, world: Some((Moment::Lowering, Accident::HandJams)), ..NONE },
+    },
+    Fault {
+        name: "place-neighbour-falls",
+        what: "the nearest neighbour of the place is knocked over while the object is lowered to it",
+        sabotage: Sabotage { action: PLACE, world: Some((Moment::Lowering, Accident::NeighbourFalls)), ..NONE },
     },
 ];
 

@@ -47,7 +47,7 @@ struct Scene {
     choices: Vec<Choice>,
 }
 
-/// Runs every planned scene without a fault, and then with each, on several workers. Tells `on_done` after each.
+/// Runs every planned scene without a fault, and then with each that concerns its test, on several workers. Tells `on_done` after each.
 ///
 /// The answers are in the order of the indices, that of no fault before the others; they depend neither on the number of
 /// workers nor on the clock. `stop` leaves out what has not begun yet.
@@ -71,8 +71,13 @@ pub fn try_faults(
         on_done();
         made
     };
+    let concerns = |scene: &Scene, fault: &Fault| {
+        let test = env.campaign.tests.get(env.test_of(scene.index));
+        test.is_some_and(|test| fault.concerns(test))
+    };
     let with_fault = |(scene, fault): &(&Scene, &Fault)| {
-        let made = if going() { with_fault(env, scene, fault, &options.manner) } else { None };
+        let made =
+            if going() && concerns(scene, fault) { with_fault(env, scene, fault, &options.manner) } else { None };
         on_done();
         made
     };

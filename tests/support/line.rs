@@ -1,0 +1,39 @@
+//! Single runs of small configurations, from scenes to verdicts.
+
+use std::collections::BTreeMap;
+
+use actcheck::actions::ActionReport;
+use actcheck::base::{Choices, names};
+use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
+use actcheck::config::Overrides;
+use actcheck::history::RunRecord;
+use actcheck::verdict::Outcome;
+
+/// What a configuration prepares that is written to a folder of its own.
+pub fn env_of(text: &str) -> Env {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("config.toml");
+    std::fs::write(&config, text).unwrap();
+    Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+/// The run of some choices.
+pub fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
+    let clock = Clock { now: String::new, secs: || 0.0 };
+    run_line(env, "test", 0, choices, &Manner { clock, disturb }).unwrap()
+}
+
+/// The scene with nothing special and senses without noise.
+pub fn nominal(env: &Env, disturb: Option<Disturbance>) -> RunRecord {
+    run(env, Choices::recorded(&[]), disturb)
+}
+
+/// What an action reported.
+pub fn report(run: &RunRecord, step: usize) -> &ActionReport {
+    run.trace.actions[step].report.as_ref().expect("it came to its end")
+}
+
+/// How an action was judged, by the properties' names.
+pub fn outcomes(run: &RunRecord, step: usize) -> BTreeMap<&str, Outcome> {
+    run.judgements[step].iter().map(|judgement| (names::local(&judgement.property), judgement.outcome)).collect()
+}
