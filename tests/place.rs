@@ -120,8 +120,8 @@ fn with_a_camera_nothing_is_known_by_the_abstract_detector() {
     let runs = runs.map(|sensing| {
         let text = format!(
             "nav_obstacle_list = [\"bottle\", \"mini_coffee_table\"]\nnav_obstacle_count = 4\n\
-            tests = [{TASK}]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
-            [placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
+            tests = [{TASK}]\ntest_count = 1\nseed = 5\n[objectLocation]\nlocation_list = [\"front\"]\n\
+            [objectSurface]\nobject_surfaces = [\"coffee_table\"]\n[placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
             {OBSTACLES}{sensing}"
         );
         (0..3).map(|index| run(&env_of(&text), Choices::random(5, index), None)).collect::<Vec<RunRecord>>()

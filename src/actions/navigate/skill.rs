@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use crate::actions::navigate::follow::{Follower, Limits, wrapped};
-use crate::actions::navigate::grid::Grid;
+use crate::actions::navigate::grid::{CELL_M, Grid};
 use crate::actions::navigate::sense::{Size, look};
 use crate::actions::navigate::shorten::way;
 use crate::actions::navigate::terrain::Terrain;
@@ -42,6 +42,8 @@ const REACHED: [f64; 2] = [0.03, 0.03];
 /// Unit of the distances: metres. From farther away no table is within sight.
 const ASIDE_M: [f64; 4] = [0.3, 0.45, 0.6, 0.8];
 const N_ASIDE: u32 = 16;
+/// How many times as long as the straight line the way to such a place may be.
+const DETOUR: f64 = 1.3;
 /// How far ahead of a goal is what a robot faces there. Unit: metres. The middle of a table.
 const FACED_M: f64 = 1.0;
 /// Time for the base to come to rest. Unit: seconds.
@@ -150,7 +152,7 @@ impl<'r, 'o> Drive<'r, 'o> {
         self.robot.begin("plan");
         let is_way = places.any(|place| {
             self.goal = place;
-            self.set_out()
+            self.set_out() && self.is_direct()
         });
         if is_way {
             self.robot.begin("drive near");
@@ -158,6 +160,14 @@ impl<'r, 'o> Drive<'r, 'o> {
         }
         self.robot.remember_floor(self.grid.standing());
         Ok(())
+    }
+
+    /// Whether the way leads about where it should, and not around a table to its far side.
+    fn is_direct(&self) -> bool {
+        let ends: Vec<[f64; 2]> = self.follower.left().collect();
+        let way: f64 = ends.windows(2).map(|pair| length(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1])).sum();
+        let [x, y, _] = self.follower.at();
+        way <= length(self.goal[0] - x, self.goal[1] - y) * DETOUR + CELL_M
     }
 
     /// Takes the best way from here, if there is one.

@@ -7,11 +7,9 @@ use nalgebra::Point3;
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::perceive::interpret::Surface;
 use crate::actions::perceive::sight::Sight;
-use crate::actions::perceive::survey::near;
 use crate::actions::route::length;
 use crate::actions::{ActionCall, ActionReport, Perceived};
 use crate::base::names;
-use crate::world::Sighting;
 
 /// Where a surface is looked for: distance in front of the base, and height. Unit: metres. A table, a low table, a far one.
 const AHEAD_M: [[f64; 2]; 3] = [[1.0, 0.7], [0.8, 0.35], [1.8, 0.8]];
@@ -28,19 +26,12 @@ const MOST_VIEWS: usize = 7;
 /// [`Interrupt`] if simulation broke or time ran out.
 pub fn perceive_plane(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
     let mut sight = Sight::default();
-    let expected = expected(call, robot);
-    // What is where a surface is expected; where there is nothing, the largest surface of all.
-    let find = |points: &[Point3<f64>]| {
-        let expected = expected.as_ref().and_then(|expected| Surface::find(&near(points, expected)));
-        expected.or_else(|| Surface::find(points))
-    };
     let mut surface = None;
-    let known = expected.as_ref().map(middle);
     let ahead = AHEAD_M.map(|ahead| in_front(robot, ahead));
-    for point in known.into_iter().chain(ahead) {
+    for point in expected(call, robot).into_iter().chain(ahead) {
         robot.begin("look ahead");
         sight.add_look_at(&point, robot)?;
-        surface = find(&sight.points);
+        surface = Surface::find(&sight.points);
         if surface.is_some() {
             break;
         }
@@ -49,7 +40,7 @@ pub fn perceive_plane(call: &ActionCall, robot: &mut Operator<'_>) -> Result<Act
         robot.remember(Perceived::default());
         return Ok(ActionReport { succeeded: false, message: "no level surface was found".to_owned() });
     };
-    let surface = sight.take_in(surface, MOST_VIEWS, find, robot)?;
+    let surface = sight.take_in(surface, MOST_VIEWS, Surface::find, robot)?;
     robot.begin("interpret");
     let things = surface.things(&sight.points, &sight.eye(), robot.known_kinds());
     let perceived = Perceived { plane: Some(surface.perceived()), things };
@@ -58,17 +49,13 @@ pub fn perceive_plane(call: &ActionCall, robot: &mut Operator<'_>) -> Result<Act
     Ok(report)
 }
 
-/// The designated surface by the floor plan, where it is within sight.
-fn expected(call: &ActionCall, robot: &Operator<'_>) -> Option<Sighting> {
+/// The middle of the designated surface by the floor plan, where it is within sight. What is there is for the camera to say.
+fn expected(call: &ActionCall, robot: &Operator<'_>) -> Option<Point3<f64>> {
     let id = call.value(SURFACE)?;
+    let piece = robot.known_furniture().into_iter().find(|piece| piece.id == id)?;
+    let middle = piece.pose.to_isometry() * Point3::new(0.0, 0.0, piece.size_m[2]);
     let base = robot.base().translation.vector;
-    let is_near = |piece: &Sighting| length(middle(piece).x - base.x, middle(piece).y - base.y) <= FAR_M;
-    robot.known_furniture().into_iter().find(|piece| piece.id == id).filter(is_near)
-}
-
-/// The middle of a piece of furniture's top.
-fn middle(piece: &Sighting) -> Point3<f64> {
-    piece.pose.to_isometry() * Point3::new(0.0, 0.0, piece.size_m[2])
+    (length(middle.x - base.x, middle.y - base.y) <= FAR_M).then_some(middle)
 }
 
 /// A point so far in front of the base, so high. Frame: world, by the base's belief.

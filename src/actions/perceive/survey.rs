@@ -92,7 +92,7 @@ fn places(expected: &Sighting) -> impl Iterator<Item = Point3<f64>> {
 }
 
 /// The points that may belong to the top of a piece of furniture.
-pub(super) fn near(points: &[Point3<f64>], expected: &Sighting) -> Vec<Point3<f64>> {
+fn near(points: &[Point3<f64>], expected: &Sighting) -> Vec<Point3<f64>> {
     let [width, depth, height] = expected.size_m;
     let from_world = expected.pose.to_isometry().inverse();
     let belongs = |point: &&Point3<f64>| {
