@@ -16,6 +16,7 @@ mod oracles;
 mod paired;
 mod patterns;
 mod property_rates;
+mod score_interval;
 mod tables;
 
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
@@ -36,6 +37,7 @@ pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow,
 pub use paired::{Difference, PairedTable, PairedTest};
 pub use patterns::{Condition, Parameter, Pattern, PatternOptions, Patterns, Subject, Values, mine, simplest_between};
 pub use property_rates::{PropertyRate, property_rates};
+pub use score_interval::score_interval;
 pub use tables::{
     Column, ColumnKind, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter, TextColumn, columns, export_csv,
     export_parquet,

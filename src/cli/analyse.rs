@@ -11,11 +11,13 @@ use crate::analysis::{
 };
 use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
 use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::picture::Picture;
 use crate::cli::{export, history_dir, output, since, why};
 use crate::history::History;
 use crate::ontology::{self, Ontology};
 use crate::report::{
-    FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table, scene_rule,
+    FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table, patterns_picture,
+    scene_rule,
 };
 use crate::verdict::Counts;
 
@@ -37,6 +39,9 @@ pub struct AnalyseArgs {
     /// Failures by one or two parameters, such as `target_category,target_turned_rad`, instead of the usual heat maps
     #[arg(long, value_name = "DOWN[,ACROSS]", value_delimiter = ',', num_args = 1..=2)]
     pub by: Vec<String>,
+    /// Draw where the patterns lie into this file, as pixels (.png) or lines (.svg)
+    #[arg(long, value_name = "FILE.png", conflicts_with = "by")]
+    pub picture: Option<PathBuf>,
     /// Print the pattern of this number of the one property that was asked for as a rule: `[scene] require` in a configuration
     /// names the file, and every scene is of that kind
     #[arg(long, value_name = "N", requires = "property", conflicts_with = "by")]
@@ -78,8 +83,15 @@ pub(super) struct Analysed {
 /// Looks for what goes with failures and prints it.
 pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     check_parameters(&args.by)?;
+    let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open(&args.history)?;
     let summary = analysed(args, &history, &[])?.summary;
+    if let Some(picture) = picture {
+        picture.write(&patterns_picture(&summary).ok_or_else(|| {
+            Diagnostic::error("X013", "there is no pattern to draw".to_owned())
+                .help("none was found that holds on the runs kept aside; more runs may show one")
+        })?)?;
+    }
     if let Some(number) = args.scene_rule {
         output::print(&rule(&summary, number)?);
         return Ok(());
@@ -111,7 +123,7 @@ pub(super) fn analysed(
             .into());
     }
     let wanted = wanted(judged(&table), &args.property)?;
-    let properties = wanted.iter().map(|of| report(args, &table, of, &hierarchy, &ontology)).collect();
+    let properties = reports(&wanted, |of| report(args, &table, of, &hierarchy, &ontology));
     let summary = FindingsSummary {
         history: history.dir().display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
@@ -128,6 +140,22 @@ pub(super) fn analysed(
         level: args.level,
     };
     Ok(Analysed { table, summary, ontology })
+}
+
+/// A report of each property, in their order: as many at once as there are cores, so that what a report needs is not there for all.
+fn reports(
+    properties: &[JudgedProperty],
+    report: impl Fn(&JudgedProperty) -> PropertyReport + Sync,
+) -> Vec<PropertyReport> {
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    let at_once = |properties: &[JudgedProperty]| -> Vec<PropertyReport> {
+        std::thread::scope(|scope| {
+            let started: Vec<_> = properties.iter().map(|of| scope.spawn(|| report(of))).collect();
+            let joined = started.into_iter().map(std::thread::ScopedJoinHandle::join);
+            joined.map(|found| found.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+        })
+    };
+    properties.chunks(workers).flat_map(at_once).collect()
 }
 
 /// The options that choose runs and the depth of patterns, as they were typed.

@@ -34,7 +34,7 @@ pub enum Command {
     ///
     /// Reads the tables beside the history, which are brought up to date first.
     #[command(
-        after_help = "Examples:\n  actcheck analyse    (after `actcheck run configs/pick.toml --runs 300`)\n  actcheck analyse --property ObjectInGripper --by target_category,target_turned_rad"
+        after_help = "Examples:\n  actcheck analyse    (after `actcheck run configs/pick.toml --runs 300`)\n  actcheck analyse --property ObjectInGripper --by target_category,target_turned_rad\n  actcheck analyse --picture patterns.png"
     )]
     Analyse(crate::cli::analyse::AnalyseArgs),
     /// Run a campaign: generate scenes, perform the actions, judge them, keep every run

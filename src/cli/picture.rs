@@ -1,4 +1,4 @@
-//! `--picture FILE`: a run drawn into a file whose ending says how.
+//! `--picture FILE`: something drawn into a file whose ending says how.
 
 use std::path::Path;
 
@@ -41,7 +41,15 @@ impl<'a> Picture<'a> {
             Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
                 .help("it was broken before its first action; `actcheck show` says why")
         })?;
-        let written = (self.render)(&drawing).and_then(|bytes| std::fs::write(self.file, bytes));
+        self.write(&drawing)
+    }
+
+    /// Writes a picture.
+    ///
+    /// # Errors
+    /// X007: the file can't be written.
+    pub(super) fn write(&self, drawing: &Drawing) -> Result<(), Diagnostics> {
+        let written = (self.render)(drawing).and_then(|bytes| std::fs::write(self.file, bytes));
         written.map_err(|error| {
             Diagnostic::error("X007", format!("{} can't be written: {error}", self.file.display()))
                 .help("name a file in a folder that exists and may be written")

@@ -51,6 +51,7 @@ fn asked(args: &ReportArgs) -> AnalyseArgs {
         campaign: args.campaign.clone(),
         since: args.since.clone(),
         by: Vec::new(),
+        picture: None,
         scene_rule: None,
         depth: DEPTH,
         level: LEVEL,

@@ -49,7 +49,7 @@ pub use formats::{
 pub use health::{HealthSummary, health_json, health_lines, health_table, health_text};
 pub use html::{Explained, HTML_COLUMNS, HtmlReport, PropertyWords, Replays, html, replay_order};
 pub use oracles::{OracleSummary, oracles_json, oracles_table, oracles_text};
-pub use picture::{Caption, Drawing, run_picture};
+pub use picture::{Caption, Drawing, patterns_picture, run_picture};
 pub use recheck_summary::{Change, RecheckLine, RecheckSummary, Why};
 pub use recheck_text::{recheck_json, recheck_table, recheck_text};
 pub use remarks::{Oddity, Remark};

@@ -12,7 +12,7 @@ const BEFORE_SECS: f64 = 0.3;
 /// When what a witness speaks of was decided, since the run began. Unit: seconds.
 ///
 /// Of the things that the witness names: the robot touched one that the action has nothing to do with; such a thing moved; the robot
-/// lost hold of what it handles. Otherwise the end of the action, whose state was judged.
+/// lost hold of what it handles, or never came to it and was nearest. Otherwise the end of the action, whose state was judged.
 pub(super) fn decided(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
     let begin = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
     let (run_begin, start, end) = (begin(0), begin(action_idx), begin(action_idx + 1));
@@ -37,9 +37,9 @@ pub(super) fn decided(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
     let touched = by_robot(&others).into_iter().map(|(start, _)| start).min_by(f64::total_cmp);
     let moved =
         || others.iter().filter_map(|id| moved(trace, id, start - run_begin, end - run_begin)).min_by(f64::total_cmp);
-    let lost = || {
-        let last = by_robot(&named).into_iter().map(|(_, end)| end).max_by(f64::total_cmp);
-        last.filter(|last| start + last < end - LOST_SECS)
+    let lost = || match by_robot(&named).into_iter().map(|(_, end)| end).max_by(f64::total_cmp) {
+        Some(last) => (start + last < end - LOST_SECS).then_some(last),
+        None => nearest(trace, &named, start - run_begin, end - run_begin),
     };
     let since_start = touched.or_else(moved).or_else(lost);
     let at = since_start.map_or(end, |secs| start + secs - BEFORE_SECS);
@@ -55,16 +55,39 @@ fn names(text: &str, word: &str) -> bool {
             .any(|(at, _)| !text[..at].ends_with(of_word) && !text[at + word.len()..].starts_with(of_word))
 }
 
+/// Positions of a track in the frames of an action, with their times since the action began. Units: seconds, metres.
+fn course<'a>(trace: &'a Trace, slot: usize, start: f64, end: f64) -> impl Iterator<Item = (f64, [f64; 3])> + use<'a> {
+    let secs = |idx: usize| idx as f64 * trace.frames.period_secs;
+    let at = move |row: &Vec<f32>| row.get(7 * slot..7 * slot + 3).map(|at| [at[0], at[1], at[2]].map(f64::from));
+    let rows = trace.frames.rows.iter().enumerate().map(move |(idx, row)| (secs(idx), row));
+    rows.filter(move |(secs, _)| (start..=end).contains(secs))
+        .filter_map(move |(secs, row)| Some((secs - start, at(row)?)))
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
+}
+
 /// When a thing had come from its place, since the action began. Units: seconds; `start` and `end` since the run began.
 fn moved(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
-    let frames = &trace.frames;
-    let slot = frames.names.iter().position(|name| name == id)?;
-    let at = |row: &Vec<f32>| row.get(7 * slot..7 * slot + 3).map(|at| [at[0], at[1], at[2]].map(f64::from));
-    let secs = |idx: usize| idx as f64 * frames.period_secs;
-    let mut rows = frames.rows.iter().enumerate().filter(|(idx, _)| (start..=end).contains(&secs(*idx)));
-    let place = at(rows.next()?.1)?;
-    let distance = |now: [f64; 3]| (0..3).map(|axis| (now[axis] - place[axis]).powi(2)).sum::<f64>().sqrt();
-    rows.find(|(_, row)| at(row).is_some_and(|now| distance(now) > MOVED_M)).map(|(idx, _)| secs(idx) - start)
+    let slot = trace.frames.names.iter().position(|name| name == id)?;
+    let mut course = course(trace, slot, start, end);
+    let (_, place) = course.next()?;
+    course.find(|(_, now)| distance(*now, place) > MOVED_M).map(|(secs, _)| secs)
+}
+
+/// When a link of the robot was nearest to one of some things, since the action began. Units: seconds; `start` and `end` since the run began.
+fn nearest(trace: &Trace, ids: &[&str], start: f64, end: f64) -> Option<f64> {
+    let slots = |wanted: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        trace.frames.names.iter().enumerate().filter(|(_, name)| wanted(name)).map(|(slot, _)| slot).collect()
+    };
+    let (links, things) = (slots(&|name| name.starts_with("robot/")), slots(&|name| ids.contains(&name)));
+    let pairs = things.iter().flat_map(|thing| links.iter().map(move |link| (*thing, *link)));
+    let apart = pairs.flat_map(|(thing, link)| {
+        let both = course(trace, thing, start, end).zip(course(trace, link, start, end));
+        both.map(|((secs, thing), (_, link))| (secs, distance(thing, link)))
+    });
+    apart.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(secs, _)| secs)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
+use crate::analysis::score_interval;
 use crate::base::names;
 use crate::history::CampaignRow;
 use crate::report::findings_json;
@@ -85,7 +86,8 @@ fn scores(report: &HtmlReport<'_>) -> Value {
     let mut statuses: BTreeMap<&str, u64> = BTreeMap::new();
     first.values().filter_map(|row| status.get(*row)).for_each(|word| *statuses.entry(word).or_default() += 1);
     json!({
-        "T": mean(first.values().filter_map(of)), "without_broken": mean(whole.filter_map(of)),
+        "T": mean(first.values().filter_map(of)), "T_interval": score_interval(first.values().filter_map(of)),
+        "without_broken": mean(whole.clone().filter_map(of)), "without_broken_interval": score_interval(whole.filter_map(of)),
         "runs": first.len(), "all_passed": wilson(passed, tested), "passed": passed, "tested": tested,
         "statuses": statuses,
     })

@@ -2,7 +2,7 @@
 //!
 //! From a run to pixels: [`run`] lays panels out, [`window`] says what each shows, [`outline`] and [`paths`] make lines of
 //! bodies and motions, [`labels`] finds room for names; [`drawing`] is all of it as plain shapes, which [`svg`] writes and
-//! [`png`] fills, with letters from [`font`].
+//! [`png`] fills, with letters from [`font`]. [`patterns`] draws the runs of patterns with the same means.
 //!
 //! Never: reads or writes a file, or knows of a shape that the trace does not hold.
 
@@ -15,6 +15,7 @@ mod outline;
 mod paint;
 mod panel;
 mod paths;
+mod patterns;
 mod png;
 mod run;
 mod svg;
@@ -22,4 +23,5 @@ mod window;
 
 pub use drawing::Drawing;
 pub use header::Caption;
+pub use patterns::patterns_picture;
 pub use run::run_picture;

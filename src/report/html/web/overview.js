@@ -5,6 +5,7 @@ function overview({ runs, summary, filter, open }) {
   const counts = runs.counts(all);
   const { scores, findings } = summary;
   const statuses = Object.entries(scores.statuses).map(([word, times]) => `${count(times)} ${word}`).join(", ");
+  const between = (found) => found ? `[${found.low.toFixed(2)}–${found.high.toFixed(2)}] ·` : "";
   const tile = (word) => make("button", {
     type: "button", class: `tile ${word}`, title: MEANING[word],
     onclick: () => { filter.set({ ...ANY, outcome: word }); location.hash = "#/runs"; },
@@ -18,8 +19,8 @@ function overview({ runs, summary, filter, open }) {
       make("div", { class: "tiles" }, OUTCOMES.map(tile)),
       shares(counts, "Outcomes")),
     make("section", { class: "scores" },
-      score("T", scores.T === null ? "–" : scores.T.toFixed(4), `mean score of ${count(scores.runs)} runs`),
-      score("T without broken runs", scores.without_broken === null ? "–" : scores.without_broken.toFixed(4), "the robot's alone"),
+      score("T", scores.T === null ? "–" : scores.T.toFixed(4), `${between(scores.T_interval)} mean score of ${count(scores.runs)} runs`),
+      score("T without broken runs", scores.without_broken === null ? "–" : scores.without_broken.toFixed(4), `${between(scores.without_broken_interval)} the robot's alone`),
       score("everything passed", scores.all_passed ? percent(scores.all_passed.rate) : "–",
         scores.all_passed ? `[${(scores.all_passed.low * 100).toFixed(0)}–${(scores.all_passed.high * 100).toFixed(0)}] · ${count(scores.passed)} of ${count(scores.tested)} runs that tested anything` : "no run tested anything")),
     make("section", { class: "card" }, make("h2", {}, "Properties"), propertyTable(summary),

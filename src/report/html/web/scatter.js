@@ -45,7 +45,7 @@ function scatter(runs, { height = 420, open, box = {}, label }) {
       if (outcome && frame.has(run)) groups[outcome].push(run);
     }
     const total = order.reduce((sum, name) => sum + groups[name].length, 0);
-    const small = total > 3000 ? 0.62 : total > 800 ? 0.8 : 1;
+    const small = total > 3000 ? 0.62 : total > 800 ? 0.8 : total > 200 ? 1 : 1.5;
     for (const name of order) {
       pen.fillStyle = colours[name];
       pen.globalAlpha = name === "passed" ? (total > 3000 ? 0.32 : 0.5) : 0.85;

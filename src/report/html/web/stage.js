@@ -36,10 +36,12 @@ class Stage {
     this.floor = new three.Mesh(new three.PlaneGeometry(60, 60), new three.MeshStandardMaterial({ roughness: 1 }));
     this.floor.receiveShadow = true;
     this.floor.position.z = -0.001;
-    this.grid = new three.GridHelper(60, 120);
+    this.grid = new three.GridHelper(40, 80, 0xffffff, 0xffffff);
     this.grid.rotation.x = Math.PI / 2;
     this.grid.material.transparent = true;
-    this.grid.material.opacity = 0.35;
+    this.grid.material.opacity = 0.5;
+    this.grid.material.depthWrite = false;
+    this.grid.position.z = 0.0005;
     scene.add(this.floor, this.grid);
     for (const body of replay.still) {
       const group = bodyOf(three, forms[body.form], body.kind === "Wall" ? "wall" : body.role ?? "platform");
@@ -89,9 +91,9 @@ class Stage {
   theme() {
     const dark = colourOf("scheme") === "dark";
     this.scene.background = new this.three.Color(dark ? 0x171d26 : 0xeef0f2);
-    this.scene.fog = new this.three.Fog(this.scene.background, 9, 24);
-    this.floor.material.color.set(dark ? 0x27303c : 0xd9dcdf);
-    this.grid.material.color.set(dark ? 0x8090a4 : 0x8b95a1);
+    this.scene.fog = new this.three.Fog(this.scene.background, 5, 13);
+    this.floor.material.color.set(dark ? 0x2a3340 : 0xdfe2e5);
+    this.grid.material.color.set(dark ? 0x4a5666 : 0xb9c0c8);
     this.draw();
   }
 

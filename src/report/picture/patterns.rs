@@ -1,0 +1,211 @@
+//! Where patterns lie: the runs of each over two parameters of their scenes, failed ones crossed, the range marked.
+
+use crate::analysis::{Condition, Parameter, Pattern, Subject, Values};
+use crate::report::FindingsSummary;
+use crate::report::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
+use crate::report::picture::{font, paint};
+
+/// Width of a picture, and of what is around and between panels. Unit: pixels.
+const WIDTH_PX: f64 = 1200.0;
+const GAP_PX: f64 = 18.0;
+/// Height of a panel, and room at its left and below it for numbers. Unit: pixels.
+const PANEL_PX: f64 = 300.0;
+const NUMBERS_PX: [f64; 2] = [46.0, 34.0];
+/// Size of words and height of their lines. Unit: pixels.
+const SIZE_PX: f64 = 12.0;
+const LINE_PX: f64 = 16.0;
+/// Half the size of a run. Unit: pixels.
+const RUN_PX: f64 = 2.6;
+/// Passed runs of a panel at most: more are one surface. Every so-many-th is drawn where there are more.
+const MOST_PASSED: usize = 3000;
+/// Share of a range that is left free around all runs.
+const ROOM: f64 = 0.04;
+/// Where things stand on a surface: what is drawn of a pattern with fewer than two ranges.
+const USUAL: [&str; 6] =
+    ["surface_x_m", "surface_y_m", "robot_distance_m", "target_turned_rad", "target_friction", "target_mass_kg"];
+const PASSED: u32 = 0x1a_8a6a;
+
+/// Draws every confirmed pattern, in the order in which `actcheck analyse` tells them; nothing where there is none that can be drawn.
+pub fn patterns_picture(findings: &FindingsSummary) -> Option<Drawing> {
+    let mut drawing = Drawing::new(WIDTH_PX);
+    let width = (WIDTH_PX - 3.0 * GAP_PX) / 2.0;
+    let (mut top, mut lowest, mut drawn) = (GAP_PX, GAP_PX, 0);
+    let confirmed = findings
+        .properties
+        .iter()
+        .flat_map(|report| report.findings.patterns.confirmed().map(move |pattern| (report, pattern)));
+    for (report, pattern) in confirmed {
+        let Some(plane) = Plane::of(&report.findings.subject, pattern) else { continue };
+        let left = GAP_PX + (width + GAP_PX) * f64::from(drawn % 2);
+        if drawn % 2 == 0 {
+            top = lowest;
+        }
+        drawn += 1;
+        let words = words(&mut drawing, &report.sentence(pattern), [left, top], width);
+        let panel = Rect {
+            left: left + NUMBERS_PX[0],
+            top: words + 8.0,
+            width: width - NUMBERS_PX[0],
+            height: PANEL_PX - NUMBERS_PX[1],
+        };
+        plane.draw(&mut drawing, panel, &report.findings.subject, pattern);
+        lowest = lowest.max(panel.bottom() + NUMBERS_PX[1] + GAP_PX);
+    }
+    drawing.height = lowest;
+    (drawn > 0).then_some(drawing)
+}
+
+/// Writes a sentence from a corner on; returns where it ends.
+fn words(drawing: &mut Drawing, text: &str, [left, top]: [f64; 2], width: f64) -> f64 {
+    font::wrapped(text, SIZE_PX + 0.5, width).into_iter().fold(top, |y, text| {
+        let paint = Paint::solid(paint::INK);
+        drawing.words(Words { text, at: [left, y + LINE_PX - 3.0], size: SIZE_PX, bold: true, paint, rim: false });
+        y + LINE_PX
+    })
+}
+
+/// One of the two parameters of a panel.
+struct Axis<'a> {
+    parameter: &'a Parameter,
+    numbers: &'a [f64],
+    /// All runs are within.
+    range: [f64; 2],
+    /// What the pattern asks for.
+    asked: [Option<f64>; 2],
+}
+
+impl<'a> Axis<'a> {
+    /// Nothing where the parameter has no number or one alone.
+    fn of(parameter: &'a Parameter, asked: [Option<f64>; 2]) -> Option<Self> {
+        let Values::Numbers(numbers) = &parameter.values else { return None };
+        let known = || numbers.iter().copied().filter(|number| number.is_finite());
+        let (low, high) = (known().min_by(f64::total_cmp)?, known().max_by(f64::total_cmp)?);
+        let room = (high - low) * ROOM;
+        (low < high).then_some(Self { parameter, numbers, range: [low - room, high + room], asked })
+    }
+
+    /// From 0 to 1 in the panel.
+    fn share(&self, value: f64) -> f64 {
+        (value - self.range[0]) / (self.range[1] - self.range[0])
+    }
+
+    fn name(&self) -> String {
+        self.parameter.name.replace('_', " ")
+    }
+
+    /// Round numbers, about five.
+    fn ticks(&self) -> Vec<f64> {
+        let rough = (self.range[1] - self.range[0]) / 5.0;
+        let power = libm::exp10(libm::floor(libm::log10(rough)));
+        let step = [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|step| *step >= rough);
+        let step = step.unwrap_or(rough);
+        let first = libm::ceil(self.range[0] / step);
+        (0..10).map(|at| (first + f64::from(at)) * step).filter(|value| *value <= self.range[1]).collect()
+    }
+}
+
+/// What a panel shows: across and up.
+struct Plane<'a> {
+    axes: [Axis<'a>; 2],
+}
+
+impl<'a> Plane<'a> {
+    /// The ranges of a pattern first, then where things stand.
+    fn of(subject: &'a Subject, pattern: &Pattern) -> Option<Self> {
+        let ranges = pattern.conditions.iter().filter_map(|condition| match condition {
+            Condition::Range { parameter, low, high } => Axis::of(subject.parameters.get(*parameter)?, [*low, *high]),
+            Condition::Kind { .. } => None,
+        });
+        let mut axes: Vec<Axis<'a>> = ranges.take(2).collect();
+        for name in USUAL {
+            let known = axes.iter().any(|axis| axis.parameter.name == name);
+            let parameter = subject.parameters.iter().find(|parameter| parameter.name == name && !known);
+            axes.extend(parameter.and_then(|parameter| Axis::of(parameter, [None, None])));
+        }
+        axes.truncate(2);
+        Some(Self { axes: <[Axis<'a>; 2]>::try_from(axes).ok()? })
+    }
+
+    fn pixel(&self, panel: Rect, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [across, up] = &self.axes;
+        [panel.left + across.share(x) * panel.width, panel.bottom() - up.share(y) * panel.height]
+    }
+
+    fn draw(&self, drawing: &mut Drawing, panel: Rect, subject: &Subject, pattern: &Pattern) {
+        drawing.polygon(panel.corners(), paint::BACKGROUND);
+        self.numbers(drawing, panel);
+        drawing.clip(Some(panel));
+        self.asked(drawing, panel);
+        // Of a pattern about kinds, only runs of these kinds are told apart by their places.
+        let kinds = pattern.conditions.iter().filter(|condition| matches!(condition, Condition::Kind { .. }));
+        let kinds: Vec<Vec<bool>> = kinds.map(|condition| condition.holds(subject)).collect();
+        let shown = |run: &usize| kinds.iter().all(|holds| holds[*run]);
+        let place = |run: usize| {
+            let at = [self.axes[0].numbers[run], self.axes[1].numbers[run]];
+            at.iter().all(|value| value.is_finite()).then(|| self.pixel(panel, at))
+        };
+        let of = |failed: bool| -> Vec<[f64; 2]> {
+            (0..subject.len()).filter(shown).filter(|run| subject.failed[*run] == failed).filter_map(place).collect()
+        };
+        let passed = of(false);
+        let every = passed.len().div_ceil(MOST_PASSED).max(1);
+        let dots =
+            passed.iter().step_by(every).map(|at| corners(*at, [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]));
+        drawing.shape(dots.collect(), true, Style::fill(Paint::new(PASSED, 0.55)));
+        let crosses = of(true)
+            .into_iter()
+            .flat_map(|at| [corners(at, [[-1.0, -1.0], [1.0, 1.0]]), corners(at, [[1.0, -1.0], [-1.0, 1.0]])]);
+        drawing.shape(crosses.collect(), false, Style::line(Line::new(Paint::new(paint::FAILED, 0.85), 1.5)));
+        drawing.clip(None);
+    }
+
+    /// The range that the pattern asks for.
+    fn asked(&self, drawing: &mut Drawing, panel: Rect) {
+        if self.axes.iter().all(|axis| axis.asked == [None, None]) {
+            return;
+        }
+        let end = |axis: &Axis<'_>, end: usize| axis.asked[end].unwrap_or(axis.range[end]);
+        let [across, up] = &self.axes;
+        let corner = |x: usize, y: usize| self.pixel(panel, [end(across, x), end(up, y)]);
+        let line = Line::dashed(Paint::solid(paint::FAILED), 1.2, [5.0, 4.0]);
+        let style = Style::both(Paint::new(paint::FAILED, 0.09), line);
+        drawing.polygon(vec![corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)], style);
+    }
+
+    /// Lines at round numbers, the numbers, and what they are.
+    fn numbers(&self, drawing: &mut Drawing, panel: Rect) {
+        let grid = Line::new(Paint::new(paint::GREY, 0.22), 0.8);
+        let write = |drawing: &mut Drawing, text: String, at: [f64; 2]| {
+            let paint = Paint::solid(paint::GREY);
+            drawing.words(Words { text, at, size: SIZE_PX - 1.5, bold: false, paint, rim: false });
+        };
+        let [across, up] = &self.axes;
+        for value in across.ticks() {
+            let [x, _] = self.pixel(panel, [value, up.range[0]]);
+            drawing.line(vec![[x, panel.top], [x, panel.bottom()]], grid);
+            let text = shown(value);
+            let half = font::width(&text, SIZE_PX - 1.5, false) / 2.0;
+            write(drawing, text, [x - half, panel.bottom() + 13.0]);
+        }
+        for value in up.ticks() {
+            let [_, y] = self.pixel(panel, [across.range[0], value]);
+            drawing.line(vec![[panel.left, y], [panel.right(), y]], grid);
+            let text = shown(value);
+            let width = font::width(&text, SIZE_PX - 1.5, false);
+            write(drawing, text, [panel.left - width - 5.0, y + 4.0]);
+        }
+        let names = format!("across: {}     up: {}     × failed   ◆ passed", across.name(), up.name());
+        write(drawing, names, [panel.left, panel.bottom() + 28.0]);
+    }
+}
+
+/// A small figure about a pixel.
+fn corners<const N: usize>([x, y]: [f64; 2], figure: [[f64; 2]; N]) -> Vec<[f64; 2]> {
+    figure.iter().map(|[right, down]| [x + RUN_PX * right, y + RUN_PX * down]).collect()
+}
+
+/// A round number without the digits that rounding adds.
+fn shown(value: f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
+}
