@@ -35,35 +35,9 @@ const WATCHED: &str = "12";
 fn main() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let watched = simulated(folder.path());
-    let mut dice = planted::Dice::new(1);
-    let runs = (0..RUNS).map(|index| {
-        made_up::run("k", index, &mut dice, &["Pick"], |target, _, dice| {
-            let slips = target.category.ends_with("Bottle") && target.friction < 0.5;
-            let of = |(at, name): (usize, &'static str)| {
-                let rate = if slips && at > 2 { 0.6 } else { 0.03 * (at + 1) as f64 };
-                (name, if dice.share() < rate { Outcome::Failed } else { Outcome::Passed })
-            };
-            PROPERTIES.into_iter().enumerate().map(of).collect()
-        })
-    });
-    let runs = runs.map(|mut run| {
-        let judged = run.actions.iter_mut().flat_map(|action| &mut action.judgements);
-        judged.for_each(|judgement| {
-            judgement.witness = format!("{} is {} cm from the gripper", run.row.run, run.row.index)
-        });
-        run
-    });
-    let mirror = paged::mirror(&folder.path().join("tables"), "k", runs);
+    let mirror = paged::mirror(&folder.path().join("tables"), "k", made_up_runs());
     let start = Instant::now();
-    let mut replays = Replays::default();
-    let mut embedded = 0;
-    while replays.bytes() < ROOM {
-        let (run, trace) = &watched[embedded % watched.len()];
-        let mut run = run.clone();
-        embedded += 1;
-        run.row.run = format!("k-{embedded}");
-        replays.add(&run, Some(trace), &[]);
-    }
+    let (replays, embedded) = replays(&watched);
     let packed = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let page = paged::page(&mirror, "made up", &BTreeMap::new(), &replays);
@@ -75,6 +49,39 @@ fn main() {
     tell("to pack the replays", packed, 5.0, "s");
     tell("from the tables to the page", secs, 5.0, "s");
     in_a_browser(&file);
+}
+
+/// Runs of which more fail where a bottle is slippery.
+fn made_up_runs() -> impl Iterator<Item = RunDetail> {
+    let mut dice = planted::Dice::new(1);
+    (0..RUNS).map(move |index| {
+        let mut run = made_up::run("k", index, &mut dice, &["Pick"], |target, _, dice| {
+            let slips = target.category.ends_with("Bottle") && target.friction < 0.5;
+            let of = |(at, name): (usize, &'static str)| {
+                let rate = if slips && at > 2 { 0.6 } else { 0.03 * (at + 1) as f64 };
+                (name, if dice.share() < rate { Outcome::Failed } else { Outcome::Passed })
+            };
+            PROPERTIES.into_iter().enumerate().map(of).collect()
+        });
+        for judgement in run.actions.iter_mut().flat_map(|action| &mut action.judgements) {
+            judgement.witness = format!("it is {} cm from the gripper, needs less than 5 cm", index % 777);
+        }
+        run
+    })
+}
+
+/// The same runs under many names, as many as there is room for.
+fn replays(watched: &[(RunDetail, Trace)]) -> (Replays, usize) {
+    let mut replays = Replays::default();
+    let mut embedded = 0;
+    while replays.bytes() < ROOM {
+        let (run, trace) = &watched[embedded % watched.len()];
+        let mut run = run.clone();
+        embedded += 1;
+        run.row.run = format!("k-{embedded}");
+        replays.add(&run, Some(trace), &[]);
+    }
+    (replays, embedded)
 }
 
 fn tell(name: &str, value: f64, demanded: f64, unit: &str) {

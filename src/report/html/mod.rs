@@ -7,6 +7,7 @@
 //! Never: reads a history or a file, chooses what is judged, or writes a word of a user's into markup.
 
 mod columns;
+mod events;
 mod input;
 mod moment;
 mod order;

@@ -1,4 +1,4 @@
-//! Runs that can be watched: courses of all bodies, contacts, phases and explanations, in few bytes.
+//! Runs that can be watched: what is known of them and the courses of all bodies, in few bytes.
 
 use std::collections::BTreeMap;
 
@@ -7,17 +7,14 @@ use serde_json::{Value, json};
 use crate::base::names;
 use crate::history::{BodyState, Form, Role, RunDetail, Trace};
 use crate::report::html::Explained;
-use crate::report::html::moment::decided;
+use crate::report::html::events::action;
 use crate::report::html::pack::{Pack, packed};
 use crate::report::html::shapes::Shapes;
-use crate::verdict::Outcome;
 
 /// The finest step of positions; coarser where a run spans more than 6.5 metres. Unit: metres. Traces are no finer.
 const GRAIN_M: f64 = 1e-4;
 /// Steps of the components of quaternions, as in traces.
 const GRAIN_TURN: f64 = 2e-4;
-/// Contacts of an action that are told at most: the strongest.
-const MOST_CONTACTS: usize = 60;
 
 /// Runs that can be watched, packed.
 #[derive(Debug, Default)]
@@ -61,13 +58,8 @@ impl Replays {
     /// The courses of all that moves, and what stands still.
     fn course(&mut self, pack: &mut Pack, run: &RunDetail, trace: &Trace) {
         let forms: BTreeMap<&str, &Form> = trace.forms.iter().map(|form| (form.name.as_str(), form)).collect();
-        let bodies: BTreeMap<&str, &BodyState> = trace
-            .snapshots
-            .iter()
-            .take(1)
-            .flat_map(|state| &state.bodies)
-            .map(|body| (body.id.as_str(), body))
-            .collect();
+        let first = trace.snapshots.iter().take(1).flat_map(|state| &state.bodies);
+        let bodies: BTreeMap<&str, &BodyState> = first.map(|body| (body.id.as_str(), body)).collect();
         let roles: BTreeMap<&str, &str> =
             run.objects.iter().map(|object| (object.id.as_str(), word(object.role))).collect();
         let mut form = |name: &str| match (forms.get(name), bodies.get(name)) {
@@ -77,36 +69,33 @@ impl Replays {
             (None, None) => None,
         };
         let frames = &trace.frames;
-        let shown: Vec<(usize, &str, usize)> = frames
-            .names
-            .iter()
-            .enumerate()
-            .filter_map(|(slot, name)| Some((slot, name.as_str(), form(name)?)))
-            .collect();
-        let tracks: Vec<Value> = shown
-            .iter()
-            .map(|(_, name, form)| json!({ "name": name, "form": form, "role": roles.get(name) }))
-            .collect();
-        let still: Vec<Value> = bodies
-            .values()
-            .filter(|body| !frames.names.contains(&body.id))
-            .filter_map(|body| {
-                let at: Vec<f64> = body.pose.position.iter().chain(&body.pose.rotation).copied().collect();
-                let kind = names::local(&body.category);
-                Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": roles.get(body.id.as_str()) }))
-            })
-            .collect();
+        let (mut slots, mut tracks): (Vec<usize>, Vec<Value>) = (Vec::new(), Vec::new());
+        for (slot, name) in frames.names.iter().enumerate() {
+            if let Some(form) = form(name) {
+                slots.push(slot);
+                tracks.push(json!({ "name": name, "form": form, "role": roles.get(name.as_str()) }));
+            }
+        }
+        let still = bodies.values().filter(|body| !frames.names.contains(&body.id)).filter_map(|body| {
+            let at: Vec<f64> = body.pose.position.iter().chain(&body.pose.rotation).copied().collect();
+            let (kind, role) = (names::local(&body.category), roles.get(body.id.as_str()));
+            Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": role }))
+        });
+        pack.say("still", still.collect::<Vec<Value>>());
         pack.say("tracks", tracks);
-        pack.say("still", still);
-        pack.say("period", frames.period_secs);
-        let slots: Vec<usize> = shown.iter().map(|(slot, ..)| *slot).collect();
-        let (columns, low, grain) = columns(&frames.rows, &slots);
-        pack.say("low", low.to_vec());
-        pack.say("grain", grain);
-        pack.say("turn", GRAIN_TURN);
-        let courses = pack.courses(&columns);
-        pack.say("courses", courses);
+        say_courses(pack, trace, &slots);
     }
+}
+
+/// Where some tracks were over time, and what is needed to read it.
+fn say_courses(pack: &mut Pack, trace: &Trace, slots: &[usize]) {
+    let (columns, low, grain) = columns(&trace.frames.rows, slots);
+    pack.say("period", trace.frames.period_secs);
+    pack.say("low", low.to_vec());
+    pack.say("grain", grain);
+    pack.say("turn", GRAIN_TURN);
+    let courses = pack.courses(&columns);
+    pack.say("courses", courses);
 }
 
 /// What is known of a run beside its actions.
@@ -140,64 +129,6 @@ fn word(role: Role) -> &'static str {
         Role::Other => "other",
         Role::Obstacle => "obstacle",
     }
-}
-
-/// One action: its words, its outcomes with what explains them, and when what happened.
-fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explained: &[Explained]) -> Value {
-    let action = &run.actions[idx];
-    let judged: Vec<Value> = action
-        .judgements
-        .iter()
-        .map(|judgement| {
-            let why = explained.iter().find(|why| why.step == action.step && why.property == judgement.property);
-            let failed = judgement.outcome == Outcome::Failed;
-            json!({
-                "property": judgement.property, "outcome": judgement.outcome.word(), "margin": judgement.margin,
-                "witness": judgement.witness, "held": judgement.held_before, "why": why.map(|why| &why.text),
-                "decided": trace.filter(|_| failed).map(|trace| decided(trace, idx, &judgement.witness)),
-            })
-        })
-        .collect();
-    let mut told = json!({
-        "action": action.action, "step": action.step, "reported": action.reported, "message": action.message,
-        "seconds": action.duration_secs, "end": action.end, "parameters": action.parameters, "judged": judged,
-    });
-    if let Some((trace, events)) = trace.and_then(|trace| Some((trace, trace.actions.get(idx)?))) {
-        let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
-        let last = trace.snapshots.last();
-        told["start"] = json!(trace.snapshots.get(idx).or(last).map_or(0.0, |state| state.time_secs - begin));
-        told["phases"] = events.phases.iter().map(|phase| json!([phase.name, phase.start_secs])).collect();
-        told["contacts"] = contacts(events.contacts.iter().map(|contact| {
-            (
-                contact.max_force_n,
-                json!([contact.pair[0], contact.pair[1], contact.start_secs, contact.end_secs, contact.max_force_n]),
-            )
-        }));
-        let seen = events.percepts.iter().map(|percept| (percept.id.clone(), percept.pose, percept.size_m));
-        let things = events.perceived.iter().flat_map(|perceived| &perceived.things);
-        let things = things
-            .map(|thing| (thing.category.as_deref().map_or("?", names::local).to_owned(), thing.pose, thing.size_m));
-        told["seen"] = seen
-            .chain(things)
-            .map(|(name, pose, size)| {
-                let at: Vec<f64> = pose.position.iter().chain(&pose.rotation).copied().collect();
-                json!({ "name": name, "at": at, "size": size })
-            })
-            .collect();
-    }
-    told
-}
-
-/// The strongest contacts, in the order in which they began.
-fn contacts(all: impl Iterator<Item = (f64, Value)>) -> Value {
-    let mut all: Vec<(f64, Value)> = all.collect();
-    if all.len() > MOST_CONTACTS {
-        all.sort_by(|a, b| b.0.total_cmp(&a.0));
-        all.truncate(MOST_CONTACTS);
-        let start = |contact: &Value| contact[2].as_f64().unwrap_or_default();
-        all.sort_by(|a, b| start(&a.1).total_cmp(&start(&b.1)));
-    }
-    all.into_iter().map(|(_, contact)| contact).collect()
 }
 
 /// Seven columns of whole numbers for each track, with the lowest corner and the step of positions. What is not finite stays where it

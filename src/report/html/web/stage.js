@@ -33,16 +33,10 @@ class Stage {
 
   fill(replay, forms) {
     const { three, scene } = this;
-    this.floor = new three.Mesh(new three.PlaneGeometry(60, 60), new three.MeshStandardMaterial({ roughness: 1 }));
+    this.floor = new three.Mesh(new three.PlaneGeometry(40, 40), new three.MeshStandardMaterial({ roughness: 1, map: this.tiles() }));
     this.floor.receiveShadow = true;
     this.floor.position.z = -0.001;
-    this.grid = new three.GridHelper(40, 80, 0xffffff, 0xffffff);
-    this.grid.rotation.x = Math.PI / 2;
-    this.grid.material.transparent = true;
-    this.grid.material.opacity = 0.5;
-    this.grid.material.depthWrite = false;
-    this.grid.position.z = 0.0005;
-    scene.add(this.floor, this.grid);
+    scene.add(this.floor);
     for (const body of replay.still) {
       const group = bodyOf(three, forms[body.form], body.kind === "Wall" ? "wall" : body.role ?? "platform");
       group.position.set(...body.at.slice(0, 3));
@@ -64,6 +58,22 @@ class Stage {
     }
     this.seen.visible = false;
     scene.add(this.seen, this.trail());
+  }
+
+  /** The floor's tiles, half a metre wide. */
+  tiles() {
+    const tile = make("canvas", { width: 256, height: 256 }), pen = tile.getContext("2d");
+    pen.fillStyle = "#fff";
+    pen.fillRect(0, 0, 256, 256);
+    pen.strokeStyle = "rgb(0 0 0 / 14%)";
+    pen.lineWidth = 4;
+    pen.strokeRect(0, 0, 256, 256);
+    const texture = new this.three.CanvasTexture(tile);
+    texture.wrapS = texture.wrapT = this.three.RepeatWrapping;
+    texture.repeat.set(80, 80);
+    texture.anisotropy = 8;
+    texture.colorSpace = this.three.SRGBColorSpace;
+    return texture;
   }
 
   /** The way of the target. */
@@ -93,7 +103,6 @@ class Stage {
     this.scene.background = new this.three.Color(dark ? 0x171d26 : 0xeef0f2);
     this.scene.fog = new this.three.Fog(this.scene.background, 5, 13);
     this.floor.material.color.set(dark ? 0x2a3340 : 0xdfe2e5);
-    this.grid.material.color.set(dark ? 0x4a5666 : 0xb9c0c8);
     this.draw();
   }
 
@@ -148,7 +157,7 @@ class Stage {
 
   end() {
     cancelAnimationFrame(this.waiting);
-    this.scene.traverse((thing) => { thing.geometry?.dispose(); thing.material?.dispose?.(); });
+    this.scene.traverse((thing) => { thing.geometry?.dispose(); thing.material?.map?.dispose(); thing.material?.dispose?.(); });
     this.renderer.dispose();
     this.renderer.forceContextLoss();
   }

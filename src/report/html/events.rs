@@ -1,0 +1,71 @@
+//! One action of a run that can be watched: its words, its outcomes with what explains them, and what happened when.
+
+use serde_json::{Value, json};
+
+use crate::base::{Pose, names};
+use crate::history::{RunDetail, Trace};
+use crate::report::html::Explained;
+use crate::report::html::moment::decided;
+use crate::verdict::Outcome;
+
+/// Contacts of an action that are told at most: the strongest.
+const MOST_CONTACTS: usize = 60;
+
+/// An action by its place in the run.
+pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explained: &[Explained]) -> Value {
+    let action = &run.actions[idx];
+    let judged = action.judgements.iter().map(|judgement| {
+        let why = explained.iter().find(|why| why.step == action.step && why.property == judgement.property);
+        let failed = judgement.outcome == Outcome::Failed;
+        json!({
+            "property": judgement.property, "outcome": judgement.outcome.word(), "margin": judgement.margin,
+            "witness": judgement.witness, "held": judgement.held_before, "why": why.map(|why| &why.text),
+            "decided": trace.filter(|_| failed).map(|trace| decided(trace, idx, &judgement.witness)),
+        })
+    });
+    let mut told = json!({
+        "action": action.action, "step": action.step, "reported": action.reported, "message": action.message,
+        "seconds": action.duration_secs, "end": action.end, "parameters": action.parameters,
+        "judged": judged.collect::<Vec<Value>>(),
+    });
+    if let Some(trace) = trace {
+        events(&mut told, trace, idx);
+    }
+    told
+}
+
+/// What the trace says of an action: when it began, its phases, its contacts, what it perceived.
+fn events(told: &mut Value, trace: &Trace, idx: usize) {
+    let Some(action) = trace.actions.get(idx) else { return };
+    let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
+    let state = trace.snapshots.get(idx).or(trace.snapshots.last());
+    told["start"] = json!(state.map_or(0.0, |state| state.time_secs - begin));
+    told["phases"] = action.phases.iter().map(|phase| json!([phase.name, phase.start_secs])).collect();
+    told["contacts"] = contacts(action.contacts.iter().map(|contact| {
+        let [a, b] = &contact.pair;
+        (contact.max_force_n, json!([a, b, contact.start_secs, contact.end_secs, contact.max_force_n]))
+    }));
+    let asked = action.percepts.iter().map(|percept| seen(&percept.id, &percept.pose, percept.size_m));
+    let things = action.perceived.iter().flat_map(|perceived| &perceived.things);
+    let things =
+        things.map(|thing| seen(thing.category.as_deref().map_or("?", names::local), &thing.pose, thing.size_m));
+    told["seen"] = asked.chain(things).collect();
+}
+
+/// Something that was perceived: the pose of its foot's middle, and its size.
+fn seen(name: &str, pose: &Pose, size_m: [f64; 3]) -> Value {
+    let at: Vec<f64> = pose.position.iter().chain(&pose.rotation).copied().collect();
+    json!({ "name": name, "at": at, "size": size_m })
+}
+
+/// The strongest contacts, in the order in which they began.
+fn contacts(all: impl Iterator<Item = (f64, Value)>) -> Value {
+    let mut all: Vec<(f64, Value)> = all.collect();
+    if all.len() > MOST_CONTACTS {
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        all.truncate(MOST_CONTACTS);
+        let start = |contact: &Value| contact[2].as_f64().unwrap_or_default();
+        all.sort_by(|a, b| start(&a.1).total_cmp(&start(&b.1)));
+    }
+    all.into_iter().map(|(_, contact)| contact).collect()
+}
