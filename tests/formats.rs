@@ -371,6 +371,8 @@ fn report_writes_what_was_asked_for() {
         .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
         .collect();
     assert_eq!(names.iter().filter(|name| name.ends_with("-result.json")).count(), 2 * 8);
+    let not_all_passed = read("o.jsonl").lines().filter(|line| !line.contains("\"passed\":8,")).count();
+    assert_eq!(names.iter().filter(|name| name.ends_with(".svg")).count(), not_all_passed, "each of them is drawn");
     assert!(read("j.xml").contains("tests=\"16\""));
     assert_eq!(read("o.jsonl").lines().count(), 2);
     assert!(!turtle(&read("e.ttl")).is_empty());

@@ -165,7 +165,7 @@ impl<'a> Sinks<'a> {
         if let Some(report) = &self.markdown {
             output::print(&markdown(report));
         }
-        told.extend(self.allure.map(|folder| folder.told()));
+        told.extend(self.allure.iter().flat_map(AllureFolder::told));
         Ok(told)
     }
 }
@@ -178,6 +178,8 @@ struct AllureFolder<'a> {
     budget: Budget,
     repetitions: Repetitions,
     results: usize,
+    /// Runs whose trace can't be read: it is gone, or another version wrote it.
+    untraced: usize,
 }
 
 impl<'a> AllureFolder<'a> {
@@ -193,7 +195,7 @@ impl<'a> AllureFolder<'a> {
         let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget).ok();
         std::fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
         let ids: Vec<String> = campaigns.iter().map(|row| row.id.clone()).collect();
-        let made = Self { folder, history, rules, budget, repetitions: Repetitions::new(), results: 0 };
+        let made = Self { folder, history, rules, budget, repetitions: Repetitions::new(), results: 0, untraced: 0 };
         made.write(&allure_common(env!("CARGO_PKG_VERSION"), &ids))?;
         Ok(made)
     }
@@ -201,15 +203,20 @@ impl<'a> AllureFolder<'a> {
     fn take(&mut self, run: &RunDetail) -> Result<(), Diagnostics> {
         let number = self.repetitions.number(run);
         self.results += run.actions.iter().map(|action| action.judgements.len()).sum::<usize>();
-        self.write(&allure_results(run, number, &self.attachments(run)))
+        let attachments = self.attachments(run);
+        self.write(&allure_results(run, number, &attachments))
     }
 
     /// Explanations of what failed, and a picture where not everything passed.
-    fn attachments(&self, run: &RunDetail) -> Vec<Attachment> {
-        let judgements = || run.actions.iter().flat_map(|action| &action.judgements);
-        if judgements().all(|judgement| judgement.outcome == Outcome::Passed) {
+    fn attachments(&mut self, run: &RunDetail) -> Vec<Attachment> {
+        let mut judgements = run.actions.iter().flat_map(|action| &action.judgements);
+        if judgements.all(|judgement| judgement.outcome == Outcome::Passed) {
             return Vec::new();
         }
+        let Ok(trace) = self.history.trace(&run.row.run) else {
+            self.untraced += 1;
+            return Vec::new();
+        };
         let rules = self.rules.as_ref();
         let explained = rules.map(|rules| report_html::explained(self.history, rules, run, &self.budget));
         let mut attachments: Vec<Attachment> = explained
@@ -224,7 +231,7 @@ impl<'a> AllureFolder<'a> {
             })
             .collect();
         // A run that was broken before its first state has nothing to draw.
-        let picture = self.history.trace(&run.row.run).ok().and_then(|trace| run_picture(&Caption::of(run), &trace));
+        let picture = run_picture(&Caption::of(run), &trace);
         attachments.extend(picture.map(|drawing| Attachment {
             about: None,
             name: "before and after".to_owned(),
@@ -243,13 +250,13 @@ impl<'a> AllureFolder<'a> {
         Ok(())
     }
 
-    fn told(&self) -> String {
-        format!(
-            "{} holds {} results: npx allure generate {}",
-            self.folder.display(),
-            self.results,
-            self.folder.display()
-        )
+    fn told(&self) -> Vec<String> {
+        let folder = self.folder.display();
+        let mut told = vec![format!("{folder} holds {} results: npx allure generate {folder}", self.results)];
+        if self.untraced > 0 {
+            told.push(format!("no pictures and explanations of {} runs: their traces can't be read", self.untraced));
+        }
+        told
     }
 }
 

@@ -25,7 +25,17 @@ pub fn rdf_text(triples: &[[Term; 3]], syntax: RdfSyntax) -> String {
         let _ = writer.serialize_triple(&triple);
     }
     let bytes = writer.finish().unwrap_or_default();
-    String::from_utf8_lossy(&bytes).into_owned()
+    let text = String::from_utf8_lossy(&bytes).into_owned();
+    if syntax == RdfSyntax::Turtle { with_ordered_prefixes(&text) } else { text }
+}
+
+/// The library writes its prefixes in an order of chance.
+fn with_ordered_prefixes(text: &str) -> String {
+    let is_prefix = |line: &&str| line.starts_with("@prefix ");
+    let mut prefixes: Vec<&str> = text.split_inclusive('\n').take_while(is_prefix).collect();
+    let length: usize = prefixes.iter().map(|line| line.len()).sum();
+    prefixes.sort_unstable();
+    prefixes.concat() + &text[length..]
 }
 
 /// The library's serializer; Turtle and RDF/XML get the known prefixes.
@@ -65,7 +75,8 @@ mod tests {
         ];
         let text = rdf_text(&triples, RdfSyntax::NTriples);
         assert_eq!(text, "<http://actions#a> <http://actions#b> \"line\\n\\\"quoted\\\" \\\\ <tag>\" .\n");
-        assert!(rdf_text(&triples, RdfSyntax::Turtle).contains("act:a act:b"));
+        let turtle = rdf_text(&triples, RdfSyntax::Turtle);
+        assert!(turtle.starts_with("@prefix act:") && turtle.contains("act:a act:b"), "{turtle}");
         assert!(rdf_text(&triples, RdfSyntax::RdfXml).contains("&lt;tag&gt;"));
     }
 }

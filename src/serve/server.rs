@@ -44,7 +44,7 @@ pub struct Options {
     pub history: PathBuf,
     /// This program, which is started for each query.
     pub program: PathBuf,
-    /// Its arguments that make it answer a query ([`crate::serve::answer`]).
+    /// Its arguments that make it answer a query ([`crate::serve::answer()`]).
     pub query_arguments: Vec<String>,
     /// Its arguments that make it print the report.
     pub report_arguments: Vec<String>,
