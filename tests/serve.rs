@@ -389,6 +389,10 @@ fn a_second_process_has_the_history_beside_the_server() {
     let before = runs(&server);
     let again = Server::start(&history, &[]);
     assert_eq!(runs(&again), before);
+    // Reading goes on beside reading, also while a query is being answered.
+    let reader = actcheck::history::History::open_to_read(&history).unwrap();
+    assert_eq!(runs(&server), before);
+    drop(reader);
     let name = history.display().to_string();
     let output = actcheck(crate::support::root(), &["list", "--history", &name, "--format", "csv"]);
     assert!(output.status.success() && stdout(&output).lines().count() == before + 1, "{}", stderr(&output));

@@ -24,7 +24,7 @@ pub struct HealthArgs {
 
 /// Prints how healthy a campaign is. Returns the exit code.
 pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
-    let history = history_dir::open(&args.history)?;
+    let history = history_dir::open_to_read(&args.history)?;
     let campaign = match &args.campaign {
         Some(id) => id.clone(),
         None => compare::newest(&history)?,

@@ -17,6 +17,14 @@ pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
     History::open_existing(&folder(args)?)
 }
 
+/// The same for reading alone, beside others that do so.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_to_read(args: &HistoryArgs) -> Result<History, Diagnostics> {
+    History::open_to_read(&folder(args)?)
+}
+
 /// The folder of the history that was named, or of the one that is found.
 ///
 /// # Errors

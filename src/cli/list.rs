@@ -13,7 +13,7 @@ type Cell = fn(&RunRow) -> Value;
 
 /// Prints one line for each run.
 pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
-    let history = history_dir::open(&args.history)?;
+    let history = history_dir::open_to_read(&args.history)?;
     let runs = history.runs(&RunFilter { campaign: args.campaign.clone(), ..RunFilter::default() })?;
     // Most campaigns have neither: columns of nothing would only be in the way.
     let repeated = runs.iter().any(|row| row.repetition.is_some());

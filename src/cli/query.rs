@@ -14,7 +14,7 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
         return list_named(args.format);
     }
     let text = text(args)?;
-    let history = history_dir::open(&args.history)?;
+    let history = history_dir::open_to_read(&args.history)?;
     let cancel = Cancel::new();
     let asked = cancel.clone();
     let _flag = stop::on_interrupt(move || asked.cancel());

@@ -10,7 +10,7 @@ use crate::report::{Table, run_json, run_text};
 /// Prints one run, and draws it where a picture is asked for.
 pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
-    let history = history_dir::open(&args.history)?;
+    let history = history_dir::open_to_read(&args.history)?;
     let run = history.run(&args.run)?;
     output::print(&match args.format {
         Format::Table => run_text(&run),

@@ -15,7 +15,7 @@ use crate::rules::{Budget, RuleBook};
 /// Prints, for each outcome of a run that is asked for, the proof that a property holds or how near it came.
 pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
-    let history = history_dir::open(&args.history)?;
+    let history = history_dir::open_to_read(&args.history)?;
     let run = history.run(&args.run)?;
     let facts = history.facts(&run.row.run)?;
     let (files, path) = ontology_file(args.ontology.as_deref());
