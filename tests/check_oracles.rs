@@ -83,6 +83,47 @@ fn the_shipped_properties_notice_every_fault() {
     assert_eq!(noticing("neighbour-falls"), ["NoGraspCollisions"]);
 }
 
+/// The actions of the whole task, each with what it needs before it, in a room with nothing unusual.
+const TASK: &str = "tests = [[\"MoveTo\"], [\"PerceivePlane\"], [\"Pick\", \"Place\"]]\ntest_count = 9\nseed = 3\n\
+    nav_obstacle_list = [\"bottle\"]\nnav_obstacle_count = 1\n[world]\nworlds = [\"empty_room\"]\n\
+    [objectLocation]\nlocation_list = [\"left_corner\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n\
+    [placeSurface]\nplace_object_surfaces = [\"coffee_table\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
+    [surfaceObjects]\nmodel_list = [\"box\"]\ncount = 1\n";
+
+/// Each of the seventeen properties notices a fault, and each fault of a drive or of a placement is noticed.
+#[test]
+fn every_property_of_the_whole_task_notices_a_fault() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("task.toml"), TASK).unwrap();
+    let env = Env::prepare(&folder.path().join("task.toml"), &Overrides::default()).unwrap();
+    let faults: Vec<Fault> = FAULTS
+        .into_iter()
+        .filter(|fault| {
+            let of_pick = fault.sabotage.action == Some("Pick") && fault.name != "neighbour-falls";
+            !of_pick && fault.name != "frozen-sensors"
+        })
+        .collect();
+    let matrix = matrix(&env, &faults);
+    assert_eq!(matrix.properties.len(), 17);
+    assert_eq!(matrix.gaps("no-op"), [], "{matrix:#?}");
+    let noticing = |name: &str| -> Vec<&str> {
+        let row = matrix.rows.iter().find(|row| row.fault == name).unwrap();
+        let noticing = row.cells.iter().filter(|cell| cell.notice == Notice::Noticed);
+        noticing.map(|cell| cell.property.rsplit('#').next().unwrap()).collect()
+    };
+    assert_eq!(noticing("obstacle"), ["NoDriveCollisions"]);
+    let carried_off = noticing("carried-off");
+    for property in ["GoalReached", "LocalisationAgrees", "StayedInZone"] {
+        assert!(carried_off.contains(&property), "{carried_off:?}");
+    }
+    // It says that it succeeded: only the world tells.
+    assert!(noticing("dropped-on-the-way").contains(&"ObjectOnSurface"));
+    assert!(!noticing("dropped-on-the-way").contains(&"PlaceReported"));
+    assert_eq!(noticing("placed-and-fallen"), ["ObjectOnSurface"]);
+    assert!(noticing("hand-jams").contains(&"ObjectReleased"));
+    assert_eq!(noticing("place-neighbour-falls"), ["NoPlaceCollisions"]);
+}
+
 /// A report is never believed to be a failure any more: nothing notices a robot that says so.
 #[test]
 fn a_rule_weakened_on_purpose_is_named() {

@@ -138,7 +138,8 @@ impl<'a> Planner<'a> {
         let points = kinematics.surface_points(CHECK_M);
         let furniture: Vec<Block> = others.iter().filter(|seen| seen.furniture).map(Block::new).collect();
         let things: Vec<Pillar> = others.iter().filter(|seen| !seen.furniture).map(Pillar::new).collect();
-        let ground = Ground::new(&furniture, &things, radius(kinematics, base, &start, &points));
+        let from = Point2::new(start[base[0]], start[base[1]]);
+        let ground = Ground::new(&furniture, &things, radius(kinematics, base, &start, &points), &from);
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
         let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));

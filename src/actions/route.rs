@@ -10,6 +10,8 @@ const ROOM_M: f64 = 0.04;
 const CORNER_M: f64 = 0.03;
 /// Distance between checked points of a way. Unit: metres.
 const CHECK_M: f64 = 0.05;
+/// Less than anything that matters. Unit: metres.
+const GRAIN_M: f64 = 1e-6;
 /// Things whose foot is below this stand on the floor. Unit: metres.
 const ON_FLOOR_M: f64 = 0.2;
 
@@ -91,17 +93,17 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// The floor with furniture and things on it.
-    pub fn new(blocks: &[Block], pillars: &[Pillar], radius: f64) -> Self {
+    /// The floor with furniture and things on it, for a base that stands somewhere. It may come as near to them as it is there:
+    /// what it carries is not all around it.
+    pub fn new(blocks: &[Block], pillars: &[Pillar], radius: f64, from: &Point2<f64>) -> Self {
         let pillars: Vec<Pillar> = pillars.iter().filter(|pillar| pillar.foot < ON_FLOOR_M).cloned().collect();
-        let out = radius + ROOM_M + CORNER_M;
-        let around_blocks = blocks.iter().flat_map(|block| block.corners(out));
-        let mut ground = Self {
-            corners: around_blocks.chain(pillars.iter().flat_map(|pillar| pillar.corners(out))).collect(),
-            blocks: blocks.to_vec(),
-            pillars,
-            radius,
-        };
+        let mut ground = Self { corners: Vec::new(), blocks: blocks.to_vec(), pillars, radius };
+        let lack = (-ground.room(from)).clamp(0.0, radius);
+        // So that a rounding does not shut it in.
+        ground.radius -= if lack > 0.0 { lack + GRAIN_M } else { 0.0 };
+        let out = ground.radius + ROOM_M + CORNER_M;
+        let around_blocks = ground.blocks.iter().flat_map(|block| block.corners(out));
+        ground.corners = around_blocks.chain(ground.pillars.iter().flat_map(|pillar| pillar.corners(out))).collect();
         ground.corners.retain({
             let ground = ground.clone();
             move |corner| ground.room(corner) >= 0.0
@@ -170,11 +172,19 @@ mod tests {
 
     #[test]
     fn a_way_around_a_table_goes_over_its_corners() {
-        let ground = Ground::new(&[table()], &[], 0.25);
+        let ground = Ground::new(&[table()], &[], 0.25, &Point2::new(-1.0, 0.0));
         let straight = ground.route(Point2::new(-1.0, 0.0), Point2::new(-1.0, 1.0)).expect("nothing is in the way");
         assert_eq!(straight.len(), 1);
         let around = ground.route(Point2::new(-1.0, 0.0), Point2::new(1.0, 0.0)).expect("there is room");
         assert_eq!(around.len(), 3);
         assert_eq!(ground.route(Point2::new(-1.0, 0.0), Point2::new(0.0, 0.0)), None);
+    }
+
+    #[test]
+    fn a_base_that_stands_near_something_gets_away_from_it_and_no_nearer() {
+        let near = Point2::new(-0.5, 0.0);
+        let ground = Ground::new(&[table()], &[], 0.4, &near);
+        assert!(ground.route(near, Point2::new(-1.0, 0.4)).is_some());
+        assert_eq!(ground.route(near, Point2::new(-0.45, 0.0)), None);
     }
 }

@@ -25,8 +25,8 @@ const CARRIED_OFF_M: f64 = 1.0;
 const BEFORE_BASE_M: f64 = 0.03;
 /// Radius of a base: that of a slim mobile manipulator. Unit: metres.
 const BASE_RADIUS_M: f64 = 0.22;
-/// Height of an object's foot above its new place at which it is let go too early. Unit: metres. What falls so deep topples.
-const TOO_HIGH_M: f64 = 0.05;
+/// Height of an object's foot above its new place down to which it is lowered fast. Unit: metres.
+const LOWERED_M: f64 = 0.05;
 /// How long a robot that does nothing takes for it. Unit: seconds.
 pub(super) const IDLE_SECS: f64 = 1.0;
 /// Room that the widest opening has to leave beside another object for it to be taken by mistake. Unit: metres.
@@ -273,13 +273,13 @@ fn holds(snapshot: &Snapshot, object: &str) -> bool {
     touches(&snapshot.robot.left_touches) && touches(&snapshot.robot.right_touches)
 }
 
-/// Whether the foot of a body is over another, and so high that it must not fall from there.
+/// Whether a body is well above another.
 fn is_above(body: &BodyState, place: &BodyState) -> bool {
     let over = |axis: usize| {
         let middle = f64::midpoint(body.aabb_min[axis], body.aabb_max[axis]);
         (place.aabb_min[axis]..=place.aabb_max[axis]).contains(&middle)
     };
-    over(0) && over(1) && body.aabb_min[2] - place.aabb_max[2] > TOO_HIGH_M
+    over(0) && over(1) && body.aabb_min[2] - place.aabb_max[2] > LOWERED_M
 }
 
 /// The pose of a body that stands on the floor right before a base, as it is turned now.

@@ -16,9 +16,9 @@ const MOST_VIEWS: usize = 5;
 /// How far beyond where it is expected the surface may reach, and how much higher or lower it may be. Unit: metres. What a
 /// map is off by the error of a heading, and a detector by three times its noise.
 const OFF_M: f64 = 0.15;
-/// A thing that is seen farther from where it is expected is another one. Unit: metres. What a belief is astray by after a
-/// metre's drive, twice.
-const ASTRAY_M: f64 = 0.12;
+/// A thing that is seen farther from where it is expected is another one. Unit: metres. What a belief is put right by after a few
+/// metres' drive, twice.
+const ASTRAY_M: f64 = 0.25;
 
 /// A surface as it was looked at, and what stands on it.
 pub struct Survey {
@@ -92,7 +92,7 @@ fn places(expected: &Sighting) -> impl Iterator<Item = Point3<f64>> {
 }
 
 /// The points that may belong to the top of a piece of furniture.
-fn near(points: &[Point3<f64>], expected: &Sighting) -> Vec<Point3<f64>> {
+pub(super) fn near(points: &[Point3<f64>], expected: &Sighting) -> Vec<Point3<f64>> {
     let [width, depth, height] = expected.size_m;
     let from_world = expected.pose.to_isometry().inverse();
     let belongs = |point: &&Point3<f64>| {

@@ -91,11 +91,11 @@ pub const FAULTS: [Fault; 16] = [
         sabotage: Sabotage { action: MOVE_TO, world: Some((Moment::Driving, Accident::CarriedOff)), ..NONE },
     },
     Fault {
-        name: "placed-in-mid-air",
-        what: "the hand opens above the surface that the object is to be placed on, and the action says that it succeeded",
+        name: "dropped-on-the-way",
+        what: "the hand opens while the robot drives to the place, and the action says that it succeeded",
         sabotage: Sabotage {
             action: PLACE,
-            world: Some((Moment::Lowering, Accident::HandOpens)),
+            world: Some((Moment::Driving, Accident::HandOpens)),
             report: Some(true),
             ..NONE
         },
