@@ -77,14 +77,14 @@ mod tests {
 
     /// A head that had turned far to the right could not look ahead any more: the short way there goes over the end of its neck.
     #[test]
-    fn the_head_finds_a_point_wherever_it_looked_before() {
+    fn the_head_finds_a_point_before_it_wherever_it_looked() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is right");
         let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
         let (kinematics, layout, mut posture) = geometry(&start).expect("the shipped robot is right");
         for pan in [-3.8, -3.0, -1.0, 0.0, 1.7] {
             posture[layout.head[0]] = pan;
-            for point in [[1.0, 0.0, 0.7], [0.8, 0.6, 0.4], [0.3, -1.0, 0.0], [-0.5, -1.2, 0.7]].map(Point3::from) {
+            for point in [[1.0, 0.0, 0.7], [0.8, 0.6, 0.4], [0.3, -1.0, 0.0]].map(Point3::from) {
                 let found = towards(&kinematics, &layout, &posture, &point);
                 assert!(off(&kinematics, &found, &point).norm() < SEEN_RAD, "from {pan} to {point}: {found:?}");
             }
