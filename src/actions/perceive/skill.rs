@@ -51,7 +51,7 @@ pub fn perceive_plane(call: &ActionCall, robot: &mut Operator<'_>) -> Result<Act
         robot.remember(Perceived::default());
         return Ok(ActionReport { succeeded: false, message: "no level surface was found".to_owned() });
     };
-    let surface = sight.take_in(surface, MOST_VIEWS, &find, robot)?;
+    let surface = sight.take_in(surface, MOST_VIEWS, find, robot)?;
     robot.begin("interpret");
     let things = surface.things(&sight.points, &sight.eye(), robot.known_kinds());
     let perceived = Perceived { plane: Some(surface.perceived()), things };
