@@ -29,6 +29,8 @@ const RUNS: u64 = 10_000;
 const PROPERTIES: [&str; 5] = ["CloseObject", "MovedObject", "NoGraspCollisions", "ObjectGrasped", "ObjectInGripper"];
 /// Room for replays, as `actcheck report` has by default. Unit: bytes.
 const ROOM: usize = 5_000_000;
+/// Each filter is set so often; the median is told.
+const TIMES: usize = 5;
 /// Runs that are simulated to be replayed under many names.
 const WATCHED: &str = "12";
 
@@ -108,6 +110,9 @@ fn simulated(folder: &Path) -> Vec<(RunDetail, Trace)> {
 fn in_a_browser(file: &Path) {
     let mut browser = Chromium::start();
     browser.size(1280, 860);
+    // What starting the browser itself takes is not the page's.
+    browser.call("Page.navigate", serde_json::json!({ "url": "data:text/html,begun" }));
+    browser.picture();
     browser.open(file, "/");
     let paint = browser.value(
         "new Promise((done) => { const told = () => { const it = performance.getEntriesByName('first-contentful-paint')[0]; \
@@ -132,11 +137,13 @@ fn in_a_browser(file: &Path) {
         ("nothing chosen", "text", "", "input"),
     ] {
         // Until the next picture is on the screen.
-        let millis = browser.value(&format!(
+        let ask = format!(
             "new Promise((done) => {{ const it = document.querySelector('[data-filter={control}]'); const start = performance.now(); \
              it.value = '{value}'; it.dispatchEvent(new Event('{event}')); \
              requestAnimationFrame(() => setTimeout(() => done(performance.now() - start), 0)); }})"
-        ));
-        tell(name, millis.as_f64().unwrap_or(f64::NAN), 100.0, "ms");
+        );
+        let mut millis: Vec<f64> = (0..TIMES).map(|_| browser.value(&ask).as_f64().unwrap_or(f64::NAN)).collect();
+        millis.sort_by(f64::total_cmp);
+        tell(name, millis[TIMES / 2], 100.0, "ms");
     }
 }

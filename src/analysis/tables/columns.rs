@@ -91,7 +91,8 @@ const COLUMNS: &[Column] = &[
         .of_scene(),
     count("others", "things that stand around: the clutter", |p| Cell::count(with_role(p, Role::Other))).of_scene(),
     count("obstacles", "obstacles on the floor", |p| Cell::count(with_role(p, Role::Obstacle))).of_scene(),
-    text("surface_category", "class of the platform (IRI)", |p| category(p.scene.surface)).of_scene(),
+    text("surface_category", "class of the platform that the target stands on (IRI)", |p| category(p.scene.surface))
+        .of_scene(),
     text("surface_model", "model of the platform", |p| model(p.scene.surface)).of_scene(),
     text("target_category", "class of the target (IRI)", |p| category(p.scene.target)).of_scene(),
     text("target_model", "model of the target: what the action handles", |p| model(p.scene.target)).of_scene(),

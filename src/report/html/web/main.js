@@ -58,10 +58,9 @@ async function main() {
       if (!first) element.focus({ preventScroll: true });
     };
     addEventListener("hashchange", () => go(false));
-    // Parts that are drawn from stand at the end of the file.
-    if (document.readyState === "loading" && location.hash.startsWith("#/run/")) {
-      document.addEventListener("DOMContentLoaded", () => go(true), { once: true });
-    } else go(true);
+    go(true);
+    // The first search need not wait for its letters.
+    (window.requestIdleCallback ?? setTimeout)(() => runs.letters());
     document.documentElement.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
     fill(element, make("h1", {}, "The report can't be read"), make("p", {}, error.message),

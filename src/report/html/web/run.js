@@ -42,7 +42,7 @@ async function watch(known, place, details, { runs, run, id }) {
   const told = (judged) => judged.outcome === "failed" && asked.has(judged.property);
   fill(details, replay.actions.map((action) => action.judged.filter(told).map((judged) => explained(action, judged, seek))), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
   if (!replay.courses || !replay.courses.frames) {
-    fill(place, make("p", { class: "note" }, replay.reason ? `It was ${runs.text(runs.status, run)}: ${replay.reason}` : "It has no state to be shown."));
+    fill(place, make("p", { class: "note" }, replay.reason ? `It was ${runs.text(runs.status, run)}: ${replay.reason}` : "Its trace is missing or damaged, or an earlier version of the program wrote it."));
     return;
   }
   const made = await player(replay);
@@ -66,7 +66,7 @@ function explained(action, judged, seek) {
   return make("section", { class: "card failure" },
     make("h2", {}, sign("failed"), make("small", {}, ` ${local(action.action)} `), local(judged.property)),
     make("p", {}, judged.witness),
-    make("p", { class: "faint" }, judged.margin !== null && `margin ${number(judged.margin)} · `,
+    make("p", { class: "faint" }, judged.margin !== null && `margin ${number(judged.margin)} `,
       typeof judged.decided === "number" && make("button", { type: "button", class: "flat", onclick: () => seek(judged.decided) }, `show the moment (${judged.decided.toFixed(1)} s)`)),
     judged.why && make("details", {}, make("summary", {}, "Why"), make("div", { class: "proof", tabindex: "0" }, judged.why.split("\n").filter((line) => line.trim()).map(proofLine))));
 }

@@ -3,6 +3,10 @@
 const NO_NUMBER = 65535;
 
 async function inflated(id) {
+  // Replays stand at the end of the file, which may still be on its way.
+  if (!document.getElementById(`data-${id}`) && document.readyState === "loading") {
+    await new Promise((done) => document.addEventListener("DOMContentLoaded", done, { once: true }));
+  }
   const element = document.getElementById(`data-${id}`);
   if (!element) throw new Error(`the part ${id} is not in this file`);
   const letters = element.textContent;
