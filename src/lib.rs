@@ -30,7 +30,7 @@
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store) |
 //! | [`campaign`] | the conductor; the only module that calls many stages | rayon |
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, campaigns side by side, when it fails | polars, statrs |
-//! | [`report`] | verdicts and tables as text, JSON and a page, in the formats of other people's tools; runs as pictures | |
+//! | [`report`] | verdicts and tables as text, JSON and pages, in the formats of other people's tools; runs as pictures and in 3D | |
 //! | [`serve`] | a history over HTTP: SPARQL endpoint, a page to ask from, the report | oxhttp |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap |
 //!
