@@ -190,7 +190,7 @@ fn the_whole_task_is_the_same_at_any_number_of_workers_and_is_told_by_action() {
 fn without_noise_clutter_and_obstacles_nearly_everything_passes() {
     let project = project();
     let config = project.path().join("configs/pick_and_place.toml");
-    edit(&config, "nav_obstacle_count = 3", "nav_obstacle_count = 0");
+    edit(&config, "nav_obstacle_count = 5", "nav_obstacle_count = 0");
     edit(&config, "count = [1, 4]", "count = 0");
     let text = std::fs::read_to_string(&config).unwrap();
     // All noise is stated as `…_noise…`, `…_drift` or `dropout`.
