@@ -20,6 +20,9 @@ use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude as engine;
 use serde_json::{Value, json};
 
+#[path = "../src/world/fresh.rs"]
+mod fresh;
+
 /// Steps of one measurement: two seconds of simulated time.
 const STEPS: u32 = 480;
 /// Measurements of each kind, taken in turns; the fastest counts.
@@ -102,19 +105,24 @@ struct ByHand {
 
 impl ByHand {
     fn new(scene: &Scene, may_sleep: bool) -> Self {
-        let softness = engine::SpringCoefficients { natural_frequency: 90.0, damping_ratio: 10.0 };
+        let softness = |frequency| engine::SpringCoefficients { natural_frequency: frequency, damping_ratio: 10.0 };
         let parameters = engine::IntegrationParameters {
             dt: 1.0 / real(f64::from(scene.physics.steps_per_second)),
             num_solver_iterations: scene.physics.iterations as usize,
             friction_in_bias_pass: true,
-            contact_softness: softness,
-            static_contact_softness: softness,
+            contact_softness: softness(90.0),
+            static_contact_softness: softness(30.0),
             contact_recycling: false,
             ..engine::IntegrationParameters::default()
         };
         let gravity = vector(&Vector3::new(0.0, 0.0, -9.81));
-        let mut world =
-            engine::PhysicsWorld { gravity, integration_parameters: parameters, ..engine::PhysicsWorld::default() };
+        let mut world = engine::PhysicsWorld {
+            gravity,
+            integration_parameters: parameters,
+            // Somebody by hand has to forget old contacts in the same way.
+            narrow_phase: fresh::narrow_phase(),
+            ..engine::PhysicsWorld::default()
+        };
         let floor = engine::ColliderBuilder::cuboid(20.0, 20.0, 0.5)
             .position(pose(&Isometry3::translation(0.0, 0.0, -0.5)))
             .friction(0.5);
