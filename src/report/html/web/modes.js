@@ -7,7 +7,7 @@ function modeBars(summary, filter, most = Infinity) {
     make("button", { type: "button", class: "flat", onclick: () => { filter.set({ ...ANY, mode: String(number) }); location.hash = "#/runs"; } },
       make("span", { class: "name" }, mode.failed.length ? mode.failed.map((iri, i) => [i > 0 && make("i", {}, " + "), breakable(local(iri))]) : make("em", {}, "nothing failed")),
       make("span", { class: `bar ${mode.failed.length ? "failed" : "passed"}`, style: { width: `${mode.share.rate / largest * 100}%` } }),
-      make("span", { class: "faint" }, `${interval(mode.share)} · ${count(mode.runs.length)} runs`)))));
+      make("span", { class: "faint" }, `${interval(mode.share)} · ${counted(mode.runs.length, "run")}`)))));
 }
 
 function modes({ runs, summary, filter }) {

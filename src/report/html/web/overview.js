@@ -14,15 +14,15 @@ function overview({ runs, summary, filter, open }) {
     make("span", { class: "large" }, value), make("b", {}, name), make("span", { class: "faint" }, told));
   return [
     make("section", {},
-      make("h1", {}, `${count(scores.runs)} runs, ${count(findings.properties.length)} properties`),
+      make("h1", {}, `${counted(scores.runs, "run")}, ${findings.properties.length === 1 ? "one property" : `${count(findings.properties.length)} properties`}`),
       make("p", { class: "lead" }, `Every property of every action of every run came to one of six outcomes. Runs: ${statuses}.`),
       make("div", { class: "tiles" }, OUTCOMES.map(tile)),
       shares(counts, "Outcomes")),
     make("section", { class: "scores" },
-      score("T", scores.T === null ? "–" : scores.T.toFixed(4), `${between(scores.T_interval)} mean score of ${count(scores.runs)} runs`),
+      score("T", scores.T === null ? "–" : scores.T.toFixed(4), `${between(scores.T_interval)} mean score of ${counted(scores.runs, "run")}`),
       score("T without broken runs", scores.without_broken === null ? "–" : scores.without_broken.toFixed(4), `${between(scores.without_broken_interval)} the robot's alone`),
       score("everything passed", scores.all_passed ? percent(scores.all_passed.rate) : "–",
-        scores.all_passed ? `[${(scores.all_passed.low * 100).toFixed(0)}–${(scores.all_passed.high * 100).toFixed(0)}] · ${count(scores.passed)} of ${count(scores.tested)} runs that tested anything` : "no run tested anything")),
+        scores.all_passed ? `[${(scores.all_passed.low * 100).toFixed(0)}–${(scores.all_passed.high * 100).toFixed(0)}] · ${count(scores.passed)} of ${counted(scores.tested, "run")} that tested anything` : "no run tested anything")),
     make("section", { class: "card" }, make("h2", {}, "Properties"), propertyTable(summary),
       make("p", { class: "more" }, make("a", { href: "#/properties" }, "margins and heat maps →"))),
     make("div", { class: "columns" },

@@ -28,7 +28,7 @@ function histogram(values, unit, label) {
     sums.map((sum, i) => sum > 0 && make("rect", {
       class: low + (i + 0.5) * step < 0 ? "failed" : "passed", x: i * width / bins + 0.5, width: width / bins - 1,
       y: height - Math.max(1.5, sum / most * height), height: Math.max(1.5, sum / most * height),
-    }, make("title", { svg: true }, `${count(sum)} runs, ${number(low + i * step)} to ${number(low + (i + 1) * step, unit)}`))),
+    }, make("title", { svg: true }, `${counted(sum, "run")}, ${number(low + i * step)} to ${number(low + (i + 1) * step, unit)}`))),
     make("line", { class: "axis", x1: 0, x2: width, y1: height, y2: height }),
     make("line", { class: "zero", x1: x(0), x2: x(0), y1: -6, y2: height + 4 }),
     make("text", { x: 0, y: height + 16 }, number(low)),

@@ -15,6 +15,11 @@ function count(value) {
   return String(value).replace(/\B(?=(\d{3})+$)/g, THIN);
 }
 
+/** `1 run`, `2 runs` */
+function counted(value, noun) {
+  return `${count(value)} ${noun}${value === 1 ? "" : "s"}`;
+}
+
 function percent(share) {
   const value = share * 100;
   return `${value > 0 && value < 9.95 ? value.toFixed(1) : value.toFixed(0)}${THIN}%`;
