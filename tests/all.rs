@@ -33,6 +33,7 @@ mod physics;
 mod pictures;
 mod place;
 mod proofs;
+mod python_client;
 mod readme;
 mod recheck;
 mod repeat;

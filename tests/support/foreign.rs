@@ -19,18 +19,38 @@ pub fn python() -> Option<&'static Path> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     PYTHON
         .get_or_init(|| {
-            let wanted = root().join("tests/foreign/requirements.txt");
-            let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python");
-            kept(&folder, &wanted, |folder| {
-                run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder))?;
-                let mut pip = Command::new(folder.join("bin/python"));
-                run(pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]).arg(&wanted))
-            })
-            .map_err(|why| left_out("what needs Python's packages", &why))
-            .ok()?;
-            Some(folder.join("bin/python"))
+            environment("python", "requirements.txt")
+                .map_err(|why| left_out("what needs Python's packages", &why))
+                .ok()
         })
         .as_deref()
+}
+
+/// Python with our client, installed by pip from its folder into an environment that has only what it needs and its tests need.
+/// The client is ours: where this can't be made, its tests fail, and say why.
+pub fn client_python() -> &'static Path {
+    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let made = PYTHON.get_or_init(|| {
+        let python = environment("python_client", "python_client.txt")?;
+        // As it is today. What builds it is in the environment already, so that this needs no network.
+        let install = ["install", "--quiet", "--disable-pip-version-check", "--no-build-isolation", "--no-deps"];
+        let client = root().join("clients/python");
+        run(Command::new(&python).args(["-m", "pip"]).args(install).arg("--force-reinstall").arg(client))?;
+        Ok(python)
+    });
+    made.as_deref().unwrap_or_else(|why| panic!("clients/python can't be installed for its tests: {why}"))
+}
+
+/// An environment with the packages that a file in `tests/foreign` names, kept beside what was compiled: its Python.
+fn environment(name: &str, packages: &str) -> Result<PathBuf, String> {
+    let wanted = root().join("tests/foreign").join(packages);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    kept(&folder, &wanted, |folder| {
+        run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder))?;
+        let mut pip = Command::new(folder.join("bin/python"));
+        run(pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]).arg(&wanted))
+    })?;
+    Ok(folder.join("bin/python"))
 }
 
 /// Allure's own generator from npm, as `tests/foreign/package.json` pins it, kept beside what was compiled.

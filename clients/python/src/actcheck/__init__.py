@@ -1,0 +1,61 @@
+"""Test your own robot skill with actcheck: a skill is a function, a program that actcheck starts serves it.
+
+```python
+import actcheck
+
+@actcheck.skill("Pick")
+def pick(robot, pickObject):
+    thing = robot.object(pickObject)
+    ...
+
+if __name__ == "__main__":
+    actcheck.serve()
+```
+"""
+
+from actcheck.connect import Connection, Result, connect
+from actcheck.env import ActionEnv, Box
+from actcheck.faults import Aborted, Closed, Failed, ProtocolFault, Unreachable
+from actcheck.messages import (
+    PROTOCOL,
+    Call,
+    Camera,
+    DepthImage,
+    Joint,
+    Observation,
+    Report,
+    RobotDescription,
+    Thing,
+)
+from actcheck.pose import Pose, wrapped
+from actcheck.robot import Robot
+from actcheck.skill import serve, skill
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "PROTOCOL",
+    "Aborted",
+    "ActionEnv",
+    "Box",
+    "Call",
+    "Camera",
+    "Closed",
+    "Connection",
+    "DepthImage",
+    "Failed",
+    "Joint",
+    "Observation",
+    "Pose",
+    "ProtocolFault",
+    "Report",
+    "Result",
+    "Robot",
+    "RobotDescription",
+    "Thing",
+    "Unreachable",
+    "connect",
+    "serve",
+    "skill",
+    "wrapped",
+]

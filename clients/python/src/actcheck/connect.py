@@ -1,0 +1,178 @@
+"""One run from a notebook or a shell: the simulation is started from here, and errors are raised where they are written."""
+
+from __future__ import annotations
+
+import shlex
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from actcheck.env import ActionEnv
+from actcheck.faults import Aborted, Closed, Failed
+from actcheck.messages import Report
+from actcheck.robot import Ended, Robot
+from actcheck.session import Session
+from actcheck.skill import Skill, report_of, wanted
+from actcheck.wire import Wire
+
+#: How long one may think between two commands. Unit: seconds of the clock on the wall.
+PATIENCE_S = 24 * 3600
+#: How long the program may take to start. Unit: seconds.
+STARTUP_S = 60.0
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of a run."""
+
+    #: 0 if everything passed, 1 if a property failed, 2 if it could not run.
+    exit_code: int
+    #: What actcheck printed.
+    text: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether every property did."""
+        return self.exit_code == 0
+
+    def __repr__(self) -> str:
+        return self.text
+
+
+class Connection:
+    """A campaign of one run whose actions are performed from here."""
+
+    def __init__(
+        self, config: str | Path, actions: Sequence[str], arguments: Sequence[str] = (), actcheck: str = "actcheck"
+    ) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="actcheck-")
+        path = Path(self._folder.name) / "notebook.sock"
+        relay = shlex.join([sys.executable, "-m", "actcheck.relay", str(path)])
+        command = [actcheck, "run", str(config), "--runs", "1", "--jobs", "1", "--launcher", relay]
+        command += ["--skill-timeout", str(PATIENCE_S), *arguments]
+        self._output = tempfile.TemporaryFile(mode="w+")
+        self._process: subprocess.Popen[str] | None = None
+        self._robot: Robot | None = None
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as door:
+                door.bind(str(path))
+                door.listen(1)
+                self._process = subprocess.Popen(
+                    command, stdin=subprocess.DEVNULL, stdout=self._output, stderr=subprocess.STDOUT, text=True
+                )
+                self._relay = self._answered(door)
+            with self._relay.makefile("r") as said:
+                address = said.readline().strip()
+            self.session = Session(Wire.dial(address), "notebook", list(actions))
+        except BaseException:
+            self.close()
+            raise
+
+    def begin(self) -> Robot:
+        """Waits for the next action and hands out the robot. Raises `Closed` when there are no more."""
+        if self._robot is not None:
+            raise RuntimeError(f"{self._robot.call.action} is not over: call `end` first")
+        call = self.session.next_call()
+        if call is None:
+            raise Closed("the run is over: `result` says what came of it")
+        self._robot = Robot(self.session, call)
+        return self._robot
+
+    def end(self, succeeded: bool = True, message: str = "") -> None:
+        """Ends the action with its own report."""
+        if self._robot is None:
+            raise RuntimeError("no action is going on: call `begin` first")
+        self._robot = None
+        self.session.end(Report(succeeded, message))
+
+    def perform(self, function: Skill) -> Report:
+        """Performs the next action by a skill. Unlike in a campaign, what it raises is raised here, with where it was written."""
+        robot = self.begin()
+        report = Report(False, "the skill raised an exception")
+        try:
+            report = report_of(function(robot, **wanted(function, robot.call)))
+        except Ended as ended:
+            report = ended.report
+        except Aborted as aborted:
+            self._robot = None
+            return Report(False, str(aborted))
+        except Failed as failed:
+            report = Report(False, str(failed))
+        finally:
+            if self._robot is not None:
+                self.end(report.succeeded, report.message)
+        return report
+
+    def env(self, action: str, ticks: int = 6) -> ActionEnv:
+        """The run as an environment with `reset` and `step`."""
+        return ActionEnv(action, ticks=ticks, session=self.session)
+
+    def result(self) -> Result:
+        """Waits for the end of the run, and says what came of it."""
+        if self._robot is not None:
+            self.end(False, "it was not ended")
+        while self.session.next_call() is not None:
+            self.session.end(Report(False, "nobody performed it"))
+        self.session.close()
+        self._relay.close()
+        code = 2 if self._process is None else self._process.wait()
+        result = Result(code, self._said())
+        self.close()
+        return result
+
+    def close(self) -> None:
+        """Ends whatever is left of it."""
+        for name in ("session", "_relay"):
+            if name in self.__dict__:
+                self.__dict__[name].close()
+        if self._process is not None and self._process.poll() is None:
+            self._process.terminate()
+            self._process.wait()
+        self._folder.cleanup()
+
+    def __enter__(self) -> Connection:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _answered(self, door: socket.socket) -> socket.socket:
+        """The relay's connection, or what actcheck said instead of starting it."""
+        door.settimeout(0.1)
+        until = time.monotonic() + STARTUP_S
+        while time.monotonic() < until:
+            try:
+                return door.accept()[0]
+            except TimeoutError:
+                if self._process is not None and self._process.poll() is not None:
+                    break
+        raise Closed(f"the run did not begin:\n{self._said()}")
+
+    def _said(self) -> str:
+        self._output.seek(0)
+        return self._output.read()
+
+
+def connect(
+    config: str | Path,
+    actions: Sequence[str] = ("Pick",),
+    *,
+    seed: int | None = None,
+    history: str | Path | None = None,
+    actcheck: str = "actcheck",
+) -> Connection:
+    """Starts one run of a configuration whose `actions` are performed from here, by `begin` and `end` or by `perform`.
+
+    `actcheck` is the program, `history` where the run is kept instead of beside the configuration.
+    """
+    arguments = [] if seed is None else ["--seed", str(seed)]
+    arguments += [] if history is None else ["--history", str(history)]
+    return Connection(config, actions, arguments, actcheck)

@@ -1,0 +1,145 @@
+"""An action as an environment with `reset` and `step`, as learning libraries want it (the interface of gymnasium)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actcheck.faults import Aborted, Closed
+from actcheck.messages import Report
+from actcheck.pose import Vector
+from actcheck.robot import Robot
+from actcheck.session import Session
+from actcheck.wire import Wire
+
+Info = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A range of vectors: what gymnasium calls `Box`."""
+
+    low: Vector
+    high: Vector
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of each vector in it."""
+        return self.low.shape
+
+    @property
+    def dtype(self) -> np.dtype[np.float64]:
+        """Of its numbers."""
+        return self.low.dtype
+
+    def contains(self, value: NDArray[Any]) -> bool:
+        """Whether a vector is in it."""
+        return value.shape == self.shape and bool(np.all((self.low <= value) & (value <= self.high)))
+
+    def sample(self, generator: np.random.Generator) -> Vector:
+        """A vector in it, where it has ends."""
+        return generator.uniform(self.low, self.high)
+
+
+def measured(robot: Robot) -> Vector:
+    """Positions and velocities of all joints, then the gap between the fingers and what they press with."""
+    seen = robot.observe()
+    return np.concatenate([seen.positions, seen.velocities, [seen.opening_m, seen.force_n]])
+
+
+def nothing(_robot: Robot) -> float:
+    """The reward of who has none: what counts as success is the simulation's secret."""
+    return 0.0
+
+
+class ActionEnv:
+    """One action, again and again: each episode is the action in another scene of the campaign.
+
+    A step's vector has, each from −1 to 1: the speed of each joint of the arm as a share of its largest; where the robot drives,
+    its speed forwards, to the left and turning, likewise; the gap between the fingers, from closed to wide open.
+
+    `observe` makes an observation of the robot, `reward` judges it, `ticks` is how many control ticks a step takes.
+    """
+
+    def __init__(
+        self,
+        action: str,
+        *,
+        observe: Callable[[Robot], Vector] = measured,
+        reward: Callable[[Robot], float] = nothing,
+        ticks: int = 6,
+        session: Session | None = None,
+    ) -> None:
+        self._session = session or Session(Wire.from_environment(), Path(__file__).stem, [action])
+        self._observe, self._reward, self._ticks = observe, reward, ticks
+        self._robot: Robot | None = None
+        self._last: Vector = np.zeros(0)
+        robot = self._session.description
+        speeds = {joint.name: joint.velocity for joint in robot.joints}
+        limits = {joint.name: (joint.lower, joint.upper) for joint in robot.joints}
+        self._arm = [(name, speeds[name], *limits[name]) for name in robot.arm_joints]
+        self._drive = [speeds[name] for name in robot.base_joints]
+        length = len(self._arm) + len(self._drive) + 1
+        self.action_space = Box(-np.ones(length), np.ones(length))
+        wide = np.full(2 * len(robot.joints) + 2, np.inf)
+        #: Of the default observation; there is none for one's own.
+        self.observation_space = Box(-wide, wide) if observe is measured else None
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the episode, for whatever else is to be known or done. Raises `RuntimeError` between episodes."""
+        if self._robot is None:
+            raise RuntimeError("no episode is going on: call `reset` first")
+        return self._robot
+
+    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
+        """Waits for the next scene. Raises `Closed` when the campaign has no more.
+
+        Scenes come from the campaign's seed: `seed` and `options` are accepted as other environments do, and must be nothing.
+        """
+        if seed is not None or options:
+            raise ValueError("scenes come from the campaign: set `seed` in its configuration")
+        if self._robot is not None:
+            self.end(False, "the next episode was begun")
+        call = self._session.next_call()
+        if call is None:
+            raise Closed("the campaign is over")
+        self._robot = Robot(self._session, call)
+        self._last = self._observe(self._robot)
+        return self._last, {"action": call.action, "parameters": dict(call.parameters), "run": call.run, "seed": call.seed}
+
+    def step(self, action: NDArray[Any]) -> tuple[Vector, float, bool, bool, Info]:
+        """Acts for a while: observation, reward, whether it ended of itself (never), whether actcheck ended it, and why."""
+        robot = self.robot
+        shares = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        if shares.shape != self.action_space.shape or not np.isfinite(shares).all():
+            raise ValueError(f"an action is {self.action_space.shape[0]} finite numbers")
+        seconds = self._ticks * robot.tick_s
+        positions = {
+            name: min(max(robot.commanded[name] + float(share) * speed * seconds, lower), upper)
+            for share, (name, speed, lower, upper) in zip(shares, self._arm)
+        }
+        drive = [float(share) * speed for share, speed in zip(shares[len(self._arm) :], self._drive)]
+        opening = float(shares[-1] + 1.0) / 2.0 * robot.description.max_opening_m
+        try:
+            robot.step(positions, base_velocity=drive or None, gripper=opening, ticks=self._ticks)
+        except Aborted as aborted:
+            self._robot = None
+            return self._last, 0.0, False, True, {"aborted": aborted.reason}
+        self._last = self._observe(robot)
+        return self._last, float(self._reward(robot)), False, False, {}
+
+    def end(self, succeeded: bool, message: str = "") -> None:
+        """Ends the episode with the action's own report, by which and by the rules it is judged."""
+        robot, self._robot = self.robot, None
+        del robot
+        self._session.end(Report(succeeded, message))
+
+    def close(self) -> None:
+        """Hangs up."""
+        self._session.close()

@@ -1,0 +1,33 @@
+"""Courses of joints over time: at rest at both ends, no faster than the joints allow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from actcheck.pose import Matrix, Vector
+
+#: Share of a joint's largest speed that is used: room for the controller to catch up.
+SPEED_SHARE = 0.9
+#: Peak over mean speed of a course that starts and ends at rest (of 3s² − 2s³).
+PEAK_OVER_MEAN = 1.5
+
+
+def course(waypoints: Sequence[Vector], speeds: Vector, period_s: float, least_s: float = 0.0) -> Matrix:
+    """Positions at each tick along straight legs between waypoints, the first of which is where it starts.
+
+    Shape: ticks × joints. `speeds` are the largest ones of the joints; `least_s` is the shortest time it may take.
+    """
+    points = np.array(waypoints)
+    legs = (np.abs(np.diff(points, axis=0)) / np.maximum(speeds, 1e-3)).max(axis=1, initial=0.0)
+    ends = np.concatenate([[0.0], np.cumsum(legs)])
+    seconds = max(float(ends[-1]) * PEAK_OVER_MEAN / SPEED_SHARE, least_s)
+    ticks = math.ceil(seconds / period_s - 1e-9)
+    if ticks <= 0:
+        return points[:0]
+    share = np.arange(1, ticks + 1) / ticks
+    at = ends[-1] * share * share * (3.0 - 2.0 * share)
+    # Legs of no length would make the ends repeat, of which interpolation takes the last: a step, as it should be.
+    return np.column_stack([np.interp(at, ends, column) for column in points.T])

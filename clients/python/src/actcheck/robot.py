@@ -1,0 +1,268 @@
+"""The robot in the hands of a skill."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actcheck.faults import Failed
+from actcheck.kinematics import Chain, UrdfJoint, read_urdf
+from actcheck.messages import Call, DepthImage, Observation, Report, RobotDescription, Thing, things_from_wire
+from actcheck.motion import course
+from actcheck.pose import Pose, Vector, wrapped
+from actcheck.session import Session
+from actcheck.wire import Message
+
+#: Joint positions by name, or those of the arm in order.
+Joints = Mapping[str, float] | Sequence[float] | Vector
+
+#: Fingers that close slower than this have stalled. Unit: m/s.
+STALLED = 0.003
+#: Ticks for which they have to. A moment's rest at the turn is none.
+STALLED_TICKS = 10
+#: Share of the grip force that stalled fingers have to feel.
+FELT_SHARE = 0.7
+#: Longest time that fingers get. Unit: seconds.
+LONGEST_GRIP_S = 2.5
+
+
+class Ended(BaseException):
+    """A skill ended its action by `Robot.end`. No `Exception`, so that no skill swallows it."""
+
+    def __init__(self, report: Report) -> None:
+        super().__init__(report.message)
+        self.report = report
+
+
+class Robot:
+    """Commands and measurements for the time of one action. Time passes only in commands."""
+
+    def __init__(self, session: Session, call: Call, urdf: list[UrdfJoint] | None = None) -> None:
+        self._session = session
+        self.description: RobotDescription = session.description
+        self.call = call
+        self._urdf = read_urdf(self.description.urdf) if urdf is None else urdf
+        self._chains: dict[str, Chain] = {}
+        self._numbers = {joint.name: number for number, joint in enumerate(self.description.joints)}
+        self._observation = call.observation
+        #: Where each joint was last told to go, by name.
+        self.commanded: dict[str, float] = dict(zip(self._numbers, call.observation.positions.tolist()))
+
+    # What is known without asking.
+
+    @property
+    def tick_s(self) -> float:
+        """Time between two commands. Unit: seconds."""
+        return self.description.control_period_s
+
+    def observe(self) -> Observation:
+        """What was measured last; no time passes."""
+        return self._observation
+
+    def joints(self) -> dict[str, float]:
+        """Measured joint positions by name."""
+        return dict(zip(self._numbers, self._observation.positions.tolist()))
+
+    def fk(self, joints: Joints | None = None, link: str | None = None) -> Pose:
+        """Pose of the tool, or of another link, for joint positions: the measured ones but for those that are given."""
+        positions = self.joints() if joints is None else self.joints() | self._named(joints)
+        return self._chain(link or self.description.tool_link).pose(positions)
+
+    def ik(self, pose: Pose, *, near: Joints | None = None, base: bool = True, link: str | None = None) -> dict[str, float]:
+        """Positions of arm and, unless `base` is false, base that bring the tool to a pose. Raises `Unreachable`.
+
+        Looked for from `near` if it is given, otherwise from where the robot is and from the postures of its profile,
+        with the base put so that the hand is over the place.
+        """
+        chain = self._chain(link or self.description.tool_link)
+        movable = set(self.description.arm_joints) | (set(self.description.base_joints) if base else set())
+        now = self.joints()
+        if near is not None:
+            seeds = [now | self._named(near)]
+        else:
+            postures = (self.description.home, *self.description.postures)
+            seeds = [now] + [now | dict(zip(self.description.arm_joints, posture)) for posture in postures if posture]
+            if base and len(self.description.base_joints) == 3:
+                seeds = [self._standing_over(seed, chain, pose) for seed in seeds]
+        found = chain.solve(pose, seeds, frozenset(chain.names) - movable)
+        return {name: position for name, position in found.items() if name in movable}
+
+    # Commands.
+
+    def step(
+        self,
+        positions: Joints | None = None,
+        *,
+        velocities: Mapping[str, float] | None = None,
+        efforts: Mapping[str, float] | None = None,
+        base_velocity: Sequence[float] | None = None,
+        gripper: float | tuple[float, float] | None = None,
+        head: tuple[float, float] | None = None,
+        ticks: int = 1,
+    ) -> Observation:
+        """One command, and what is measured after its ticks. What is not named goes on as it was told.
+
+        `positions`, `velocities` and `efforts` by joint; `base_velocity` forwards, to the left (m/s) and turning (rad/s), in
+        the base's frame; `gripper` as the gap between the fingers (metres), or as gap and force (newtons); `head` as pan and
+        tilt (radians).
+        """
+        message: Message = {"type": "command", "ticks": ticks}
+        if positions is not None:
+            message["positions"] = named = self._checked(self._named(positions), "position")
+            self.commanded.update(named)
+        if velocities is not None:
+            message["velocities"] = self._checked(velocities, "velocity")
+        if efforts is not None:
+            message["efforts"] = self._checked(efforts, "effort")
+        if base_velocity is not None:
+            message["base_velocity"] = [float(value) for value in base_velocity]
+        if gripper is not None:
+            opening, force = gripper if isinstance(gripper, tuple) else (gripper, self.description.grip_force_n)
+            message["gripper"] = {"opening_m": float(opening), "force_n": float(force)}
+        if head is not None:
+            message["head"] = {"pan_rad": float(head[0]), "tilt_rad": float(head[1])}
+        return self._command(message)
+
+    def wait(self, seconds: float) -> Observation:
+        """Lets time pass."""
+        ticks = math.ceil(seconds / self.tick_s - 1e-9)
+        return self._command({"type": "command", "ticks": ticks}) if ticks > 0 else self._observation
+
+    def follow(
+        self,
+        waypoints: Sequence[Joints],
+        seconds: float = 0.0,
+        until: Callable[[Observation], bool] | None = None,
+    ) -> Observation:
+        """Moves along joint positions, at rest at both ends, no faster than the joints allow and no shorter than `seconds`.
+
+        Joints that a waypoint does not name go on to where they were told. It stops early as soon as `until` says so.
+        """
+        way = [self._checked(self._named(waypoint), "position") for waypoint in waypoints]
+        names = list(dict.fromkeys(name for waypoint in way for name in waypoint))
+        points = [[self.commanded[name] for name in names]]
+        for waypoint in way:
+            points.append([waypoint.get(name, before) for name, before in zip(names, points[-1])])
+        speeds = np.array([self.description.joints[self._numbers[name]].velocity for name in names])
+        rows = course([np.array(point) for point in points], speeds, self.tick_s, seconds)
+        for row in rows.tolist():
+            positions = dict(zip(names, row))
+            self.commanded.update(positions)
+            self._command({"type": "command", "ticks": 1, "positions": positions})
+            if until is not None and until(self._observation):
+                break
+        return self._observation
+
+    def move_joints(self, target: Joints, seconds: float = 0.0) -> Observation:
+        """Moves to joint positions, at rest at both ends."""
+        return self.follow([target], seconds)
+
+    def move_straight(self, *poses: Pose, seconds: float = 0.0, step_m: float = 0.03, base: bool = False) -> Observation:
+        """Brings the tool to poses along straight lines, from where it was told to be. Raises `Unreachable`."""
+        joints, start, way = dict(self.commanded), self.fk(self.commanded), []
+        for pose in poses:
+            pieces = max(1, math.ceil(float(np.linalg.norm(pose.position - start.position)) / step_m))
+            for piece in range(1, pieces + 1):
+                place = start.position + (pose.position - start.position) * (piece / pieces)
+                joints |= self.ik(Pose(place, pose.rotation), near=joints, base=base)
+                way.append(dict(joints))
+            start = pose
+        movable = (*self.description.base_joints, *self.description.arm_joints)
+        return self.follow([{name: at[name] for name in movable} for at in way], seconds)
+
+    def drive(self, x: float, y: float, heading: float, seconds: float = 0.0) -> Observation:
+        """Drives straight to a place, turning on the way. Frame: world, by its own belief."""
+        names = self.description.base_joints
+        turned = self.commanded[names[2]] + wrapped(heading - self.commanded[names[2]])
+        return self.follow([dict(zip(names, (x, y, turned)))], seconds)
+
+    def base_velocity(self, forward: float, left: float = 0.0, turn: float = 0.0, *, ticks: int = 1) -> Observation:
+        """Drives at a speed for some ticks. Units: m/s, rad/s. Frame: the base's."""
+        return self.step(base_velocity=(forward, left, turn), ticks=ticks)
+
+    def gripper(self, opening_m: float, force_n: float | None = None, wait: bool = True) -> Observation:
+        """Moves the fingers to a gap, and waits until they are there or have stalled on something, unless `wait` is false."""
+        force = self.description.grip_force_n if force_n is None else force_n
+        self.step(gripper=(opening_m, force))
+        still, before = 0, math.inf
+        for _ in range(math.ceil(LONGEST_GRIP_S / self.tick_s) if wait else 0):
+            seen = self.step()
+            speed, before = abs(seen.opening_m - before) / self.tick_s / 2.0, seen.opening_m
+            resting = speed < STALLED and (seen.force_n > FELT_SHARE * force or abs(seen.opening_m - opening_m) < 2e-3)
+            still = still + 1 if resting else 0
+            if still >= STALLED_TICKS:
+                break
+        return self._observation
+
+    def feels(self, share: float = FELT_SHARE) -> bool:
+        """Whether the fingers press on something with that share of the grip force."""
+        return self._observation.force_n > share * self.description.grip_force_n
+
+    # Sensors. No time passes.
+
+    def depth(self) -> DepthImage:
+        """A picture of the depth camera."""
+        answer = self._session.ask("depth")
+        return DepthImage(answer["arrays"]["depth"], Pose.from_wire(answer["camera_pose"]), answer["horizontal_fov_rad"])
+
+    def cloud(self) -> NDArray[np.float32]:
+        """The points that the depth camera sees. Shape: points × 3. Frame: world. Unit: metres."""
+        cloud: NDArray[np.float32] = self._session.ask("cloud")["arrays"]["cloud"]
+        return cloud
+
+    def objects(self, of: str | None = None) -> tuple[Thing, ...]:
+        """What the reference perception sees: everything, or the one thing of an id; with its errors."""
+        return things_from_wire(self._session.ask("objects", of)["objects"])
+
+    def object(self, of: str) -> Thing:
+        """One thing that the reference perception sees. Raises `Failed` where it sees none."""
+        for thing in self.objects(of):
+            if thing.id == of:
+                return thing
+        raise Failed(f"{of} was not seen")
+
+    # The end.
+
+    def end(self, succeeded: bool, message: str = "", perceived: Sequence[Thing] = ()) -> NoReturn:
+        """Ends the action with its own report, from wherever it is called; `return` does it too."""
+        raise Ended(Report(succeeded, message, perceived))
+
+    def _command(self, message: Message) -> Observation:
+        self._observation = self._session.command(message)
+        return self._observation
+
+    def _chain(self, link: str) -> Chain:
+        if link not in self._chains:
+            self._chains[link] = Chain(self._urdf, link, self.call.root)
+        return self._chains[link]
+
+    def _standing_over(self, seed: dict[str, float], chain: Chain, pose: Pose) -> dict[str, float]:
+        """The posture with the base turned so that the hand heads as the pose does, and put so that it is there."""
+        x, y, heading = self.description.base_joints
+        hand = chain.pose(seed)
+        if math.hypot(*pose.rotation[:2, 0]) > 0.1 and math.hypot(*hand.rotation[:2, 0]) > 0.1:
+            seed = seed | {heading: seed[heading] + wrapped(pose.yaw - hand.yaw)}
+        miss = pose.position - chain.pose(seed).position
+        return seed | {x: seed[x] + float(miss[0]), y: seed[y] + float(miss[1])}
+
+    def _named(self, joints: Joints) -> dict[str, float]:
+        if isinstance(joints, Mapping):
+            return dict(joints)
+        names = self.description.arm_joints
+        if len(joints) != len(names):
+            raise ValueError(f"{len(joints)} positions were given for the {len(names)} joints of the arm")
+        return {name: float(value) for name, value in zip(names, joints)}
+
+    def _checked(self, values: Mapping[str, Any], what: str) -> dict[str, float]:
+        checked = {}
+        for name, value in values.items():
+            if name not in self._numbers:
+                raise ValueError(f"the robot has no joint {name!r}; it has {', '.join(self._numbers)}")
+            checked[name] = number = float(value)
+            if not math.isfinite(number):
+                raise ValueError(f"the {what} of {name} is {number}")
+        return checked

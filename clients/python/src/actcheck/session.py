@@ -1,0 +1,105 @@
+"""The course of a connection: hello, then resets and actions until bye."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any
+
+from actcheck.faults import Aborted, Closed, ProtocolFault
+from actcheck.messages import PROTOCOL, Call, Observation, Report, RobotDescription
+from actcheck.pose import Pose
+from actcheck.wire import Message, Wire
+
+
+class Session:
+    """A connection to one simulation, after both sides said hello."""
+
+    def __init__(self, wire: Wire, name: str, actions: list[str]) -> None:
+        self._wire = wire
+        hello = self._receive("hello")
+        if hello.get("protocol") != PROTOCOL:
+            wire.close()
+            raise ProtocolFault(f"actcheck speaks version {hello.get('protocol')} of the protocol, this package {PROTOCOL}")
+        self.description = RobotDescription.from_wire(hello)
+        self._run, self._seed, self._root = "", 0, Pose.upright((0.0, 0.0, 0.0))
+        self._aborted: Aborted | None = None
+        wire.send({"type": "hello", "protocol": PROTOCOL, "name": name, "actions": actions})
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._wire.close()
+
+    def next_call(self) -> Call | None:
+        """Waits for the next action; nothing when there are no more."""
+        while True:
+            message = self._receive("reset", "begin", "bye")
+            if message["type"] == "bye":
+                return None
+            if message["type"] == "reset":
+                self._run, self._seed = str(message["run"]), int(message["seed"])
+                root = message.get("root_pose")
+                self._root = Pose.from_wire(root) if root else Pose.upright((0.0, 0.0, 0.0))
+                self._wire.send({"type": "ready"})
+                continue
+            self._aborted = None
+            sent = message["observation"]
+            truth = {"truth": message["truth"]} if message.get("truth") else {}
+            return Call(
+                action=message["action"],
+                parameters={name: _single(value) for name, value in message["parameters"].items()},
+                kinds=message.get("kinds") or {},
+                budget_s=float(message["budget_s"]),
+                observation=Observation.from_wire(sent | truth),
+                run=self._run,
+                seed=self._seed,
+                root=self._root,
+            )
+
+    def command(self, message: Message) -> Observation:
+        """Sends a command and waits until its ticks are over. Raises `Aborted`."""
+        self._go_on()
+        self._wire.send(message)
+        return Observation.from_wire(self._receive("observation"))
+
+    def ask(self, what: str, of: str | None = None) -> Message:
+        """Asks a sensor; no simulated time passes. Raises `Aborted`."""
+        self._go_on()
+        self._wire.send({"type": "ask", "what": what} if of is None else {"type": "ask", "what": what, "of": of})
+        return self._receive("answer")
+
+    def end(self, report: Report) -> None:
+        """Ends the action with its own report."""
+        self._wire.send(report.to_wire())
+
+    def close(self) -> None:
+        """Hangs up."""
+        self._wire.close()
+
+    def _go_on(self) -> None:
+        """A skill that goes on after its action was ended is told so again, and nothing is sent."""
+        if self._aborted is not None:
+            raise Aborted(self._aborted.reason)
+
+    def _receive(self, *due: str) -> Message:
+        message = self._wire.receive()
+        kind = message["type"]
+        if kind in due:
+            return message
+        if kind == "abort":
+            self._wire.send({"type": "aborted"})
+            self._aborted = Aborted(str(message.get("reason", "no reason was given")))
+            raise self._aborted
+        if kind == "error":
+            raise ProtocolFault(f"actcheck refused a message: {message.get('reason', 'no reason was given')}")
+        if kind == "bye":
+            raise Closed("actcheck ended the connection")
+        raise ProtocolFault(f"a message `{kind}` came where {' or '.join(due)} was due")
+
+
+def _single(value: Any) -> Any:
+    """The value of a designator: the only one as it is."""
+    return value[0] if isinstance(value, list) and len(value) == 1 else value

@@ -1,0 +1,253 @@
+"""Skills and what they do with the robot."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import unittest
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from actcheck import Aborted, Failed, Pose, ProtocolFault, Report, Robot, Thing, serve
+from actcheck import skill as skill_for
+from actcheck.session import Session
+from actcheck.skill import skills
+from actcheck.wire import Message
+from tests.fake import ARM, BASE, LEVEL, TICK_S, Script, Simulation, hello, one_action, robot_of
+
+
+class Serving(unittest.TestCase):
+    def setUp(self) -> None:
+        self.kept: dict[str, Any] = dict(skills)
+        skills.clear()
+
+    def tearDown(self) -> None:
+        skills.clear()
+        skills.update(self.kept)
+
+    def ends(self, function: Callable[..., Any], script: Script = one_action) -> list[Message]:
+        """What came to the simulation when a skill was served."""
+        skill_for("Pick")(function)
+        simulation = Simulation(script)
+        self.errors = io.StringIO()
+        with contextlib.redirect_stderr(self.errors):
+            serve("test", simulation.wire)
+        simulation.join()
+        return [message for message in simulation.received if message["type"] in ("end", "aborted")]
+
+    def test_a_skill_gets_the_designators_that_it_names(self) -> None:
+        seen: dict[str, Any] = {}
+
+        def pick(robot: Robot, pickObject: str) -> bool:
+            seen.update(target=pickObject, run=robot.call.run, seed=robot.call.seed)
+            return True
+
+        def script(simulation: Simulation) -> None:
+            self.hello = simulation.greet()
+            simulation.reset()
+            simulation.begin(pickObject="obj:glass_1", objectSurface=["obj:table"])
+            simulation.act()
+            simulation.bye()
+
+        self.assertEqual(self.ends(pick, script), [{"type": "end", "succeeded": True, "message": ""}])
+        self.assertEqual(seen, {"target": "obj:glass_1", "run": "k7f3-1", "seed": 5})
+        self.assertEqual(self.hello, {"type": "hello", "protocol": 1, "name": "test", "actions": ["Pick"]})
+
+    def test_a_skill_that_takes_all_gets_all(self) -> None:
+        def pick(robot: Robot, **designators: Any) -> Report:
+            return Report(False, str(sorted(designators.items())))
+
+        self.assertEqual(self.ends(pick)[0]["message"], "[('pickObject', 'obj:glass_1')]")
+
+    def test_what_a_skill_returns_or_raises_is_how_it_ended(self) -> None:
+        glass = Thing("x", Pose.upright((1.0, 2.0, 3.0)), np.array([0.1, 0.1, 0.2]), "act:Glass")
+
+        def raises_failed(robot: Robot) -> None:
+            raise Failed("the glass is too wide")
+
+        def ends_from_within(robot: Robot) -> None:
+            try:
+                robot.end(True, "done", [glass])
+            except Exception:
+                self.fail("it must not be caught")
+
+        seen = {"pose": glass.pose.to_wire(), "size_m": [0.1, 0.1, 0.2], "category": "act:Glass"}
+        cases: list[tuple[Callable[..., Any], bool, str, list[Message]]] = [
+            (lambda robot: None, True, "", []),
+            (lambda robot: False, False, "the skill returned False", []),
+            (lambda robot: Report(True, "held"), True, "held", []),
+            (raises_failed, False, "the glass is too wide", []),
+            (ends_from_within, True, "done", [seen]),
+        ]
+        for function, succeeded, message, perceived in cases:
+            (end,) = self.ends(function)
+            self.assertEqual((end["succeeded"], end["message"], end.get("perceived", [])), (succeeded, message, perceived))
+
+    def test_a_fault_of_the_skill_is_told_where_it_was_written(self) -> None:
+        def pick(robot: Robot) -> None:
+            robot.step({"tentacle_joint": 1.0})
+
+        (end,) = self.ends(pick)
+        self.assertFalse(end["succeeded"])
+        self.assertRegex(end["message"], r"ValueError: .*'tentacle_joint'.*\(test_skill.py, line \d+: robot.step")
+        self.assertIn("Traceback", self.errors.getvalue())
+        (end,) = self.ends(lambda robot: 7)
+        self.assertRegex(end["message"], "returns a Report, a bool or None, not int")
+
+    def test_an_aborted_action_is_over_even_for_a_skill_that_catches_everything(self) -> None:
+        tries: list[str] = []
+
+        def pick(robot: Robot) -> None:
+            for _ in range(3):
+                try:
+                    robot.wait(0.1)
+                except Aborted as aborted:
+                    tries.append(aborted.reason)
+            raise Aborted("again")
+
+        def script(simulation: Simulation) -> None:
+            simulation.greet()
+            simulation.reset()
+            simulation.begin()
+            simulation.receive("command")
+            simulation.send({"type": "abort", "reason": "budget"})
+            simulation.receive("aborted")
+            simulation.reset()
+            simulation.bye()
+
+        self.assertEqual(self.ends(pick, script), [{"type": "aborted"}])
+        self.assertEqual(tries, ["budget"] * 3)
+
+    def test_another_version_and_a_refusal_end_the_program_with_a_sentence(self) -> None:
+        def other_version(simulation: Simulation) -> None:
+            simulation.send(hello(protocol=7))
+
+        def refusal(simulation: Simulation) -> None:
+            simulation.greet()
+            simulation.send({"type": "error", "reason": "unknown key"})
+
+        for script, words in ((other_version, "version 7"), (refusal, "unknown key"), (lambda simulation: None, "hung up")):
+            with self.assertRaisesRegex(SystemExit, words):
+                self.ends(lambda robot: None, script)
+
+    def test_a_message_that_is_not_due_is_told(self) -> None:
+        def script(simulation: Simulation) -> None:
+            simulation.greet()
+            simulation.send(simulation.observation())
+
+        session = Session(Simulation(script).wire, "test", [])
+        with self.assertRaisesRegex(ProtocolFault, "`observation` came where reset or begin or bye was due"):
+            session.next_call()
+
+
+class Hands(unittest.TestCase):
+    """The robot's own commands and sensors."""
+
+    def setUp(self) -> None:
+        self.simulation = Simulation(one_action)
+        self.session, self.robot = robot_of(self.simulation)
+
+    def tearDown(self) -> None:
+        self.session.end(Report(True))
+        self.assertIsNone(self.session.next_call())
+        self.simulation.join()
+
+    def commands(self) -> list[Message]:
+        return [message for message in self.simulation.received if message["type"] == "command"]
+
+    def test_joints_move_smoothly_to_where_they_are_told(self) -> None:
+        self.robot.move_joints(LEVEL, seconds=3.0)
+        self.assertEqual(len(self.commands()), 180)
+        at = self.robot.joints()
+        np.testing.assert_allclose([at[name] for name in ARM], LEVEL)
+        self.robot.follow([{"head_tilt_joint": -0.3}, {"arm_lift_joint": 0.1}], until=lambda seen: seen.time_s > 3.1)
+        self.assertLess(len(self.commands()), 190)
+
+    def test_waiting_is_one_command(self) -> None:
+        seen = self.robot.wait(0.5)
+        self.assertEqual(self.commands(), [{"type": "command", "ticks": 30}])
+        self.assertAlmostEqual(seen.time_s, 0.5)
+        self.assertAlmostEqual(seen.budget_left_s, 59.5)
+
+    def test_everything_that_a_command_can_say(self) -> None:
+        self.robot.step(
+            {"arm_lift_joint": 0.2},
+            velocities={"wrist_roll_joint": 0.1},
+            efforts={"arm_roll_joint": 1.5},
+            base_velocity=(0.1, 0.0, 0.2),
+            gripper=(0.05, 3.0),
+            head=(0.1, -0.4),
+            ticks=3,
+        )
+        self.assertEqual(
+            self.commands(),
+            [
+                {
+                    "type": "command",
+                    "ticks": 3,
+                    "positions": {"arm_lift_joint": 0.2},
+                    "velocities": {"wrist_roll_joint": 0.1},
+                    "efforts": {"arm_roll_joint": 1.5},
+                    "base_velocity": [0.1, 0.0, 0.2],
+                    "gripper": {"opening_m": 0.05, "force_n": 3.0},
+                    "head": {"pan_rad": 0.1, "tilt_rad": -0.4},
+                }
+            ],
+        )
+
+    def test_what_no_robot_can_do_is_refused_here(self) -> None:
+        with self.assertRaisesRegex(ValueError, "no joint 'tentacle'; it has base_x_joint, "):
+            self.robot.step({"tentacle": 1.0})
+        with self.assertRaisesRegex(ValueError, "velocity of arm_lift_joint is nan"):
+            self.robot.step(velocities={"arm_lift_joint": math.nan})
+        with self.assertRaisesRegex(ValueError, "3 positions were given for the 5 joints of the arm"):
+            self.robot.move_joints([0.0, 0.0, 0.0])
+        self.assertEqual(self.commands(), [])
+
+    def test_fingers_close_until_they_stall(self) -> None:
+        self.assertAlmostEqual(self.robot.gripper(0.135).opening_m, 0.135, 3)
+        self.simulation.between_m = 0.08
+        seen = self.robot.gripper(0.0)
+        self.assertAlmostEqual(seen.opening_m, 0.08, 3)
+        self.assertTrue(self.robot.feels())
+        self.assertLess(seen.time_s, 2.0, "it does not wait for longer than it has to")
+        self.simulation.between_m = None
+        self.assertAlmostEqual(self.robot.gripper(0.0).opening_m, 0.0, 3)
+        self.assertFalse(self.robot.feels())
+
+    def test_the_hand_goes_where_ik_says_and_straight(self) -> None:
+        target = Pose.pointing((1.4, 0.5, 0.6), 0.4)
+        self.robot.move_joints(self.robot.ik(target))
+        np.testing.assert_allclose(self.robot.fk().position, target.position, atol=1e-3)
+        before = len(self.commands())
+        self.robot.move_straight(target.moved(z=0.1), seconds=1.0)
+        for command in self.commands()[before:]:
+            hand = self.robot.fk(command["positions"])
+            self.assertLess(float(np.linalg.norm((hand.position - target.position)[:2])), 3e-3, "straight up")
+        self.assertEqual(self.robot.commanded["base_x_joint"], self.robot.joints()["base_x_joint"])
+
+    def test_the_base_drives_the_short_way_round(self) -> None:
+        self.robot.drive(0.2, -0.1, math.pi * 1.9)
+        at = self.robot.joints()
+        np.testing.assert_allclose([at[name] for name in BASE], [0.2, -0.1, -0.1 * math.pi])
+        self.robot.base_velocity(0.1, turn=0.3, ticks=6)
+        self.assertEqual(self.commands()[-1]["base_velocity"], [0.1, 0.0, 0.3])
+
+    def test_sensors_answer_in_no_time(self) -> None:
+        self.assertEqual([thing.id for thing in self.robot.objects()], ["obj:glass_1", "obj:table"])
+        glass = self.robot.object("obj:glass_1")
+        self.assertEqual((glass.category, glass.furniture, glass.pose.position.tolist()), ("act:Glass", False, [1.0, 0.0, 0.5]))
+        with self.assertRaisesRegex(Failed, "obj:cup was not seen"):
+            self.robot.object("obj:cup")
+        self.assertEqual(self.robot.cloud().shape, (5, 3))
+        picture = self.robot.depth()
+        self.assertEqual((picture.depth.shape, picture.depth[2, 3]), ((3, 4), 11.0))
+        self.assertEqual(self.robot.observe().time_s, 0.0)
+        self.assertAlmostEqual(TICK_S, self.robot.tick_s)
+
+
+if __name__ == "__main__":
+    unittest.main()
