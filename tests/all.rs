@@ -10,6 +10,7 @@ mod check_oracles;
 mod commands;
 mod compare;
 mod config;
+mod dataset;
 mod determinism;
 mod diagnostics;
 mod extra;

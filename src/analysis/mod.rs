@@ -5,6 +5,7 @@
 mod compare;
 mod consistency;
 mod coverage;
+mod dataset;
 mod failure_modes;
 mod false_discovery;
 mod findings;
@@ -22,6 +23,7 @@ mod tables;
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, Flaky, PassPower, Repeated, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
+pub use dataset::{Dataset, export_dataset};
 pub use failure_modes::{FailureMode, failure_modes};
 pub use false_discovery::benjamini_hochberg;
 pub use findings::{

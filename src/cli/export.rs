@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::analysis::{Hierarchy, Mirror, TableFilter, export_csv, export_parquet};
+use crate::analysis::{Dataset, Hierarchy, Mirror, TableFilter, export_csv, export_dataset, export_parquet};
 use crate::base::{Diagnostic, Diagnostics, names};
 use crate::campaign::{self, Env};
 use crate::cli::args::HistoryArgs;
@@ -18,11 +18,11 @@ use crate::ontology;
 #[derive(Debug, Args)]
 pub struct ExportArgs {
     /// Id of the run to write as a configuration, or its beginning
-    #[arg(required_unless_present_any = ["parquet", "csv", "nquads", "turtle", "rebuild_mirror"])]
+    #[arg(required_unless_present_any = ["parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
     pub run: Option<String>,
     /// The file to write (TOML); `-` prints it
     #[arg(short, long, value_name = "FILE.toml", conflicts_with = "regression", requires = "run")]
-    #[arg(required_unless_present_any = ["regression", "parquet", "csv", "nquads", "turtle", "rebuild_mirror"])]
+    #[arg(required_unless_present_any = ["regression", "parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
     pub output: Option<PathBuf>,
     /// Put it, under the run's id, into the project's folder `regressions`, which every campaign runs first
     #[arg(long, requires = "run")]
@@ -37,6 +37,10 @@ pub struct ExportArgs {
     /// The same as CSV: `outcomes.csv` and `schema.json`
     #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
+    /// Write runs as data for learning into this folder, in Parquet: `joints` and `robot` (observations and commands over time),
+    /// `objects` (the truth), `percepts`, `actions` and `outcomes`, and `schema.json`, which says what each column means
+    #[arg(long, value_name = "DIR")]
+    pub dataset: Option<PathBuf>,
     /// Write the whole history as RDF, facts in their named graphs (N-Quads)
     #[arg(long, value_name = "FILE.nq")]
     pub nquads: Option<PathBuf>,
@@ -75,7 +79,7 @@ pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
         history.write_turtle(file)?;
         output::print(&format!("{} holds campaigns, runs, scenes and outcomes\n", file.display()));
     }
-    if args.parquet.is_some() || args.csv.is_some() || args.rebuild_mirror {
+    if args.parquet.is_some() || args.csv.is_some() || args.dataset.is_some() || args.rebuild_mirror {
         export_tables(args, &history)?;
     }
     Ok(())
@@ -100,7 +104,28 @@ fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics
         let told = format!("{} holds {rows} rows, {} what their columns mean\n", table.display(), schema.display());
         output::print(&told);
     }
+    if let Some(folder) = &args.dataset {
+        print_dataset(&export_dataset(history, &mirror, &filter, &hierarchy, folder)?);
+    }
     Ok(())
+}
+
+fn print_dataset(dataset: &Dataset) {
+    for (table, rows) in &dataset.tables {
+        output::print(&format!("{} holds {rows} rows\n", table.display()));
+    }
+    let runs = dataset.runs;
+    output::print(&format!("{} says what the columns of these tables of {runs} runs mean\n", dataset.schema.display()));
+    if dataset.without_course > 0 {
+        let note = Diagnostic::warning(
+            "X054",
+            format!(
+                "{} of {runs} runs hold no course of the robot: an earlier version kept them",
+                dataset.without_course
+            ),
+        );
+        output::print_diagnostics(&note.help("`actcheck run` keeps it today").into());
+    }
 }
 
 /// The rows that were asked for; a campaign that is not there is a fault.

@@ -38,8 +38,19 @@ pub(super) fn encode(rows: &[Vec<f32>]) -> Vec<u8> {
 }
 
 /// The rows of bytes that [`encode`] made; nothing where they are damaged.
-pub(super) fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
+#[cfg(test)]
+fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
+    decode_next(bytes).map(|(rows, _)| rows)
+}
+
+/// The rows of bytes that begin with what [`encode`] made, and what follows; nothing where they are damaged.
+pub(super) fn decode_next(bytes: &[u8]) -> Option<(Vec<Vec<f32>>, &[u8])> {
     let mut rest = Reader { bytes };
+    let rows = read(&mut rest)?;
+    Some((rows, rest.bytes))
+}
+
+fn read(rest: &mut Reader<'_>) -> Option<Vec<Vec<f32>>> {
     let kind = rest.byte()?;
     let height = rest.number()?;
     if kind == RAGGED {
@@ -56,7 +67,7 @@ pub(super) fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
     }
     let mut rows = vec![Vec::with_capacity(width); height];
     for _ in 0..width {
-        for (row, value) in rows.iter_mut().zip(decode_column(height, &mut rest)?) {
+        for (row, value) in rows.iter_mut().zip(decode_column(height, rest)?) {
             row.push(value);
         }
     }

@@ -33,7 +33,7 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
         postcard::to_stdvec(&(&trace.map, &trace.forms, &trace.robot_courses)).map_err(|error| error.to_string())?,
     );
     let head = compressed(&head)?;
-    let course = compressed(&frames::encode(&frames.rows))?;
+    let course = compressed(&[frames::encode(&frames.rows), encode_motions(trace)?].concat())?;
     let length = u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
     Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
 }
@@ -45,8 +45,33 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
 pub(super) fn decode(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (head, course) = parts(bytes)?;
     let (choices, mut trace) = decode_head(head)?;
-    trace.frames.rows = frames::decode(&expanded(course)?).ok_or("the course of the bodies can't be read")?;
+    let course = expanded(course)?;
+    let (rows, rest) = frames::decode_next(&course).ok_or("the course of the bodies can't be read")?;
+    trace.frames.rows = rows;
+    decode_motions(rest, &mut trace).ok_or("the course of the robot can't be read")?;
     Ok((choices, trace))
+}
+
+/// Behind the course of the bodies: what the robot measured and was told, for each action the joints and the rows.
+fn encode_motions(trace: &Trace) -> Result<Vec<u8>, String> {
+    let mut out = Vec::new();
+    for course in &trace.robot_courses {
+        out.extend(postcard::to_stdvec(&course.motion.joints).map_err(|error| error.to_string())?);
+        out.extend(frames::encode(&course.motion.rows));
+    }
+    Ok(out)
+}
+
+/// Traces of earlier versions end before; they have none.
+fn decode_motions(mut rest: &[u8], trace: &mut Trace) -> Option<()> {
+    if rest.is_empty() {
+        return Some(());
+    }
+    for course in &mut trace.robot_courses {
+        (course.motion.joints, rest) = postcard::take_from_bytes(rest).ok()?;
+        (course.motion.rows, rest) = frames::decode_next(rest)?;
+    }
+    Some(())
 }
 
 /// Decisions and the trace without the rows of its frames: all that facts are made of.

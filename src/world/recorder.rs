@@ -10,6 +10,7 @@ use crate::world::World;
 use crate::world::contacts::{Touch, touches};
 use crate::world::convert::{from_pose, from_vector};
 use crate::world::engine::Owner;
+use crate::world::motion::MotionMeter;
 use crate::world::quality::QualityMeter;
 use crate::world::robot_course::{RobotCourse, RobotMeter};
 
@@ -98,6 +99,7 @@ pub struct Recorder {
     closed: Vec<((Owner, Owner), Episode)>,
     pub(super) quality: QualityMeter,
     pub(super) robot: RobotMeter,
+    pub(super) motion: MotionMeter,
 }
 
 impl Recorder {
@@ -120,6 +122,7 @@ impl Recorder {
             closed: Vec::new(),
             quality: QualityMeter::default(),
             robot: RobotMeter::default(),
+            motion: MotionMeter::default(),
         }
     }
 
@@ -149,6 +152,7 @@ impl World {
             self.frame();
         }
         self.begin_robot_course();
+        self.begin_motion();
     }
 
     /// Ends a record and hands it out.
@@ -177,7 +181,12 @@ impl World {
                 max_displacement_m: *max_displacement_m,
             })
             .collect();
-        Record { contacts, courses, base: self.recorder.base, robot: self.end_robot_course() }
+        Record {
+            contacts,
+            courses,
+            base: self.recorder.base,
+            robot: RobotCourse { motion: self.end_motion(), ..self.end_robot_course() },
+        }
     }
 
     /// The course of everything that moves since the first record began.
@@ -219,6 +228,7 @@ impl World {
             self.record_robot(&touches);
             if (self.recorder.n_ticks - self.recorder.began).is_multiple_of(self.recorder.ticks_per_frame) {
                 self.frame();
+                self.record_motion();
             }
         }
     }
@@ -293,6 +303,6 @@ impl World {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "frames are kept in 32 bits")]
-fn grain(value: f64, grain: f64) -> f32 {
+pub(super) fn grain(value: f64, grain: f64) -> f32 {
     ((value / grain).round() * grain) as f32
 }

@@ -11,10 +11,10 @@ use rapier3d::prelude::{Collider, RigidBodyHandle};
 use serde::{Deserialize, Serialize};
 
 use crate::base::Pose;
-use crate::world::World;
 use crate::world::contacts::Touch;
 use crate::world::convert::{from_pose, from_vector};
 use crate::world::engine::Owner;
+use crate::world::{Motion, World};
 
 /// Control ticks between two looks for links in each other. At 60 ticks a second that is twenty looks: what moves at 1 m/s
 /// goes 5 cm from one to the next.
@@ -33,6 +33,9 @@ pub struct RobotCourse {
     pub self_contacts: Vec<SelfCollision>,
     /// Things that both fingers touched at some time, in scene order.
     pub held: Vec<HeldCourse>,
+    /// What it measured and was told. It is kept with the course of the bodies, which not every reader needs.
+    #[serde(skip)]
+    pub motion: Motion,
 }
 
 /// Extremes of one joint. Units: metres or radians, by kind.
@@ -139,7 +142,7 @@ impl World {
             held_secs: *ticks as f64 * tick_secs,
             max_tilt_rad: *tilt,
         });
-        RobotCourse { joints: joints.collect(), self_contacts, held: held.collect() }
+        RobotCourse { joints: joints.collect(), self_contacts, held: held.collect(), motion: Motion::default() }
     }
 
     fn record_joints(&mut self) {

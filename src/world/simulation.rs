@@ -235,6 +235,7 @@ impl World {
     /// After a fault nothing moves any more.
     pub fn step(&mut self, command: &Command) {
         self.take(command);
+        self.recorder.motion.tell(command);
         self.tick();
     }
 

@@ -2,7 +2,7 @@
 
 /// A value, or nothing where there is none.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Cell {
+pub(in crate::analysis) enum Cell {
     Text(Option<String>),
     Number(Option<f64>),
     Count(Option<i64>),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use polars::prelude::{Column as Series, DataFrame, NamedFrom as _, PolarsError, Series as Values};
 
 use crate::analysis::tables::cell::Cell;
-use crate::analysis::tables::columns::{Column, ColumnKind, columns};
+use crate::analysis::tables::columns::{ColumnKind, columns};
 use crate::analysis::tables::place::{ActionScene, Hierarchy, Place};
 use crate::base::names;
 use crate::history::RunDetail;
@@ -43,15 +43,16 @@ impl Rows {
     /// As a table of the library.
     pub fn frame(mut self) -> Result<DataFrame, PolarsError> {
         self.cells.resize_with(columns().len(), Vec::new);
-        let series = columns().iter().zip(self.cells).map(|(column, cells)| series(column, cells));
+        let series = columns().iter().zip(self.cells).map(|(column, cells)| series(column.name, column.kind, cells));
         DataFrame::new(self.height, series.collect())
     }
 }
 
-fn series(column: &Column, cells: Vec<Cell>) -> Series {
-    let name = column.name.into();
+/// Cells as a column of the library; those of another sort are missing.
+pub(in crate::analysis) fn series(name: &str, kind: ColumnKind, cells: Vec<Cell>) -> Series {
+    let name = name.into();
     let cells = cells.into_iter();
-    match column.kind {
+    match kind {
         ColumnKind::Text => {
             let text = |cell| if let Cell::Text(text) = cell { text } else { None };
             Values::new(name, cells.map(text).collect::<Vec<Option<String>>>())

@@ -190,7 +190,7 @@ pub(super) fn unread(file: &Path, error: &PolarsError) -> Diagnostics {
 }
 
 /// A fault of writing a table.
-pub(super) fn unwritten(file: &Path, error: &impl ToString) -> Diagnostics {
+pub(in crate::analysis) fn unwritten(file: &Path, error: &impl ToString) -> Diagnostics {
     Diagnostic::error("A001", format!("the table `{}` can't be written: {}", file.display(), plain(error)))
         .help("look at the folder's permissions and the room on the disk")
         .into()

@@ -13,8 +13,12 @@ mod outcomes;
 mod place;
 mod write;
 
+pub(super) use cell::Cell;
 pub use columns::{Column, ColumnKind, columns};
+pub(super) use frames::series;
+pub(super) use mirror::unwritten;
 pub use mirror::{Mirror, MirrorChange};
 pub use outcomes::{OutcomeTable, TableFilter, TextColumn};
 pub use place::Hierarchy;
+pub(super) use write::schema as outcomes_schema;
 pub use write::{export_csv, export_parquet};

@@ -18,7 +18,7 @@ pub struct TableFilter {
 }
 
 impl TableFilter {
-    pub(super) fn takes_campaign(&self, campaign: &str) -> bool {
+    pub(in crate::analysis) fn takes_campaign(&self, campaign: &str) -> bool {
         self.campaigns.as_ref().is_none_or(|wanted| wanted.iter().any(|wanted| wanted == campaign))
     }
 

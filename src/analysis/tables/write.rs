@@ -70,7 +70,7 @@ fn export(
 }
 
 /// What every column says.
-fn schema() -> Value {
+pub(in crate::analysis) fn schema() -> Value {
     let mut described: Vec<Value> = columns().iter().map(|column| json!(column)).collect();
     described.extend(kinds_columns().map(|(name, description)| {
         json!({ "name": name, "type": ColumnKind::Text, "unit": "", "parameter": true, "description": description })

@@ -1,0 +1,74 @@
+//! A table that is filled row by row and written piece by piece.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use polars::io::parquet::write::BatchedWriter;
+use polars::prelude::{DataFrame, ParquetWriter, PolarsError};
+
+use crate::analysis::dataset::columns::TableSaid;
+use crate::analysis::tables::{Cell, series, unwritten};
+use crate::base::Diagnostics;
+
+/// Rows that are in memory at once, at most about.
+const ROWS_AT_ONCE: usize = 100_000;
+
+/// One table of a dataset while it is written.
+pub(super) struct Sheet {
+    said: TableSaid,
+    path: PathBuf,
+    writer: BatchedWriter<File>,
+    cells: Vec<Vec<Cell>>,
+    waiting: usize,
+    /// Rows up to now.
+    pub(super) rows: usize,
+}
+
+impl Sheet {
+    /// An empty table in a folder.
+    pub(super) fn begin(said: TableSaid, folder: &Path) -> Result<Self, Diagnostics> {
+        let path = folder.join(said.file);
+        let cells: Vec<Vec<Cell>> = said.columns.iter().map(|_| Vec::new()).collect();
+        let open = || -> Result<BatchedWriter<File>, PolarsError> {
+            let empty = frame(&said, cells.clone(), 0)?;
+            ParquetWriter::new(File::create(&path)?).batched(empty.schema())
+        };
+        let writer = open().map_err(|error| unwritten(&path, &error))?;
+        Ok(Self { said, path, writer, cells, waiting: 0, rows: 0 })
+    }
+
+    /// Adds a row, in the order of the columns.
+    pub(super) fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
+        for (cells, cell) in self.cells.iter_mut().zip(row) {
+            cells.push(cell);
+        }
+        (self.waiting, self.rows) = (self.waiting + 1, self.rows + 1);
+    }
+
+    /// Writes what is waiting, if that is much.
+    pub(super) fn make_room(&mut self) -> Result<(), Diagnostics> {
+        if self.waiting >= ROWS_AT_ONCE { self.flush() } else { Ok(()) }
+    }
+
+    /// Writes what is waiting and closes the file.
+    pub(super) fn finish(mut self) -> Result<(PathBuf, usize), Diagnostics> {
+        self.flush()?;
+        self.writer.finish().map_err(|error| unwritten(&self.path, &error))?;
+        Ok((self.path, self.rows))
+    }
+
+    fn flush(&mut self) -> Result<(), Diagnostics> {
+        let height = std::mem::take(&mut self.waiting);
+        if height == 0 {
+            return Ok(());
+        }
+        let cells = self.cells.iter_mut().map(std::mem::take).collect();
+        let written = frame(&self.said, cells, height).and_then(|frame| self.writer.write_batch(&frame));
+        written.map_err(|error| unwritten(&self.path, &error))
+    }
+}
+
+fn frame(said: &TableSaid, cells: Vec<Vec<Cell>>, height: usize) -> Result<DataFrame, PolarsError> {
+    let columns = said.columns.iter().zip(cells).map(|(column, cells)| series(column.name, column.kind, cells));
+    DataFrame::new(height, columns.collect())
+}

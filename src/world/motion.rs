@@ -1,0 +1,170 @@
+//! What the robot measured of itself and what its controllers were told, over time: what policies are learned from.
+
+use serde::{Deserialize, Serialize};
+
+use crate::world::recorder::grain;
+use crate::world::{Command, World};
+
+/// Positions, velocities and targets are whole multiples of this, which compresses. Units: metres or radians, and of them a second.
+const GRAIN: f64 = 1e-4;
+/// The same for efforts. Units: newtons or newton metres.
+const EFFORT_GRAIN: f64 = 0.01;
+
+/// The course of the robot during one action, sampled as often as its bodies' poses are; the first row is how it began.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    /// Names of the joints, in the robot's order.
+    pub joints: Vec<String>,
+    /// One for each moment; see [`MotionRow`]. Shape: moments × (12 + 4 · joints).
+    pub rows: Vec<Vec<f32>>,
+}
+
+/// One moment of a [`Motion`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionRow<'a> {
+    /// Since the action began. Unit: seconds.
+    pub time_secs: f32,
+    /// Measured gap between the fingers. Unit: metres.
+    pub opening_m: f32,
+    /// What each finger's motor gives, left and right. Unit: newtons, positive closes.
+    pub finger_efforts_n: [f32; 2],
+    /// The gap that the fingers were told to go to. Unit: metres.
+    pub told_opening_m: f32,
+    /// The largest force that a finger was told to give. Unit: newtons.
+    pub told_force_n: f32,
+    /// Where the base truly is: x, y (metres), heading (radians). Frame: world.
+    pub base_true: [f32; 3],
+    /// Where the base believes that it is.
+    pub base_believed: [f32; 3],
+    joints: &'a [f32],
+}
+
+/// One joint at one moment. Units: metres or radians, and their efforts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointMoment {
+    /// Measured position, the base's by its own belief.
+    pub position: f32,
+    /// Measured velocity.
+    pub velocity: f32,
+    /// What its motor gives beyond what holds the robot's own weight.
+    pub effort: f32,
+    /// Where its controller was told to go in the control tick that ended then.
+    pub target: f32,
+}
+
+impl Motion {
+    /// Its moments, in order. Rows of another length than they should have are none.
+    pub fn moments(&self) -> impl Iterator<Item = MotionRow<'_>> {
+        self.rows.iter().filter_map(|row| {
+            let (head, joints) = row.split_first_chunk::<12>()?;
+            let [time_secs, opening_m, left, right, told_opening_m, told_force_n, base @ ..] = *head;
+            let [true_x, true_y, true_heading, x, y, heading] = base;
+            (joints.len() == 4 * self.joints.len()).then_some(MotionRow {
+                time_secs,
+                opening_m,
+                finger_efforts_n: [left, right],
+                told_opening_m,
+                told_force_n,
+                base_true: [true_x, true_y, true_heading],
+                base_believed: [x, y, heading],
+                joints,
+            })
+        })
+    }
+}
+
+impl<'a> MotionRow<'a> {
+    /// Its joints, in the order of their names.
+    pub fn joints(&self) -> impl Iterator<Item = JointMoment> + 'a {
+        self.joints.chunks_exact(4).map(|values| JointMoment {
+            position: values[0],
+            velocity: values[1],
+            effort: values[2],
+            target: values[3],
+        })
+    }
+}
+
+/// Gathers a [`Motion`].
+#[derive(Default)]
+pub(super) struct MotionMeter {
+    told: Option<Command>,
+    rows: Vec<Vec<f32>>,
+}
+
+impl MotionMeter {
+    /// Notes what the controllers are told.
+    pub(super) fn tell(&mut self, command: &Command) {
+        match &mut self.told {
+            Some(told) => told.clone_from(command),
+            None => self.told = Some(command.clone()),
+        }
+    }
+}
+
+impl World {
+    /// Begins anew: what is told now is to stay.
+    pub(super) fn begin_motion(&mut self) {
+        self.recorder.motion.rows.clear();
+        self.recorder.motion.told = Some(self.hold());
+        self.record_motion();
+    }
+
+    /// Keeps this moment.
+    pub(super) fn record_motion(&mut self) {
+        let Some(told) = &self.recorder.motion.told else { return };
+        let observed = self.observe();
+        let base = self.base_true();
+        let secs = self.recorder.secs_since_begin(self.recorder.n_ticks());
+        let mut row = vec![grain(secs, GRAIN), grain(observed.gripper_opening_m, GRAIN)];
+        row.extend(observed.finger_efforts_n.map(|effort| grain(effort, EFFORT_GRAIN)));
+        row.extend([grain(told.gripper_opening_m, GRAIN), grain(told.grip_force_n, EFFORT_GRAIN)]);
+        row.extend(base.into_iter().chain(self.believed(base)).map(|value| grain(value, GRAIN)));
+        for (idx, position) in observed.positions.iter().enumerate() {
+            let of = |values: &[f64]| values.get(idx).copied().unwrap_or(f64::NAN);
+            let [velocity, target] = [of(&observed.velocities), of(&told.positions)];
+            row.extend([*position, velocity].map(|value| grain(value, GRAIN)));
+            row.extend([grain(of(&observed.loads), EFFORT_GRAIN), grain(target, GRAIN)]);
+        }
+        self.recorder.motion.rows.push(row);
+    }
+
+    /// What was kept since it began.
+    pub(super) fn end_motion(&mut self) -> Motion {
+        let joints = self.robot.model.joints.iter().map(|joint| joint.name.clone()).collect();
+        Motion { joints, rows: std::mem::take(&mut self.recorder.motion.rows) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::world::robot::tests::lonely;
+
+    #[test]
+    fn what_was_measured_and_told_comes_back() {
+        let mut world = lonely();
+        world.begin_record();
+        let mut command = world.hold();
+        let lift = world.layout().arm[0];
+        command.positions[lift] = 0.2;
+        command.gripper_opening_m = 0.1;
+        for _ in 0..60 {
+            world.step(&command);
+        }
+        let observed = world.observe();
+        let motion = world.end_record().robot.motion;
+        let moments: Vec<_> = motion.moments().collect();
+        assert_eq!(moments.len(), 11, "ten a second, and how it began");
+        assert_eq!(motion.joints.len(), world.kinematics().joints().len());
+        let (first, last) = (moments[0], moments[10]);
+        assert_eq!((first.time_secs, last.time_secs), (0.0, 1.0));
+        assert!((f64::from(last.opening_m) - observed.gripper_opening_m).abs() < 1e-4);
+        assert!((last.told_opening_m - 0.1).abs() < 1e-6);
+        let joint = last.joints().nth(lift).expect("it has as many joints as the robot");
+        assert!((joint.target - 0.2).abs() < 1e-6);
+        assert!((f64::from(joint.position) - observed.positions[lift]).abs() < 1e-4);
+        assert!((f64::from(joint.velocity) - observed.velocities[lift]).abs() < 1e-4);
+        let began = first.joints().nth(lift).expect("it has as many joints as the robot");
+        assert!((began.target - began.position).abs() < 1e-6 && began.position < 0.1);
+    }
+}
