@@ -1,23 +1,29 @@
 //! `actcheck export --dataset`: what is in it, by other people's reader, and that it agrees with the history.
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::support::{actcheck, foreign, made_history, root, stderr, stdout};
+use crate::support::{actcheck, copy, foreign, made_history, root, stderr, stdout};
+
+/// Exports into the folder `data` of one that passes. The history is a copy: others may have the first open.
+fn export(arguments: &[&str]) -> (tempfile::TempDir, Output) {
+    let folder = tempfile::tempdir().unwrap();
+    copy(made_history(), &folder.path().join("history"));
+    let output =
+        actcheck(folder.path(), &[&["export", "--history", "history", "--dataset", "data"], arguments].concat());
+    (folder, output)
+}
 
 fn exported(arguments: &[&str]) -> (tempfile::TempDir, String) {
-    let folder = tempfile::tempdir().unwrap();
-    let history = made_history().to_string_lossy().into_owned();
-    let into = folder.path().to_string_lossy().into_owned();
-    let output = actcheck(root(), &[&["export", "--history", &history, "--dataset", &into], arguments].concat());
+    let (folder, output) = export(arguments);
     assert!(output.status.success(), "{}", stderr(&output));
     (folder, stdout(&output))
 }
 
 fn schema(folder: &Path) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(folder.join("schema.json")).unwrap()).unwrap()
+    serde_json::from_str(&std::fs::read_to_string(folder.join("data/schema.json")).unwrap()).unwrap()
 }
 
 #[test]
@@ -31,7 +37,7 @@ fn every_table_is_told_and_described() {
         ["actions", "joints", "robot", "objects", "percepts", "outcomes"].map(|name| format!("{name}.parquet"))
     );
     for file in files {
-        assert!(folder.path().join(file).is_file() && told.contains(file), "{told}");
+        assert!(folder.path().join("data").join(file).is_file() && told.contains(file), "{told}");
     }
     for table in schema["tables"].as_array().unwrap() {
         for column in table["columns"].as_array().unwrap() {
@@ -46,7 +52,7 @@ fn the_tables_agree_with_each_other_by_another_reader() {
     let (folder, _) = exported(&[]);
     let output = Command::new(python)
         .arg(root().join("tests/foreign/check_dataset.py"))
-        .arg(folder.path())
+        .arg(folder.path().join("data"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .output()
         .unwrap();
@@ -57,9 +63,5 @@ fn the_tables_agree_with_each_other_by_another_reader() {
 fn only_what_is_asked_for_is_in_it() {
     let (_folder, told) = exported(&["--since", "2999-01-01"]);
     assert!(told.contains("joints.parquet holds 0 rows") && told.contains("of 0 runs"), "{told}");
-    let into = tempfile::tempdir().unwrap();
-    let history = made_history().to_string_lossy().into_owned();
-    let into = into.path().to_string_lossy().into_owned();
-    let output = actcheck(root(), &["export", "--history", &history, "--dataset", &into, "--campaign", "none"]);
-    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(export(&["--campaign", "none"]).1.status.code(), Some(2));
 }

@@ -55,6 +55,8 @@ def hello(**changes: Any) -> Message:
         "gripper_joints": FINGERS,
         "head_joints": HEAD,
         "tool_link": "grasp_link",
+        "tool_turned_rad": [0.0, 0.0, 0.0],
+        "mount_height_m": 0.0,
         "max_opening_m": 0.135,
         "grip_force_n": 7.0,
         "home": HOME,
@@ -139,9 +141,11 @@ class Simulation:
         return {
             "type": "observation",
             "time_s": self.time_s,
-            "positions": [self.positions[name] for name in names],
-            "velocities": [0.0] * len(names),
-            "efforts": [0.0] * len(names),
+            "joints": {
+                "positions": [self.positions[name] for name in names],
+                "velocities": [0.0] * len(names),
+                "efforts": [0.0] * len(names),
+            },
             "base": {"position_m": [x, y], "heading_rad": heading},
             "gripper": {"opening_m": self.opening_m, "force_n": self.force_n},
             "budget_left_s": 60.0 - self.time_s,

@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 
 from actcheck import Pose, Unreachable, wrapped
-from actcheck.kinematics import Chain, read_urdf, turn, turn_between
+from actcheck.kinematics import Chain, read_urdf, rotation, turn, turn_between
 from actcheck.motion import course
 from tests.fake import ARM, BASE, HOME, LEVEL, URDF
 
@@ -103,6 +103,9 @@ class Chains(unittest.TestCase):
         root = Pose.upright((1.0, 2.0, 3.0), math.pi / 2)
         moved = Chain(read_urdf(URDF), "grasp_link", root).pose({})
         np.testing.assert_allclose(moved.matrix(), (root * self.chain.pose({})).matrix(), atol=1e-12)
+        tip = Pose(np.zeros(3), rotation(0.0, 0.0, math.pi / 2))
+        turned = Chain(read_urdf(URDF), "grasp_link", tip=tip).pose({})
+        np.testing.assert_allclose(turned.matrix(), (self.chain.pose({}) * tip).matrix(), atol=1e-12)
 
 
 class Courses(unittest.TestCase):

@@ -238,10 +238,13 @@ class Hands(unittest.TestCase):
 
     def test_sensors_answer_in_no_time(self) -> None:
         self.assertEqual([thing.id for thing in self.robot.objects()], ["obj:glass_1", "obj:table"])
-        glass = self.robot.object("obj:glass_1")
+        glass, others = self.robot.look_for("obj:glass_1")
+        self.assertEqual([thing.id for thing in others], ["obj:table"])
+        self.assertAlmostEqual(glass.beside(np.array([1.1, 0.01, 0.0])), 0.06)
+        self.assertAlmostEqual(glass.beside(np.array([1.0, 0.01, 0.0])), -0.03)
         self.assertEqual((glass.category, glass.furniture, glass.pose.position.tolist()), ("act:Glass", False, [1.0, 0.0, 0.5]))
         with self.assertRaisesRegex(Failed, "obj:cup was not seen"):
-            self.robot.object("obj:cup")
+            self.robot.look_for("obj:cup")
         self.assertEqual(self.robot.cloud().shape, (5, 3))
         picture = self.robot.depth()
         self.assertEqual((picture.depth.shape, picture.depth[2, 3]), ((3, 4), 11.0))

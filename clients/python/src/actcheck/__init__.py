@@ -5,7 +5,7 @@ import actcheck
 
 @actcheck.skill("Pick")
 def pick(robot, pickObject):
-    thing = robot.object(pickObject)
+    thing, others = robot.look_for(pickObject)
     ...
 
 if __name__ == "__main__":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shlex
 import socket
 import subprocess
@@ -22,7 +24,7 @@ from actcheck.skill import Skill, report_of, wanted
 from actcheck.wire import Wire
 
 #: How long one may think between two commands. Unit: seconds of the clock on the wall.
-PATIENCE_S = 24 * 3600
+PATIENCE_S = 3600
 #: How long the program may take to start. Unit: seconds.
 STARTUP_S = 60.0
 
@@ -54,8 +56,10 @@ class Connection:
         self._folder = tempfile.TemporaryDirectory(prefix="actcheck-")
         path = Path(self._folder.name) / "notebook.sock"
         relay = shlex.join([sys.executable, "-m", "actcheck.relay", str(path)])
-        command = [actcheck, "run", str(config), "--runs", "1", "--jobs", "1", "--launcher", relay]
-        command += ["--skill-timeout", str(PATIENCE_S), *arguments]
+        # Beside the configuration, to which its paths are relative.
+        self._config = Path(config).with_name(f".{Path(config).stem}-{Path(self._folder.name).name}.toml")
+        self._config.write_text(with_launcher(Path(config).read_text(), relay))
+        command = [actcheck, "run", str(self._config), "--runs", "1", "--jobs", "1", *arguments]
         self._output = tempfile.TemporaryFile(mode="w+")
         self._process: subprocess.Popen[str] | None = None
         self._robot: Robot | None = None
@@ -135,6 +139,7 @@ class Connection:
             self._process.terminate()
             self._process.wait()
         self._folder.cleanup()
+        self._config.unlink(missing_ok=True)
 
     def __enter__(self) -> Connection:
         return self
@@ -159,6 +164,18 @@ class Connection:
     def _said(self) -> str:
         self._output.seek(0)
         return self._output.read()
+
+
+def with_launcher(config: str, launcher: str) -> str:
+    """A configuration's text with another `test_launcher`, that has all the time it wants."""
+    line = f"test_launcher = {json.dumps(launcher)}"
+    config, found = re.subn(r"(?m)^test_launcher\s*=.*$", lambda _: line, config)
+    if not found:
+        config = f"{line}\n{config}"
+    config = re.sub(r"(?m)^timeout_s\s*=.*\n?", "", config)
+    patience = f"[skill]\ntimeout_s = {PATIENCE_S}.0"
+    config, found = re.subn(r"(?m)^\[skill\].*$", lambda _: patience, config)
+    return config if found else f"{config}\n{patience}\n"
 
 
 def connect(

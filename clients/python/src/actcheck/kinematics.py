@@ -84,11 +84,15 @@ def _numbers(text: str | None, default: tuple[float, float, float]) -> Vector:
 def _origin(element: xml.Element | None) -> Matrix:
     matrix = np.eye(4)
     if element is not None:
-        roll, pitch, yaw = _numbers(element.get("rpy"), (0.0, 0.0, 0.0))
-        x, y, z = np.eye(3)
-        matrix[:3, :3] = turn(z, yaw) @ turn(y, pitch) @ turn(x, roll)
+        matrix[:3, :3] = rotation(*_numbers(element.get("rpy"), (0.0, 0.0, 0.0)).tolist())
         matrix[:3, 3] = _numbers(element.get("xyz"), (0.0, 0.0, 0.0))
     return matrix
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> Matrix:
+    """Turns about fixed axes x, then y, then z, as a URDF has them. Unit: radians. Shape: 3 × 3."""
+    x, y, z = np.eye(3)
+    return turn(z, yaw) @ turn(y, pitch) @ turn(x, roll)
 
 
 def turn(axis: Vector, angle: float) -> Matrix:
@@ -114,7 +118,7 @@ def turn_between(start: Matrix, end: Matrix) -> Vector:
 class Chain:
     """The joints from the root to one link."""
 
-    def __init__(self, joints: Sequence[UrdfJoint], link: str, root: Pose | None = None) -> None:
+    def __init__(self, joints: Sequence[UrdfJoint], link: str, root: Pose | None = None, tip: Pose | None = None) -> None:
         by_child = {joint.child: joint for joint in joints}
         if link not in by_child and link not in {joint.parent for joint in joints}:
             raise ValueError(f"the robot has no link {link!r}")
@@ -125,6 +129,8 @@ class Chain:
         self._way = way[::-1]
         #: Pose of the root link. Shape: 4 × 4.
         self.root = np.eye(4) if root is None else root.matrix()
+        #: How what is brought to places stands in the link. Shape: 4 × 4.
+        self.tip = np.eye(4) if tip is None else tip.matrix()
         #: Those that move, from the root outwards; followers stand for the joint that they follow.
         self.names = list(dict.fromkeys(_leader(joint) for joint in self._way if joint.kind != "fixed"))
         limits = {joint.name: (joint.lower, joint.upper) for joint in joints}
@@ -147,6 +153,7 @@ class Chain:
             slides = joint.kind == "prismatic"
             seen.append((number, slides, factor, axis, pose[:3, 3]))
             pose = pose @ _motion(joint, slides, float(positions[number]) * factor + offset)
+        pose = pose @ self.tip
         jacobian = np.zeros((6, len(self.names)))
         tip = pose[:3, 3]
         for number, slides, factor, axis, point in seen:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -57,8 +57,12 @@ class RobotDescription:
     arm_joints: tuple[str, ...]
     gripper_joints: tuple[str, ...]
     head_joints: tuple[str, ...]
-    #: The link that is brought to things: x points where the fingers point, y across them.
+    #: The link that is brought to things.
     tool_link: str
+    #: How the tool is turned in it (roll, pitch, yaw; radians): its x points where the fingers point, its y across them.
+    tool_turned_rad: tuple[float, float, float]
+    #: How high the root of a robot that does not drive stands. Unit: metres.
+    mount_height_m: float
     max_opening_m: float
     grip_force_n: float
     #: Arm positions for driving.
@@ -85,6 +89,8 @@ class RobotDescription:
                 Joint(**{name: joint[name] for name in Joint.__dataclass_fields__}) for joint in robot["joints"]
             ),
             tool_link=robot["tool_link"],
+            tool_turned_rad=tuple(robot.get("tool_turned_rad") or (0.0, 0.0, 0.0)),
+            mount_height_m=float(robot.get("mount_height_m", 0.0)),
             max_opening_m=float(robot["max_opening_m"]),
             grip_force_n=float(robot["grip_force_n"]),
             home=tuple(robot.get("home") or ()),
@@ -121,13 +127,13 @@ class Observation:
     @classmethod
     def from_wire(cls, sent: Message) -> Observation:
         """From an observation."""
-        base, gripper = sent["base"], sent["gripper"]
+        joints, base, gripper = sent["joints"], sent["base"], sent["gripper"]
         x, y = base["position_m"]
         return cls(
             time_s=sent["time_s"],
-            positions=np.array(sent["positions"], dtype=np.float64),
-            velocities=np.array(sent["velocities"], dtype=np.float64),
-            efforts=np.array(sent["efforts"], dtype=np.float64),
+            positions=np.array(joints["positions"], dtype=np.float64),
+            velocities=np.array(joints["velocities"], dtype=np.float64),
+            efforts=np.array(joints["efforts"], dtype=np.float64),
             base=(x, y, base["heading_rad"]),
             opening_m=gripper["opening_m"],
             force_n=gripper["force_n"],
@@ -160,6 +166,11 @@ class Thing:
             category=sent.get("category"),
             furniture=bool(sent.get("furniture", False)),
         )
+
+    def beside(self, place: Vector) -> float:
+        """How far a place is beside it, seen from above; negative within it. Unit: metres."""
+        x, y, _ = self.pose.rotation.T @ (place - self.pose.position)
+        return float(max(abs(x) - self.size_m[0] / 2, abs(y) - self.size_m[1] / 2))
 
     def to_wire(self) -> Message:
         """As the end of an action tells what was perceived."""
@@ -218,5 +229,3 @@ class Call:
     run: str = ""
     #: The same for the same campaign seed and run.
     seed: int = 0
-    #: Where the robot's root link stands.
-    root: Pose = field(default_factory=lambda: Pose.upright((0.0, 0.0, 0.0)))

@@ -90,6 +90,11 @@ class Pose:
         """Angle about the vertical. Unit: radians."""
         return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
+    @property
+    def across(self) -> float:
+        """Which way its y points, seen from above. Unit: radians."""
+        return math.atan2(self.rotation[1, 1], self.rotation[0, 1])
+
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
         """The same elsewhere, by a way along the world's axes. Unit: metres."""
         return Pose(self.position + np.array([x, y, z]), self.rotation)

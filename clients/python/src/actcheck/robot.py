@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actcheck.faults import Failed
-from actcheck.kinematics import Chain, UrdfJoint, read_urdf
+from actcheck.kinematics import Chain, UrdfJoint, read_urdf, rotation
 from actcheck.messages import Call, DepthImage, Observation, Report, RobotDescription, Thing, things_from_wire
 from actcheck.motion import course
 from actcheck.pose import Pose, Vector, wrapped
@@ -218,12 +218,12 @@ class Robot:
         """What the reference perception sees: everything, or the one thing of an id; with its errors."""
         return things_from_wire(self._session.ask("objects", of)["objects"])
 
-    def object(self, of: str) -> Thing:
-        """One thing that the reference perception sees. Raises `Failed` where it sees none."""
-        for thing in self.objects(of):
-            if thing.id == of:
-                return thing
-        raise Failed(f"{of} was not seen")
+    def look_for(self, of: str) -> tuple[Thing, list[Thing]]:
+        """One thing that the reference perception sees, and everything else. Raises `Failed` where it does not see that."""
+        seen = {thing.id: thing for thing in self.objects()}
+        if of not in seen:
+            raise Failed(f"{of} was not seen")
+        return seen.pop(of), list(seen.values())
 
     # The end.
 
@@ -237,15 +237,22 @@ class Robot:
 
     def _chain(self, link: str) -> Chain:
         if link not in self._chains:
-            self._chains[link] = Chain(self._urdf, link, self.call.root)
+            root, tip = Pose.upright((0.0, 0.0, 0.0)), Pose.upright((0.0, 0.0, 0.0))
+            if not self.description.base_joints:
+                x, y, heading = self.call.observation.base
+                root = Pose.upright((x, y, self.description.mount_height_m), heading)
+            if link == self.description.tool_link:
+                tip = Pose(tip.position, rotation(*self.description.tool_turned_rad))
+            self._chains[link] = Chain(self._urdf, link, root, tip)
         return self._chains[link]
 
     def _standing_over(self, seed: dict[str, float], chain: Chain, pose: Pose) -> dict[str, float]:
         """The posture with the base turned so that the hand heads as the pose does, and put so that it is there."""
         x, y, heading = self.description.base_joints
         hand = chain.pose(seed)
-        if math.hypot(*pose.rotation[:2, 0]) > 0.1 and math.hypot(*hand.rotation[:2, 0]) > 0.1:
-            seed = seed | {heading: seed[heading] + wrapped(pose.yaw - hand.yaw)}
+        # By what is across the fingers: that is level also where they point down.
+        if math.hypot(*pose.rotation[:2, 1]) > 0.1 and math.hypot(*hand.rotation[:2, 1]) > 0.1:
+            seed = seed | {heading: seed[heading] + wrapped(pose.across - hand.across)}
         miss = pose.position - chain.pose(seed).position
         return seed | {x: seed[x] + float(miss[0]), y: seed[y] + float(miss[1])}
 

@@ -7,7 +7,6 @@ from typing import Any
 
 from actcheck.faults import Aborted, Closed, ProtocolFault
 from actcheck.messages import PROTOCOL, Call, Observation, Report, RobotDescription
-from actcheck.pose import Pose
 from actcheck.wire import Message, Wire
 
 
@@ -21,7 +20,7 @@ class Session:
             wire.close()
             raise ProtocolFault(f"actcheck speaks version {hello.get('protocol')} of the protocol, this package {PROTOCOL}")
         self.description = RobotDescription.from_wire(hello)
-        self._run, self._seed, self._root = "", 0, Pose.upright((0.0, 0.0, 0.0))
+        self._run, self._seed = "", 0
         self._aborted: Aborted | None = None
         wire.send({"type": "hello", "protocol": PROTOCOL, "name": name, "actions": actions})
 
@@ -41,8 +40,6 @@ class Session:
                 return None
             if message["type"] == "reset":
                 self._run, self._seed = str(message["run"]), int(message["seed"])
-                root = message.get("root_pose")
-                self._root = Pose.from_wire(root) if root else Pose.upright((0.0, 0.0, 0.0))
                 self._wire.send({"type": "ready"})
                 continue
             self._aborted = None
@@ -56,7 +53,6 @@ class Session:
                 observation=Observation.from_wire(sent | truth),
                 run=self._run,
                 seed=self._seed,
-                root=self._root,
             )
 
     def command(self, message: Message) -> Observation:
