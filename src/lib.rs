@@ -19,11 +19,12 @@
 //! | --- | --- | --- |
 //! | [`base`] | sources and diagnostics, terms, poses, recorded choices, shipped files | |
 //! | [`search`] | where in a cube to look next, learnt from margins; failure rates whatever was looked at | statrs |
-//! | [`config`] | TOML text to a `Campaign` in which nothing is left to check; models, ours and other people's | toml, roxmltree, mesh-loader |
+//! | [`config`] | TOML text to a `Campaign` in which nothing is left to check; models, ours and other people's | toml, roxmltree, mesh-loader, shlex |
 //! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxigraph (parsers) |
 //! | [`scenario`] | recorded choices to one concrete `Scene`; what "simpler" means | parry3d (overlaps) |
 //! | [`world`] | a `Scene` to a stepping simulation; the only place that knows the engine | rapier3d, parry3d, urdf-rs |
 //! | [`actions`] | the robot's actions over commands and observations; the `Trace` | |
+//! | [`protocol`] | actions performed by a program of somebody's, in lockstep over a socket | nix |
 //! | [`facts`] | a `Trace` to RDF facts, interned once | |
 //! | [`rules`] | rule text to what it finds in the facts; SPARQL properties | datafrog, oxigraph (evaluator) |
 //! | [`verdict`] | findings to outcomes with witness and margin; the scores | |
@@ -53,6 +54,8 @@ pub mod scenario;
 pub mod world;
 
 pub mod actions;
+
+pub mod protocol;
 
 pub mod facts;
 

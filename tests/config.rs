@@ -56,7 +56,8 @@ fn all_parameters_of_the_paper_are_read() {
     );
     assert_eq!(campaign.tests[1], ["MoveTo", "PerceivePlane", "Pick", "Place"]);
     assert_eq!(campaign.test_count, 15);
-    assert_eq!(campaign.launcher, Launcher::Program("python3 my_robot.py".to_owned()));
+    let Launcher::Program(skill) = &campaign.launcher else { panic!("{:?}", campaign.launcher) };
+    assert_eq!((skill.text.as_str(), skill.args.join(" ")), ("python3 my_robot.py", "my_robot.py".to_owned()));
     assert_eq!((campaign.nav_obstacles.join(" "), campaign.nav_obstacle_count), ("box bottle".to_owned(), 2));
     let candidates: Vec<String> =
         campaign.candidates.iter().map(|(name, values)| format!("{name}: {}", values.join(", "))).collect();

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Each module, the modules that it may import, in the order of the line. `cli` may import all.
-const FLOORS: [(&str, &[&str]); 15] = [
+const FLOORS: [(&str, &[&str]); 16] = [
     ("base", &[]),
     ("search", &["base"]),
     ("config", &["base", "search"]),
@@ -13,6 +13,7 @@ const FLOORS: [(&str, &[&str]); 15] = [
     ("scenario", &["base", "config", "ontology"]),
     ("world", &["base", "scenario"]),
     ("actions", &["base", "scenario", "world"]),
+    ("protocol", &["base", "config", "scenario", "world", "actions"]),
     ("facts", &["base", "ontology", "actions"]),
     ("rules", &["base", "ontology", "facts"]),
     ("verdict", &["base", "ontology", "facts", "rules"]),
@@ -20,8 +21,8 @@ const FLOORS: [(&str, &[&str]); 15] = [
     (
         "campaign",
         &[
-            "base", "search", "config", "ontology", "scenario", "world", "actions", "facts", "rules", "verdict",
-            "history",
+            "base", "search", "config", "ontology", "scenario", "world", "actions", "protocol", "facts", "rules",
+            "verdict", "history",
         ],
     ),
     ("analysis", &["base", "history", "verdict"]),
@@ -30,10 +31,12 @@ const FLOORS: [(&str, &[&str]); 15] = [
 ];
 
 /// Libraries of the field and where they may be named.
-const FENCES: [(&str, &[&str]); 13] = [
+const FENCES: [(&str, &[&str]); 15] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh_loader", &["config"]),
+    ("shlex", &["config"]),
+    ("nix", &["protocol"]),
     ("statrs", &["search", "analysis"]),
     ("oxigraph", &["ontology", "rules", "history"]),
     ("rapier3d", &["world"]),

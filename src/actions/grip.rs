@@ -37,8 +37,12 @@ pub fn close(robot: &mut Operator<'_>) -> Result<bool, Interrupt> {
 
 /// Whether both fingers push with about the force that they were told.
 pub fn feels(robot: &Operator<'_>) -> bool {
-    let enough = FELT_SHARE * robot.profile().grip_force_n;
-    robot.observe().finger_efforts_n.iter().all(|effort| *effort > enough)
+    feels_in(&robot.observe(), robot.profile().grip_force_n)
+}
+
+/// The same of what was observed, of fingers that were told to press with this force.
+pub fn feels_in(observed: &Observation, grip_force_n: f64) -> bool {
+    observed.finger_efforts_n.iter().all(|effort| *effort > FELT_SHARE * grip_force_n)
 }
 
 /// Feels, tick by tick, whether a hand still holds what it closed on.

@@ -3,6 +3,7 @@
 //! Never: reads the simulation's truth inside a skill, judges an action, or knows a property.
 
 mod call;
+mod controls;
 mod cut;
 mod grasp;
 mod grip;
@@ -10,6 +11,7 @@ mod memory;
 mod motion;
 mod navigate;
 mod operator;
+mod outside;
 mod perceive;
 mod perform;
 mod pick;
@@ -23,7 +25,12 @@ mod standing;
 mod trace;
 
 pub use call::ActionCall;
+pub use controls::Controls;
 pub use cut::Cut;
+pub use grip::feels_in;
+pub use memory::Held;
+pub use operator::{Interrupt, Operator};
+pub use outside::{Outside, OutsideFault};
 pub use perform::{Interference, perform, perform_with};
 pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
 pub use skills::{UnknownSkill, known_skill, reference_skills};

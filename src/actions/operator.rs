@@ -5,13 +5,14 @@ use nalgebra::Isometry3;
 use crate::actions::grip::GripWatch;
 use crate::actions::memory::{Held, Memory, Standing};
 use crate::actions::sabotage::IDLE_SECS;
-use crate::actions::{ActionReport, Cut, Interference, Perceived, Percept, Phase, Saboteur};
+use crate::actions::controls::Drives;
+use crate::actions::{ActionReport, Cut, OutsideFault, Perceived, Percept, Phase, Saboteur};
 use crate::base::Choices;
 use crate::scenario::{FloorPlan, KnownKind, RobotProfile};
 use crate::world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
 
 /// Why a skill has to stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Interrupt {
     /// Simulation is at fault.
     Fault,
@@ -19,6 +20,8 @@ pub enum Interrupt {
     Budget,
     /// The run is cut off from outside.
     Cut,
+    /// What performs it from outside is at fault.
+    Outside(OutsideFault),
 }
 
 /// Share of a joint's velocity limit that skills use: room for the controller to catch up.
@@ -28,12 +31,14 @@ const PEAK_OVER_MEAN: f64 = 1.5;
 
 /// The robot as a skill sees it, for the time of one action.
 pub struct Operator<'a> {
-    world: &'a mut World,
+    pub(super) world: &'a mut World,
     choices: &'a mut Choices,
     memory: &'a mut Memory,
-    command: Command,
+    pub(super) command: Command,
     start_secs: f64,
-    budget_secs: f64,
+    pub(super) budget_secs: f64,
+    /// What an outside controller keeps moving.
+    pub(super) drives: Drives,
     cut: Cut,
     /// Who makes things go wrong on purpose; nobody as a rule.
     saboteur: Option<&'a mut Saboteur>,
@@ -54,14 +59,13 @@ impl<'a> Operator<'a> {
         choices: &'a mut Choices,
         memory: &'a mut Memory,
         budget_secs: f64,
-        interference: Interference<'a>,
+        (cut, saboteur): (Cut, Option<&'a mut Saboteur>),
     ) -> Self {
         let (mut command, start_secs) = (world.hold(), world.time_secs());
         if memory.held.is_some() {
             // A hand that holds something goes on pressing.
             command.gripper_opening_m = 0.0;
         }
-        let Interference { cut, saboteur } = interference;
         let (phases, percepts) = (Vec::new(), Vec::new());
         Self {
             world,
@@ -70,6 +74,7 @@ impl<'a> Operator<'a> {
             command,
             start_secs,
             budget_secs,
+            drives: Drives::default(),
             cut,
             saboteur,
             grip: None,
@@ -334,7 +339,7 @@ impl<'a> Operator<'a> {
         Ok(())
     }
 
-    fn tick(&mut self) -> Result<(), Interrupt> {
+    pub(super) fn tick(&mut self) -> Result<(), Interrupt> {
         match &mut self.saboteur {
             None => self.world.step(&self.command),
             Some(saboteur) => saboteur.step(self.world, &self.command),

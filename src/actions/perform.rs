@@ -5,8 +5,8 @@ use crate::actions::memory::Memory;
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::skills::skill;
 use crate::actions::{
-    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, RobotCourse, Saboteur,
-    Trace,
+    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Outside, OutsideFault,
+    RobotCourse, Saboteur, Trace,
 };
 use crate::base::Choices;
 use crate::scenario::{Budget, SceneMap};
@@ -21,19 +21,14 @@ pub fn perform(calls: &[ActionCall], world: &mut World, choices: &mut Choices, b
 }
 
 /// What comes into a run from outside. The default is nothing, as it should be.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Interference<'a> {
     /// Where the run is cut off.
     pub cut: Cut,
     /// Who makes things go wrong on purpose.
     pub saboteur: Option<&'a mut Saboteur>,
-}
-
-impl Interference<'_> {
-    /// The same for a while.
-    fn lent(&mut self) -> Interference<'_> {
-        Interference { cut: self.cut, saboteur: self.saboteur.as_deref_mut() }
-    }
+    /// Who performs the actions that it knows, instead of the reference skills.
+    pub outside: Option<&'a mut dyn Outside>,
 }
 
 /// Performs the actions as [`perform`] does, with interference from outside.
@@ -51,13 +46,17 @@ pub fn perform_with(
     let mut memory = Memory::default();
     let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
     let mut robot_courses = Vec::with_capacity(calls.len());
+    let mut begun = interference.outside.as_deref_mut().map_or(Ok(()), |outside| outside.begin_run(world));
     for call in calls {
         let stopped = actions.last().is_some_and(|last| last.end != ActionEnd::Completed);
         if stopped {
             actions.push(ActionTrace::not_reached(&call.action, &call.parameters));
             continue;
         }
-        let (action, course) = perform_one(call, world, choices, &mut memory, budget, interference.lent());
+        let (action, course) = match std::mem::replace(&mut begun, Ok(())) {
+            Ok(()) => perform_one(call, (world, choices, &mut memory), budget, &mut interference),
+            Err(fault) => (never_begun(call, ended_outside(fault)), RobotCourse::default()),
+        };
         actions.push(action);
         robot_courses.push(course);
         snapshots.push(world.snapshot());
@@ -70,23 +69,22 @@ pub fn perform_with(
 
 fn perform_one(
     call: &ActionCall,
-    world: &mut World,
-    choices: &mut Choices,
-    memory: &mut Memory,
+    (world, choices, memory): (&mut World, &mut Choices, &mut Memory),
     budget: &Budget,
-    mut interference: Interference<'_>,
+    interference: &mut Interference<'_>,
 ) -> (ActionTrace, RobotCourse) {
     let began = world.time_secs();
     world.begin_record();
     let misled = interference.saboteur.as_deref_mut().map(|saboteur| saboteur.begin(call, world));
     let understood = misled.as_ref().unwrap_or(call);
-    let mut operator = Operator::new(world, choices, memory, budget.action_secs, interference);
-    let outcome = match skill(&call.action) {
-        Ok(skill) => operator.act(|operator| skill(understood, operator)),
-        Err(unknown) => {
-            let nothing = ActionTrace::not_reached(&call.action, &call.parameters);
-            let broken = ActionTrace { end: ActionEnd::Broken(unknown.to_string()), ..nothing };
-            return (broken, RobotCourse::default());
+    let disturbed = (interference.cut, interference.saboteur.as_deref_mut());
+    let mut operator = Operator::new(world, choices, memory, budget.action_secs, disturbed);
+    let outside = interference.outside.as_deref_mut().filter(|outside| outside.performs(&call.action));
+    let outcome = match (outside, skill(&call.action)) {
+        (Some(outside), _) => operator.act(|operator| outside.perform(understood, operator)),
+        (None, Ok(skill)) => operator.act(|operator| skill(understood, operator)),
+        (None, Err(unknown)) => {
+            return (never_begun(call, ActionEnd::Broken(unknown.to_string())), RobotCourse::default());
         }
     };
     let (phases, percepts, perceived) = (operator.phases, operator.percepts, operator.perceived);
@@ -121,6 +119,15 @@ fn perform_one(
     (trace, record.robot)
 }
 
+/// An action of which nothing happened, and why.
+fn never_begun(call: &ActionCall, end: ActionEnd) -> ActionTrace {
+    ActionTrace { end, ..ActionTrace::not_reached(&call.action, &call.parameters) }
+}
+
+fn ended_outside(fault: OutsideFault) -> ActionEnd {
+    if fault.late { ActionEnd::Timeout(fault.reason) } else { ActionEnd::Broken(fault.reason) }
+}
+
 fn ended(
     outcome: Result<ActionReport, Interrupt>,
     world: &World,
@@ -130,6 +137,7 @@ fn ended(
         (_, Some(fault)) => (ActionEnd::Broken(fault.to_string()), None),
         (Ok(report), None) => (ActionEnd::Completed, Some(report)),
         (Err(Interrupt::Cut), None) => (ActionEnd::Cut(cut::REASON.to_owned()), None),
+        (Err(Interrupt::Outside(fault)), None) => (ended_outside(fault), None),
         (Err(_), None) => {
             let reason = format!("the action took longer than its budget of {} s", budget.action_secs);
             (ActionEnd::Timeout(reason), None)

@@ -15,7 +15,7 @@ use crate::verdict::{Counts, Outcome, Recurrence};
 
 /// What is asked for only during a run: what sensors get wrong, and which postures a planner tries. These are its names but
 /// for those that name an object.
-const SENSES: [&str; 13] = [
+const SENSES: [&str; 14] = [
     "sense.localisation.x",
     "sense.localisation.y",
     "sense.localisation.heading",
@@ -29,6 +29,7 @@ const SENSES: [&str; 13] = [
     "sense.odometry.landmark.y",
     "sense.odometry.landmark.heading",
     "motion.samples",
+    "skill.seed",
 ];
 /// The same of one object.
 const SENSES_OF_OBJECT: [&str; 7] = ["x", "y", "z", "yaw", "width", "depth", "height"];

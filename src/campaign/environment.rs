@@ -13,6 +13,7 @@ use crate::campaign::solids;
 use crate::config::{self, Campaign, Launcher, Overrides};
 use crate::history::{CampaignRecord, History};
 use crate::ontology::{self, Ontology};
+use crate::protocol::Programs;
 use crate::rules::{Budget, RuleBook};
 use crate::scenario::Space;
 use crate::search::Strategy;
@@ -32,6 +33,8 @@ pub struct Env {
     pub rule_budget: Budget,
     /// What scenes have to satisfy, where the configuration asks for something.
     pub(super) requirement: Option<Requirement>,
+    /// Who performs actions instead of the reference skills, where the configuration names a program.
+    pub(super) programs: Option<Programs>,
 }
 
 impl Env {
@@ -127,7 +130,6 @@ impl Env {
         let mut faults = Diagnostics::new();
         categorise(&mut campaign, &ontology);
         solids::take_apart(&mut campaign, &mut faults);
-        check_launcher(&campaign, &mut faults);
         check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
         if let Err(error) = world::check_robot(&campaign.robot) {
@@ -140,7 +142,8 @@ impl Env {
         match (space, rules) {
             (Some(space), Some(rules)) if !faults.has_errors() => {
                 faults.extend(check_case(&campaign, &space));
-                faults.or(Self { campaign, ontology, space, rules, rule_budget, requirement })
+                let programs = programs(&campaign);
+                faults.or(Self { campaign, ontology, space, rules, rule_budget, requirement, programs })
             }
             _ => Err(faults),
         }
@@ -277,18 +280,23 @@ fn check_search(campaign: &Campaign, faults: &mut Diagnostics) {
     }
 }
 
-fn check_launcher(campaign: &Campaign, faults: &mut Diagnostics) {
-    if let Launcher::Program(text) = &campaign.launcher {
-        faults.push(
-            campaign
-                .fault("S020", "test_launcher", format!("`{text}` would be a program, and none can be started yet"))
-                .help("use `test_launcher = \"reference\"`: the skills that come with actcheck"),
-        );
+/// The program that performs actions, where there is one.
+fn programs(campaign: &Campaign) -> Option<Programs> {
+    match &campaign.launcher {
+        Launcher::Reference => None,
+        Launcher::Program(skill) => {
+            let tested = campaign.tests.iter().flatten().cloned().collect();
+            Some(Programs::new(skill.as_ref().clone(), tested))
+        }
     }
 }
 
-/// An action that the ontology has and no skill performs; names that the ontology lacks are the scene space's matter.
+/// An action that the ontology has and no skill performs; names that the ontology lacks are the scene space's matter. What a
+/// program performs only shows when it is started.
 fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnostics) {
+    if campaign.launcher != Launcher::Reference {
+        return;
+    }
     for (test, listed) in campaign.tests.iter().enumerate() {
         for (step, action) in listed.iter().enumerate() {
             if let (true, Err(unknown)) = (ontology.actions.contains_key(action), actions::known_skill(action)) {

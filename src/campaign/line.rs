@@ -1,11 +1,12 @@
 //! The line, once, top to bottom: choices → scene → world → trace → facts → findings → verdict.
 
-use crate::actions::{self, ActionCall, ActionEnd, Cut, Interference, Quality, Saboteur, Trace};
+use crate::actions::{self, ActionCall, ActionEnd, Cut, Interference, Outside, Quality, Saboteur, Trace};
 use crate::base::Choices;
 use crate::campaign::Env;
 use crate::campaign::judging::judge_action;
 use crate::facts::{self, RunFacts};
 use crate::history::{RunRecord, RunStatus};
+use crate::protocol::{Performance, RunName};
 use crate::scenario::{self, Scene};
 use crate::verdict::{Judgement, action_score, run_score};
 use crate::world::{self, World};
@@ -70,7 +71,7 @@ pub(super) fn run_line_until(
     manner: &Manner,
     cut: Cut,
 ) -> Result<RunRecord, Failure> {
-    run_line_with(env, campaign, run, manner, Interference { cut, saboteur: None })
+    run_line_with(env, campaign, run, manner, Interference { cut, ..Interference::default() })
 }
 
 /// The same, while somebody makes things go wrong on purpose.
@@ -86,7 +87,7 @@ pub fn run_sabotaged(
     manner: &Manner,
     saboteur: &mut Saboteur,
 ) -> Result<RunRecord, Failure> {
-    run_line_with(env, campaign, run, manner, Interference { cut: Cut::Never, saboteur: Some(saboteur) })
+    run_line_with(env, campaign, run, manner, Interference { saboteur: Some(saboteur), ..Interference::default() })
 }
 
 fn run_line_with(
@@ -106,6 +107,13 @@ fn run_line_with(
         }
     };
     choices.begin_noise();
+    let mut program = env.programs.as_ref().map(|programs| {
+        let seed = choices.index(SKILL_SEED, SEEDS) as u64;
+        let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
+        Performance::new(programs, run, manner.clock.secs)
+    });
+    let outside = program.as_mut().map(|program| program as &mut dyn Outside);
+    let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, outside };
     let (mut trace, quality) = perform((env, interference), test, &scene, &mut choices, disturb)?;
     trace.map = scene.map.clone();
     let mut record = record(env, campaign, index, scene, trace)?;
@@ -115,6 +123,10 @@ fn run_line_with(
     record.wall_secs = (manner.clock.secs)() - start_secs;
     Ok(record)
 }
+
+/// The choice that all randomness of a program's comes from, and how many there are: numbers that every language can hold.
+const SKILL_SEED: &str = "skill.seed";
+const SEEDS: usize = 1 << 32;
 
 /// The choice that leaves out so many of the last actions.
 pub(super) const TEST_LEFT_OUT: &str = "test.left_out";

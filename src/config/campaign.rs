@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::base::{Diagnostic, Diagnostics, Files, Shard, Source, Span};
-use crate::config::{Case, ObjectModel, RobotProfile, WorldMap, designators};
+use crate::config::{Case, ObjectModel, RobotProfile, Skill, WorldMap, designators};
 use crate::search::Strategy;
 
 /// One campaign: every test in `test_count` scenes, in each `repeat` times.
@@ -115,12 +115,12 @@ pub struct Overrides {
 }
 
 /// What performs the actions.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Launcher {
     /// Our own skills, in process.
     Reference,
-    /// A program, with the text as the user gave it.
-    Program(String),
+    /// A program of somebody's, for the actions that it knows; our own skills for the others.
+    Program(Box<Skill>),
 }
 
 /// A range to draw from, both ends included.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::{Diagnostic, Diagnostics, Files, Severity, Source, Span, did_you_mean};
 use crate::config::designators::{self, Designators};
-use crate::config::{Campaign, Launcher, Overrides, Table, case, ranges, shelf};
+use crate::config::{Campaign, Overrides, Table, case, ranges, shelf, skill};
 use crate::search::Strategy;
 
 /// The ontology that the program carries.
@@ -42,7 +42,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let (tests, mut places) = read_tests(&mut table);
     let test_count = table.integer("test_count", 1..=MOST_RUNS).and_then(|count| u32::try_from(count).ok());
     let repeat = table.integer("repeat", 1..=MOST_REPETITIONS).and_then(|count| u32::try_from(count).ok());
-    let launcher = read_launcher(&mut table);
+    let launcher = skill::read(&mut table, folder, &mut found);
     let seed = table.integer("seed", 0..=i64::MAX).map_or(0, i64::unsigned_abs);
     let ontology = read_ontology_path(&mut table, folder);
     let scene_rule = read_scene_rule(&mut table, folder, &mut found);
@@ -61,8 +61,8 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     table.finish(&mut found);
     let named = designators::named_models(&candidates, &nav_obstacles);
     let report = shelf.report(&named);
-    let warnings: Diagnostics = report.iter().filter(|fault| fault.severity == Severity::Warning).cloned().collect();
     found.extend(report);
+    let warnings: Diagnostics = found.iter().filter(|fault| fault.severity == Severity::Warning).cloned().collect();
 
     let robot = match robot {
         Some(robot) if !found.has_errors() => robot,
@@ -128,13 +128,6 @@ fn read_tests(table: &mut Table) -> (Vec<Vec<String>>, BTreeMap<String, Span>) {
         tests.push(list.value.into_iter().map(|action| action.value).collect());
     }
     (tests, places)
-}
-
-fn read_launcher(table: &mut Table) -> Launcher {
-    match table.string("test_launcher").map(|launcher| launcher.value) {
-        Some(program) if program != "reference" => Launcher::Program(program),
-        _ => Launcher::Reference,
-    }
 }
 
 fn read_ontology_path(table: &mut Table, folder: &Path) -> (Files, PathBuf) {

@@ -112,6 +112,11 @@ impl Table {
         self.found.push(Diagnostic::error(code, message).at(&self.source, span).help(help));
     }
 
+    /// Notes the faults of a table within this one.
+    pub fn note(&mut self, faults: Diagnostics) {
+        self.found.extend(faults);
+    }
+
     /// Moves the faults to `diagnostics`, with one (C003) for each key that nobody asked for.
     pub fn finish(mut self, diagnostics: &mut Diagnostics) {
         for (key, entry) in std::mem::take(&mut self.entries) {

@@ -134,6 +134,7 @@ pub(super) fn insert_joints(
             target: 0.0,
             setpoint: 0.0,
             setpoint_velocity: 0.0,
+            push: None,
         });
     }
     Ok(motors)

@@ -26,6 +26,34 @@ pub(super) struct Motor {
     /// Where it wants to be now: follows the target no faster than the joint may move.
     pub(super) setpoint: f64,
     pub(super) setpoint_velocity: f64,
+    /// What it gives instead of going anywhere.
+    pub(super) push: Option<f64>,
+}
+
+/// Share of its largest speed within which a motor that gives an effort takes it back, so that it gets no faster.
+const SLACK: f64 = 0.02;
+
+impl Motor {
+    /// What it gives beyond the robot's own weight, by its control law.
+    fn load(&self, position: f64, velocity: f64) -> f64 {
+        let law = || self.stiffness * (self.setpoint - position) + self.damping * (self.setpoint_velocity - velocity);
+        self.push.unwrap_or_else(law)
+    }
+
+    /// Gives an effort for a step: what wants to move at `top` speed and may give no more gives that much until it is there. Where
+    /// it goes to positions again, it begins from where it is.
+    fn give(&mut self, engine: &mut PhysicsWorld, effort: f64, top: f64) {
+        let Some((multibody, link)) = engine.multibody_joints.get_mut(self.joint) else { return };
+        let Some(is) = multibody.link(link) else { return };
+        self.setpoint = f64::from(is.joint.coords()[self.axis as usize]);
+        self.setpoint_velocity = f64::from(multibody.joint_velocity(is)[0]);
+        self.target = self.setpoint;
+        let Some(link) = multibody.link_mut(link) else { return };
+        let damping = effort.abs() / (SLACK * top).max(1e-6);
+        let data = &mut link.joint.data;
+        data.set_motor(self.axis, 0.0, to_real(top.copysign(effort)), 0.0, to_real(damping));
+        data.set_motor_max_force(self.axis, to_real(effort.abs()));
+    }
 }
 
 /// The robot, its bodies in the engine, and its joint controllers.
@@ -133,10 +161,7 @@ impl Robot {
     /// braked. Units: newtons or newton metres.
     pub fn loads(&self, positions: &[f64], velocities: &[f64]) -> Vec<f64> {
         let joints = self.motors.iter().zip(positions.iter().zip(velocities));
-        let load = |(motor, (position, velocity)): (&Motor, (&f64, &f64))| {
-            motor.stiffness * (motor.setpoint - position) + motor.damping * (motor.setpoint_velocity - velocity)
-        };
-        joints.map(load).collect()
+        joints.map(|(motor, (position, velocity))| motor.load(*position, *velocity)).collect()
     }
 
     /// What each motor would give by its control law, as a share of what its joint may: more than 1 is cut off. The robot's own
@@ -145,9 +170,7 @@ impl Robot {
         let states = positions.iter().zip(velocities);
         let motors = self.motors.iter().zip(&self.model.joints).zip(states);
         let shares = motors.map(|((motor, joint), (position, velocity))| {
-            let effort =
-                motor.stiffness * (motor.setpoint - position) + motor.damping * (motor.setpoint_velocity - velocity);
-            if joint.effort > 0.0 { effort.abs() / joint.effort } else { 0.0 }
+            if joint.effort > 0.0 { motor.load(*position, *velocity).abs() / joint.effort } else { 0.0 }
         });
         shares.collect()
     }
@@ -157,6 +180,20 @@ impl Robot {
         let Joint { lower, upper, .. } = self.model.joints[joint];
         if target.is_finite() {
             self.motors[joint].target = target.clamp(lower, upper);
+        }
+    }
+
+    /// Where one joint's controller is told to go.
+    pub fn target(&self, joint: usize) -> f64 {
+        self.motors[joint].target
+    }
+
+    /// Joints, by index, whose motors give an effort instead of going to a position; all others do that. Fingers always do.
+    pub fn push(&mut self, efforts: &[(usize, f64)]) {
+        for (idx, motor) in self.motors.iter_mut().enumerate() {
+            let told = efforts.iter().find(|(joint, effort)| *joint == idx && effort.is_finite());
+            let limit = self.model.joints[idx].effort;
+            motor.push = told.filter(|_| !self.layout.fingers.contains(&idx)).map(|(_, effort)| effort.clamp(-limit, limit));
         }
     }
 
@@ -171,13 +208,18 @@ impl Robot {
     /// velocity limits; motors follow setpoints, with the robot's own weight (not that of what it holds) compensated.
     pub fn control(&mut self, engine: &mut PhysicsWorld, holding: &[f64], dt: f64, steps_left: u32) {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
+            let held = holding.get(idx).copied().unwrap_or(0.0);
             let largest = self.model.joints[idx].velocity * dt;
+            if let Some(effort) = motor.push {
+                motor.give(engine, effort + held, self.model.joints[idx].velocity);
+                continue;
+            }
             let change = ((motor.target - motor.setpoint) / f64::from(steps_left)).clamp(-largest, largest);
             motor.setpoint += change;
             motor.setpoint_velocity = change / dt;
             let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
             let Some(link) = multibody.link_mut(link) else { continue };
-            let position = motor.setpoint + holding.get(idx).copied().unwrap_or(0.0) / motor.stiffness;
+            let position = motor.setpoint + held / motor.stiffness;
             let data = &mut link.joint.data;
             data.set_motor(
                 motor.axis,
@@ -358,6 +400,33 @@ pub(super) mod tests {
             assert_eq!(found[layout.fingers[0]], seed[layout.fingers[0]]);
         }
         assert!(n_solved >= 60, "solved {n_solved} of 100 from random postures");
+    }
+
+    /// A constant force on what is free to move: acceleration is force over mass, up to the joint's largest speed.
+    #[test]
+    fn efforts_push_as_told_and_no_faster_than_joints_may() {
+        let mut world = lonely();
+        let base = world.layout().base.expect("it drives")[0];
+        let (joint, mass) = (world.kinematics().joints()[base].clone(), world.robot.model.links[base + 1..].iter());
+        let mass: f64 = mass.map(|link| link.mass).sum();
+        let force = 0.25 * mass;
+        assert!(force < joint.effort);
+        let mut command = world.hold();
+        command.efforts = vec![(base, force)];
+        for _ in 0..30 {
+            world.step(&command);
+        }
+        let reached = world.observe().velocities[base];
+        let expected = force / mass * 30.0 * world.tick_secs();
+        assert!((reached - expected).abs() < 0.05 * expected, "{reached} m/s instead of {expected} m/s");
+        assert!((world.observe().loads[base] - force).abs() < 1e-9);
+        command.efforts = vec![(base, 1e9)];
+        (0..120).for_each(|_| world.step(&command));
+        let fastest = world.observe().velocities[base];
+        assert!((fastest / joint.velocity - 1.0).abs() < 0.03, "{fastest} m/s instead of {} m/s", joint.velocity);
+        let still = world.hold();
+        (0..120).for_each(|_| world.step(&still));
+        assert!(world.observe().velocities[base].abs() < 1e-2);
     }
 
     #[test]

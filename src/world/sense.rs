@@ -40,6 +40,17 @@ impl World {
         self.begin_tracking();
     }
 
+    /// Where everything truly is: poses of the objects' own frames, which stand on their feet.
+    pub fn truth(&self) -> Vec<Sighting> {
+        let objects = self.objects.iter().map(|object| Sighting {
+            id: object.id.clone(),
+            pose: Pose::from_isometry(&self.pose_of(object)),
+            size_m: object.model.size_m,
+            furniture: object.fixed,
+        });
+        objects.collect()
+    }
+
     /// Ids of everything that can be seen, in scene order.
     pub fn visible(&self) -> Vec<String> {
         self.objects.iter().map(|object| object.id.clone()).collect()

@@ -9,7 +9,7 @@ use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, Ri
 
 use crate::base::Pose;
 use crate::scenario::{
-    CONTROL_HZ, FloorPlan, Inertia, KnownKind, ObjectModel, RobotProfile, Scene, SceneObject, Sensing,
+    CONTROL_HZ, Camera, FloorPlan, Inertia, KnownKind, ObjectModel, RobotProfile, Scene, SceneObject, Sensing,
 };
 use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
 use crate::world::engine::{Owner, add_floor, collider, engine};
@@ -33,6 +33,9 @@ pub struct Command {
     pub gripper_opening_m: f64,
     /// Largest force of one finger. Unit: newtons.
     pub grip_force_n: f64,
+    /// Joints, by index, whose motors give an effort instead of going to a position, beyond what holds the robot's own weight. At
+    /// its largest speed a joint gets no faster. Not for fingers. Units: newtons or newton metres.
+    pub efforts: Vec<(usize, f64)>,
 }
 
 /// What the robot measures of itself.
@@ -321,7 +324,20 @@ impl World {
             positions: observed.positions,
             gripper_opening_m: observed.gripper_opening_m,
             grip_force_n: self.robot.profile.grip_force_n,
+            efforts: Vec::new(),
         }
+    }
+
+    /// Where the base's controllers are told to go, as the robot believes it now: the same place looks another one when it
+    /// finds out that it stands elsewhere.
+    pub fn aimed_base(&self) -> Option<[f64; 3]> {
+        let base = self.robot.layout.base?;
+        Some(self.believed(base.map(|idx| self.robot.target(idx))))
+    }
+
+    /// The depth camera.
+    pub fn camera(&self) -> &Camera {
+        &self.sensing.camera
     }
 
     /// Disturbs the state of an object, for tests. False if there is no such object.
@@ -358,6 +374,7 @@ impl World {
             self.robot.aim(idx, command.gripper_opening_m / 2.0);
         }
         self.robot.limit_grip(command.grip_force_n);
+        self.robot.push(&command.efforts);
     }
 
     /// A base pose as the robot believes it, from the true one. Headings keep counting beyond a full turn.

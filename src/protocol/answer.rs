@@ -1,0 +1,94 @@
+//! Answers to what a program asks for: pictures, points, and the reference perception's objects. No simulated time passes.
+
+use serde::Serialize;
+
+use crate::actions::Operator;
+use crate::base::Pose;
+use crate::protocol::message::{Ask, Binary, What, WireObject, WirePose};
+use crate::world::DepthImage;
+
+/// An answer.
+#[derive(Debug, Serialize)]
+pub struct Answer {
+    r#type: &'static str,
+    #[serde(flatten)]
+    content: Content,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(tag = "what", rename_all = "snake_case")]
+enum Content {
+    Depth {
+        camera_pose: WirePose,
+        width: usize,
+        height: usize,
+        horizontal_fov_rad: f64,
+        focal_px: f64,
+        binary: [Binary; 1],
+    },
+    Cloud {
+        binary: [Binary; 1],
+    },
+    Objects {
+        objects: Vec<WireObject>,
+    },
+}
+
+/// The answer to a request, and the bytes of the frame that follows it, if one does.
+pub fn answer(ask: &Ask, robot: &mut Operator<'_>) -> (Answer, Option<Vec<u8>>) {
+    let (content, bytes) = match ask.what {
+        What::Depth => depth(robot),
+        What::Cloud => cloud(robot),
+        What::Objects => (Content::Objects { objects: objects(ask.of.as_deref(), robot) }, None),
+    };
+    (Answer { r#type: "answer", content }, bytes)
+}
+
+/// A picture, and where the camera is by the robot's belief.
+fn look(robot: &mut Operator<'_>) -> (DepthImage, nalgebra::Isometry3<f64>) {
+    let image = robot.look();
+    (image, robot.kinematics().camera(&robot.observe().positions))
+}
+
+fn depth(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {
+    let (image, camera) = look(robot);
+    let DepthImage { width, height, focal_px, depths } = image;
+    let bytes = depths.iter().flat_map(|depth| depth.to_le_bytes()).collect();
+    let content = Content::Depth {
+        camera_pose: WirePose::of(&Pose::from_isometry(&camera)),
+        width,
+        height,
+        horizontal_fov_rad: robot.camera().field_of_view_rad,
+        focal_px,
+        binary: [Binary { name: "depth", dtype: "f32", shape: vec![height, width] }],
+    };
+    (content, Some(bytes))
+}
+
+fn cloud(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {
+    let (image, camera) = look(robot);
+    let mut bytes = Vec::with_capacity(12 * image.depths.len());
+    for row in 0..image.height {
+        for point in (0..image.width).filter_map(|column| image.point(column, row)) {
+            let point = camera * point;
+            #[expect(clippy::cast_possible_truncation, reason = "depths have 32 bits, and more would be made up")]
+            bytes.extend([point.x, point.y, point.z].into_iter().flat_map(|along| (along as f32).to_le_bytes()));
+        }
+    }
+    let shape = vec![bytes.len() / 12, 3];
+    (Content::Cloud { binary: [Binary { name: "cloud", dtype: "f32", shape }] }, Some(bytes))
+}
+
+fn objects(of: Option<&str>, robot: &mut Operator<'_>) -> Vec<WireObject> {
+    let seen = match of {
+        Some(id) => robot.see(id).into_iter().collect(),
+        None => robot.see_if(|_| true),
+    };
+    let objects = seen.into_iter().map(|thing| WireObject {
+        category: robot.kind_of(&thing.id).map(|kind| kind.category),
+        id: thing.id,
+        pose: WirePose::of(&thing.pose),
+        size_m: thing.size_m,
+    });
+    objects.collect()
+}

@@ -1,0 +1,165 @@
+//! Commands: what a program wants of the joints, checked against the robot that it has.
+
+use std::fmt;
+
+use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, Visitor};
+
+use crate::actions::{Controls, OutsideFault};
+use crate::protocol::hello::{Joints, Role};
+
+/// A command as it is on the wire.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WireCommand {
+    #[serde(rename = "type")]
+    _kind: serde::de::IgnoredAny,
+    #[serde(default = "one")]
+    ticks: u32,
+    #[serde(default)]
+    positions: Targets,
+    #[serde(default)]
+    velocities: Targets,
+    #[serde(default)]
+    efforts: Targets,
+    #[serde(default)]
+    base_velocity: Option<[f64; 3]>,
+    #[serde(default)]
+    gripper: Option<GripperTarget>,
+    #[serde(default)]
+    head: Option<HeadTarget>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GripperTarget {
+    opening_m: f64,
+    #[serde(default)]
+    force_n: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HeadTarget {
+    #[serde(default)]
+    pan_rad: Option<f64>,
+    #[serde(default)]
+    tilt_rad: Option<f64>,
+}
+
+/// Targets by the names of joints, in the order of the message: a name can come twice, and is found out then.
+#[derive(Debug, Default)]
+struct Targets(Vec<(String, f64)>);
+
+impl<'de> Deserialize<'de> for Targets {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(TargetsVisitor)
+    }
+}
+
+struct TargetsVisitor;
+
+impl<'de> Visitor<'de> for TargetsVisitor {
+    type Value = Targets;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object of numbers by the names of joints")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Targets, A::Error> {
+        let mut targets = Vec::new();
+        while let Some(target) = map.next_entry()? {
+            targets.push(target);
+        }
+        Ok(Targets(targets))
+    }
+}
+
+impl WireCommand {
+    /// How many ticks the command lasts, and the controls that it asks for.
+    ///
+    /// # Errors
+    /// It names a joint that is not there, that has another key, or twice; or lasts no tick at all.
+    pub fn controls(self, joints: &Joints) -> Result<(u32, Controls), OutsideFault> {
+        if self.ticks == 0 {
+            return Err(wrong("its command lasts 0 ticks, so that no time would ever pass".to_owned()));
+        }
+        let mut taken = Taken { joints, seen: Vec::new() };
+        let mut controls = Controls {
+            positions: taken.list(&self.positions)?,
+            velocities: taken.list(&self.velocities)?,
+            efforts: taken.list(&self.efforts)?,
+            base_velocity: self.base_velocity,
+            opening_m: self.gripper.as_ref().map(|gripper| gripper.opening_m),
+            force_n: self.gripper.and_then(|gripper| gripper.force_n),
+        };
+        if controls.base_velocity.is_some() {
+            taken.base()?;
+        }
+        for (number, (name, angle)) in self.head.into_iter().flat_map(|head| head.targets()).enumerate() {
+            let Some(angle) = angle else { continue };
+            let joint = joints.head.get(number).ok_or_else(|| wrong(format!("the robot's head has no {name}")))?;
+            taken.once(*joint, name)?;
+            controls.positions.push((*joint, angle));
+        }
+        Ok((self.ticks, controls))
+    }
+}
+
+impl HeadTarget {
+    fn targets(&self) -> [(&'static str, Option<f64>); 2] {
+        [("pan", self.pan_rad), ("tilt", self.tilt_rad)]
+    }
+}
+
+/// Which joints have a target already.
+struct Taken<'a> {
+    joints: &'a Joints,
+    seen: Vec<usize>,
+}
+
+impl Taken<'_> {
+    fn list(&mut self, targets: &Targets) -> Result<Vec<(usize, f64)>, OutsideFault> {
+        targets.0.iter().map(|(name, value)| Ok((self.joint(name)?, *value))).collect()
+    }
+
+    fn joint(&mut self, name: &str) -> Result<usize, OutsideFault> {
+        let Some((joint, role)) = self.joints.by_name.get(name) else {
+            let help = crate::base::did_you_mean(name, self.joints.by_name.keys().map(String::as_str));
+            return Err(wrong(format!("the robot has no joint `{name}`: {help}")));
+        };
+        if *role == Role::Gripper {
+            return Err(wrong(format!("`{name}` is a finger, which goes by `gripper`")));
+        }
+        self.once(*joint, name)?;
+        Ok(*joint)
+    }
+
+    fn once(&mut self, joint: usize, name: &str) -> Result<(), OutsideFault> {
+        if self.seen.contains(&joint) {
+            return Err(wrong(format!("its command has two targets for the joint `{name}`")));
+        }
+        self.seen.push(joint);
+        Ok(())
+    }
+
+    /// A velocity of the whole base goes with no target of one of its joints.
+    fn base(&self) -> Result<(), OutsideFault> {
+        if !self.joints.drives {
+            return Err(wrong("the robot has no base that drives".to_owned()));
+        }
+        let of_base = self.joints.by_name.iter().find(|(_, (idx, role))| *role == Role::Base && self.seen.contains(idx));
+        match of_base {
+            Some((name, _)) => Err(wrong(format!("its command has a base velocity and a target for `{name}`"))),
+            None => Ok(()),
+        }
+    }
+}
+
+fn wrong(reason: String) -> OutsideFault {
+    OutsideFault { late: false, reason }
+}

@@ -1,0 +1,181 @@
+//! Frames on a stream: four bytes of length, one of kind, the payload. Waiting ends by the clock, or by what else is watched.
+
+use std::io::{ErrorKind, Read, Write};
+use std::ops::Range;
+use std::os::unix::net::UnixStream;
+use std::time::Duration;
+
+use crate::actions::OutsideFault;
+
+/// Longest payload that a program gets. Unit: bytes.
+pub const TO_PROGRAM_LIMIT: usize = 64 << 20;
+/// Longest payload that a program may send. Unit: bytes.
+pub const FROM_PROGRAM_LIMIT: usize = 1 << 20;
+
+/// Kinds of payloads: JSON in UTF-8, and plain bytes.
+const JSON: u8 = b'J';
+const BYTES: u8 = b'B';
+const HEADER: usize = 5;
+/// Who waits looks around so often.
+const POLL: Duration = Duration::from_millis(20);
+
+/// Frames over a stream, one at a time in each direction.
+#[derive(Debug)]
+pub struct Wire {
+    stream: UnixStream,
+    clock_secs: fn() -> f64,
+    /// What came in; its first `filled` bytes count.
+    incoming: Vec<u8>,
+    outgoing: Vec<u8>,
+}
+
+/// How long somebody waits.
+struct Patience {
+    until_secs: f64,
+    clock_secs: fn() -> f64,
+    /// Time in which nothing came at all, for clocks that stand still. Unit: seconds.
+    idle_secs: f64,
+    limit_secs: f64,
+}
+
+impl Wire {
+    /// Frames over a connected stream.
+    ///
+    /// # Errors
+    /// The stream can't be set up.
+    pub fn new(stream: UnixStream, clock_secs: fn() -> f64) -> std::io::Result<Self> {
+        stream.set_nonblocking(false)?;
+        stream.set_read_timeout(Some(POLL))?;
+        stream.set_write_timeout(Some(POLL))?;
+        Ok(Self { stream, clock_secs, incoming: vec![0; 64 << 10], outgoing: Vec::with_capacity(64 << 10) })
+    }
+
+    /// Sends one message with the binary frames that it announces.
+    ///
+    /// # Errors
+    /// It is not taken within `limit_secs`, or the other side is gone.
+    pub fn send(&mut self, message: &impl serde::Serialize, binaries: &[&[u8]], limit_secs: f64) -> Result<(), OutsideFault> {
+        self.outgoing.clear();
+        self.outgoing.extend_from_slice(&[0; HEADER]);
+        serde_json::to_writer(&mut self.outgoing, message).map_err(|error| broke(format!("no message: {error}")))?;
+        let length = self.outgoing.len() - HEADER;
+        self.outgoing[..HEADER].copy_from_slice(&header(JSON, length)?);
+        for binary in binaries {
+            self.outgoing.extend_from_slice(&header(BYTES, binary.len())?);
+            self.outgoing.extend_from_slice(binary);
+        }
+        let mut patience = self.patience(limit_secs);
+        let mut sent = 0;
+        while sent < self.outgoing.len() {
+            match self.stream.write(&self.outgoing[sent..]) {
+                Ok(0) => return Err(gone()),
+                Ok(n_bytes) => sent += n_bytes,
+                Err(error) => patience.bear(&error, "take a message")?,
+            }
+        }
+        Ok(())
+    }
+
+    /// The next message, as the place of its bytes: one JSON object. `watch` is asked while nothing comes.
+    ///
+    /// # Errors
+    /// Nothing came within `limit_secs`, the other side is gone, or what came is no frame, too long, or more than one.
+    pub fn receive(
+        &mut self,
+        limit_secs: f64,
+        watch: &mut dyn FnMut() -> Result<(), OutsideFault>,
+    ) -> Result<Range<usize>, OutsideFault> {
+        let mut patience = self.patience(limit_secs);
+        let (mut filled, mut needed) = (0, HEADER);
+        while filled < needed {
+            match self.stream.read(&mut self.incoming[filled..]) {
+                Ok(0) => {
+                    watch()?;
+                    return Err(gone());
+                }
+                Ok(n_bytes) => {
+                    filled += n_bytes;
+                    patience.check("send a whole message")?;
+                }
+                Err(error) => {
+                    watch()?;
+                    patience.bear(&error, "answer")?;
+                }
+            }
+            if filled >= HEADER {
+                needed = HEADER + payload_length(&self.incoming)?;
+                let room = needed.max(self.incoming.len());
+                self.incoming.resize(room, 0);
+            }
+        }
+        if filled > needed {
+            return Err(broke("it sent more than one message at a time: it has to wait for each answer".to_owned()));
+        }
+        Ok(HEADER..needed)
+    }
+
+    /// The bytes of the message that came last.
+    pub fn payload(&self, range: Range<usize>) -> &[u8] {
+        &self.incoming[range]
+    }
+
+    fn patience(&self, limit_secs: f64) -> Patience {
+        Patience {
+            until_secs: (self.clock_secs)() + limit_secs,
+            clock_secs: self.clock_secs,
+            idle_secs: 0.0,
+            limit_secs,
+        }
+    }
+}
+
+impl Patience {
+    /// Goes on where a read or write only took its time.
+    fn bear(&mut self, error: &std::io::Error, what: &str) -> Result<(), OutsideFault> {
+        match error.kind() {
+            ErrorKind::Interrupted => Ok(()),
+            ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+                self.idle_secs += POLL.as_secs_f64();
+                self.check(what)
+            }
+            ErrorKind::BrokenPipe | ErrorKind::ConnectionReset => Err(gone()),
+            _ => Err(broke(format!("the connection failed: {error}"))),
+        }
+    }
+
+    fn check(&self, what: &str) -> Result<(), OutsideFault> {
+        if self.idle_secs < self.limit_secs && (self.clock_secs)() < self.until_secs {
+            return Ok(());
+        }
+        Err(OutsideFault { late: true, reason: format!("it did not {what} within {} s", self.limit_secs) })
+    }
+}
+
+fn header(kind: u8, length: usize) -> Result<[u8; HEADER], OutsideFault> {
+    let bytes = u32::try_from(length).ok().filter(|_| length <= TO_PROGRAM_LIMIT);
+    let [a, b, c, d] =
+        bytes.ok_or_else(|| broke(format!("a message of {length} bytes is too long"))).map(u32::to_le_bytes)?;
+    Ok([a, b, c, d, kind])
+}
+
+/// Length of the payload that a header announces.
+fn payload_length(incoming: &[u8]) -> Result<usize, OutsideFault> {
+    let [a, b, c, d, kind, ..] = *incoming else { return Ok(0) };
+    if kind != JSON {
+        let begun = String::from_utf8_lossy(&incoming[..HEADER]).escape_debug().to_string();
+        return Err(broke(format!("it sent `{begun}`, which is no frame of JSON: its fifth byte must be `J`")));
+    }
+    let length = u32::from_le_bytes([a, b, c, d]) as usize;
+    if length > FROM_PROGRAM_LIMIT {
+        return Err(broke(format!("it sent a message of {length} bytes; the longest may have {FROM_PROGRAM_LIMIT}")));
+    }
+    Ok(length)
+}
+
+fn broke(reason: String) -> OutsideFault {
+    OutsideFault { late: false, reason }
+}
+
+fn gone() -> OutsideFault {
+    broke("it closed the connection".to_owned())
+}

@@ -1,0 +1,174 @@
+//! How a program is introduced to its robot: the URDF, and which joints are what.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::protocol::message::PROTOCOL;
+use crate::world::{Joint, JointKind, World};
+
+/// What can be observed or asked for.
+const SENSORS: [&str; 6] = ["joints", "odometry", "gripper", "depth", "cloud", "objects"];
+
+/// The first message to a program.
+#[derive(Debug, Serialize)]
+pub struct Introduction<'a> {
+    r#type: &'static str,
+    protocol: u32,
+    actcheck: &'static str,
+    worker: usize,
+    control_period_s: f64,
+    privileged: bool,
+    robot: Robot<'a>,
+    sensors: [&'static str; 6],
+}
+
+#[derive(Debug, Serialize)]
+struct Robot<'a> {
+    name: &'a str,
+    urdf: &'a str,
+    joints: Vec<WireJoint<'a>>,
+    base_joints: Vec<&'a str>,
+    arm_joints: Vec<&'a str>,
+    gripper_joints: Vec<&'a str>,
+    head_joints: Vec<&'a str>,
+    mount_height_m: f64,
+    home: &'a [f64],
+    tool_link: &'a str,
+    tool_turned_rad: [f64; 3],
+    max_opening_m: f64,
+    grip_force_n: f64,
+    camera: Camera<'a>,
+}
+
+#[derive(Debug, Serialize)]
+struct WireJoint<'a> {
+    name: &'a str,
+    kind: &'static str,
+    role: &'static str,
+    lower: f64,
+    upper: f64,
+    velocity: f64,
+    effort: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Camera<'a> {
+    link: &'a str,
+    width: u32,
+    height: u32,
+    horizontal_fov_rad: f64,
+    min_range_m: f64,
+    max_range_m: f64,
+}
+
+/// What a joint is to the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    Base,
+    Arm,
+    Gripper,
+    Head,
+    Other,
+}
+
+impl Role {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Base => "base",
+            Self::Arm => "arm",
+            Self::Gripper => "gripper",
+            Self::Head => "head",
+            Self::Other => "other",
+        }
+    }
+}
+
+/// The joints of a robot by their names.
+#[derive(Debug, Clone, Default)]
+pub struct Joints {
+    /// Index and role.
+    pub by_name: BTreeMap<String, (usize, Role)>,
+    /// Indices of pan and tilt, as far as there are such joints.
+    pub head: Vec<usize>,
+    /// Whether the base drives.
+    pub drives: bool,
+}
+
+impl Joints {
+    /// The joints of the robot in a world.
+    pub fn of(world: &World) -> Self {
+        let roles = roles(world);
+        let names = world.kinematics().joints().iter().map(|joint| joint.name.clone());
+        let by_name = names.zip(roles).enumerate().map(|(idx, (name, role))| (name, (idx, role))).collect();
+        Self { by_name, head: world.layout().head.clone(), drives: world.layout().base.is_some() }
+    }
+}
+
+/// The introduction of the robot in a world to the program of one worker.
+pub fn introduction(world: &World, worker: usize, privileged: bool) -> Introduction<'_> {
+    let (profile, camera) = (world.profile(), world.camera());
+    let joints = world.kinematics().joints();
+    let roles = roles(world);
+    let names = |wanted: &[usize]| wanted.iter().filter_map(|idx| Some(joints.get(*idx)?.name.as_str())).collect();
+    let layout = world.layout();
+    Introduction {
+        r#type: "hello",
+        protocol: PROTOCOL,
+        actcheck: env!("CARGO_PKG_VERSION"),
+        worker,
+        control_period_s: world.tick_secs(),
+        privileged,
+        robot: Robot {
+            name: &profile.name,
+            urdf: &profile.urdf.text,
+            joints: joints.iter().zip(roles).map(|(joint, role)| wire_joint(joint, role)).collect(),
+            base_joints: layout.base.map_or_else(Vec::new, |base| names(&base)),
+            arm_joints: names(&layout.arm),
+            gripper_joints: names(&layout.fingers),
+            head_joints: names(&layout.head),
+            mount_height_m: profile.mount_height_m,
+            home: &profile.home,
+            tool_link: &profile.grasp_link,
+            tool_turned_rad: profile.grasp_turned_rad,
+            max_opening_m: profile.max_opening_m,
+            grip_force_n: profile.grip_force_n,
+            camera: Camera {
+                link: &profile.camera_link,
+                width: camera.width,
+                height: camera.height,
+                horizontal_fov_rad: camera.field_of_view_rad,
+                min_range_m: camera.min_range_m,
+                max_range_m: camera.max_range_m,
+            },
+        },
+        sensors: SENSORS,
+    }
+}
+
+fn wire_joint(joint: &Joint, role: Role) -> WireJoint<'_> {
+    let kind = match joint.kind {
+        JointKind::Prismatic => "prismatic",
+        JointKind::Revolute => "revolute",
+    };
+    let Joint { name, lower, upper, velocity, effort, .. } = joint;
+    let [lower, upper, velocity, effort] = [*lower, *upper, *velocity, *effort].map(written);
+    WireJoint { name, kind, role: role.word(), lower, upper, velocity, effort }
+}
+
+/// JSON has no infinity: the largest number stands for it.
+fn written(value: f64) -> f64 {
+    value.clamp(f64::MIN, f64::MAX)
+}
+
+fn roles(world: &World) -> Vec<Role> {
+    let layout = world.layout();
+    let role = |idx: usize| match idx {
+        idx if layout.base.is_some_and(|base| base.contains(&idx)) => Role::Base,
+        idx if layout.arm.contains(&idx) => Role::Arm,
+        idx if layout.fingers.contains(&idx) => Role::Gripper,
+        idx if layout.head.contains(&idx) => Role::Head,
+        _ => Role::Other,
+    };
+    (0..world.kinematics().joints().len()).map(role).collect()
+}

@@ -1,0 +1,105 @@
+//! What a program prints: the last lines are kept, and all of it is counted.
+
+use std::collections::VecDeque;
+use std::io::{PipeReader, Read};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// So many lines are kept.
+const LINES: usize = 20;
+/// Longest line that is kept as it is. Unit: bytes.
+const LONGEST: usize = 400;
+/// What a process that has ended printed last is read within this time.
+const REST: Duration = Duration::from_millis(500);
+
+/// Reads what a program prints while it runs.
+#[derive(Debug)]
+pub struct Output {
+    tail: Arc<Mutex<Tail>>,
+    ended: Receiver<()>,
+}
+
+#[derive(Debug, Default)]
+struct Tail {
+    lines: VecDeque<String>,
+    /// The line that has not ended yet.
+    begun: Vec<u8>,
+    n_bytes: u64,
+}
+
+impl Output {
+    /// Reads from a pipe until everybody has closed it.
+    pub fn read(mut pipe: PipeReader) -> Self {
+        let tail = Arc::new(Mutex::new(Tail::default()));
+        let (end, ended) = channel();
+        let filled = Arc::clone(&tail);
+        std::thread::spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(n_bytes @ 1..) = pipe.read(&mut bytes) {
+                filled.lock().unwrap_or_else(PoisonError::into_inner).take(&bytes[..n_bytes]);
+            }
+            // Nobody may be waiting for it.
+            let _ = end.send(());
+        });
+        Self { tail, ended }
+    }
+
+    /// How much was printed so far. Unit: bytes.
+    pub fn n_bytes(&self) -> u64 {
+        self.tail.lock().unwrap_or_else(PoisonError::into_inner).n_bytes
+    }
+
+    /// The last lines of a program that has ended.
+    pub fn last_lines(&self) -> Vec<String> {
+        // A process that got away may still hold the pipe.
+        let _ = self.ended.recv_timeout(REST);
+        let tail = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
+        let rest = (!tail.begun.is_empty()).then(|| readable(&tail.begun));
+        let all: Vec<String> = tail.lines.iter().cloned().chain(rest).collect();
+        all[all.len().saturating_sub(LINES)..].to_vec()
+    }
+}
+
+impl Tail {
+    fn take(&mut self, bytes: &[u8]) {
+        self.n_bytes += bytes.len() as u64;
+        for piece in bytes.split_inclusive(|byte| *byte == b'\n') {
+            let room = LONGEST.saturating_sub(self.begun.len());
+            let (text, ends) = piece.strip_suffix(b"\n").map_or((piece, false), |text| (text, true));
+            self.begun.extend_from_slice(&text[..text.len().min(room)]);
+            if ends {
+                let line = readable(&std::mem::take(&mut self.begun));
+                self.lines.push_back(line);
+                if self.lines.len() > LINES {
+                    self.lines.pop_front();
+                }
+            }
+        }
+    }
+}
+
+/// A line without what would move a terminal's cursor.
+fn readable(line: &[u8]) -> String {
+    let text = String::from_utf8_lossy(line);
+    text.trim_end_matches('\r').chars().map(|c| if c.is_control() && c != '\t' { '\u{fffd}' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_lines_are_kept_and_none_is_too_long() {
+        let mut tail = Tail::default();
+        for number in 0..30 {
+            tail.take(format!("line {number}\r\nand ").as_bytes());
+        }
+        tail.take(&[b'x'; 3 * LONGEST]);
+        tail.take(b"\n\x1b[2Jlast");
+        assert_eq!(tail.lines.len(), LINES);
+        assert_eq!(tail.lines[0], "and line 11");
+        assert_eq!(tail.lines[LINES - 1].len(), LONGEST);
+        assert_eq!(readable(&tail.begun), "\u{fffd}[2Jlast");
+    }
+}

@@ -1,0 +1,205 @@
+//! A program's part in one run: its actions, command by command.
+
+use std::collections::BTreeMap;
+
+use crate::actions::{ActionCall, ActionReport, Interrupt, Operator, Outside, OutsideFault};
+use crate::protocol::answer::answer;
+use crate::protocol::command::WireCommand;
+use crate::protocol::message::{Ask, End, ToProgram, WireKind, kind_of, parse};
+use crate::protocol::observation::Observed;
+use crate::protocol::pool::{Lent, Programs};
+use crate::protocol::remember::{Grasped, remember};
+use crate::protocol::session::Session;
+use crate::world::World;
+
+/// Longest message of an action's end that is kept. Unit: characters.
+const LONGEST_MESSAGE: usize = 1000;
+
+/// What a program is told of the run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunName {
+    /// The run's id.
+    pub run: String,
+    /// Position in the campaign, from 0.
+    pub index: u64,
+    /// For all randomness of the program's: the same in every repetition of the run.
+    pub seed: u64,
+}
+
+/// A program that performs actions of one run.
+#[derive(Debug)]
+pub struct Performance<'a> {
+    lent: Lent<'a>,
+    run: RunName,
+    clock_secs: fn() -> f64,
+    /// What it printed last, if it was at fault.
+    output: Option<Vec<String>>,
+}
+
+impl<'a> Performance<'a> {
+    /// A run of one of the campaign's programs. It is started when the run begins, unless it has been before.
+    pub fn new(programs: &'a Programs, run: RunName, clock_secs: fn() -> f64) -> Self {
+        Self { lent: programs.lend(), run, clock_secs, output: None }
+    }
+
+    /// The last lines that the program printed, if it ended the run by a fault of its own.
+    pub fn output(&self) -> Option<&[String]> {
+        self.output.as_deref()
+    }
+
+    /// The program, started if there is none or if it is still busy with what a crash of simulation ended.
+    fn started(&mut self, world: &World) -> Result<&mut Session, OutsideFault> {
+        let worker = &mut self.lent.worker;
+        let programs = self.lent.programs;
+        let session = match worker.session.take().filter(|session| session.idle) {
+            Some(session) => session,
+            None => Session::start((&programs.skill, worker.number), &programs.tested, world, self.clock_secs).map_err(
+                |(fault, output)| {
+                    self.output = Some(output);
+                    fault
+                },
+            )?,
+        };
+        Ok(worker.session.insert(session))
+    }
+
+    /// Ends the program for a fault of its own.
+    fn give_up(&mut self, fault: OutsideFault) -> OutsideFault {
+        if let Some(mut session) = self.lent.worker.session.take() {
+            let fault = session.refuse(fault);
+            self.output = Some(session.end());
+            return self.named(fault);
+        }
+        self.named(fault)
+    }
+
+    fn named(&self, fault: OutsideFault) -> OutsideFault {
+        let text = &self.lent.programs.skill.text;
+        OutsideFault { reason: format!("the program `{text}`: {}", fault.reason), ..fault }
+    }
+}
+
+impl Outside for Performance<'_> {
+    fn begin_run(&mut self, world: &World) -> Result<(), OutsideFault> {
+        let RunName { run, index, seed } = self.run.clone();
+        let begun =
+            self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }));
+        begun.map_err(|fault| self.give_up(fault))
+    }
+
+    fn performs(&self, action: &str) -> bool {
+        self.lent.worker.session.as_ref().is_some_and(|session| session.actions.contains(action))
+    }
+
+    fn perform(&mut self, call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
+        let privileged = self.lent.programs.skill.privileged;
+        let Some(session) = &mut self.lent.worker.session else {
+            let reason = format!("no program is there to perform {}", call.action);
+            return Err(Interrupt::Outside(OutsideFault { late: false, reason }));
+        };
+        session.idle = false;
+        robot.begin(&call.action);
+        let mut performed = Performed { session, robot, privileged, grasped: Grasped::default() };
+        let ended = performed.begin(call).and_then(|()| performed.follow());
+        let outcome = match ended {
+            Ok(end) => remember(call, &end, performed.grasped, performed.robot)
+                .map(|()| report(end))
+                .map_err(Interrupt::Outside),
+            Err(interrupt) => Err(performed.stop(interrupt)),
+        };
+        match outcome {
+            Err(Interrupt::Outside(fault)) => Err(Interrupt::Outside(self.give_up(fault))),
+            other => {
+                if let Some(session) = &mut self.lent.worker.session {
+                    session.idle = !session.lost;
+                }
+                other
+            }
+        }
+    }
+}
+
+fn report(end: End) -> ActionReport {
+    let message = end.message.chars().take(LONGEST_MESSAGE).collect();
+    ActionReport { succeeded: end.succeeded, message }
+}
+
+/// An action under way.
+struct Performed<'a, 'b> {
+    session: &'a mut Session,
+    robot: &'a mut Operator<'b>,
+    privileged: bool,
+    grasped: Grasped,
+}
+
+impl Performed<'_, '_> {
+    fn begin(&mut self, call: &ActionCall) -> Result<(), Interrupt> {
+        let parameters = call.parameters.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
+        let values = call.parameters.values().flatten();
+        let kinds: BTreeMap<&str, WireKind> = values
+            .filter_map(|id| {
+                let kind = self.robot.kind_of(id)?;
+                Some((id.as_str(), WireKind { category: kind.category, size_m: kind.size_m }))
+            })
+            .collect();
+        let measured = self.robot.observe();
+        self.grasped.feel(self.robot, &measured);
+        let begin = ToProgram::Begin {
+            action: &call.action,
+            parameters,
+            kinds,
+            budget_s: self.robot.budget_left_secs(),
+            observation: Observed::of(self.robot, &measured, self.privileged),
+        };
+        self.session.send(&begin, &[]).map_err(Interrupt::Outside)
+    }
+
+    /// Does what the program asks for until it ends the action.
+    fn follow(&mut self) -> Result<End, Interrupt> {
+        loop {
+            let message = self.session.receive().map_err(Interrupt::Outside)?;
+            match kind_of(message).map_err(Interrupt::Outside)?.as_str() {
+                "command" => {
+                    let command: WireCommand = parse("command", message).map_err(Interrupt::Outside)?;
+                    self.obey(command)?;
+                }
+                "ask" => {
+                    let ask: Ask = parse("ask", message).map_err(Interrupt::Outside)?;
+                    let (answer, bytes) = answer(&ask, self.robot);
+                    let binaries: Vec<&[u8]> = bytes.iter().map(Vec::as_slice).collect();
+                    self.session.send(&answer, &binaries).map_err(Interrupt::Outside)?;
+                }
+                "end" => return parse("end", message).map_err(Interrupt::Outside),
+                other => {
+                    let reason = format!("it sent `{other}` where `command`, `ask` or `end` was due");
+                    return Err(Interrupt::Outside(OutsideFault { late: false, reason }));
+                }
+            }
+        }
+    }
+
+    fn obey(&mut self, command: WireCommand) -> Result<(), Interrupt> {
+        let (ticks, controls) = command.controls(&self.session.joints).map_err(Interrupt::Outside)?;
+        self.robot.steer(&controls);
+        self.robot.step(ticks)?;
+        let measured = self.robot.observe();
+        self.grasped.feel(self.robot, &measured);
+        let observed = Observed::of(self.robot, &measured, self.privileged);
+        self.session.send(&observed.message(), &[]).map_err(Interrupt::Outside)
+    }
+
+    /// Tells the program that its action is over. One that does not take that is started anew for the next run, and the action
+    /// has ended for its own reason.
+    fn stop(&mut self, interrupt: Interrupt) -> Interrupt {
+        let reason = match interrupt {
+            Interrupt::Outside(_) => return interrupt,
+            Interrupt::Fault => "fault",
+            Interrupt::Budget => "budget",
+            Interrupt::Cut => "stopped",
+        };
+        if self.session.abort(reason).is_err() {
+            self.session.lost = true;
+        }
+        interrupt
+    }
+}

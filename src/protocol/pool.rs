@@ -1,0 +1,67 @@
+//! The programs of a campaign: one for each run that is being made at the same time.
+
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
+
+use crate::config::Skill;
+use crate::protocol::session::Session;
+
+/// Programs that wait for a run.
+#[derive(Debug)]
+pub struct Programs {
+    pub(super) skill: Skill,
+    /// The actions of all tests.
+    pub(super) tested: BTreeSet<String>,
+    workers: Mutex<Workers>,
+}
+
+#[derive(Debug, Default)]
+struct Workers {
+    free: Vec<Worker>,
+    n_workers: usize,
+}
+
+/// A place for one program, which may have to be started yet.
+#[derive(Debug, Default)]
+pub(super) struct Worker {
+    pub number: usize,
+    pub session: Option<Session>,
+}
+
+/// A worker for the time of one run.
+#[derive(Debug)]
+pub(super) struct Lent<'a> {
+    pub programs: &'a Programs,
+    pub worker: Worker,
+}
+
+impl Programs {
+    /// No program yet. `tested` are the actions of all tests.
+    pub fn new(skill: Skill, tested: BTreeSet<String>) -> Self {
+        Self { skill, tested, workers: Mutex::default() }
+    }
+
+    /// A worker whose program waits for a run, or is to be started.
+    pub(super) fn lend(&self) -> Lent<'_> {
+        let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);
+        let worker = workers.free.pop().unwrap_or_else(|| {
+            workers.n_workers += 1;
+            Worker { number: workers.n_workers - 1, session: None }
+        });
+        Lent { programs: self, worker }
+    }
+}
+
+impl Drop for Lent<'_> {
+    fn drop(&mut self) {
+        let worker = std::mem::take(&mut self.worker);
+        self.programs.workers.lock().unwrap_or_else(PoisonError::into_inner).free.push(worker);
+    }
+}
+
+impl Drop for Programs {
+    fn drop(&mut self) {
+        let workers = std::mem::take(self.workers.get_mut().unwrap_or_else(PoisonError::into_inner));
+        workers.free.into_iter().filter_map(|worker| worker.session).for_each(Session::bye);
+    }
+}
