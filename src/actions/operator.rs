@@ -2,10 +2,10 @@
 
 use nalgebra::Isometry3;
 
+use crate::actions::controls::Drives;
 use crate::actions::grip::GripWatch;
 use crate::actions::memory::{Held, Memory, Standing};
 use crate::actions::sabotage::IDLE_SECS;
-use crate::actions::controls::Drives;
 use crate::actions::{ActionReport, Cut, OutsideFault, Perceived, Percept, Phase, Saboteur};
 use crate::base::Choices;
 use crate::scenario::{FloorPlan, KnownKind, RobotProfile};

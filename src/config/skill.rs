@@ -105,7 +105,9 @@ fn unused(mut options: Table, folder: &Path, span: Span, found: &mut Diagnostics
     options.finish(found);
     let message = "`[skill]` has no effect: the reference skills perform the actions";
     found.push(
-        Diagnostic::warning("C035", message).at(&source, span).help("name a program in `test_launcher`, or leave it out"),
+        Diagnostic::warning("C035", message)
+            .at(&source, span)
+            .help("name a program in `test_launcher`, or leave it out"),
     );
 }
 
@@ -125,7 +127,12 @@ fn fill(skill: &mut Skill, options: &mut Table, folder: &Path) {
         skill.dir = beside(folder, &written.value);
         if !skill.dir.is_dir() {
             let message = format!("there is no folder {}", skill.dir.display());
-            options.fault("C034", written.span, message, "the program's working folder is relative to the configuration");
+            options.fault(
+                "C034",
+                written.span,
+                message,
+                "the program's working folder is relative to the configuration",
+            );
         }
     }
     set(&mut skill.privileged, options.boolean("privileged"));

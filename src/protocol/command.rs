@@ -152,7 +152,8 @@ impl Taken<'_> {
         if !self.joints.drives {
             return Err(wrong("the robot has no base that drives".to_owned()));
         }
-        let of_base = self.joints.by_name.iter().find(|(_, (idx, role))| *role == Role::Base && self.seen.contains(idx));
+        let of_base =
+            self.joints.by_name.iter().find(|(_, (idx, role))| *role == Role::Base && self.seen.contains(idx));
         match of_base {
             Some((name, _)) => Err(wrong(format!("its command has a base velocity and a target for `{name}`"))),
             None => Ok(()),

@@ -54,7 +54,12 @@ impl Wire {
     ///
     /// # Errors
     /// It is not taken within `limit_secs`, or the other side is gone.
-    pub fn send(&mut self, message: &impl serde::Serialize, binaries: &[&[u8]], limit_secs: f64) -> Result<(), OutsideFault> {
+    pub fn send(
+        &mut self,
+        message: &impl serde::Serialize,
+        binaries: &[&[u8]],
+        limit_secs: f64,
+    ) -> Result<(), OutsideFault> {
         self.outgoing.clear();
         self.outgoing.extend_from_slice(&[0; HEADER]);
         serde_json::to_writer(&mut self.outgoing, message).map_err(|error| broke(format!("no message: {error}")))?;

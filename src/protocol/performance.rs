@@ -53,12 +53,11 @@ impl<'a> Performance<'a> {
         let programs = self.lent.programs;
         let session = match worker.session.take().filter(|session| session.idle) {
             Some(session) => session,
-            None => Session::start((&programs.skill, worker.number), &programs.tested, world, self.clock_secs).map_err(
-                |(fault, output)| {
+            None => Session::start((&programs.skill, worker.number), &programs.tested, world, self.clock_secs)
+                .map_err(|(fault, output)| {
                     self.output = Some(output);
                     fault
-                },
-            )?,
+                })?,
         };
         Ok(worker.session.insert(session))
     }
@@ -82,8 +81,7 @@ impl<'a> Performance<'a> {
 impl Outside for Performance<'_> {
     fn begin_run(&mut self, world: &World) -> Result<(), OutsideFault> {
         let RunName { run, index, seed } = self.run.clone();
-        let begun =
-            self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }));
+        let begun = self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }));
         begun.map_err(|fault| self.give_up(fault))
     }
 

@@ -26,7 +26,8 @@ const GRACE_POLLS: u32 = 200;
 const SWEEPS: usize = 10;
 
 /// Starts a program within limits on its memory (kilobytes) and computing time (seconds).
-const LIMITED: &str = r#"[ -z "$1" ] || ulimit -v "$1" || exit 126; [ -z "$2" ] || ulimit -t "$2" || exit 126; shift 2; exec "$@""#;
+const LIMITED: &str =
+    r#"[ -z "$1" ] || ulimit -v "$1" || exit 126; [ -z "$2" ] || ulimit -t "$2" || exit 126; shift 2; exec "$@""#;
 /// Waits until nobody holds its input any more, which also happens when this program is killed, then ends a group of processes.
 const GUARD: &str = r#"read -r _; kill -s KILL -- "-$1" 2>/dev/null; rm -rf -- "$2""#;
 

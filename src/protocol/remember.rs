@@ -3,9 +3,7 @@
 
 use nalgebra::Isometry3;
 
-use crate::actions::{
-    ActionCall, Held, Operator, OutsideFault, Perceived, PerceivedPlane, PerceivedThing, feels_in,
-};
+use crate::actions::{ActionCall, Held, Operator, OutsideFault, Perceived, PerceivedPlane, PerceivedThing, feels_in};
 use crate::base::Pose;
 use crate::protocol::message::{End, WirePose};
 use crate::world::Observation;
@@ -45,12 +43,7 @@ impl Taken {
 ///
 /// # Errors
 /// A pose of the message is none.
-pub fn remember(
-    call: &ActionCall,
-    end: &End,
-    grasped: Grasped,
-    robot: &mut Operator<'_>,
-) -> Result<(), OutsideFault> {
+pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Operator<'_>) -> Result<(), OutsideFault> {
     if end.perceived.is_some() || end.plane.is_some() {
         let perceived = perceived(end)?;
         robot.remember(perceived);
@@ -90,11 +83,7 @@ fn perceived(end: &End) -> Result<Perceived, OutsideFault> {
     let plane = end.plane.map(|plane| Ok(PerceivedPlane { pose: plane.pose.pose()?, size_m: plane.size_m }));
     let things = end.perceived.iter().flatten().map(|thing| {
         let pose = upright(&thing.pose)?;
-        Ok(PerceivedThing {
-            category: thing.category.clone(),
-            pose: Pose::from_isometry(&pose),
-            size_m: thing.size_m,
-        })
+        Ok(PerceivedThing { category: thing.category.clone(), pose: Pose::from_isometry(&pose), size_m: thing.size_m })
     });
     Ok(Perceived { plane: plane.transpose()?, things: things.collect::<Result<_, OutsideFault>>()? })
 }

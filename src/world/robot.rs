@@ -169,9 +169,12 @@ impl Robot {
     pub fn effort_shares(&self, positions: &[f64], velocities: &[f64]) -> Vec<f64> {
         let states = positions.iter().zip(velocities);
         let motors = self.motors.iter().zip(&self.model.joints).zip(states);
-        let shares = motors.map(|((motor, joint), (position, velocity))| {
-            if joint.effort > 0.0 { motor.load(*position, *velocity).abs() / joint.effort } else { 0.0 }
-        });
+        let shares =
+            motors.map(
+                |((motor, joint), (position, velocity))| {
+                    if joint.effort > 0.0 { motor.load(*position, *velocity).abs() / joint.effort } else { 0.0 }
+                },
+            );
         shares.collect()
     }
 
@@ -193,7 +196,8 @@ impl Robot {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let told = efforts.iter().find(|(joint, effort)| *joint == idx && effort.is_finite());
             let limit = self.model.joints[idx].effort;
-            motor.push = told.filter(|_| !self.layout.fingers.contains(&idx)).map(|(_, effort)| effort.clamp(-limit, limit));
+            motor.push =
+                told.filter(|_| !self.layout.fingers.contains(&idx)).map(|(_, effort)| effort.clamp(-limit, limit));
         }
     }
 
