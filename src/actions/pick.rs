@@ -102,7 +102,8 @@ fn put_right(mut way: Plan, seen: Sighting, robot: &mut Operator<'_>) -> Result<
     }
     robot.take_for(&again);
     robot.begin("approach");
-    robot.follow(&[way.near.last().cloned().unwrap_or_default()], 0.0)?;
+    let last: Vec<Vec<f64>> = way.near.last().cloned().into_iter().collect();
+    robot.follow(&last, 0.0)?;
     Ok((way, again))
 }
 

@@ -156,9 +156,8 @@ fn misplaced(campaign: &Campaign, name: &str, written: &[f64], made: &[&Choice])
     let moved = written.iter().zip(made).find(|(written, made)| written.to_bits() != made.value.to_bits());
     if let Some((written, made)) = moved {
         let (is, bounds) = match made.kind {
-            ChoiceKind::Index { of } if name == "other.count" => {
-                let least = campaign.other_count.0;
-                (format!("{}", written + f64::from(least)), format!("{least} to {}", least as usize + of - 1))
+            ChoiceKind::Index { .. } if let Some((least, most)) = campaign.other_counts.of_choice(name) => {
+                (format!("{}", written + f64::from(least)), format!("{least} to {most}"))
             }
             ChoiceKind::Index { of } => (format!("{written}"), format!("whole numbers from 0 to {}", of - 1)),
             ChoiceKind::Real { low, high, .. } => (format!("{written}"), format!("{low} to {high}")),

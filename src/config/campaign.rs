@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::base::{Diagnostic, Diagnostics, Files, Shard, Source, Span};
-use crate::config::{Case, ObjectModel, RobotProfile, Skill, WorldMap, designators};
+use crate::config::{Case, ObjectModel, OtherCounts, RobotProfile, Skill, WorldMap, designators};
 use crate::search::Strategy;
 
 /// One campaign: every test in `test_count` scenes, in each `repeat` times.
@@ -43,8 +43,8 @@ pub struct Campaign {
     ///
     /// A table named after a designator that has no special meaning gives its candidates under its own name.
     pub candidates: BTreeMap<String, Vec<String>>,
-    /// How many other objects stand on the surface (`[surfaceObjects] count = [least, most]`).
-    pub other_count: (u32, u32),
+    /// How many other objects stand on the surfaces.
+    pub other_counts: OtherCounts,
     /// Rules that a scene has to satisfy (`[scene] require`).
     pub scene_rule: Option<Source>,
     /// Shares of targets and of other objects that lie on their side (`[pickObject] lying`, `[surfaceObjects] lying`).

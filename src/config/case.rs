@@ -4,12 +4,16 @@ use std::collections::BTreeMap;
 
 use crate::base::{Diagnostics, Span, did_you_mean};
 use crate::config::designators::Designators;
-use crate::config::{Located, Table};
+use crate::config::{Located, OtherCounts, Table};
 
 /// Choices that pick a name from a designator's candidates: they are written by name, so that a case survives other
 /// candidates being added. `*` stands for a number.
-const NAMED: [(&str, &str); 3] =
-    [("surface.model", "objectSurface"), ("target.model", "pickObject"), ("other.*.model", "surfaceObjects")];
+const NAMED: [(&str, &str); 4] = [
+    ("surface.model", "objectSurface"),
+    ("target.model", "pickObject"),
+    ("other.*.model", "surfaceObjects"),
+    ("place_other.*.model", "surfaceObjects"),
+];
 
 /// One scene that a configuration fixes: every run of it makes these choices.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -46,7 +50,7 @@ pub(super) enum Form<'a> {
 
 impl<'a> Form<'a> {
     /// The form of a choice's values, by its name.
-    pub(super) fn of(choice: &str, candidates: &'a BTreeMap<String, Vec<String>>, least_others: u32) -> Self {
+    pub(super) fn of(choice: &str, candidates: &'a BTreeMap<String, Vec<String>>, counts: &OtherCounts) -> Self {
         let fits = |pattern: &str| match pattern.split_once('*') {
             Some((start, end)) => {
                 choice.strip_prefix(start).and_then(|rest| rest.strip_suffix(end)).is_some_and(is_number)
@@ -54,11 +58,11 @@ impl<'a> Form<'a> {
             None => choice == pattern,
         };
         let designator = NAMED.iter().find(|(pattern, _)| fits(pattern)).map_or(choice, |(_, designator)| designator);
-        match candidates.get(designator) {
-            Some(names) => Self::Name(names),
-            None if choice == "other.count" => Self::Count(least_others),
-            None if choice.ends_with(".left_out") => Self::YesNo,
-            None => Self::Number,
+        match (candidates.get(designator), counts.of_choice(choice)) {
+            (Some(names), _) => Self::Name(names),
+            (None, Some((least, _))) => Self::Count(least),
+            (None, None) if choice.ends_with(".left_out") => Self::YesNo,
+            (None, None) => Self::Number,
         }
     }
 }
@@ -108,7 +112,7 @@ fn read_choices(
     for key in table.untaken_keys() {
         let name = format!("{prefix}{key}");
         let span = table.key_span(&key).unwrap_or_default();
-        let form = Form::of(&name, &designators.candidates, designators.other_count.0);
+        let form = Form::of(&name, &designators.candidates, &designators.other_counts);
         let values = read_values(&mut table, &key, form);
         places.insert(Case::place_of(&name), span.clone());
         if choices.insert(name.clone(), values).is_some() {

@@ -115,7 +115,7 @@ fn choice_lines(campaign: &Campaign, case: &CaseText<'_>) -> String {
             out.push('\n');
         }
         thing = Some(of);
-        let form = Form::of(name, &campaign.candidates, campaign.other_count.0);
+        let form = Form::of(name, &campaign.candidates, &campaign.other_counts);
         let written: Vec<String> = values[name].iter().map(|choice| written(choice.value, form)).collect();
         let value = match written.as_slice() {
             [only] => only.clone(),

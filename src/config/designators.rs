@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::{Diagnostics, Span};
 use crate::config::shelf::Shelf;
-use crate::config::{Located, Table};
+use crate::config::{Located, OtherCounts, Table};
 
 /// What a table's candidates are names of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,7 +33,7 @@ const DEFAULT_COUNT: (u32, u32) = (1, 4);
 /// What the configuration offers scene generation to choose from.
 pub(crate) struct Designators {
     pub(crate) candidates: BTreeMap<String, Vec<String>>,
-    pub(crate) other_count: (u32, u32),
+    pub(crate) other_counts: OtherCounts,
     pub(crate) lying: (f64, f64),
     pub(crate) nav_obstacles: Vec<String>,
     pub(crate) nav_obstacle_count: u32,
@@ -48,8 +48,9 @@ pub(crate) fn read(
     found: &mut Diagnostics,
 ) -> Designators {
     let mut candidates = BTreeMap::new();
-    let mut other_count = (0, 0);
+    let mut other_counts = OtherCounts::default();
     let mut lying = (0.0, 0.0);
+    let has_others = root.key_span("surfaceObjects").is_some();
     for (name, key, kind) in PAPER_TABLES {
         let Some(mut table) = root.table(name) else { continue };
         table.require(&[key]);
@@ -63,8 +64,11 @@ pub(crate) fn read(
             }
         }
         if name == "surfaceObjects" {
-            other_count = read_count(&mut table);
+            other_counts.beside_target = read_count(&mut table).unwrap_or(DEFAULT_COUNT);
             lying.1 = table.number("lying", 0.0..=1.0).unwrap_or(0.0);
+        }
+        if name == "placeSurface" {
+            other_counts.at_place = read_place_count(&mut table, has_others);
         }
         if name == "pickObject" {
             lying.0 = table.number("lying", 0.0..=1.0).unwrap_or(0.0);
@@ -76,7 +80,7 @@ pub(crate) fn read(
         read_own_table(root, &name, &mut candidates, places, found);
     }
     let (nav_obstacles, nav_obstacle_count) = read_obstacles(root, shelf);
-    Designators { candidates, other_count, lying, nav_obstacles, nav_obstacle_count }
+    Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count }
 }
 
 /// Names of the models that a configuration may put into scenes.
@@ -120,7 +124,7 @@ fn read_own_table(
 }
 
 /// `count = [least, most]`, or one number for exactly that many.
-fn read_count(table: &mut Table) -> (u32, u32) {
+fn read_count(table: &mut Table) -> Option<(u32, u32)> {
     let bounds = 0..=MOST_OBJECTS;
     let range = if table.is_list("count") {
         table.integer_range("count", bounds)
@@ -128,7 +132,18 @@ fn read_count(table: &mut Table) -> (u32, u32) {
         table.integer("count", bounds).map(|count| (count, count))
     };
     let both = |(least, most)| Some((u32::try_from(least).ok()?, u32::try_from(most).ok()?));
-    range.and_then(both).unwrap_or(DEFAULT_COUNT)
+    range.and_then(both)
+}
+
+/// How many things stand on the surface to place on: of those that stand around the target, where there are such.
+fn read_place_count(table: &mut Table, has_others: bool) -> (u32, u32) {
+    let place = table.key_span("count");
+    let count = read_count(table).unwrap_or_default();
+    if count.1 > 0 && !has_others {
+        let message = format!("{} things shall stand on the surface to place on, but there is none to choose", count.1);
+        table.fault("C007", place.unwrap_or(0..0), message, "name models in `[surfaceObjects] model_list`, or set the count to 0");
+    }
+    count
 }
 
 fn read_obstacles(root: &mut Table, shelf: &Shelf) -> (Vec<String>, u32) {

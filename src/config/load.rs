@@ -57,7 +57,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let case = table.table("case");
     let designators = designators::read(&mut table, &mut shelf, &mut places, &mut found);
     let case = case.map(|table| case::read(table, &designators, &mut places, &mut found));
-    let Designators { candidates, other_count, lying, nav_obstacles, nav_obstacle_count } = designators;
+    let Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count } = designators;
     table.finish(&mut found);
     let named = designators::named_models(&candidates, &nav_obstacles);
     let report = shelf.report(&named);
@@ -85,7 +85,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         nav_obstacles,
         nav_obstacle_count,
         candidates,
-        other_count,
+        other_counts,
         lying,
         scene_rule,
         start: shelf.start,

@@ -14,13 +14,15 @@ pub(super) fn role_word(role: Role) -> &'static str {
         Role::Platform => "platform",
         Role::Target => "target",
         Role::Other => "other",
+        Role::PlaceOther => "place-other",
         Role::Obstacle => "obstacle",
     }
 }
 
 /// The role of a word.
 pub(super) fn role_of(word: &str) -> Option<Role> {
-    [Role::Platform, Role::Target, Role::Other, Role::Obstacle].into_iter().find(|role| role_word(*role) == word)
+    let all = [Role::Platform, Role::Target, Role::Other, Role::PlaceOther, Role::Obstacle];
+    all.into_iter().find(|role| role_word(*role) == word)
 }
 
 /// What makes sensing wrong, standard deviations for the most part, by local name of their terms.

@@ -62,7 +62,8 @@ pub struct ShrunkChoice {
 impl ShrunkSummary {
     /// Other objects that are left.
     pub fn others(&self) -> usize {
-        self.run.objects.iter().filter(|object| matches!(object.role, Role::Other | Role::Obstacle)).count()
+        let is_other = |role| matches!(role, Role::Other | Role::PlaceOther | Role::Obstacle);
+        self.run.objects.iter().filter(|object| is_other(object.role)).count()
     }
 }
 

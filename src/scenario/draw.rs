@@ -65,6 +65,7 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
     if let Some(world) = world {
         hand.surround(world);
     }
+    hand.clutter_place()?;
     let drive = space.drives.get(test).copied().flatten();
     if drive.is_some() {
         hand.name_front(world);
@@ -109,7 +110,7 @@ pub(super) struct Hand<'a> {
     /// Models of the objects that a record leaves out.
     left_out: Vec<String>,
     pub(super) designators: BTreeMap<String, Vec<String>>,
-    /// Where the platform stands; nothing where that is the origin.
+    /// Where the platform stands that things are put on; nothing where that is the origin.
     pub(super) platform: Option<Pose>,
     /// The place in front of the platform, where it got its name from the configuration.
     pub(super) front: Option<Location>,
@@ -227,19 +228,49 @@ impl<'a> Hand<'a> {
         Ok(())
     }
 
-    /// The others may stand anywhere. Nominal is the fewest, on a ring around the middle, the first at the far side.
+    /// What stands around the target.
     fn set_others(&mut self, surface: &Surface) -> Result<(), Discard> {
-        let (least, most) = self.space.other_count;
-        if self.space.others.is_empty() || most == 0 {
+        let counts = self.space.other_counts.beside_target;
+        if !self.space.others.is_empty() && counts.1 > 0 {
+            let ids = self.strew("other", Role::Other, counts, surface)?;
+            self.designators.insert("surfaceObjects".to_owned(), ids);
+        }
+        Ok(())
+    }
+
+    /// What stands already where the target is to be placed.
+    fn clutter_place(&mut self) -> Result<(), Discard> {
+        let counts = self.space.other_counts.at_place;
+        let id = self.designators.get("placeSurface").and_then(|ids| ids.first());
+        let place = self.objects.iter().find(|object| Some(&object.id) == id);
+        let Some((surface, pose)) = place.and_then(|place| Some((place.model.surface?, place.pose))) else {
+            return Ok(());
+        };
+        if self.space.others.is_empty() || counts.1 == 0 {
             return Ok(());
         }
-        let more = self.choices.index("other.count", (most - least + 1) as usize);
+        let platform = self.platform.replace(pose);
+        let strewn = self.strew("place_other", Role::PlaceOther, counts, &surface);
+        self.platform = platform;
+        strewn.map(|_| ())
+    }
+
+    /// Some of the models that stand around, anywhere on a surface: their ids. Nominal is the fewest, on a ring around the
+    /// middle, the first at the far side.
+    fn strew(
+        &mut self,
+        kind: &str,
+        role: Role,
+        (least, most): (u32, u32),
+        surface: &Surface,
+    ) -> Result<Vec<String>, Discard> {
+        let more = self.choices.index(&format!("{kind}.count"), (most - least + 1) as usize);
         let count = least as usize + more;
         // Seven tenths of the way out, where the ring keeps clear of the middle and of the edge.
         let radius = 0.35 * surface.size_m[0].min(surface.size_m[1]);
         let mut ids = Vec::new();
         for number in 1..=count {
-            let name = format!("other.{number}");
+            let name = format!("{kind}.{number}");
             if let Some(model) = self.choose(&format!("{name}.model"), &self.space.others) {
                 // Only a shrunk record leaves one out; the ids of the others stay as they were.
                 if self.choices.exception(&format!("{name}.left_out"), 2) == 1 {
@@ -248,11 +279,10 @@ impl<'a> Hand<'a> {
                 }
                 let angle = TAU * (number - 1) as f64 / count as f64;
                 let nominal = [radius * libm::cos(angle), radius * libm::sin(angle)];
-                ids.push(self.place(&name, model, Role::Other, surface, nominal)?);
+                ids.push(self.place(&name, model, role, surface, nominal)?);
             }
         }
-        self.designators.insert("surfaceObjects".to_owned(), ids);
-        Ok(())
+        Ok(ids)
     }
 
     /// One of some models: nominal is the first.

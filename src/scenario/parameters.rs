@@ -40,7 +40,7 @@ impl Space {
             ParameterKind::OneOf(0 | 1) | ParameterKind::Count(0 | 1) => {}
             kind => found.push(Parameter { name, kind }),
         };
-        let (least, most) = self.other_count;
+        let (least, most) = self.other_counts.beside_target;
         let most = if self.others.is_empty() { 0 } else { most };
         if most > 0 {
             add("other.count".to_owned(), ParameterKind::Count((most - least + 1) as usize));

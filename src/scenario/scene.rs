@@ -59,8 +59,10 @@ pub enum Role {
     Platform,
     /// What the robot is asked to handle.
     Target,
-    /// Stands around.
+    /// Stands around, where the target does.
     Other,
+    /// Stands on the surface that the target is to be placed on.
+    PlaceOther,
     /// Stands in the way of the base.
     Obstacle,
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::base::{Diagnostics, did_you_mean, names, nearest};
-use crate::config::{self, Campaign, Location, ObjectModel, Physics, RobotProfile, Sensing, Surface, WorldMap};
+use crate::config::{self, Campaign, Location, ObjectModel, OtherCounts, Physics, RobotProfile, Sensing, Surface, WorldMap};
 use crate::ontology::Ontology;
 use crate::scenario::surroundings::Surroundings;
 use crate::scenario::{KnownKind, placement};
@@ -24,7 +24,7 @@ pub struct Space {
     pub(super) surfaces: Vec<Arc<ObjectModel>>,
     pub(super) targets: Vec<Arc<ObjectModel>>,
     pub(super) others: Vec<Arc<ObjectModel>>,
-    pub(super) other_count: (u32, u32),
+    pub(super) other_counts: OtherCounts,
     /// Worlds; none where scenes lie on a floor with nothing else.
     pub(super) worlds: Vec<Surroundings>,
     /// Names of the surfaces of worlds on which the target may stand.
@@ -61,7 +61,7 @@ impl Space {
         check_tables(campaign, ontology, &mut found);
         let surfaces = models(campaign, "objectSurface");
         let targets = models(campaign, "pickObject");
-        let others = if campaign.other_count.1 > 0 { models(campaign, "surfaceObjects") } else { Vec::new() };
+        let others = if campaign.other_counts.any() { models(campaign, "surfaceObjects") } else { Vec::new() };
         check_categories(campaign, ontology, &mut found);
         check_surfaces(campaign, &mut found);
         let has_platform = !surfaces.is_empty() || !campaign.worlds.is_empty();
@@ -80,9 +80,7 @@ impl Space {
             .filter_map(|name| campaign.worlds.get(name))
             .map(|map| Surroundings::new(map, &campaign.models))
             .collect();
-        for key in ["pickObject", "surfaceObjects"] {
-            check_fit(campaign, key, &tops(campaign, &surfaces, &worlds), &mut found);
-        }
+        check_tops(campaign, &surfaces, &worlds, &mut found);
         check_worlds(campaign, &worlds, &mut found);
         let names = campaign.candidates.iter().filter(|(name, _)| !is_of_objects(name));
         config::in_order_of_place(found).or(Self {
@@ -91,7 +89,7 @@ impl Space {
             surfaces,
             targets,
             others,
-            other_count: campaign.other_count,
+            other_counts: campaign.other_counts,
             worlds,
             surface_names: candidates(campaign, "objectSurface"),
             place_names: candidates(campaign, "placeSurface"),
@@ -283,9 +281,27 @@ fn check_surfaces(campaign: &Campaign, found: &mut Diagnostics) {
     }
 }
 
-/// Names and extents of everything that the objects may stand on.
-fn tops(campaign: &Campaign, models: &[Arc<ObjectModel>], worlds: &[Surroundings]) -> Vec<(String, Surface)> {
-    let named = candidates(campaign, "objectSurface");
+/// Whether everything can stand wherever it may be put.
+fn check_tops(campaign: &Campaign, surfaces: &[Arc<ObjectModel>], worlds: &[Surroundings], found: &mut Diagnostics) {
+    let first = tops(campaign, "objectSurface", surfaces, worlds);
+    for key in ["pickObject", "surfaceObjects"] {
+        check_fit(campaign, key, &first, found);
+    }
+    if campaign.other_counts.at_place.1 > 0 {
+        let mut further = tops(campaign, "placeSurface", &models(campaign, "placeSurface"), worlds);
+        further.retain(|(name, _)| first.iter().all(|(other, _)| other != name));
+        check_fit(campaign, "surfaceObjects", &further, found);
+    }
+}
+
+/// Surfaces that a designator may stand for, by name: of models where they are put into the scene, of worlds that have them.
+fn tops(
+    campaign: &Campaign,
+    designator: &str,
+    models: &[Arc<ObjectModel>],
+    worlds: &[Surroundings],
+) -> Vec<(String, Surface)> {
+    let named = candidates(campaign, designator);
     let of_models = models.iter().filter_map(|model| Some((model.name.clone(), model.surface?)));
     let of_worlds = worlds.iter().flat_map(Surroundings::surfaces).filter(|object| named.contains(&object.id));
     of_models.chain(of_worlds.filter_map(|object| Some((object.id.clone(), object.model.surface?)))).collect()

@@ -56,11 +56,11 @@ impl World {
         self.objects.iter().map(|object| object.id.clone()).collect()
     }
 
-    /// Everything that stands for good as the floor plan has it: without noise, and off by as much as the robot is wrong about
-    /// where it stands itself.
+    /// Everything that the floor plan has: without noise, and off by as much as the robot is wrong about where it stands itself.
+    /// What stands for good and is on no map is for the robot's eyes.
     pub fn known_furniture(&self) -> Vec<Sighting> {
-        let fixed = self.objects.iter().filter(|object| object.fixed);
-        let as_built = fixed.map(|object| {
+        let on_map = self.objects.iter().filter(|object| object.on_map);
+        let as_built = on_map.map(|object| {
             let (foot, size_m) = self.foot(object, &object.placed);
             Sighting { id: object.id.clone(), pose: Pose::from_isometry(&foot), size_m, furniture: true }
         });
@@ -95,7 +95,7 @@ impl World {
             *size = (*size + noise).max(SMALLEST_M);
         }
         let pose = Pose::from_isometry(&(self.believed_from_true * seen));
-        Some(Sighting { id: id.to_owned(), pose, size_m, furniture: object.fixed })
+        Some(Sighting { id: id.to_owned(), pose, size_m, furniture: object.on_map })
     }
 
     /// Gap between the fingers as a noisy sensor gives it. Unit: metres.

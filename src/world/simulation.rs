@@ -9,7 +9,7 @@ use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, Ri
 
 use crate::base::Pose;
 use crate::scenario::{
-    CONTROL_HZ, Camera, FloorPlan, Inertia, KnownKind, ObjectModel, RobotProfile, Scene, SceneObject, Sensing,
+    CONTROL_HZ, Camera, FloorPlan, Inertia, KnownKind, ObjectModel, RobotProfile, Role, Scene, SceneObject, Sensing,
 };
 use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
 use crate::world::engine::{Owner, add_floor, collider, engine};
@@ -61,6 +61,8 @@ pub(super) struct Object {
     pub(super) model: Arc<ObjectModel>,
     /// Whether nothing moves it.
     pub(super) fixed: bool,
+    /// Whether it belongs to the world that the robot has a plan of, as nothing else of a scene does.
+    pub(super) on_map: bool,
     pub(super) body: RigidBodyHandle,
     pub(super) mass_kg: f64,
     pub(super) friction: f64,
@@ -162,6 +164,7 @@ fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object
         id: object.id.clone(),
         model: object.model.clone(),
         fixed,
+        on_map: object.role == Role::Platform,
         body,
         mass_kg: object.mass_kg,
         friction: object.friction,

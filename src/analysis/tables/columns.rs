@@ -90,6 +90,10 @@ const COLUMNS: &[Column] = &[
     number("base_yaw_rad", "rad", "which way the base faced at first", |p| Cell::number(p.run.robot_base[2]))
         .of_scene(),
     count("others", "things that stand around: the clutter", |p| Cell::count(with_role(p, Role::Other))).of_scene(),
+    count("place_others", "things that stand where the target is to be placed", |p| {
+        Cell::count(with_role(p, Role::PlaceOther))
+    })
+    .of_scene(),
     count("obstacles", "obstacles on the floor", |p| Cell::count(with_role(p, Role::Obstacle))).of_scene(),
     text("surface_category", "class of the platform that the target stands on (IRI)", |p| category(p.scene.surface))
         .of_scene(),

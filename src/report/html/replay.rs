@@ -126,7 +126,7 @@ fn word(role: Role) -> &'static str {
     match role {
         Role::Platform => "platform",
         Role::Target => "target",
-        Role::Other => "other",
+        Role::Other | Role::PlaceOther => "other",
         Role::Obstacle => "obstacle",
     }
 }

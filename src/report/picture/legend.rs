@@ -51,7 +51,7 @@ fn entries(material: &Material<'_>) -> Vec<(Sample, &'static str)> {
         material.trace.actions.iter().any(|action| !action.percepts.is_empty() || action.perceived.is_some());
     let all = [
         (has(Role::Target), Sample::Area(paint::movable(Role::Target)), "target"),
-        (has(Role::Other), Sample::Area(paint::movable(Role::Other)), "other objects"),
+        (has(Role::Other) || has(Role::PlaceOther), Sample::Area(paint::movable(Role::Other)), "other objects"),
         (has(Role::Obstacle), Sample::Area(paint::movable(Role::Obstacle)), "obstacles"),
         (true, Sample::Area(paint::FURNITURE), "furniture"),
         (true, Sample::Area(paint::ROBOT), "robot"),

@@ -37,7 +37,7 @@ pub(super) fn rgb_of(role: Role) -> u32 {
     match role {
         Role::Target => TARGET,
         Role::Obstacle => OBSTACLE,
-        Role::Other | Role::Platform => OTHER,
+        Role::Other | Role::PlaceOther | Role::Platform => OTHER,
     }
 }
 

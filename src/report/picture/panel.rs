@@ -236,11 +236,12 @@ fn name_bodies(
 ) {
     let mut named: Vec<(&BodyState, Role)> =
         shown.iter().filter(|body| !is_wall(body)).map(|body| (*body, material.role(body))).collect();
-    let rank = |role: Role| [Role::Target, Role::Obstacle, Role::Other, Role::Platform].iter().position(|r| *r == role);
+    let order = [Role::Target, Role::Obstacle, Role::Other, Role::PlaceOther, Role::Platform];
+    let rank = |role: Role| order.iter().position(|other| *other == role);
     named.sort_by_key(|(body, role)| (body.fixed, rank(*role)));
     for (body, role) in named {
         // On a map, what stands on tables is too small to be named.
-        if is_map && !body.fixed && role == Role::Other {
+        if is_map && !body.fixed && matches!(role, Role::Other | Role::PlaceOther) {
             continue;
         }
         let at = window.rect(&Bounds::of(body));
