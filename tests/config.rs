@@ -72,7 +72,7 @@ fn all_parameters_of_the_paper_are_read() {
             "world: lab, apartment",
         ]
     );
-    assert_eq!(campaign.other_count, (1, 4));
+    assert_eq!(campaign.other_counts.beside_target, (1, 4));
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn without_anything_said_the_shipped_files_serve() {
         campaign.robot.urdf.name.strip_prefix("built-in:").map(|name| name.contains("mobile_manipulator")),
         Some(true)
     );
-    assert_eq!((campaign.seed, campaign.other_count), (0, (0, 0)));
+    assert_eq!((campaign.seed, campaign.other_counts.beside_target), (0, (0, 0)));
     assert_eq!(campaign.launcher, Launcher::Reference);
     assert!(campaign.history.ends_with(".actcheck"));
     assert_eq!(campaign.sensing.position_noise_m, 0.0);
@@ -103,7 +103,7 @@ fn numbers_of_other_objects_may_be_exact() {
         load_text(&format!(
             "tests = [[\"Pick\"]]\ntest_count = 1\n[surfaceObjects]\nmodel_list = [\"mug\"]\ncount = {text}\n"
         ))
-        .other_count
+        .other_counts.beside_target
     };
     assert_eq!(count("3"), (3, 3));
     assert_eq!(count("0"), (0, 0));

@@ -33,6 +33,21 @@ fn shipped(name: &str) -> Arc<ObjectModel> {
     Arc::new(actcheck::config::model::read(&source).expect("the shipped models are right"))
 }
 
+/// A robot has a plan of its world, and of nothing that a scene puts into it, even where nothing can move it.
+#[test]
+fn what_stands_for_good_is_known_only_if_it_is_on_the_map() {
+    let fixed = Arc::new(ObjectModel { fixed: true, ..Arc::unwrap_or_clone(block([0.2, 0.2, 0.2])) });
+    let at = |x: f64| Pose::upright([x, 0.0, 0.0], 0.0);
+    let objects = vec![
+        object("table", block([0.5, 0.5, 0.5]), Role::Platform, at(0.0), 1.0, 0.5),
+        object("pillar", Arc::clone(&fixed), Role::Obstacle, at(1.0), 1.0, 0.5),
+        object("statue", fixed, Role::Other, at(2.0), 1.0, 0.5),
+    ];
+    let world = world(objects);
+    let known: Vec<String> = world.known_furniture().into_iter().map(|piece| piece.id).collect();
+    assert_eq!(known, ["table"]);
+}
+
 /// A box of 1 kg, unless the scene says otherwise.
 fn block(size: [f64; 3]) -> Arc<ObjectModel> {
     let pose = Pose::upright([0.0, 0.0, size[2] / 2.0], 0.0);

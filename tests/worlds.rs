@@ -140,6 +140,40 @@ fn obstacles_stand_on_the_floor_and_in_nobodys_way() {
     }
 }
 
+/// Things stand where the target is to be placed too, in a world and without one, and nowhere if nobody asks for them.
+#[test]
+fn the_place_can_be_cluttered() {
+    let others =
+        "[surfaceObjects]\nmodel_list = [\"mug\", \"bottle\"]\ncount = 2\n[pickObject]\nmodel_list = [\"can\"]\n";
+    for world in [
+        "[world]\nworlds = [\"apartment\"]\n[objectSurface]\nobject_surfaces = [\"dining_table\"]\n[placeSurface]\nplace_object_surfaces = [\"side_table\", \"coffee_table\"]\n",
+        "[objectSurface]\nobject_surfaces = [\"table\"]\n[placeSurface]\nplace_object_surfaces = [\"coffee_table\"]\n",
+    ] {
+        let at_place = |scene: &Scene| -> Vec<actcheck::scenario::SceneObject> {
+            scene.objects.iter().filter(|object| object.role == Role::PlaceOther).cloned().collect()
+        };
+        let (_folder, bare) = env(&format!("{world}{others}"));
+        assert!(scenes(&bare, 10).iter().all(|scene| at_place(scene).is_empty()));
+        let (_folder, env) = env(&format!("{world}count = [1, 4]\n{others}"));
+        let mut counts = std::collections::BTreeSet::new();
+        for scene in scenes(&env, 40) {
+            let standing = at_place(&scene);
+            counts.insert(standing.len());
+            let place = &scene.designators["placeSurface"][0];
+            let platform = scene.objects.iter().find(|object| object.id == *place).unwrap();
+            let surface = platform.model.surface.unwrap();
+            for object in &standing {
+                let local = platform.pose.to_isometry().inverse() * nalgebra::Point3::from(object.pose.position);
+                assert!(local.x.abs() < surface.size_m[0] / 2.0 && local.y.abs() < surface.size_m[1] / 2.0);
+                assert!((local.z - surface.height_m).abs() < 1e-9, "{} stands on {place}", object.id);
+                assert!(!scene.designators["surfaceObjects"].contains(&object.id));
+                assert_eq!(scene.objects.iter().filter(|other| other.id == object.id).count(), 1);
+            }
+        }
+        assert_eq!(counts, [1, 2, 3, 4].into());
+    }
+}
+
 /// Sizes, lying objects and the start of the base are drawn where the configuration asks for it.
 #[test]
 fn scenes_use_every_parameter() {

@@ -1,6 +1,5 @@
 //! `actcheck analyse`
 
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -9,12 +8,13 @@ use crate::analysis::{
     FINDING_COLUMNS, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns,
     flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
-use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
-use crate::cli::args::{Format, HistoryArgs};
+use crate::base::{Diagnostic, Diagnostics, did_you_mean};
+use crate::cli::args::Format;
+use crate::cli::chosen::{self, ChosenRuns, is_meant};
+use crate::cli::output;
 use crate::cli::picture::Picture;
-use crate::cli::{export, history_dir, output, since, why};
 use crate::history::History;
-use crate::ontology::{self, Ontology};
+use crate::ontology::Ontology;
 use crate::report::{
     FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table, patterns_picture,
     scene_rule,
@@ -24,18 +24,15 @@ use crate::verdict::Counts;
 /// Heat maps that are made of a property that was asked for: where on its surface the target stood, and what it was and how it was turned.
 const USUAL_MAPS: [[&str; 2]; 2] = [["surface_y_m", "surface_x_m"], ["target_category", "target_turned_rad"]];
 
+/// Conditions that a pattern has at most, by default and at all.
+const MOST_CONDITIONS: u8 = 3;
+
 /// `actcheck analyse`
 #[derive(Debug, Args)]
 pub struct AnalyseArgs {
     /// Only this property, by its name in the ontology (may be given several times); tells heat maps too
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
-    /// Only runs of this campaign (may be given several times) [default: all but the smaller forms of runs]
-    #[arg(long, value_name = "ID")]
-    pub campaign: Vec<String>,
-    /// Only runs since then, such as 2026-11-21, 2026-11-21T18:00:00Z or 12h ago as 12h
-    #[arg(long, value_name = "WHEN", value_parser = since::moment)]
-    pub since: Option<String>,
     /// Failures by one or two parameters, such as `target_category,target_turned_rad`, instead of the usual heat maps
     #[arg(long, value_name = "DOWN[,ACROSS]", value_delimiter = ',', num_args = 1..=2)]
     pub by: Vec<String>,
@@ -47,17 +44,14 @@ pub struct AnalyseArgs {
     #[arg(long, value_name = "N", requires = "property", conflicts_with = "by")]
     pub scene_rule: Option<usize>,
     /// Conditions of a pattern at most
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=3))]
+    #[arg(long, value_name = "N", default_value_t = MOST_CONDITIONS, value_parser = clap::value_parser!(u8).range(1..=3))]
     pub depth: u8,
     /// Share of false patterns that is bearable on average, after correction for everything that was tried
     #[arg(long, value_name = "LEVEL", default_value_t = 0.05, value_parser = level)]
     pub level: f64,
-    /// The ontology that says which kinds belong to which [default: ontology/actions.ttl here, or the one that the program carries]
-    #[arg(long, value_name = "FILE")]
-    pub ontology: Option<PathBuf>,
-    /// Where the history lies.
+    /// Of which runs, and where the history lies.
     #[command(flatten)]
-    pub history: HistoryArgs,
+    pub chosen: ChosenRuns,
     /// How it is printed (csv: the patterns, or with --by the cells of the map; json: everything)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
@@ -84,8 +78,17 @@ pub(super) struct Analysed {
 pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     check_parameters(&args.by)?;
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
-    let history = history_dir::open(&args.history)?;
-    let summary = analysed(args, &history, &[])?.summary;
+    let history = args.chosen.open()?;
+    let asked = Question {
+        chosen: &args.chosen,
+        property: &args.property,
+        by: &args.by,
+        // In a text about all properties they would be too much to read.
+        usual_maps: !args.property.is_empty() || args.format != Format::Table,
+        depth: args.depth,
+        level: args.level,
+    };
+    let summary = analysed(&asked, &history, &[])?.summary;
     if let Some(picture) = picture {
         picture.write(&patterns_picture(&summary).ok_or_else(|| {
             Diagnostic::error("X013", "there is no pattern to draw".to_owned())
@@ -105,29 +108,50 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
+/// What is asked of the chosen runs.
+pub(super) struct Question<'a> {
+    /// Of which runs.
+    pub chosen: &'a ChosenRuns,
+    /// Of which properties, by their names; none: of all.
+    pub property: &'a [String],
+    /// Parameters of the one heat map that is wanted; none: the usual ones.
+    pub by: &'a [String],
+    /// Whether heat maps are wanted that were not asked for.
+    pub usual_maps: bool,
+    /// Conditions of a pattern at most.
+    pub depth: u8,
+    /// Share of false patterns that is bearable.
+    pub level: f64,
+}
+
+impl Question<'_> {
+    /// The options that choose runs and the depth of patterns, as they were typed.
+    fn typed(&self) -> String {
+        let depth = if self.depth < MOST_CONDITIONS { format!(" --depth {}", self.depth) } else { String::new() };
+        self.chosen.typed() + &depth
+    }
+}
+
 /// Brings the tables beside a history up to date and looks for what goes with failures; the table has some further columns.
 pub(super) fn analysed(
-    args: &AnalyseArgs,
+    asked: &Question<'_>,
     history: &History,
     further: &[&'static str],
 ) -> Result<Analysed, Diagnostics> {
-    let filter = export::filter(history, &args.campaign, args.since.clone())?;
-    let hierarchy = export::hierarchy(args.ontology.as_deref())?;
-    let (files, path) = why::ontology_file(args.ontology.as_deref());
-    let ontology = ontology::load(&files, &path)?;
+    let filter = asked.chosen.filter(history)?;
+    let ontology = asked.chosen.ontology()?;
+    let hierarchy = chosen::hierarchy(&ontology);
     let (mirror, _) = Mirror::update(history)?;
     let table = read(&mirror, &filter, further)?;
     if table.is_empty() {
-        return Err(Diagnostic::error("X044", format!("the history `{}` has no such runs", history.dir().display()))
-            .help("`actcheck list` shows the runs that it has; `actcheck run CONFIG` makes some")
-            .into());
+        return Err(chosen::none_of(history).into());
     }
-    let wanted = wanted(judged(&table), &args.property)?;
-    let properties = reports(&wanted, |of| report(args, &table, of, &hierarchy, &ontology));
+    let wanted = wanted(judged(&table), asked.property)?;
+    let properties = reports(&wanted, |of| report(asked, &table, of, &hierarchy, &ontology));
     let summary = FindingsSummary {
         history: history.dir().display().to_string(),
         program: std::env::args().next().unwrap_or_else(|| "actcheck".to_owned()),
-        options: options(args),
+        options: asked.typed(),
         campaigns: table.text("campaign").texts.clone(),
         runs: table.text("run").texts.len() as u64,
         counts: judged(&table).iter().fold(Counts::default(), |mut sum, of| {
@@ -135,9 +159,9 @@ pub(super) fn analysed(
             sum
         }),
         modes: table_failure_modes(&table),
-        cascades: cascades(&table, args.level),
+        cascades: cascades(&table, asked.level),
         properties,
-        level: args.level,
+        level: asked.level,
     };
     Ok(Analysed { table, summary, ontology })
 }
@@ -158,20 +182,6 @@ fn reports(
     properties.chunks(workers).flat_map(at_once).collect()
 }
 
-/// The options that choose runs and the depth of patterns, as they were typed.
-fn options(args: &AnalyseArgs) -> String {
-    let mut typed = String::new();
-    let mut add = |name: &str, value: String| typed.push_str(&format!(" --{name} {value}"));
-    args.campaign.iter().for_each(|id| add("campaign", id.clone()));
-    args.since.iter().for_each(|since| add("since", since.clone()));
-    args.ontology.iter().for_each(|file| add("ontology", file.display().to_string()));
-    args.history.history.iter().for_each(|folder| add("history", folder.display().to_string()));
-    if args.depth < 3 {
-        add("depth", args.depth.to_string());
-    }
-    typed
-}
-
 fn read(mirror: &Mirror, filter: &TableFilter, further: &[&'static str]) -> Result<OutcomeTable, Diagnostics> {
     let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
     let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).chain(further.iter().copied()).collect();
@@ -179,27 +189,26 @@ fn read(mirror: &Mirror, filter: &TableFilter, further: &[&'static str]) -> Resu
 }
 
 fn report(
-    args: &AnalyseArgs,
+    asked: &Question<'_>,
     table: &OutcomeTable,
     of: &JudgedProperty,
     hierarchy: &Hierarchy,
     ontology: &Ontology,
 ) -> PropertyReport {
     let options =
-        PatternOptions { most_conditions: usize::from(args.depth), level: args.level, ..PatternOptions::default() };
+        PatternOptions { most_conditions: usize::from(asked.depth), level: asked.level, ..PatternOptions::default() };
     let findings = property_findings(table, of, hierarchy, &options);
     let (flaky, repeated_scenes) = flaky_scenes(table, of);
-    let asked: Vec<&str> = args.by.iter().map(String::as_str).collect();
-    let maps: Vec<&[&str]> = match (asked.is_empty(), args.property.is_empty() && args.format == Format::Table) {
-        (false, _) => vec![&asked],
-        // Of all properties at once they would be too much to read.
-        (true, true) => Vec::new(),
-        (true, false) => USUAL_MAPS.iter().map(<[&str; 2]>::as_slice).collect(),
+    let by: Vec<&str> = asked.by.iter().map(String::as_str).collect();
+    let maps: Vec<&[&str]> = match (by.is_empty(), asked.usual_maps) {
+        (false, _) => vec![&by],
+        (true, false) => Vec::new(),
+        (true, true) => USUAL_MAPS.iter().map(<[&str; 2]>::as_slice).collect(),
     };
     PropertyReport {
         maps: maps.into_iter().filter_map(|by| two_way(&findings.subject, by)).collect(),
         unit: ontology.properties.get(&of.property).and_then(|property| property.unit.clone()),
-        trend: trend(table, of, args.level),
+        trend: trend(table, of, asked.level),
         flaky,
         repeated_scenes,
         findings,
@@ -208,17 +217,9 @@ fn report(
 
 /// The properties that were asked for; all where none was.
 fn wanted(all: Vec<JudgedProperty>, names: &[String]) -> Result<Vec<JudgedProperty>, Diagnostics> {
-    let is = |of: &JudgedProperty, name: &String| names::local(&of.property) == name || of.property == *name;
-    let mut faults = Diagnostics::new();
-    for name in names.iter().filter(|name| !all.iter().any(|of| is(of, name))) {
-        let known: BTreeSet<&str> = all.iter().map(|of| names::local(&of.property)).collect();
-        faults.push(
-            Diagnostic::error("X045", format!("no property `{name}` was judged in these runs"))
-                .help(did_you_mean(name, known)),
-        );
-    }
-    faults.or(())?;
-    Ok(all.into_iter().filter(|of| names.is_empty() || names.iter().any(|name| is(of, name))).collect())
+    chosen::all_judged(names, all.iter().map(|of| of.property.as_str()))?;
+    let is_wanted = |of: &JudgedProperty| names.is_empty() || names.iter().any(|name| is_meant(&of.property, name));
+    Ok(all.into_iter().filter(is_wanted).collect())
 }
 
 /// A pattern as the rule of a scene; patterns are counted over all properties that were asked for, as the text tells them.

@@ -1,18 +1,15 @@
 //! `actcheck export`
 
-use std::cmp::Reverse;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::analysis::{Dataset, Hierarchy, Mirror, TableFilter, export_csv, export_dataset, export_parquet};
-use crate::base::{Diagnostic, Diagnostics, names};
+use crate::analysis::{Dataset, Mirror, export_csv, export_dataset, export_parquet};
+use crate::base::{Diagnostic, Diagnostics};
 use crate::campaign::{self, Env};
-use crate::cli::args::HistoryArgs;
-use crate::cli::{history_dir, output, since, why};
+use crate::cli::chosen::{self, ChosenRuns};
+use crate::cli::{output, written};
 use crate::history::History;
-use crate::ontology;
 
 /// `actcheck export`
 #[derive(Debug, Args)]
@@ -50,24 +47,14 @@ pub struct ExportArgs {
     /// Make the tables beside the history anew, from its store
     #[arg(long)]
     pub rebuild_mirror: bool,
-    /// Only rows of this campaign (for tables; may be given several times)
-    #[arg(long, value_name = "ID")]
-    pub campaign: Vec<String>,
-    /// Only rows of runs since then, such as 2026-11-21, 2026-11-21T18:00:00Z or 12h ago as 12h (for tables)
-    #[arg(long, value_name = "WHEN", value_parser = since::moment)]
-    pub since: Option<String>,
-    /// The ontology that says which kinds belong to which (for tables) [default: ontology/actions.ttl here, or the one that the
-    /// program carries]
-    #[arg(long, value_name = "FILE")]
-    pub ontology: Option<PathBuf>,
-    /// Where the history lies.
+    /// Of which runs the tables are, and where the history lies.
     #[command(flatten)]
-    pub history: HistoryArgs,
+    pub chosen: ChosenRuns,
 }
 
 /// Writes a stored run as a configuration of its own, or the history as tables or RDF.
 pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
-    let history = history_dir::open(&args.history)?;
+    let history = args.chosen.open()?;
     if let Some(run) = &args.run {
         export_run(args, &history, run)?;
     }
@@ -86,8 +73,8 @@ pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
 }
 
 fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics> {
-    let filter = filter(history, &args.campaign, args.since.clone())?;
-    let hierarchy = hierarchy(args.ontology.as_deref())?;
+    let filter = args.chosen.filter(history)?;
+    let hierarchy = chosen::hierarchy(&args.chosen.ontology()?);
     let (mirror, change) = if args.rebuild_mirror { Mirror::rebuild(history) } else { Mirror::update(history) }?;
     if args.rebuild_mirror {
         let runs = change.added;
@@ -128,31 +115,6 @@ fn print_dataset(dataset: &Dataset) {
     }
 }
 
-/// The rows that were asked for; a campaign that is not there is a fault.
-pub(super) fn filter(
-    history: &History,
-    campaigns: &[String],
-    since: Option<String>,
-) -> Result<TableFilter, Diagnostics> {
-    for campaign in campaigns {
-        history.campaign(campaign)?;
-    }
-    Ok(TableFilter { campaigns: (!campaigns.is_empty()).then(|| campaigns.to_vec()), since })
-}
-
-/// The classes above each class of an ontology, the nearest first: the more classes are above one, the nearer it is.
-pub(super) fn hierarchy(ontology: Option<&Path>) -> Result<Hierarchy, Diagnostics> {
-    let (files, path) = why::ontology_file(ontology);
-    let classes = ontology::load(&files, &path)?.superclasses;
-    let depth = |class: &String| classes.get(class).map_or(0, BTreeSet::len);
-    let nearest_first = |above: &BTreeSet<String>| {
-        let mut above: Vec<&String> = above.iter().collect();
-        above.sort_by_key(|class| (Reverse(depth(class)), *class));
-        above.into_iter().map(|class| names::local(class).to_owned()).collect()
-    };
-    Ok(classes.iter().map(|(class, above)| (class.clone(), nearest_first(above))).collect())
-}
-
 /// Writes a stored run as a configuration of its own.
 fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Diagnostics> {
     let run = history.run(run)?;
@@ -172,7 +134,7 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
         output::print(&text);
         return Ok(());
     }
-    std::fs::write(&file, text).map_err(|error| unwritten(&file, &error))?;
+    written::write(&file, text)?;
     let shown = file.display();
     output::print(&format!("{shown} holds run {}: actcheck run {shown}\n", run.row.run));
     Ok(())
@@ -181,16 +143,11 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
 /// A new file in the folder of regressions, which is there afterwards.
 fn new_regression(env: &Env, run: &str) -> Result<PathBuf, Diagnostics> {
     let folder = campaign::regressions_folder(&env.campaign.source)?;
-    std::fs::create_dir_all(&folder).map_err(|error| unwritten(&folder, &error))?;
+    std::fs::create_dir_all(&folder).map_err(|error| written::unwritten(&folder, error))?;
     let file = folder.join(format!("{run}.toml"));
     if file.exists() {
         let fault = Diagnostic::error("X042", format!("{} is there already", file.display()));
         return Err(fault.help("it may have been edited: move it away, or name another file with `-o`").into());
     }
     Ok(file)
-}
-
-fn unwritten(file: &Path, error: &std::io::Error) -> Diagnostic {
-    Diagnostic::error("X007", format!("{} can't be written: {error}", file.display()))
-        .help("name a file in a folder that exists and may be written")
 }

@@ -10,6 +10,7 @@ mod args;
 mod case;
 mod check;
 mod check_oracles;
+mod chosen;
 mod clock;
 mod compare;
 mod datalog;
@@ -39,6 +40,7 @@ mod shrink;
 mod since;
 mod stop;
 mod why;
+mod written;
 
 pub use args::Arguments;
 pub use entry::run;

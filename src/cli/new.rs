@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean};
 use crate::cli::args::{NewArgs, NewKind, NewPropertyArgs};
-use crate::cli::output;
+use crate::cli::{output, written};
 use crate::ontology::{self, property_template};
 
 /// Writes what is new.
@@ -46,26 +46,22 @@ fn property(args: &NewPropertyArgs) -> Result<(), Diagnostics> {
             .help("choose another name, or edit that file")
             .into());
     }
-    let text = Files::Disk.read(&args.ontology).map_err(|why| unwritable(&args.ontology, &why))?.text;
-    write(&rule, &template.rule_text)?;
-    write(&args.ontology, &format!("{}{}", text.trim_end(), template.ontology_entry.replacen('\n', "\n\n", 1)))?;
+    let text = Files::Disk
+        .read(&args.ontology)
+        .map_err(|why| {
+            written::unwritten(&args.ontology, why)
+                .help("name an ontology in a folder that may be written, with `--ontology FILE`")
+        })?
+        .text;
+    written::write(&rule, &template.rule_text)?;
+    written::write(
+        &args.ontology,
+        format!("{}{}", text.trim_end(), template.ontology_entry.replacen('\n', "\n\n", 1)),
+    )?;
     output::print(&format!(
         "wrote {} and an entry in {}: edit both, then `actcheck check CONFIG`\n",
         rule.display(),
         args.ontology.display()
     ));
     Ok(())
-}
-
-/// Writes a file whole or not at all.
-fn write(path: &Path, text: &str) -> Result<(), Diagnostics> {
-    let beside = path.with_extension("new");
-    std::fs::write(&beside, text)
-        .and_then(|()| std::fs::rename(&beside, path))
-        .map_err(|error| unwritable(path, &error.to_string()).into())
-}
-
-fn unwritable(path: &Path, why: &str) -> Diagnostic {
-    Diagnostic::error("X007", format!("{} can't be written: {why}", path.display()))
-        .help("name an ontology in a folder that may be written, with `--ontology FILE`")
 }

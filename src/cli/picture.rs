@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::written;
 use crate::history::{History, RunDetail};
 use crate::report::{Caption, Drawing, run_picture};
 
@@ -49,11 +50,7 @@ impl<'a> Picture<'a> {
     /// # Errors
     /// X007: the file can't be written.
     pub(super) fn write(&self, drawing: &Drawing) -> Result<(), Diagnostics> {
-        let written = (self.render)(drawing).and_then(|bytes| std::fs::write(self.file, bytes));
-        written.map_err(|error| {
-            Diagnostic::error("X007", format!("{} can't be written: {error}", self.file.display()))
-                .help("name a file in a folder that exists and may be written")
-                .into()
-        })
+        let bytes = (self.render)(drawing).map_err(|error| written::unwritten(self.file, error))?;
+        written::write(self.file, bytes)
     }
 }

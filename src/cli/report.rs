@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::base::{Diagnostic, Diagnostics, names};
-use crate::cli::args::HistoryArgs;
+use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::chosen::{ChosenRuns, is_meant};
 use crate::cli::report_formats::{self, FormatArgs};
-use crate::cli::{history_dir, output, report_html, since};
+use crate::cli::{output, report_html, written};
 
 /// `actcheck report`
 #[derive(Debug, Args)]
@@ -22,22 +22,12 @@ pub struct ReportArgs {
     /// Only this property, by its name in the ontology (may be given several times)
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
-    /// Only runs of this campaign (may be given several times) [default: all but the smaller forms of runs]
-    #[arg(long, value_name = "ID")]
-    pub campaign: Vec<String>,
-    /// Only runs since then, such as 2026-11-21, 2026-11-21T18:00:00Z or 12h ago as 12h
-    #[arg(long, value_name = "WHEN", value_parser = since::moment)]
-    pub since: Option<String>,
-    /// The ontology that explains outcomes and says which kinds belong to which [default: ontology/actions.ttl here, or the one
-    /// that the program carries]
-    #[arg(long, value_name = "FILE")]
-    pub ontology: Option<PathBuf>,
     /// Room for the replays of failed runs in the page: more take longer to make and to send
     #[arg(long, value_name = "MB", default_value_t = 5.0, value_parser = megabytes)]
     pub replay_mb: f64,
-    /// Where the history lies.
+    /// Of which runs, and where the history lies.
     #[command(flatten)]
-    pub history: HistoryArgs,
+    pub chosen: ChosenRuns,
 }
 
 fn megabytes(text: &str) -> Result<f64, String> {
@@ -50,7 +40,7 @@ fn megabytes(text: &str) -> Result<f64, String> {
 impl ReportArgs {
     /// Whether a property was asked for by its name or IRI.
     pub(super) fn wants(&self, property: &str) -> bool {
-        self.property.iter().any(|name| name == property || name == names::local(property))
+        self.property.iter().any(|name| is_meant(property, name))
     }
 
     /// Whether a report goes to the output stream.
@@ -69,14 +59,14 @@ impl ReportArgs {
 /// Writes the reports that were asked for.
 pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
     let printed = args.prints()?;
-    let history = history_dir::open(&args.history)?;
+    let history = args.chosen.open()?;
     let mut told = report_formats::write(args, &history)?;
     if let Some(file) = &args.html {
         let page = report_html::page(args, &history)?;
         if file.as_os_str() == "-" {
             output::print(&page);
         } else {
-            std::fs::write(file, &page).map_err(|error| report_formats::unwritten(file, &error))?;
+            written::write(file, &page)?;
             told.push(format!("{} holds the report ({:.1} MB)", file.display(), page.len() as f64 / 1e6));
         }
     }

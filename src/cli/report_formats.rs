@@ -6,11 +6,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
+use crate::base::Diagnostics;
 use crate::cli::report::ReportArgs;
-use crate::cli::{export, output, report_html, why};
+use crate::cli::{chosen, output, report_html, written};
 use crate::history::{CampaignRow, History, RunDetail, RunFilter, RunRow};
-use crate::ontology;
 use crate::report::{
     Attachment, Caption, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results, markdown,
     observation, run_picture,
@@ -56,7 +55,7 @@ pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>,
     if !args.formats.any() {
         return Ok(Vec::new());
     }
-    let (campaigns, rows) = chosen(args, history)?;
+    let (campaigns, rows) = asked_for(args, history)?;
     let mut sinks = Sinks::open(args, history, &campaigns)?;
     let mut judged = BTreeSet::new();
     for row in &rows {
@@ -67,13 +66,13 @@ pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>,
         }
         sinks.take(&run)?;
     }
-    known(&args.property, &judged)?;
+    chosen::all_judged(&args.property, judged.iter().map(String::as_str))?;
     sinks.finish(&args.formats, &campaigns)
 }
 
 /// The campaigns and runs that were asked for, in their order; smaller forms of runs only where their campaign is named.
-fn chosen(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
-    let filter = export::filter(history, &args.campaign, args.since.clone())?;
+fn asked_for(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
+    let filter = args.chosen.filter(history)?;
     let shrunk = history.shrunk_campaigns()?;
     let wanted = |id: &String| match &filter.campaigns {
         Some(named) => named.contains(id),
@@ -83,24 +82,11 @@ fn chosen(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec
     let mut rows = history.runs(&RunFilter::default())?;
     rows.retain(|row| wanted(&row.campaign) && row.started.as_str() >= since);
     if rows.is_empty() {
-        return Err(Diagnostic::error("X044", format!("the history `{}` has no such runs", history.dir().display()))
-            .help("`actcheck list` shows the runs that it has; `actcheck run CONFIG` makes some")
-            .into());
+        return Err(chosen::none_of(history).into());
     }
     let met: BTreeSet<&String> = rows.iter().map(|row| &row.campaign).collect();
     let campaigns = history.campaigns()?.into_iter().filter(|row| met.contains(&row.id)).collect();
     Ok((campaigns, rows))
-}
-
-/// A property that was never judged was misspelt.
-fn known(wanted: &[String], judged: &BTreeSet<String>) -> Result<(), Diagnostics> {
-    let mut faults = Diagnostics::new();
-    for name in wanted.iter().filter(|name| !judged.iter().any(|iri| iri == *name || names::local(iri) == *name)) {
-        let message = format!("no property `{name}` was judged in these runs");
-        let help = did_you_mean(name, judged.iter().map(|iri| names::local(iri)));
-        faults.push(Diagnostic::error("X045", message).help(help));
-    }
-    faults.or(())
 }
 
 /// What has been made so far of each format.
@@ -158,7 +144,7 @@ impl<'a> Sinks<'a> {
             if file.as_os_str() == "-" {
                 output::print(&text);
             } else {
-                std::fs::write(file, text).map_err(|error| unwritten(file, &error))?;
+                written::write(file, text)?;
                 told.push(format!("{} holds {what}", file.display()));
             }
         }
@@ -190,10 +176,9 @@ impl<'a> AllureFolder<'a> {
         campaigns: &[CampaignRow],
     ) -> Result<Self, Diagnostics> {
         let budget = Budget::default();
-        let (files, path) = why::ontology_file(args.ontology.as_deref());
         // Rules that can't be read today explain nothing; the outcomes are those of the history.
-        let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget).ok();
-        std::fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
+        let rules = RuleBook::prepare_within(&args.chosen.ontology()?, &budget).ok();
+        std::fs::create_dir_all(folder).map_err(|error| written::unwritten(folder, error))?;
         let ids: Vec<String> = campaigns.iter().map(|row| row.id.clone()).collect();
         let made = Self { folder, history, rules, budget, repetitions: Repetitions::new(), results: 0, untraced: 0 };
         made.write(&allure_common(env!("CARGO_PKG_VERSION"), &ids))?;
@@ -244,8 +229,7 @@ impl<'a> AllureFolder<'a> {
 
     fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Diagnostics> {
         for (name, bytes) in files {
-            let file = self.folder.join(name);
-            std::fs::write(&file, bytes).map_err(|error| unwritten(&file, &error))?;
+            written::write(&self.folder.join(name), bytes)?;
         }
         Ok(())
     }
@@ -269,9 +253,4 @@ pub(super) fn tell(lines: &[String], printed: bool) {
     } else {
         output::print(&text);
     }
-}
-
-pub(super) fn unwritten(file: &Path, error: &std::io::Error) -> Diagnostic {
-    Diagnostic::error("X007", format!("{} can't be written: {error}", file.display()))
-        .help("name a file in a folder that exists and may be written")
 }

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::base::Diagnostics;
-use crate::cli::analyse::{AnalyseArgs, Analysed, analysed};
-use crate::cli::args::{Format, HistoryArgs};
+use crate::cli::analyse::{Analysed, Question, analysed};
 use crate::cli::clock;
 use crate::cli::report::ReportArgs;
 use crate::history::{History, RunDetail, Trace};
@@ -30,7 +29,15 @@ type Watched = (RunDetail, Option<Trace>, Vec<Explained>);
 /// # Errors
 /// The history has no such runs, or can't be read.
 pub(super) fn page(args: &ReportArgs, history: &History) -> Result<String, Diagnostics> {
-    let Analysed { table, summary, ontology } = analysed(&asked(args), history, &HTML_COLUMNS)?;
+    let asked = Question {
+        chosen: &args.chosen,
+        property: &args.property,
+        by: &[],
+        usual_maps: true,
+        depth: DEPTH,
+        level: LEVEL,
+    };
+    let Analysed { table, summary, ontology } = analysed(&asked, history, &HTML_COLUMNS)?;
     let order = replay_order(&summary, &table);
     let replays = replays(history, &ontology, &order, args.replay_mb * BYTES_IN_A_MB)?;
     Ok(html(&HtmlReport {
@@ -42,24 +49,6 @@ pub(super) fn page(args: &ReportArgs, history: &History) -> Result<String, Diagn
         words: &words(&ontology),
         replays: &replays,
     }))
-}
-
-/// The same question as `actcheck analyse` is asked.
-fn asked(args: &ReportArgs) -> AnalyseArgs {
-    AnalyseArgs {
-        property: args.property.clone(),
-        campaign: args.campaign.clone(),
-        since: args.since.clone(),
-        by: Vec::new(),
-        picture: None,
-        scene_rule: None,
-        depth: DEPTH,
-        level: LEVEL,
-        ontology: args.ontology.clone(),
-        history: HistoryArgs { history: args.history.history.clone() },
-        // All heat maps are wanted.
-        format: Format::Json,
-    }
 }
 
 fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {

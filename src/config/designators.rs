@@ -141,7 +141,12 @@ fn read_place_count(table: &mut Table, has_others: bool) -> (u32, u32) {
     let count = read_count(table).unwrap_or_default();
     if count.1 > 0 && !has_others {
         let message = format!("{} things shall stand on the surface to place on, but there is none to choose", count.1);
-        table.fault("C007", place.unwrap_or(0..0), message, "name models in `[surfaceObjects] model_list`, or set the count to 0");
+        table.fault(
+            "C007",
+            place.unwrap_or(0..0),
+            message,
+            "name models in `[surfaceObjects] model_list`, or set the count to 0",
+        );
     }
     count
 }

@@ -8,7 +8,6 @@ use oxigraph::store::{StorageError, Store};
 use crate::base::names;
 use crate::history::read::{Node, id_of, subjects, text_of};
 use crate::history::statements::iri;
-use crate::history::write_scene::role_of;
 use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail, RunRow, RunStatus};
 use crate::scenario::Role;
 use crate::verdict::{Judgement, Outcome};
@@ -125,7 +124,7 @@ fn object(node: &Node) -> ObjectDetail {
         id: node.all("act:object").first().map(id_of).unwrap_or_default(),
         model: node.text("act:model").unwrap_or_default(),
         category: node.text("act:category").unwrap_or_default(),
-        role: node.text("act:role").and_then(|word| role_of(&word)).unwrap_or(Role::Other),
+        role: node.text("act:role").and_then(|word| Role::from_word(&word)).unwrap_or(Role::Other),
         x: number("w:x"),
         y: number("w:y"),
         z: number("w:z"),

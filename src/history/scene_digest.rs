@@ -9,7 +9,6 @@ use crate::base::{Diagnostics, Digest};
 use crate::history::detail::{designators, objects};
 use crate::history::read::Node;
 use crate::history::write_run::run_node;
-use crate::history::write_scene::role_word;
 use crate::history::{History, ObjectDetail, RunRow};
 
 /// The scene of a run, in two digests.
@@ -55,7 +54,7 @@ fn read(store: &Store, run: &NamedNode) -> Result<SceneDigest, StorageError> {
 }
 
 fn add_place(object: &ObjectDetail, digest: &mut Digest) {
-    for text in [&object.id, &object.model, &object.category, role_word(object.role)] {
+    for text in [&object.id, &object.model, &object.category, object.role.word()] {
         digest.update(text.as_bytes());
     }
     add_numbers([object.x, object.y, object.z, object.yaw], digest);

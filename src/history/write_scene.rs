@@ -8,23 +8,6 @@ use crate::history::RunRecord;
 use crate::history::statements::{Statements, iri};
 use crate::scenario::{Role, Scene, SceneObject};
 
-/// The word for a role.
-pub(super) fn role_word(role: Role) -> &'static str {
-    match role {
-        Role::Platform => "platform",
-        Role::Target => "target",
-        Role::Other => "other",
-        Role::PlaceOther => "place-other",
-        Role::Obstacle => "obstacle",
-    }
-}
-
-/// The role of a word.
-pub(super) fn role_of(word: &str) -> Option<Role> {
-    let all = [Role::Platform, Role::Target, Role::Other, Role::PlaceOther, Role::Obstacle];
-    all.into_iter().find(|role| role_word(*role) == word)
-}
-
 /// What makes sensing wrong, standard deviations for the most part, by local name of their terms.
 pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
     let sensing = &scene.sensing;
@@ -80,7 +63,7 @@ fn write_object(record: &RunRecord, object: &SceneObject, run: &NamedNode, state
         .has("act:object", iri(&thing))
         .has("act:category", iri(&object.model.category))
         .text("act:model", &object.model.name)
-        .text("act:role", role_word(object.role));
+        .text("act:role", object.role.word());
     for (property, value) in [
         ("w:x", x),
         ("w:y", y),

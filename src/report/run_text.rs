@@ -73,7 +73,7 @@ fn object_row(object: &ObjectDetail) -> Vec<String> {
     vec![
         object.id.clone(),
         names::local(&object.category).to_owned(),
-        format!("{:?}", object.role).to_lowercase(),
+        object.role.word().to_owned(),
         format!("{:.3}", object.x),
         format!("{:.3}", object.y),
         format!("{:.1}", object.yaw.to_degrees()),
@@ -125,7 +125,7 @@ pub fn run_json(run: &RunDetail) -> Value {
         .iter()
         .map(|o| {
             json!({
-                "id": o.id, "model": o.model, "category": o.category, "role": format!("{:?}", o.role).to_lowercase(),
+                "id": o.id, "model": o.model, "category": o.category, "role": o.role.word(),
                 "x": o.x, "y": o.y, "z": o.z, "yaw": o.yaw, "mass_kg": o.mass_kg, "friction": o.friction,
                 "restitution": o.restitution, "robot_distance_m": o.robot_distance_m,
                 "neighbour_distance_m": o.neighbour_distance_m, "target_distance_m": o.target_distance_m,

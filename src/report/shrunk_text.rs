@@ -120,7 +120,7 @@ fn scene_table(shrunk: &ShrunkSummary) -> String {
     for object in &shrunk.run.objects {
         table.add_row([
             object.id.clone(),
-            format!("{:?}", object.role).to_lowercase(),
+            object.role.word().to_owned(),
             format!("{:.3}", object.x),
             format!("{:.3}", object.y),
             format!("{:.1}", object.yaw.to_degrees()),
@@ -187,7 +187,7 @@ pub fn shrunk_json(shrunk: &ShrunkSummary) -> Value {
         .run
         .objects
         .iter()
-        .map(|o| json!({"id": o.id, "role": format!("{:?}", o.role).to_lowercase(), "x": o.x, "y": o.y, "yaw": o.yaw}))
+        .map(|o| json!({"id": o.id, "role": o.role.word(), "x": o.x, "y": o.y, "yaw": o.yaw}))
         .collect();
     json!({
         "run": shrunk.run.row.run, "shrunk_from": shrunk.original, "failed": shrunk.failed,

@@ -67,6 +67,26 @@ pub enum Role {
     Obstacle,
 }
 
+impl Role {
+    const ALL: [Self; 5] = [Self::Platform, Self::Target, Self::Other, Self::PlaceOther, Self::Obstacle];
+
+    /// The word for it, for people and in histories.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Platform => "platform",
+            Self::Target => "target",
+            Self::Other => "other",
+            Self::PlaceOther => "place-other",
+            Self::Obstacle => "obstacle",
+        }
+    }
+
+    /// The role of a word.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|role| role.word() == word)
+    }
+}
+
 /// The robot at the beginning.
 #[derive(Debug, Clone)]
 pub struct RobotStart {

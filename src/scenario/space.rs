@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::base::{Diagnostics, did_you_mean, names, nearest};
-use crate::config::{self, Campaign, Location, ObjectModel, OtherCounts, Physics, RobotProfile, Sensing, Surface, WorldMap};
+use crate::config::{
+    self, Campaign, Location, ObjectModel, OtherCounts, Physics, RobotProfile, Sensing, Surface, WorldMap,
+};
 use crate::ontology::Ontology;
 use crate::scenario::surroundings::Surroundings;
 use crate::scenario::{KnownKind, placement};

@@ -122,13 +122,9 @@ fn told(pack: &mut Pack, run: &RunDetail) {
     pack.say("objects", objects);
 }
 
+/// What stands where the target is to be placed looks like all else that stands around.
 fn word(role: Role) -> &'static str {
-    match role {
-        Role::Platform => "platform",
-        Role::Target => "target",
-        Role::Other | Role::PlaceOther => "other",
-        Role::Obstacle => "obstacle",
-    }
+    if role == Role::PlaceOther { Role::Other.word() } else { role.word() }
 }
 
 /// Seven columns of whole numbers for each track, with the lowest corner and the step of positions. What is not finite stays where it

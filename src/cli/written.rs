@@ -1,0 +1,72 @@
+//! Results into files: whole or not at all.
+
+use std::fs::{self, File};
+use std::io::Write as _;
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics};
+
+/// Writes a file. Where that fails, on a full disk say, what was there before is there still.
+///
+/// # Errors
+/// X007: it can't be written.
+pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnostics> {
+    // What a link points to is written, not the link.
+    let target = fs::canonicalize(file).unwrap_or_else(|_| file.to_path_buf());
+    let written = match fs::metadata(&target) {
+        // A pipe or a terminal has no other to take its place, and a folder says itself that it is none.
+        Ok(found) if !found.is_file() => fs::write(&target, bytes),
+        _ => replace(&target, bytes.as_ref()),
+    };
+    written.map_err(|error| unwritten(file, &error).into())
+}
+
+fn replace(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut name = file.file_name().unwrap_or_default().to_os_string();
+    name.push(".part");
+    let beside = file.with_file_name(name);
+    let written = File::create(&beside).and_then(|mut part| {
+        part.write_all(bytes)?;
+        part.sync_all()
+    });
+    written.and_then(|()| fs::rename(&beside, file)).inspect_err(|_| {
+        // Half a file is of no use to anybody; where it can't be removed either, its name says what it is.
+        let _ = fs::remove_file(&beside);
+    })
+}
+
+/// X007: a file or folder that can't be written.
+pub(super) fn unwritten(file: &Path, why: impl std::fmt::Display) -> Diagnostic {
+    Diagnostic::error("X007", format!("{} can't be written: {why}", file.display()))
+        .help("name a file in a folder that exists and may be written")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
+        let folder = tempfile::tempdir().expect("there is room for a folder");
+        let file = folder.path().join("out.txt");
+        let names = || -> Vec<_> {
+            let entries = fs::read_dir(folder.path()).expect("the folder is there");
+            entries.map(|entry| entry.expect("it can be read").file_name()).collect()
+        };
+        for text in ["one", "another"] {
+            write(&file, text).expect("it can be written");
+            assert_eq!(fs::read_to_string(&file).expect("it is there"), text);
+            assert_eq!(names(), ["out.txt"]);
+        }
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(&file, &link).expect("links can be made");
+        write(&link, "through the link").expect("it can be written");
+        assert_eq!(fs::read_to_string(&file).expect("it is there"), "through the link");
+        assert!(write(Path::new("/dev/null"), "gone").is_ok());
+        // The disk that is always full.
+        let told = write(Path::new("/dev/full"), "too much").expect_err("nothing can be written there");
+        assert!(told.iter().any(|fault| fault.code == "X007"));
+        let told = write(&folder.path().join("none").join("out.txt"), "x").expect_err("there is no such folder");
+        assert_eq!(told.len(), 1);
+    }
+}
