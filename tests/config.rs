@@ -103,7 +103,8 @@ fn numbers_of_other_objects_may_be_exact() {
         load_text(&format!(
             "tests = [[\"Pick\"]]\ntest_count = 1\n[surfaceObjects]\nmodel_list = [\"mug\"]\ncount = {text}\n"
         ))
-        .other_counts.beside_target
+        .other_counts
+        .beside_target
     };
     assert_eq!(count("3"), (3, 3));
     assert_eq!(count("0"), (0, 0));
