@@ -62,13 +62,13 @@ fn the_shipped_pick_has_passed_and_failed_runs_and_exits_with_one() {
 }
 
 #[test]
-fn a_hundred_runs_show_several_ways_to_fail() {
+fn a_campaign_shows_several_ways_to_fail() {
     let project = project();
-    let (code, json) = run_json(project.path(), &["--runs", "100", "--history", "h"]);
+    let (code, json) = run_json(project.path(), &["--runs", "60", "--history", "h"]);
     assert_eq!(code, 1);
-    assert_eq!(json["finished_runs"], 100);
+    assert_eq!(json["finished_runs"], 60);
     let passed = json["runs_passed"]["count"].as_u64().unwrap();
-    assert!((30..=95).contains(&passed), "{passed} of 100 runs passed fully");
+    assert!((18..=57).contains(&passed), "{passed} of 60 runs passed fully");
     let mut modes: Vec<Vec<&str>> = Vec::new();
     for run in json["runs"].as_array().unwrap() {
         let failed: Vec<&str> = run["actions"][0]["outcomes"]
@@ -94,11 +94,11 @@ fn a_lone_glass_and_perfect_senses_make_a_pick_that_works() {
     assert!(code <= 1 && json["finished_runs"] == 1);
     let output = actcheck(
         project.path(),
-        &["run", "configs/lone_glass.toml", "--runs", "60", "--history", "h", "--format", "json"],
+        &["run", "configs/lone_glass.toml", "--runs", "30", "--history", "h", "--format", "json"],
     );
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     let passed = json["runs_passed"]["count"].as_u64().unwrap();
-    assert!(passed >= 57, "{passed} of 60 runs passed fully with a lone object and no noise");
+    assert!(passed >= 28, "{passed} of 30 runs passed fully with a lone object and no noise");
 }
 
 #[test]

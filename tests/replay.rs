@@ -43,13 +43,13 @@ fn stored_runs_go_the_same_way_in_a_new_process_at_any_number_of_workers() {
 #[test]
 fn runs_by_chance_go_the_same_way_at_one_and_two_workers() {
     let project = project();
-    let arguments = ["run", "configs/lone_glass.toml", "--runs", "22", "--history", "h"];
+    let arguments = ["run", "configs/lone_glass.toml", "--runs", "12", "--history", "h"];
     assert_ne!(actcheck(project.path(), &arguments).status.code(), Some(2));
-    let (code, one) = replayed(project.path(), &["--sample", "20", "--jobs", "1", "--exact"]);
-    let (_, two) = replayed(project.path(), &["--sample", "20", "--jobs", "2", "--exact"]);
+    let (code, one) = replayed(project.path(), &["--sample", "10", "--jobs", "1", "--exact"]);
+    let (_, two) = replayed(project.path(), &["--sample", "10", "--jobs", "2", "--exact"]);
     assert_eq!((code, &one), (0, &two), "{one:#}");
     let runs = one.as_array().unwrap();
-    assert_eq!(runs.iter().filter(|run| run["same"] == true).count(), 20);
+    assert_eq!(runs.iter().filter(|run| run["same"] == true).count(), 10);
     let (_, other) = replayed(project.path(), &["--sample", "2", "--seed", "1"]);
     let names = |list: &Value| list.as_array().unwrap().iter().map(|run| run["run"].clone()).collect::<Vec<_>>();
     assert_ne!(names(&other), names(&replayed(project.path(), &["--sample", "2", "--seed", "2"]).1));
