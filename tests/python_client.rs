@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use crate::support::{foreign, root, stderr, stdout};
+use serde_json::Value;
+
+use crate::support::{actcheck, foreign, project, root, stderr, stdout};
 
 /// Runs Python in the client's folder, and leaves nothing behind there.
 fn python(arguments: &[&str]) -> Output {
@@ -31,4 +33,51 @@ fn its_types_hold() {
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mypy");
     let output = python(&["-m", "mypy", "--strict", "--cache-dir", &cache.to_string_lossy()]);
     assert!(output.status.success(), "{}", stdout(&output));
+}
+
+/// Where the examples' Python is found first.
+fn path() -> std::ffi::OsString {
+    let bin = foreign::client_python().parent().unwrap().to_owned();
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    std::env::join_paths(std::iter::once(bin).chain(std::env::split_paths(&others))).unwrap()
+}
+
+/// Runs a configuration whose launcher is an example, and gives back what was printed and the digests of all states, by run.
+fn campaign(folder: &Path, example: &str, arguments: &[&str]) -> (Value, String) {
+    let launcher = root().join("clients/python/examples").join(example);
+    let config = folder.join("configs/python.toml");
+    let pick = std::fs::read_to_string(root().join("configs/pick.toml")).unwrap();
+    let named = pick.replace("test_launcher = \"reference\"", &format!("test_launcher = {:?}", launcher.display()));
+    assert_ne!(named, pick);
+    std::fs::write(&config, named).unwrap();
+    let history = folder.join(arguments.join("")).display().to_string();
+    let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(["run", "configs/python.toml", "--format", "json", "--history", &history])
+        .args(arguments)
+        .current_dir(folder)
+        .env("PATH", path())
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap();
+    assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
+    let hashes = "SELECT ?index ?hash { ?run a act:Run ; act:index ?index ; act:traceHash ?hash } ORDER BY ?index";
+    let kept = actcheck(folder, &["query", hashes, "--history", &history, "--format", "csv"]);
+    (serde_json::from_slice(&output.stdout).unwrap(), stdout(&kept))
+}
+
+/// The scripted pick, in another process and another language, is as deterministic as our own.
+#[test]
+fn a_pick_in_python_goes_the_same_way_at_any_number_of_workers() {
+    let folder = project();
+    let (one, hashes) = campaign(folder.path(), "pick.py", &["--runs", "3", "--jobs", "1"]);
+    let (two, again) = campaign(folder.path(), "pick.py", &["--runs", "3", "--jobs", "2"]);
+    assert_eq!(hashes.lines().count(), 4, "{hashes}");
+    assert_eq!(hashes, again);
+    let told = |campaign: &Value| {
+        campaign["runs"].as_array().unwrap().iter().map(|run| run["actions"].clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(told(&one), told(&two));
+    // It does what it is there for: in most scenes, whichever they are today.
+    let score = one["runs"].as_array().unwrap().iter().map(|run| run["score"].as_f64().unwrap()).sum::<f64>() / 3.0;
+    assert!(score > 0.5, "{one:#}");
 }
