@@ -89,6 +89,7 @@ fn objects(of: Option<&str>, robot: &mut Operator<'_>) -> Vec<WireObject> {
         id: thing.id,
         pose: WirePose::of(&thing.pose),
         size_m: thing.size_m,
+        furniture: thing.furniture,
     });
     objects.collect()
 }

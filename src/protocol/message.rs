@@ -27,6 +27,8 @@ pub struct WireObject {
     pub category: Option<String>,
     pub pose: WirePose,
     pub size_m: [f64; 3],
+    /// Whether it stands for good.
+    pub furniture: bool,
 }
 
 /// Everything as it truly is.

@@ -81,6 +81,7 @@ fn truth(robot: &Operator<'_>) -> Truth {
         id: thing.id,
         pose: WirePose::of(&thing.pose),
         size_m: thing.size_m,
+        furniture: thing.furniture,
     });
     Truth { objects: objects.collect() }
 }

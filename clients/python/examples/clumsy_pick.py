@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """A pick in a hurry, to be compared with `pick.py`: nothing in it fails on purpose, it is only careless.
 
 It goes straight at the thing and unfolds its arm on the way, looks at nothing that stands around, does not slow down before it

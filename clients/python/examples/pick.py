@@ -1,6 +1,6 @@
-#!/usr/bin/env python3
-"""A scripted pick: tall things from the side, low ones from above, from where furniture and other things leave room."""
+"""A scripted pick: from the side or from above, from where furniture and other things leave room."""
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 
@@ -9,29 +9,32 @@ from actcheck import Failed, Pose, Report, Robot, Thing, Unreachable, serve, ski
 
 
 def ways(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[float, float, Pose]]:
-    """Hands around the thing: what speaks against each, how far back it is clear of all furniture, and its pose."""
+    """Hands at its side, or above what is low: what speaks against each, how far back furniture is clear, and its pose."""
     height, place, (x, y, _) = float(thing.size_m[2]), thing.pose.position, robot.observe().base
     up, down = (min(max(height / 2, 0.055), 0.11), 0.0) if height >= 0.1 else (max(height - 0.03, 0.0275), math.pi / 2)
+    blocks, things = [one for one in others if one.furniture], [one for one in others if not one.furniture]
     for turn in np.linspace(-math.pi, math.pi, 24, endpoint=False).tolist():
         heading = math.atan2(place[1] - y, place[0] - x) + turn
-        along = [place - np.array([math.cos(heading), math.sin(heading), 0.0]) * back for back in np.arange(0.0, 1.2, 0.03)]
-        clear = [all(one.beside(at) > 0.1 for one in others if one.furniture) for at in along]
-        if any(clear[4:]):
-            out = clear.index(True, 4)
-            room = min((one.beside(at) for at in along[:out] for one in others if not one.furniture), default=1.0)
-            cost = 0.012 * out + 0.3 * abs(turn) + 20.0 * max(0.0, 0.1 - room)
-            yield cost, 0.03 * out, Pose.pointing(place, heading, down).moved(z=up)
+        back = -np.array([math.cos(heading), math.sin(heading), 0.0])
+        along = place + back * np.arange(0.0, 2.0, 0.03)[:, None]
+        out = next(n for n in range(4, len(along)) if n > 40 or all(one.beside(along[n]) > 0.1 for one in blocks))
+        drive = np.linspace([x, y, 0.0], along[out + 22], 20)  # the base stands some 66 cm behind the hand
+        room = min((one.beside(at) for at in along[:out] for one in things), default=1.0)
+        if all(one.beside(at) > 0.25 for at in drive for one in blocks):
+            against = 0.012 * out + 0.3 * abs(turn) + 20.0 * max(0.0, 0.1 - room)
+            yield against, 0.03 * out, Pose.pointing(place, heading, down).moved(z=up)
 
 
 def take(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Report:
     """Drives there, closes the hand on the thing, lifts it and takes it away."""
     x, y, heading = robot.description.base_joints
-    for _, back, hand in sorted(ways(robot, thing, others), key=lambda way: way[0]):
+    best = sorted(ways(robot, thing, others), key=lambda way: way[0])
+    for (_, back, hand), posture in itertools.product(best, robot.description.postures):
         try:
-            at = robot.ik(hand)
+            at = robot.ik(hand, near=posture)
         except Unreachable:
             continue
-        if all(one.beside(np.array([at[x], at[y], 0.0])) > 0.24 for one in others if one.furniture):
+        if all(one.beside(np.array([at[x], at[y], 0.0])) > 0.2 for one in others if one.furniture):
             break
     else:
         raise Failed("no free way to it was found")
@@ -45,14 +48,11 @@ def take(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Report:
     robot.gripper(0.0)
     robot.move_straight(hand.moved(z=0.15), seconds=2.0)
     robot.move_joints(away)
-    robot.wait(0.5)
-    gap = robot.observe().opening_m * 100.0
-    return Report(robot.feels(), f"the fingers are {gap:.1f} cm apart" if robot.feels() else "the hand is empty")
+    return Report(robot.feels(), "it holds it" if robot.feels() else "the hand is empty")
 
 
 @skill("Pick")
 def pick(robot: Robot, pickObject: str) -> Report:
-    robot.wait(0.5)
     return take(robot, *robot.look_for(pickObject))
 
 

@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 
 from actcheck import Pose, Unreachable, wrapped
-from actcheck.kinematics import Chain, read_urdf, rotation, turn, turn_between
+from actcheck.kinematics import Chain, on_base, read_urdf, rotation, turn, turn_between
 from actcheck.motion import course
 from tests.fake import ARM, BASE, HOME, LEVEL, URDF
 
@@ -106,6 +106,17 @@ class Chains(unittest.TestCase):
         tip = Pose(np.zeros(3), rotation(0.0, 0.0, math.pi / 2))
         turned = Chain(read_urdf(URDF), "grasp_link", tip=tip).pose({})
         np.testing.assert_allclose(turned.matrix(), (self.chain.pose({}) * tip).matrix(), atol=1e-12)
+
+
+    def test_a_base_that_the_urdf_lacks_is_put_below_it(self) -> None:
+        joints = read_urdf(URDF)
+        self.assertIs(on_base(joints, BASE), joints)
+        standing = [joint for joint in joints if joint.name not in BASE]
+        driven = Chain(on_base(standing, ["planar_x", "planar_y", "planar_heading"]), "grasp_link")
+        self.assertEqual(driven.names, ["planar_x", "planar_y", "planar_heading", *ARM])
+        there = dict(zip(driven.names, (1.0, 2.0, 0.5, *LEVEL)))
+        expected = self.chain.pose(dict(zip(BASE + ARM, there.values())))
+        np.testing.assert_allclose(driven.pose(there).matrix(), expected.matrix(), atol=1e-12)
 
 
 class Courses(unittest.TestCase):

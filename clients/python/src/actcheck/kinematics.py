@@ -50,6 +50,20 @@ def read_urdf(text: str) -> list[UrdfJoint]:
     return [_joint(element) for element in xml.fromstring(text).findall("joint")]
 
 
+def on_base(joints: list[UrdfJoint], names: Sequence[str]) -> list[UrdfJoint]:
+    """The joints of a robot on a base that drives: where the URDF lacks those of the base (x, y, heading) they come before it."""
+    known, children = {joint.name for joint in joints}, {joint.child for joint in joints}
+    if len(names) != 3 or names[0] in known:
+        return joints
+    links = ["odometry", *(f"odometry/{name}" for name in names[:2])]
+    links.append(next((joint.parent for joint in joints if joint.parent not in children), "base_link"))
+    driven = []
+    for number, (name, kind, axis) in enumerate(zip(names, ("prismatic", "prismatic", "revolute"), np.eye(3))):
+        ends = links[number], links[number + 1]
+        driven.append(UrdfJoint(name, kind, *ends, np.eye(4), axis, -math.inf, math.inf, None))
+    return driven + joints
+
+
 def _joint(element: xml.Element) -> UrdfJoint:
     def link(tag: str) -> str:
         found = element.find(tag)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actcheck.faults import Failed
-from actcheck.kinematics import Chain, UrdfJoint, read_urdf, rotation
+from actcheck.kinematics import Chain, UrdfJoint, on_base, read_urdf, rotation
 from actcheck.messages import Call, DepthImage, Observation, Report, RobotDescription, Thing, things_from_wire
 from actcheck.motion import course
 from actcheck.pose import Pose, Vector, wrapped
@@ -45,7 +45,7 @@ class Robot:
         self._session = session
         self.description: RobotDescription = session.description
         self.call = call
-        self._urdf = read_urdf(self.description.urdf) if urdf is None else urdf
+        self._urdf = on_base(urdf or read_urdf(self.description.urdf), self.description.base_joints)
         self._chains: dict[str, Chain] = {}
         self._numbers = {joint.name: number for number, joint in enumerate(self.description.joints)}
         self._observation = call.observation
@@ -75,19 +75,18 @@ class Robot:
     def ik(self, pose: Pose, *, near: Joints | None = None, base: bool = True, link: str | None = None) -> dict[str, float]:
         """Positions of arm and, unless `base` is false, base that bring the tool to a pose. Raises `Unreachable`.
 
-        Looked for from `near` if it is given, otherwise from where the robot is and from the postures of its profile,
-        with the base put so that the hand is over the place.
+        Looked for from `near` if it is given, otherwise from the postures of the robot's profile, then from where it is. Where
+        that does not say where the base is, the base is put so that the hand is over the place.
         """
         chain = self._chain(link or self.description.tool_link)
         movable = set(self.description.arm_joints) | (set(self.description.base_joints) if base else set())
         now = self.joints()
-        if near is not None:
-            seeds = [now | self._named(near)]
-        else:
-            postures = (self.description.home, *self.description.postures)
-            seeds = [now] + [now | dict(zip(self.description.arm_joints, posture)) for posture in postures if posture]
-            if base and len(self.description.base_joints) == 3:
-                seeds = [self._standing_over(seed, chain, pose) for seed in seeds]
+        postures = [*self.description.postures, self.description.home, ()]
+        given = [self._named(near)] if near is not None else [dict(zip(self.description.arm_joints, it)) for it in postures]
+        seeds = [now | seed for seed in given]
+        if base and len(self.description.base_joints) == 3:
+            stands = set(self.description.base_joints)
+            seeds = [it if stands <= seed.keys() else self._standing_over(it, chain, pose) for it, seed in zip(seeds, given)]
         found = chain.solve(pose, seeds, frozenset(chain.names) - movable)
         return {name: position for name, position in found.items() if name in movable}
 
