@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """The pick of `pick.py`, with a learned idea of where the thing is: `train_grasp_offset.py` learned it from runs of this program.
 
 Before it drives it looks at the thing with its depth camera. A network says from the box of what is seen there how far the thing is

@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Learns the weights of `learned_pick.py` from an exported dataset of its runs, offline: in a second, without a simulation.
 
     actcheck run clients/python/examples/configs/collect.toml
