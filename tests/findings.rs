@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use actcheck::analysis::{
-    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, Parameter, PatternOptions, TableFilter, Values, cascades,
-    columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Condition, FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, Parameter, PatternOptions, TableFilter, Values,
+    cascades, columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck::history::{Repetition, RunDetail};
-use actcheck::report::scene_rule;
+use actcheck::report::{FindingsSummary, PropertyReport, patterns_picture, scene_rule};
 use actcheck::verdict::Outcome::{self, Failed, Inapplicable, Passed, Untested};
 
 use crate::support::planted::{Dice, kind, range};
@@ -87,6 +87,50 @@ fn a_pattern_in_runs_is_told_with_its_runs() {
     assert_eq!(map.down[0], "Bottle");
     assert!(map.cells[0][0].failing.unwrap().rate > 0.6 && map.cells[0].last().unwrap().failing.unwrap().rate < 0.3);
     assert!(two_way(&found.subject, &["nothing"]).is_none());
+}
+
+/// The summary of one property, as `actcheck analyse` makes it.
+fn summary(table: &OutcomeTable, property: usize) -> FindingsSummary {
+    let of = &judged(table)[property];
+    let findings = property_findings(table, of, &hierarchy(), &PatternOptions::default());
+    let report = PropertyReport {
+        findings,
+        unit: None,
+        trend: trend(table, of, 0.05),
+        flaky: Vec::new(),
+        repeated_scenes: 0,
+        maps: Vec::new(),
+    };
+    FindingsSummary {
+        history: "h".to_owned(),
+        program: "actcheck".to_owned(),
+        options: String::new(),
+        campaigns: vec!["k".to_owned()],
+        runs: table.text("run").texts.len() as u64,
+        counts: of.counts,
+        modes: Vec::new(),
+        cascades: Vec::new(),
+        properties: vec![report],
+        level: 0.05,
+    }
+}
+
+#[test]
+fn a_pattern_is_drawn_with_its_sentence_and_every_run_in_its_colour() {
+    let table = table(runs("k", 1_500, 0.05), &TableFilter::default());
+    let told = summary(&table, 0);
+    let svg = patterns_picture(&told).expect("there is a pattern").to_svg();
+    assert!(svg.contains("InHand fails") && svg.contains("Bottle"), "{svg}");
+    // Runs of the pattern's kind are drawn, two strokes for each that failed.
+    let findings = &told.properties[0].findings;
+    let pattern = findings.patterns.confirmed().next().unwrap();
+    let kind = pattern.conditions.iter().find(|condition| matches!(condition, Condition::Kind { .. })).unwrap();
+    let holds = kind.holds(&findings.subject);
+    let failed = holds.iter().zip(&findings.subject.failed).filter(|(holds, failed)| **holds && **failed).count();
+    let strokes = svg.lines().map(|line| line.matches('M').count()).filter(|count| *count == 2 * failed).count();
+    assert!(failed > 50 && strokes >= 1, "{failed} failed, {svg}");
+    // A property that never fails has no pattern, and without a pattern there is no picture.
+    assert!(patterns_picture(&summary(&table, 1)).is_none());
 }
 
 #[test]
