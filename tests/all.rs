@@ -34,6 +34,7 @@ mod physics;
 mod pictures;
 mod place;
 mod proofs;
+mod protocol;
 mod python_client;
 mod readme;
 mod recheck;

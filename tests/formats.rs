@@ -302,6 +302,7 @@ fn earl_parses_and_is_consistent_under_owl_rl() {
         program_version: "0.1.0".to_owned(),
         config_digest: String::new(),
         ontology_digest: String::new(),
+        skill: None,
     };
     let text = report.text(&[campaign]);
     let statements = turtle(&text);

@@ -9,7 +9,9 @@ use actcheck::actions::{ActionEnd, Quality};
 use actcheck::base::{Choice, ChoiceKind, Diagnostics, Pose, Source, Term, digest_of, names};
 use actcheck::config::{Camera, ObjectModel, Odometry, Physics, RobotProfile, Sensing};
 use actcheck::facts::{RunFacts, extract};
-use actcheck::history::{CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus};
+use actcheck::history::{
+    CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus, SkillRecord,
+};
 use actcheck::scenario::{RobotStart, Role, Scene, SceneObject};
 use actcheck::verdict::{Judgement, Outcome};
 use tempfile::TempDir;
@@ -128,6 +130,7 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
         seed: u64::MAX,
         status: RunStatus::Completed,
         reason: None,
+        program_output: index.is_multiple_of(3).then(|| format!("line 1\nline {index}")),
         score,
         action_scores: vec![score],
         discards: (0..index % 2).map(|_| "found no free place for `plate`".to_owned()).collect(),
@@ -155,6 +158,11 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         ontology_digest: digest_of("ontology"),
         rules: PROPERTIES.iter().map(|p| (names::act(p), format!("../rules/{p}.rls"), digest_of(p))).collect(),
         models: vec![("glass".to_owned(), digest_of("glass"))],
+        skill: Some(SkillRecord {
+            command: "python3 pick.py".to_owned(),
+            digest: digest_of("pick.py"),
+            privileged: true,
+        }),
         seed: 7,
         planned_runs: 6,
         repeat: 1,

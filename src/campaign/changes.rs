@@ -24,6 +24,8 @@ pub enum ChangeKind {
     Program,
     /// The configuration's text.
     Config,
+    /// The program that performs actions: its command, or a file of it.
+    Skill,
     /// The file of an object model or a robot.
     Model,
     /// The ontology.
@@ -38,6 +40,7 @@ impl ChangeKind {
         match self {
             Self::Program => "program",
             Self::Config => "configuration",
+            Self::Skill => "skill",
             Self::Model => "model",
             Self::Ontology => "ontology",
             Self::Rule => "rule",
@@ -60,6 +63,10 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<Change> {
         single(ChangeKind::Config, &was.name, &was.config_digest, &is.config_digest),
         single(ChangeKind::Ontology, "all files", &was.ontology_digest, &is.ontology_digest),
     ];
+    let skill = |record: &CampaignRecord| {
+        record.skill.iter().map(|skill| (skill.command.clone(), skill.digest.clone())).collect()
+    };
+    all.extend(named(ChangeKind::Skill, &skill(was), &skill(is)));
     let models = |record: &CampaignRecord| record.models.iter().cloned().collect();
     all.extend(named(ChangeKind::Model, &models(was), &models(is)));
     let rules = |record: &CampaignRecord| {
@@ -94,6 +101,7 @@ fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String,
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::history::SkillRecord;
 
     fn record(digest: &str) -> CampaignRecord {
         CampaignRecord {
@@ -105,6 +113,7 @@ mod tests {
             ontology_digest: String::new(),
             rules: Vec::new(),
             models: Vec::new(),
+            skill: None,
             seed: 7,
             planned_runs: 1,
             repeat: 1,
@@ -117,6 +126,20 @@ mod tests {
             program_version: "0.1.0".to_owned(),
             program_digest: digest.to_owned(),
         }
+    }
+
+    #[test]
+    fn a_skill_that_changed_or_that_was_not_there_is_named() {
+        let with = |digest: &str| CampaignRecord {
+            skill: Some(SkillRecord { command: "pick.py".to_owned(), digest: digest.to_owned(), privileged: false }),
+            ..record("aa")
+        };
+        let found = changes(&with("1"), &with("2"));
+        let [change] = found.as_slice() else { panic!("{found:?}") };
+        assert_eq!((change.kind.word(), change.name.as_str()), ("skill", "pick.py"));
+        let found = changes(&record("aa"), &with("2"));
+        let [change] = found.as_slice() else { panic!("{found:?}") };
+        assert_eq!((change.kind, change.was.as_deref(), change.is.as_deref()), (ChangeKind::Skill, None, Some("2")));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::campaign::line::TEST_LEFT_OUT;
 use crate::campaign::requirement::Requirement;
 use crate::campaign::solids;
 use crate::config::{self, Campaign, Launcher, Overrides};
-use crate::history::{CampaignRecord, History};
+use crate::history::{CampaignRecord, History, SkillRecord};
 use crate::ontology::{self, Ontology};
 use crate::protocol::Programs;
 use crate::rules::{Budget, RuleBook};
@@ -179,6 +179,7 @@ impl Env {
             ontology_digest: self.ontology.digest.clone(),
             rules,
             models,
+            skill: self.skill(),
             seed: self.campaign.seed,
             planned_runs: self.planned_runs(),
             repeat: self.campaign.repeat,
@@ -191,6 +192,23 @@ impl Env {
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
             program_digest: PROGRAM_DIGEST.to_owned(),
         }
+    }
+
+    /// The program that performs actions, for the record.
+    fn skill(&self) -> Option<SkillRecord> {
+        match &self.campaign.launcher {
+            Launcher::Reference => None,
+            Launcher::Program(skill) => Some(SkillRecord {
+                command: skill.text.clone(),
+                digest: skill.digest.clone(),
+                privileged: skill.privileged,
+            }),
+        }
+    }
+
+    /// Whether a program that performs actions is told the truth.
+    pub fn is_privileged(&self) -> bool {
+        self.skill().is_some_and(|skill| skill.privileged)
     }
 
     /// Runs of all tests together.

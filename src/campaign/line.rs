@@ -119,6 +119,7 @@ fn run_line_with(
     let mut record = record(env, campaign, index, scene, trace)?;
     record.choices = choices.into_made();
     record.quality = quality;
+    record.program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
     record.started = started;
     record.wall_secs = (manner.clock.secs)() - start_secs;
     Ok(record)
@@ -166,6 +167,7 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
         seed: env.campaign.seed,
         status,
         reason,
+        program_output: None,
         score: run_score(&action_scores),
         action_scores,
         discards: Vec::new(),

@@ -10,6 +10,7 @@ use crate::base::{Diagnostic, Diagnostics};
 use crate::campaign::budget::Tally;
 use crate::campaign::make_run::{Making, make_run};
 use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Planned, Schedule, Spent, Told, schedule_of};
+use crate::config::Launcher;
 use crate::history::{History, RunRecord};
 
 /// The store is brought to the disk at least this often. Unit: seconds.
@@ -174,6 +175,10 @@ struct Keeper<'a> {
     on_run: &'a mut dyn FnMut(&RunRecord),
     end: CampaignEnd,
     tally: Tally,
+    /// Runs in a row, up to now, that a program ended by a fault of its own.
+    broken_in_a_row: u64,
+    /// So many of them are enough.
+    most_broken: Option<u64>,
     /// Runs of the batch, as the schedule is told of them.
     told: Vec<Told>,
     flushed_at: f64,
@@ -188,7 +193,23 @@ impl<'a> Keeper<'a> {
     ) -> Self {
         let end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
         let flushed_at = (manner.clock.secs)();
-        Self { history, manner, began_secs, on_run, end, tally: Tally::new(env), told: Vec::new(), flushed_at }
+        let most_broken = match &env.campaign.launcher {
+            Launcher::Reference => None,
+            Launcher::Program(skill) => Some(skill.max_broken),
+        };
+        let tally = Tally::new(env);
+        Self {
+            history,
+            manner,
+            began_secs,
+            on_run,
+            end,
+            tally,
+            broken_in_a_row: 0,
+            most_broken,
+            told: Vec::new(),
+            flushed_at,
+        }
     }
 
     /// Keeps the schedule's next run, and says whether there may be another one.
@@ -202,7 +223,8 @@ impl<'a> Keeper<'a> {
                 }
                 self.end.discards.extend(record.discards.iter().map(|reason| (record.index, reason.clone())));
                 (self.on_run)(&record);
-                self.count(Told::of(&record))
+                self.count(Told::of(&record))?;
+                self.bear(&record)
             }
             Making::Stored(told) => self.count(told),
             Making::Interrupted => {
@@ -213,6 +235,19 @@ impl<'a> Keeper<'a> {
                 self.stop(faults);
                 ControlFlow::Break(())
             }
+        }
+    }
+
+    /// A program that breaks run after run breaks the next one, too. Runs are kept in the order of the schedule, so that the last
+    /// one is the same whatever the number of workers. Somebody who resumes the campaign gives the program another chance.
+    fn bear(&mut self, record: &RunRecord) -> ControlFlow<()> {
+        self.broken_in_a_row = if record.program_output.is_some() { self.broken_in_a_row + 1 } else { 0 };
+        match self.most_broken {
+            Some(most) if self.broken_in_a_row >= most => {
+                self.stop(hopeless(most, record).into());
+                ControlFlow::Break(())
+            }
+            _ => ControlFlow::Continue(()),
         }
     }
 
@@ -253,4 +288,15 @@ impl<'a> Keeper<'a> {
         self.end.discards.sort();
         self.end
     }
+}
+
+/// Why a campaign stops whose program breaks so many runs in a row.
+fn hopeless(most: u64, last: &RunRecord) -> Diagnostic {
+    let reason = last.reason.as_deref().unwrap_or_default();
+    let runs = if most == 1 { "a run was".to_owned() } else { format!("{most} runs in a row were") };
+    let message = format!("{runs} broken by the program that performs actions; the last one, {}: {reason}", last.id);
+    Diagnostic::error("S033", message).help(format!(
+        "`actcheck show {}` shows what it printed; `[skill] max_broken` says how many such runs are borne",
+        last.id
+    ))
 }

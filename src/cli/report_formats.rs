@@ -109,7 +109,11 @@ impl<'a> Sinks<'a> {
             junit: asked.junit.as_ref().map(|_| JunitReport::new()),
             earl: asked.earl.as_ref().map(|_| EarlReport::new()),
             jsonl: asked.jsonl.as_ref().map(|_| String::new()),
-            markdown: asked.markdown.then(MarkdownReport::new),
+            markdown: asked.markdown.then(|| {
+                let mut report = MarkdownReport::new();
+                report.know(campaigns);
+                report
+            }),
             campaigns: campaigns.to_vec(),
         })
     }

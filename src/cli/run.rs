@@ -238,6 +238,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
         failure_modes: Vec::new(),
         regressions: Vec::new(),
         runs,
+        privileged: env.is_privileged(),
         planned: env.runs_to_make(),
         discards: end.discards.len() as u64,
         ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), told: spent.to_string() }),

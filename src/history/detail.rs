@@ -19,6 +19,7 @@ pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageE
         row: row(run, &node),
         seed: node.count("act:seed").unwrap_or_default(),
         reason: node.text("act:reason"),
+        program_output: node.text("act:programOutput"),
         discards: discards(store, run, &node)?,
         wall_secs: node.number("act:wallSeconds").unwrap_or_default(),
         elapsed_secs: node.number("act:elapsedSeconds").unwrap_or_default(),

@@ -8,6 +8,7 @@ use oxigraph::store::Store;
 
 use crate::history::detail::{outcome, status, version};
 use crate::history::read::{Node, id_of, select, text_of};
+use crate::history::read_campaign::skill;
 use crate::history::write_campaign::campaign_node;
 use crate::history::{CampaignRow, OutcomeRow, Repetition, RunFilter, RunRow};
 use crate::verdict::Outcome;
@@ -114,6 +115,7 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
         program_version: version(node),
         config_digest: text("act:configDigest"),
         ontology_digest: text("act:ontologyDigest"),
+        skill: skill(node),
     }
 }
 

@@ -35,7 +35,7 @@ pub use answer::{Cancel, QueryAnswer};
 pub use newest::NewestOutcomes;
 pub use rdf_text::{RdfSyntax, rdf_text};
 pub use recheck::{Recheck, StoredJudgement};
-pub use record::{CampaignEnd, CampaignRecord, Repetition, RunRecord, RunStatus};
+pub use record::{CampaignEnd, CampaignRecord, Repetition, RunRecord, RunStatus, SkillRecord};
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;
 pub use store::History;

@@ -4,10 +4,10 @@ use oxigraph::model::Term;
 use oxigraph::store::{StorageError, Store};
 
 use crate::base::Shard;
-use crate::history::CampaignRecord;
 use crate::history::detail::version;
 use crate::history::read::{Node, text_of};
 use crate::history::write_campaign::campaign_node;
+use crate::history::{CampaignRecord, SkillRecord};
 
 /// What was asked for, judged by and simulated with; nothing where the history has no such campaign.
 pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord>, StorageError> {
@@ -35,6 +35,7 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         ontology_digest: text(&node, "act:ontologyDigest"),
         rules,
         models,
+        skill: skill(&node),
         seed: node.count("act:seed").unwrap_or_default(),
         planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
         // Histories of before there were repetitions lack it.
@@ -48,6 +49,15 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         program_version: version(&node),
         program_digest: text(&node, "act:programDigest"),
     }))
+}
+
+/// The program that performed actions, where there was one.
+pub(super) fn skill(node: &Node) -> Option<SkillRecord> {
+    Some(SkillRecord {
+        command: node.text("act:skillCommand")?,
+        digest: node.text("act:skillDigest").unwrap_or_default(),
+        privileged: node.truth("act:privileged").unwrap_or_default(),
+    })
 }
 
 fn shards(node: &Node) -> Vec<Shard> {

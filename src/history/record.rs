@@ -27,6 +27,8 @@ pub struct CampaignRecord {
     pub rules: Vec<(String, String, String)>,
     /// Digests of robot and models by name, sorted.
     pub models: Vec<(String, String)>,
+    /// The program that performed actions; nothing where the reference skills performed all.
+    pub skill: Option<SkillRecord>,
     /// Seed of all randomness.
     pub seed: u64,
     /// How many runs were asked for; where budgets end the campaign, at most so many.
@@ -49,6 +51,23 @@ pub struct CampaignRecord {
     pub program_version: String,
     /// Digest of its sources; empty where an earlier one wrote the campaign.
     pub program_digest: String,
+}
+
+/// A program that performs actions, as a campaign's record has it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SkillRecord {
+    /// Its command with its arguments, as the user wrote them.
+    pub command: String,
+    /// Digest of the command and of its files.
+    pub digest: String,
+    /// Whether it was told the truth about scenes, which no robot knows.
+    pub privileged: bool,
+}
+
+impl SkillRecord {
+    /// What is to be said of campaigns whose program was told the truth.
+    pub const PRIVILEGED: &str =
+        "the program was told where everything truly is (`[skill] privileged = true`), which no robot is";
 }
 
 /// How a run ended as a whole.
@@ -130,6 +149,8 @@ pub struct RunRecord {
     pub status: RunStatus,
     /// Why, where it did not complete.
     pub reason: Option<String>,
+    /// The last lines that the program printed, where a fault of its own ended the run: it performs the actions then.
+    pub program_output: Option<String>,
     /// Mean of the action scores (the paper's S).
     pub score: f64,
     /// One for each action (the paper's A).

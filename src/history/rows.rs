@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::history::{Repetition, RunStatus};
+use crate::history::{Repetition, RunStatus, SkillRecord};
 use crate::scenario::Role;
 use crate::verdict::{Judgement, Outcome};
 
@@ -75,6 +75,8 @@ pub struct CampaignRow {
     pub config_digest: String,
     /// Digest of the ontology.
     pub ontology_digest: String,
+    /// The program that performed actions; nothing where the reference skills performed all.
+    pub skill: Option<SkillRecord>,
 }
 
 /// Outcome of one property in one action execution.
@@ -109,6 +111,8 @@ pub struct RunDetail {
     pub seed: u64,
     /// Why it did not complete.
     pub reason: Option<String>,
+    /// The last lines that the program printed, where a fault of its own ended the run.
+    pub program_output: Option<String>,
     /// Why each scene that was drawn for it before could not be used, in order.
     pub discards: Vec<String>,
     /// Unit: seconds.

@@ -35,6 +35,13 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version))
         .text("act:programDigest", &record.program_digest);
+    if let Some(skill) = &record.skill {
+        statements
+            .about(campaign.clone())
+            .text("act:skillCommand", &skill.command)
+            .text("act:skillDigest", &skill.digest)
+            .has("act:privileged", Literal::from(skill.privileged));
+    }
     for shard in &record.shards {
         statements.about(campaign.clone()).text("act:shard", &shard.to_string());
     }

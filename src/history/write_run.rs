@@ -51,6 +51,7 @@ fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
         .text("act:traceHash", &record.trace.hash)
         .has("act:discards", count(record.discards.len() as u64))
         .may("act:reason", record.reason.as_deref().map(Literal::new_simple_literal))
+        .may("act:programOutput", record.program_output.as_deref().map(Literal::new_simple_literal))
         .may("act:shrunkFrom", record.shrunk_from.as_deref().map(run_node))
         .has("prov:startedAtTime", time(&record.started))
         .has("act:wallSeconds", Literal::from(record.wall_secs))

@@ -74,7 +74,9 @@ impl<'a> Performance<'a> {
 
     fn named(&self, fault: OutsideFault) -> OutsideFault {
         let text = &self.lent.programs.skill.text;
-        OutsideFault { reason: format!("the program `{text}`: {}", fault.reason), ..fault }
+        let last = self.output.iter().flatten().rev().find(|line| !line.trim().is_empty());
+        let printed = last.map_or_else(String::new, |line| format!("; it printed last: {}", line.trim()));
+        OutsideFault { reason: format!("the program `{text}`: {}{printed}", fault.reason), ..fault }
     }
 }
 

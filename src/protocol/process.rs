@@ -42,6 +42,8 @@ pub struct Process {
     address: String,
     listener: UnixListener,
     pub output: Output,
+    /// Whether it was ended, and its number may be somebody else's.
+    over: bool,
 }
 
 impl Process {
@@ -81,7 +83,9 @@ impl Process {
         drop(command);
         let output = Output::read(reader);
         match guard(&child, folder) {
-            Ok(guard) => Ok(Self { child, guard, folder: folder.to_path_buf(), address, listener, output }),
+            Ok(guard) => {
+                Ok(Self { child, guard, folder: folder.to_path_buf(), address, listener, output, over: false })
+            }
             Err(error) => {
                 // It may have ended by itself.
                 let _ = child.kill();
@@ -144,6 +148,9 @@ impl Process {
 
     /// Ends it with all that it started. Gives the last lines that it printed.
     pub fn end(&mut self) -> Vec<String> {
+        if std::mem::replace(&mut self.over, true) {
+            return Vec::new();
+        }
         if let Ok(leader) = i32::try_from(self.child.id()) {
             // There may be nobody left.
             let _ = killpg(Pid::from_raw(leader), Signal::SIGKILL);

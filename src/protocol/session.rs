@@ -33,6 +33,8 @@ pub struct Session {
     pub idle: bool,
     /// Whether it has lost the thread, by no fault that ended a run.
     pub lost: bool,
+    /// Whether it was told that it did something wrong, and may end for that by itself.
+    refused: bool,
 }
 
 impl Session {
@@ -64,6 +66,7 @@ impl Session {
             printed_before: 0,
             idle: true,
             lost: false,
+            refused: false,
         };
         match session.introduce(&introduction(world, worker, skill.privileged), tested) {
             Ok(()) => {
@@ -158,14 +161,17 @@ impl Session {
     /// Tells the program what it did wrong, as far as it listens. Gives the fault back.
     pub fn refuse(&mut self, fault: OutsideFault) -> OutsideFault {
         // The run is over for this fault; that the program does not hear of it changes nothing.
-        let _ = self.wire.send(&ToProgram::Error { reason: &fault.reason }, &[], REFUSAL_SECS);
+        let told = self.wire.send(&ToProgram::Error { reason: &fault.reason }, &[], REFUSAL_SECS);
+        self.refused = told.is_ok() && !fault.late;
         fault
     }
 
     /// Ends the program. Gives the last lines that it printed.
     pub fn end(mut self) -> Vec<String> {
         // One that is told why it ends may print something that tells more.
-        self.process.ends_soon();
+        if self.refused {
+            self.process.ends_soon();
+        }
         self.process.end()
     }
 

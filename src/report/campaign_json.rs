@@ -26,6 +26,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         "campaign": summary.campaign,
         "config": summary.config,
         "history": summary.history,
+        "privileged": summary.privileged,
         "planned_runs": summary.planned,
         "finished_runs": summary.runs.len(),
         "interrupted": summary.interrupted,

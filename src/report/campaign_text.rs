@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use comfy_table::{Attribute, Cell, Color};
 
 use crate::base::names;
+use crate::history::SkillRecord;
 use crate::report::repeated_text::repeated_text;
 use crate::report::table::ruled;
 use crate::report::weighted::weighted_text;
@@ -166,6 +167,9 @@ fn failure_modes(out: &mut String, summary: &CampaignSummary) {
 
 /// Properties whose outcomes say less than they seem to.
 fn remarks(out: &mut String, summary: &CampaignSummary) {
+    if summary.privileged {
+        let _ = writeln!(out, "note: {}", SkillRecord::PRIVILEGED);
+    }
     for remark in summary.remarks() {
         let severity = if remark.warning { "warning" } else { "note" };
         let _ = writeln!(out, "{severity}: {}", summary.remark_text(&remark));

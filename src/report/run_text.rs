@@ -16,6 +16,10 @@ pub fn run_text(run: &RunDetail) -> String {
     if let Some(reason) = &run.reason {
         let _ = writeln!(out, "{}: {reason}", row.status.word());
     }
+    if let Some(printed) = run.program_output.as_ref().filter(|printed| !printed.is_empty()) {
+        let _ = writeln!(out, "the program printed last:");
+        printed.lines().for_each(|line| out.push_str(&format!("  {line}\n")));
+    }
     let _ = writeln!(
         out,
         "campaign {}, run {} of it, seed {}, started {}, {:.2} s of wall time, actcheck {}",
@@ -151,7 +155,7 @@ pub fn run_json(run: &RunDetail) -> Value {
         "run": row.run, "campaign": row.campaign, "index": row.index, "test": row.test, "status": row.status.word(),
         "scene": row.repetition.map(|repetition| repetition.scene),
         "repetition": row.repetition.map(|repetition| repetition.number), "weight": row.weight,
-        "reason": run.reason, "score": row.score, "trace_hash": row.trace_hash, "seed": run.seed,
+        "reason": run.reason, "program_output": run.program_output, "score": row.score, "trace_hash": row.trace_hash, "seed": run.seed,
         "started": row.started, "wall_secs": run.wall_secs, "program_version": run.program_version,
         "world": run.world, "robot_base": run.robot_base, "noise": run.noise, "designators": run.designators,
         "objects": objects, "actions": actions,

@@ -27,6 +27,8 @@ pub struct CampaignSummary {
     pub failure_modes: Vec<FailureMode>,
     /// The project's cases, which ran first. They count for the exit code, and for nothing else.
     pub regressions: Vec<CaseSummary>,
+    /// Whether a program that performs actions was told the truth, which no robot knows.
+    pub privileged: bool,
     /// Runs that were asked for.
     pub planned: u64,
     /// Scenes that could not be built and were drawn again.
@@ -318,6 +320,7 @@ pub(super) mod tests {
             search: None,
             failure_modes: vec![],
             regressions: vec![],
+            privileged: false,
             planned: runs.len() as u64,
             runs,
             discards: 1,

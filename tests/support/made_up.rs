@@ -58,6 +58,7 @@ pub fn run(
         },
         seed: 7,
         reason: None,
+        program_output: None,
         discards: Vec::new(),
         wall_secs: 1.0,
         elapsed_secs: 1.0,

@@ -55,6 +55,9 @@ fn differences(first: &CampaignRecord, second: &CampaignRecord) -> Vec<String> {
     if first.ontology_digest != second.ontology_digest {
         found.push("ontology".to_owned());
     }
+    if first.skill != second.skill {
+        found.push("the program that performs actions".to_owned());
+    }
     let models = |record: &CampaignRecord| record.models.iter().cloned().collect::<BTreeSet<_>>();
     let rules = |record: &CampaignRecord| {
         record.rules.iter().map(|(_, path, of)| (path.clone(), of.clone())).collect::<BTreeSet<_>>()

@@ -55,6 +55,11 @@ impl Found {
         for number in [record.seed, record.planned_runs, u64::from(record.repeat)] {
             digest.update(&number.to_le_bytes());
         }
+        if let Some(skill) = &record.skill {
+            digest.update(skill.command.as_bytes());
+            digest.update(skill.digest.as_bytes());
+            digest.update(&[u8::from(skill.privileged)]);
+        }
         for (name, of) in record.rules.iter().map(|(property, _, of)| (property, of)).chain(
             // Both are sorted.
             record.models.iter().map(|(name, of)| (name, of)),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::base::names;
-use crate::history::{RunDetail, RunStatus};
+use crate::history::{CampaignRow, RunDetail, RunStatus, SkillRecord};
 use crate::verdict::{Counts, Judgement, Outcome, wilson};
 
 /// Failed runs that are told; the rest is counted.
@@ -22,12 +22,19 @@ pub struct MarkdownReport {
     passed_runs: u64,
     failures: Vec<String>,
     failed_runs: u64,
+    privileged: Vec<String>,
 }
 
 impl MarkdownReport {
     /// A summary of nothing.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Notes which of the campaigns had a program that was told the truth.
+    pub fn know(&mut self, campaigns: &[CampaignRow]) {
+        let told = campaigns.iter().filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
+        self.privileged = told.map(|row| row.id.clone()).collect();
     }
 
     /// Adds a run.
@@ -80,6 +87,9 @@ pub fn markdown(report: &MarkdownReport) -> String {
     if runs > 0 {
         let mean = report.scores.iter().sum::<f64>() / runs as f64;
         let _ = writeln!(out, "\nT = {mean:.4}; runs in which everything passed: {}.", rate(report.passed_runs, runs));
+    }
+    for campaign in &report.privileged {
+        let _ = writeln!(out, "\nIn {}, {}.", code(campaign), SkillRecord::PRIVILEGED);
     }
     if !report.properties.is_empty() {
         out.push_str("\n| action | property | pass rate [95 % interval] |");

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::analysis::score_interval;
 use crate::base::names;
-use crate::history::CampaignRow;
+use crate::history::{CampaignRow, SkillRecord};
 use crate::report::findings_json;
 use crate::report::html::HtmlReport;
 use crate::report::html::columns::{Slot, Slots};
@@ -26,6 +26,7 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     pack.say("program", report.findings.program.as_str());
     pack.say("options", report.findings.options.as_str());
     pack.say("outcomes", Outcome::ALL.map(Outcome::word).to_vec());
+    pack.say("privileged", SkillRecord::PRIVILEGED);
     pack.say("scores", scores(report));
     sentences(&mut findings, report);
     pack.say("findings", findings);
@@ -99,6 +100,8 @@ fn campaign(row: &CampaignRow) -> Value {
         "interrupted": row.interrupted, "seed": row.seed, "planned": row.planned_runs, "runs": row.runs,
         "score": row.score, "without_broken": row.score_without_broken, "version": row.program_version,
         "config": row.config_digest, "ontology": row.ontology_digest,
+        "skill": row.skill.as_ref().map(|skill| &skill.command),
+        "privileged": row.skill.as_ref().is_some_and(|skill| skill.privileged),
     })
 }
 

@@ -1,0 +1,294 @@
+//! Actions performed by a program of somebody's: what goes over the wire, what it leaves behind, and all that it can do wrong.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::support::{actcheck, root, stderr, stdout};
+
+/// A glass alone on a table.
+const SCENE: &str = "
+seed = 7
+[objectSurface]
+object_surfaces = [\"coffee_table\"]
+[pickObject]
+model_list = [\"glass\"]
+";
+
+/// A folder with a configuration `c.toml` whose program is one of `tests/protocol/`.
+fn project(program: &str, tests: &str, runs: u32, skill: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["wire.py", program] {
+        std::fs::copy(root().join("tests/protocol").join(file), folder.path().join(file)).unwrap();
+    }
+    let mut text = format!("tests = {tests}\ntest_count = {runs}\ntest_launcher = \"{program}\"\n{SCENE}");
+    write!(text, "[skill]\n{skill}\n").unwrap();
+    std::fs::write(folder.path().join("c.toml"), text).unwrap();
+    folder
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
+    let mut all = vec!["run", "c.toml", "--format", "json"];
+    all.extend(arguments);
+    let output = actcheck(folder, &all);
+    let (text, complaints) = (stdout(&output), stderr(&output));
+    let json = serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}\n{complaints}"));
+    (output.status.code().unwrap(), json, complaints)
+}
+
+fn runs(json: &Value) -> &[Value] {
+    json["runs"].as_array().unwrap()
+}
+
+fn of<'a>(run: &'a Value, key: &str) -> &'a str {
+    run[key].as_str().unwrap_or_default()
+}
+
+/// Everything that is known of a run by its id.
+fn shown(folder: &Path, run: &str) -> Value {
+    let output = actcheck(folder, &["show", run, "--history", ".actcheck", "--format", "json"]);
+    serde_json::from_str(&stdout(&output)).unwrap_or_else(|error| panic!("{error}: {}", stderr(&output)))
+}
+
+/// Nothing of a program whose working folder was this one is left.
+fn nothing_is_left(folder: &Path) {
+    let here = std::fs::canonicalize(folder).unwrap();
+    let alive = || -> Vec<String> {
+        let processes = std::fs::read_dir("/proc").unwrap().flatten();
+        let held = processes.filter(|entry| std::fs::read_link(entry.path().join("cwd")).is_ok_and(|cwd| cwd == here));
+        held.map(|entry| std::fs::read_to_string(entry.path().join("cmdline")).unwrap_or_default()).collect()
+    };
+    let patience = Instant::now() + Duration::from_secs(10);
+    while !alive().is_empty() && Instant::now() < patience {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(alive(), [""; 0], "these are left");
+}
+
+/// Traces of runs by their index, and what the actions reported.
+fn courses(folder: &Path, json: &Value) -> Vec<(String, String)> {
+    let shown = runs(json).iter().map(|run| shown(folder, of(run, "run")));
+    shown.map(|run| (of(&run, "trace_hash").to_owned(), of(&run["actions"][0], "message").to_owned())).collect()
+}
+
+#[test]
+fn a_program_performs_an_action_the_same_with_any_number_of_workers() {
+    let folder = project("well_behaved.py", "[[\"Pick\"]]", 5, "env = { WIRE_LOG = \"log\" }");
+    let (code, one, complaints) = run(folder.path(), &["--jobs", "1"]);
+    assert_eq!((code, one["counts"]["broken"].as_u64(), runs(&one).len()), (1, Some(0), 5), "{complaints}\n{one:#}");
+    let alone = courses(folder.path(), &one);
+    assert!(alone.iter().all(|(hash, message)| !hash.is_empty() && message == "only waved"), "{alone:?}");
+    let (_, two, _) = run(folder.path(), &["--jobs", "2"]);
+    assert_eq!(alone, courses(folder.path(), &two));
+    nothing_is_left(folder.path());
+    described(folder.path());
+    let replayed = actcheck(folder.path(), &["replay", of(&runs(&one)[3], "run"), "--history", ".actcheck"]);
+    assert!(replayed.status.success(), "{}\n{}", stdout(&replayed), stderr(&replayed));
+    std::fs::OpenOptions::new()
+        .append(true)
+        .open(folder.path().join("well_behaved.py"))
+        .and_then(|mut file| std::io::Write::write_all(&mut file, b"# Other words.\n"))
+        .unwrap();
+    let replayed = actcheck(folder.path(), &["replay", of(&runs(&one)[3], "run"), "--history", ".actcheck"]);
+    assert!(stdout(&replayed).contains("skill"), "{}\n{}", stdout(&replayed), stderr(&replayed));
+}
+
+/// Every message that went either way is as `clients/protocol.schema.json` says.
+fn described(folder: &Path) {
+    let logs = std::fs::read_dir(folder).unwrap().flatten().map(|entry| entry.path());
+    let logs: Vec<_> = logs.filter(|path| path.to_string_lossy().contains("log.")).collect();
+    assert!(!logs.is_empty());
+    let output = Command::new("python3")
+        .arg(root().join("tests/protocol/validate.py"))
+        .arg(root().join("clients/protocol.schema.json"))
+        .args(logs)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}{}", stdout(&output), stderr(&output));
+}
+
+#[test]
+fn what_the_program_does_not_know_is_done_by_the_reference_skills() {
+    let folder = project("mixed.py", "[[\"MoveTo\", \"PerceivePlane\", \"Pick\"]]", 2, "");
+    let (_, json, complaints) = run(folder.path(), &[]);
+    for one in runs(&json) {
+        let run = shown(folder.path(), of(one, "run"));
+        let message = |step: usize| of(&run["actions"][step], "message").to_owned();
+        assert_eq!((of(&run, "status"), message(0).as_str()), ("completed", "stayed"), "{complaints}\n{run:#}");
+        assert!(message(1).contains("surface"), "{run:#}");
+        assert_eq!(message(2), "waved");
+    }
+    nothing_is_left(folder.path());
+}
+
+#[test]
+fn the_truth_is_told_only_where_a_campaign_asks_for_it_and_then_everybody_hears_of_it() {
+    for privileged in [false, true] {
+        let folder = project("truth.py", "[[\"Pick\"]]", 1, &format!("privileged = {privileged}"));
+        let (_, json, complaints) = run(folder.path(), &[]);
+        let message = of(&shown(folder.path(), of(&runs(&json)[0], "run"))["actions"][0], "message").to_owned();
+        let told = if privileged { "told of coffee_table_1, glass_1" } else { "told nothing" };
+        assert_eq!((message.as_str(), json["privileged"].as_bool()), (told, Some(privileged)), "{complaints}");
+        let report = |format: &str| stdout(&actcheck(folder.path(), &["report", format, "--history", ".actcheck"]));
+        assert_eq!(report("--markdown").contains("where everything truly is"), privileged);
+        let text = stdout(&actcheck(folder.path(), &["run", "c.toml"]));
+        assert_eq!(text.contains("where everything truly is"), privileged, "{text}");
+    }
+}
+
+/// What goes wrong in the first run, how it ends, and what is said of it.
+const FAULTS: [(&str, &str, &str); 36] = [
+    (
+        "exit_at_start",
+        "broken",
+        "it exited with code 1 before it connected to the address in ACTCHECK_ADDRESS; it printed last: can't find my weights",
+    ),
+    ("never_connects", "timeout", "it did not connect to the address in ACTCHECK_ADDRESS within 1.5 s"),
+    ("silent_at_start", "timeout", "it did not answer within"),
+    ("other_version", "broken", "it speaks version 2 of the protocol, and this is version 1"),
+    ("no_action", "broken", "it performs none of the tests' actions: it named Pikc, the tests have Pick"),
+    ("odd_hello", "broken", "unknown field `colour`"),
+    ("bye_at_start", "broken", "it sent `bye` where `hello` was due"),
+    ("exit", "broken", "it exited with code 3; it printed last: the last words"),
+    ("children", "broken", "it exited with code 0; it printed last: the last words"),
+    ("runaway", "broken", "it exited with code 3; it printed last: the last words"),
+    ("silent", "timeout", "it did not answer within 0.5 s"),
+    ("raise", "broken", "it exited with code 1; it printed last: ValueError: no idea what to do"),
+    ("killed", "broken", "it was ended by SIGSEGV"),
+    ("shut", "broken", "it closed the connection"),
+    ("garbage", "broken", "which is no frame of JSON: its fifth byte must be `J`"),
+    ("short_garbage", "timeout", "it did not answer within 0.5 s"),
+    ("not_json", "broken", "that can't be read: expected"),
+    ("not_object", "broken", "that can't be read: invalid"),
+    ("unknown_type", "broken", "it sent `dance` where `command`, `ask` or `end` was due"),
+    ("unknown_key", "broken", "unknown field `postions`, expected one of"),
+    ("wrong_kind", "broken", "which is no frame of JSON: its fifth byte must be `J`"),
+    ("long_frame", "broken", "it sent a message of 2147483647 bytes; the longest may have 1048576"),
+    ("two", "broken", "it sent more than one message at a time"),
+    ("drip", "timeout", "it did not send a whole message within 0.5 s"),
+    ("unknown_joint", "broken", "the robot has no joint `arm_lift_jointt`: did you mean `arm_lift_joint`?"),
+    ("finger", "broken", "is a finger, which goes by `gripper`"),
+    ("joint_twice", "broken", "its command has two targets for the joint `arm_lift_joint`"),
+    ("joint_in_two_lists", "broken", "its command has two targets for the joint `arm_lift_joint`"),
+    ("no_ticks", "broken", "its command lasts 0 ticks"),
+    ("not_a_number", "broken", "that can't be read"),
+    ("infinite", "broken", "number out of range"),
+    ("zero_quaternion", "broken", "whose quaternion [0.0, 0.0, 0.0, 0.0] is no rotation"),
+    ("chatter", "broken", "bytes in one run"),
+    ("memory", "broken", "it exited with code 1; it printed last: MemoryError"),
+    ("busy", "broken", "it was ended by SIG"),
+    ("stays", "completed", ""),
+];
+
+#[test]
+fn each_fault_of_a_program_ends_one_run_and_the_next_one_begins_with_a_new_program() {
+    let mut wrong = Vec::new();
+    for (fault, status, words) in FAULTS {
+        let patience = if ["chatter", "busy"].contains(&fault) { "10.0" } else { "0.5" };
+        let folder = project(
+            "faulty.py",
+            "[[\"Pick\"]]",
+            2,
+            &format!(
+                "startup_s = 1.5\ntimeout_s = {patience}\nmemory_mb = 1024\ncpu_s = 1\nenv = {{ FAULT = \"{fault}\", FAULT_ONCE = \"once\" }}"
+            ),
+        );
+        std::fs::write(folder.path().join("once"), "").unwrap();
+        let (_, json, complaints) = run(folder.path(), &["--jobs", "1"]);
+        let [first, second] = runs(&json) else { panic!("{fault}: {json:#}\n{complaints}") };
+        let told = of(first, "reason");
+        if of(first, "status") != status || !told.contains(words) || of(second, "status") != "completed" {
+            wrong.push(format!("{fault}: {} ({told}), then {}", of(first, "status"), of(second, "status")));
+        }
+        nothing_is_left(folder.path());
+        if fault == "raise" {
+            let all = stdout(&actcheck(folder.path(), &["show", of(first, "run"), "--history", ".actcheck"]));
+            assert!(all.contains("the program printed last:\n  Traceback (most recent call last)"), "{all}");
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_hundred_runs_with_faults_by_chance_end_and_nothing_is_lost() {
+    let folder = project("faulty.py", "[[\"Pick\"]]", 100, "timeout_s = 0.3\nmax_broken = 100");
+    let (code, json, complaints) = run(folder.path(), &["--jobs", "4"]);
+    assert!(code <= 1, "{complaints}");
+    let counted = |status: &str| runs(&json).iter().filter(|run| of(run, "status") == status).count();
+    let [completed, broken, timeout] = ["completed", "broken", "timeout"].map(counted);
+    assert_eq!((json["finished_runs"].as_u64(), completed + broken + timeout), (Some(100), 100));
+    assert!(completed > 20 && broken > 20 && timeout > 0, "{completed} completed, {broken} broken, {timeout} too late");
+    let kept = actcheck(folder.path(), &["list", "--history", ".actcheck", "--format", "json"]);
+    let kept: Vec<Value> = serde_json::from_str(&stdout(&kept)).unwrap();
+    assert_eq!(kept.len(), 100);
+    let listed = |status: &str| kept.iter().filter(|run| of(run, "status") == status).count();
+    assert_eq!([listed("completed"), listed("broken"), listed("timeout")], [completed, broken, timeout]);
+    nothing_is_left(folder.path());
+    // What a program does goes by the seed that it is given: who makes the runs changes nothing.
+    let (_, again, _) = run(folder.path(), &["--jobs", "2", "--runs", "20"]);
+    let statuses = |json: &Value| runs(json).iter().map(|run| of(run, "status").to_owned()).collect::<Vec<_>>();
+    assert_eq!(statuses(&again), statuses(&json)[..20]);
+}
+
+#[test]
+fn a_program_that_breaks_every_run_stops_the_campaign_with_one_error() {
+    for jobs in ["1", "4"] {
+        let folder = project("faulty.py", "[[\"Pick\"]]", 50, "max_broken = 3\nenv = { FAULT = \"raise\" }");
+        let (code, json, complaints) = run(folder.path(), &["--jobs", jobs]);
+        assert_eq!((code, json["finished_runs"].as_u64()), (2, Some(3)), "{complaints}");
+        assert_eq!(complaints.matches("S033").count(), 1, "{complaints}");
+        assert!(complaints.contains("ValueError: no idea what to do"), "{complaints}");
+        nothing_is_left(folder.path());
+    }
+}
+
+#[test]
+fn an_action_that_takes_too_long_ends_for_the_program_too() {
+    let folder = project("endless.py", "[[\"Pick\"]]", 2, "");
+    let config = folder.path().join("c.toml");
+    let text = std::fs::read_to_string(&config).unwrap();
+    std::fs::write(&config, text + "[budget]\naction_secs = 2\n").unwrap();
+    let (_, json, complaints) = run(folder.path(), &["--jobs", "1"]);
+    for run in runs(&json) {
+        let told = (of(run, "status"), of(run, "reason"));
+        assert_eq!(told, ("timeout", "the action took longer than its budget of 2 s"), "{complaints}");
+    }
+    // The same process had both runs.
+    assert_eq!(std::fs::read_to_string(folder.path().join("starts")).unwrap().lines().count(), 1);
+    nothing_is_left(folder.path());
+}
+
+#[test]
+fn nothing_is_left_when_the_simulator_itself_is_ended() {
+    for signal in ["INT", "KILL"] {
+        let folder = project("faulty.py", "[[\"Pick\"]]", 50, "timeout_s = 60.0\nenv = { FAULT = \"silent\" }");
+        let mut simulator = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+            .args(["run", "c.toml", "--jobs", "2"])
+            .current_dir(folder.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let here = std::fs::canonicalize(folder.path()).unwrap();
+        let has_program = || {
+            let processes = std::fs::read_dir("/proc").unwrap().flatten();
+            processes.filter(|entry| std::fs::read_link(entry.path().join("cwd")).is_ok_and(|cwd| cwd == here)).count()
+                > 1
+        };
+        let patience = Instant::now() + Duration::from_secs(30);
+        while !has_program() && Instant::now() < patience {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let id = simulator.id().to_string();
+        // The second interrupt insists.
+        for _ in 0..2 {
+            Command::new("kill").args(["-s", signal, &id]).stderr(Stdio::null()).status().unwrap();
+            std::thread::sleep(Duration::from_millis(300));
+        }
+        simulator.wait().unwrap();
+        nothing_is_left(folder.path());
+    }
+}
