@@ -7,7 +7,7 @@ use crate::base::{Choice, Diagnostics, Source, names};
 use crate::campaign::line::TEST_LEFT_OUT;
 use crate::campaign::shrink::{accepted_places, unit_of};
 use crate::campaign::{Env, Recalled};
-use crate::config::{self, CaseText, Overrides};
+use crate::config::{self, CaseText, Launcher, Overrides};
 use crate::history::{CampaignRecord, History, RunDetail};
 use crate::verdict::Outcome;
 
@@ -35,6 +35,7 @@ pub fn export(
     let choices: Vec<Choice> =
         accepted_places(&choices).into_iter().filter(|choice| choice.name != TEST_LEFT_OUT).collect();
     let failed = failed(run);
+    let folder = absolute(folder);
     let mut case = CaseText {
         run: &run.row.run,
         test: &test[..performed],
@@ -43,11 +44,11 @@ pub fn export(
         choices: &choices,
         unit: unit_of,
         paths: [None, None, None],
+        skill: skill_seen_from(&folder, env),
     };
     let source = &env.campaign.source;
     let (home, written) = (home(source), config::written_paths(source)?);
     let project = project(&home, &written);
-    let folder = absolute(folder);
     if !folder.starts_with(&project) {
         let bare = config::case_text(&env.campaign, &case)?;
         if carried_is_the_same(&bare, &folder, env, record) {
@@ -56,6 +57,13 @@ pub fn export(
     }
     case.paths = written.map(|path| path.map(|path| seen_from(&folder, &absolute(&home.join(path)))));
     config::case_text(&env.campaign, &case)
+}
+
+/// How a configuration in a folder names the program that performs actions, and its working folder.
+fn skill_seen_from(folder: &Path, env: &Env) -> Option<(Option<String>, String)> {
+    let Launcher::Program(skill) = &env.campaign.launcher else { return None };
+    let seen = |path: &Path| seen_from(folder, &absolute(path));
+    Some((skill.launcher(seen), seen(&skill.dir)))
 }
 
 /// The folder for a configuration's regressions: `regressions` beside it or in the folder above, whichever is there; where

@@ -32,6 +32,8 @@ pub struct CaseText<'a> {
     pub unit: fn(&str) -> &'static str,
     /// The keys `ontology` and `model_dir` and the robot's `profile`, as they are to be written; nothing leaves out.
     pub paths: [Option<String>; 3],
+    /// `test_launcher` and `[skill] dir` as they are to be written, where a program performs actions.
+    pub skill: Option<(Option<String>, String)>,
 }
 
 /// The paths that a configuration's text names, as they are written: of the ontology, the models, and the robot where it
@@ -74,6 +76,14 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
     }
     if let (Some(profile), Some(Value::Table(robot))) = (profile, table.get_mut("robot")) {
         robot.insert("profile".to_owned(), Value::String(profile));
+    }
+    if let Some((launcher, dir)) = &case.skill {
+        let launcher = launcher.iter().map(|text| ("test_launcher".to_owned(), Value::String(text.clone())));
+        table.extend(launcher);
+        let skill = table.entry("skill").or_insert_with(|| Value::Table(toml::Table::new()));
+        if let Value::Table(skill) = skill {
+            skill.insert("dir".to_owned(), Value::String(dir.clone()));
+        }
     }
     let mut out = format!(
         "# One scene, taken from run {}: `actcheck run` with this file makes it again.\n\

@@ -19,6 +19,9 @@ pub struct Skill {
     pub program: PathBuf,
     /// Its arguments.
     pub args: Vec<String>,
+    /// The file that `test_launcher` begins with, seen from where this program runs, and the words behind it; nothing where it
+    /// begins with an installed program.
+    pub launched: Option<(PathBuf, Vec<String>)>,
     /// Digest of the launched file, and of every argument that is a file.
     pub digest: String,
     /// Further variables of its environment (`env`).
@@ -37,6 +40,16 @@ pub struct Skill {
     pub cpu_secs: Option<u64>,
     /// So many runs in a row that the program broke stop the campaign (`max_broken`).
     pub max_broken: u64,
+}
+
+impl Skill {
+    /// What `test_launcher` is in a configuration that lies elsewhere; nothing where it is the same everywhere.
+    pub fn launcher(&self, seen: impl Fn(&Path) -> String) -> Option<String> {
+        let (file, behind) = self.launched.as_ref()?;
+        let file = seen(file);
+        let words = [file.as_str()].into_iter().chain(behind.iter().map(String::as_str));
+        shlex::try_join(words).ok()
+    }
 }
 
 /// An hour is more than any answer takes.
@@ -67,10 +80,10 @@ pub(super) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         options.finish(found);
     }
     match find(&written, folder) {
-        Ok((program, mut args)) => {
+        Ok(Command { program, mut args, launched }) => {
             skill.text = [&written.value].into_iter().chain(&skill.args).cloned().collect::<Vec<_>>().join(" ");
             args.append(&mut skill.args);
-            Launcher::Program(Box::new(Skill { digest: digest(&program, &args, &skill.dir), program, args, ..skill }))
+            Launcher::Program(Box::new(Skill { digest: digest(&program, &args, &skill.dir), program, args, launched, ..skill }))
         }
         Err(Missing { code, message, help }) => {
             table.fault(code, written.span, message, help);
@@ -85,6 +98,7 @@ fn blank(folder: &Path) -> Skill {
         text: String::new(),
         program: PathBuf::new(),
         args: Vec::new(),
+        launched: None,
         digest: String::new(),
         env: BTreeMap::new(),
         dir,
@@ -166,8 +180,16 @@ struct Missing {
     help: String,
 }
 
+/// What a command starts.
+struct Command {
+    program: PathBuf,
+    args: Vec<String>,
+    /// The file that the command begins with, if it does, and the words behind it.
+    launched: Option<(PathBuf, Vec<String>)>,
+}
+
 /// The file that a command starts, and its arguments.
-fn find(written: &Located<String>, folder: &Path) -> Result<(PathBuf, Vec<String>), Missing> {
+fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
     let text = written.value.as_str();
     // A path may have spaces in it.
     let words = if beside(folder, text).is_file() { Some(vec![text.to_owned()]) } else { shlex::split(text) };
@@ -179,16 +201,19 @@ fn find(written: &Located<String>, folder: &Path) -> Result<(PathBuf, Vec<String
     let mut words = split.into_iter();
     let (name, args) = (words.next().unwrap_or_default(), words.collect::<Vec<_>>());
     let path = beside(folder, &name);
-    let is_path = name.contains('/') || path.is_file() || name.ends_with(".py") || name.ends_with(".launch");
-    if !is_path {
-        let program = on_path(&name).ok_or_else(|| Missing {
-            code: "C031",
-            message: format!("there is no program `{name}`, neither beside the configuration nor on the search path"),
-            help: "name a file relative to the configuration, or a program that is installed; `reference` is our own skills"
-                .to_owned(),
-        })?;
-        return Ok((program, args));
+    if name.contains('/') || path.is_file() || name.ends_with(".py") || name.ends_with(".launch") {
+        return find_file(&name, path, args);
     }
+    let program = on_path(&name).ok_or_else(|| Missing {
+        code: "C031",
+        message: format!("there is no program `{name}`, neither beside the configuration nor on the search path"),
+        help: "name a file relative to the configuration, or an installed program; `reference` means our own skills".to_owned(),
+    })?;
+    Ok(Command { program, args, launched: None })
+}
+
+/// The same where a command begins with a file: `name` is how it is written, `path` where it is.
+fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Missing> {
     if !path.is_file() {
         return Err(Missing {
             code: "C031",
@@ -196,17 +221,20 @@ fn find(written: &Located<String>, folder: &Path) -> Result<(PathBuf, Vec<String
             help: "the path of `test_launcher` is relative to the configuration".to_owned(),
         });
     }
-    let path = std::path::absolute(&path).unwrap_or(path);
-    match (ROS.iter().find(|(ending, _)| name.ends_with(ending)), name.ends_with(".py")) {
-        (Some((_, starter)), _) => through(starter, &path, args, "C033"),
-        (None, true) => through(&["python3"], &path, args, "C032"),
-        (None, false) if is_executable(&path) => Ok((path, args)),
-        (None, false) => Err(Missing {
-            code: "C032",
-            message: format!("{} is not executable", path.display()),
-            help: format!("run `chmod +x {name}`, or name what runs it: `test_launcher = \"sh {name}\"`"),
-        }),
-    }
+    let launched = Some((path.clone(), args.clone()));
+    let (program, args) = match (ROS.iter().find(|(ending, _)| name.ends_with(ending)), name.ends_with(".py")) {
+        (Some((_, starter)), _) => through(starter, &path, args, "C033")?,
+        (None, true) => through(&["python3"], &path, args, "C032")?,
+        (None, false) if is_executable(&path) => (std::path::absolute(&path).unwrap_or(path), args),
+        (None, false) => {
+            return Err(Missing {
+                code: "C032",
+                message: format!("{} is not executable", path.display()),
+                help: format!("run `chmod +x {name}`, or name what runs it: `test_launcher = \"sh {name}\"`"),
+            });
+        }
+    };
+    Ok(Command { program, args, launched })
 }
 
 /// A file that something else runs.
@@ -227,7 +255,8 @@ fn through(
         .to_owned(),
     })?;
     let mut all: Vec<String> = before.iter().map(|word| (*word).to_owned()).collect();
-    all.push(path.display().to_string());
+    // The program's working folder may be another one.
+    all.push(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()).display().to_string());
     all.extend(args);
     Ok((found, all))
 }

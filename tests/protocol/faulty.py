@@ -12,7 +12,7 @@ import wire
 FOREVER = 600
 KINDS = (
     "exit silent raise killed shut garbage short_garbage not_json not_object unknown_type unknown_key wrong_kind long_frame two "
-    "hang_action drip unknown_joint finger joint_twice joint_in_two_lists no_ticks not_a_number infinite children runaway "
+    "drip unknown_joint finger joint_twice joint_in_two_lists no_ticks not_a_number infinite children runaway "
     "zero_quaternion"
 ).split()
 
@@ -62,8 +62,8 @@ def wrong(link, kind):
         link.raw(frame + frame)
     elif kind == "drip":
         link.raw(b"\x00\x01\x00\x00J")
-        for _ in range(100):
-            time.sleep(0.01)
+        for _ in range(200):
+            time.sleep(0.05)
             link.raw(b" ")
     elif kind == "unknown_joint":
         link.send({"type": "command", "positions": {joint + "t": 0.0}})

@@ -1,0 +1,21 @@
+"""The controller of `benches/protocol.rs` that does nothing, with the package `clients/python`, which needs numpy."""
+
+import os
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "clients/python/src"))
+import actcheck
+
+
+@actcheck.skill("Pick")
+def pick(robot, pickObject):
+    ticks, total = int(os.environ["TICKS"]), int(os.environ["TOTAL"])
+    began = time.perf_counter()
+    for _ in range(total // ticks):
+        robot.step(ticks=ticks)
+    robot.end(True, str(time.perf_counter() - began))
+
+
+actcheck.serve()

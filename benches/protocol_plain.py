@@ -1,0 +1,20 @@
+"""The controller of `benches/protocol.rs` that does nothing, with Python's own library alone."""
+
+import os
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests/protocol"))
+from wire import serve
+
+
+def perform(link, begin):
+    ticks, total = int(os.environ["TICKS"]), int(os.environ["TOTAL"])
+    began = time.perf_counter()
+    for _ in range(total // ticks):
+        link.ask({"type": "command", "ticks": ticks})
+    return {"type": "end", "succeeded": True, "message": str(time.perf_counter() - began)}
+
+
+serve(perform)
