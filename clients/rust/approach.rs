@@ -37,7 +37,9 @@ fn main() -> std::io::Result<()> {
         }
         let still = json!({ "type": "command", "ticks": 30, "base_velocity": [0.0, 0.0, 0.0] });
         let Some(_) = link.ask(&still)? else { return Ok(None) };
-        Ok(Some(json!({ "type": "end", "succeeded": false, "message": format!("stands before {wanted}, and has no idea how to take it") })))
+        Ok(Some(
+            json!({ "type": "end", "succeeded": false, "message": format!("stands before {wanted}, and has no idea how to take it") }),
+        ))
     })
 }
 

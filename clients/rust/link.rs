@@ -22,7 +22,8 @@ pub struct Link {
 /// # Errors
 /// There is no simulator, or it speaks wrongly.
 pub fn serve(actions: &[&str], mut perform: impl FnMut(&mut Link, &Value) -> Result<Option<Value>>) -> Result<()> {
-    let address = std::env::var("ACTCHECK_ADDRESS").map_err(|_| odd("ACTCHECK_ADDRESS is not set: actcheck starts this"))?;
+    let address =
+        std::env::var("ACTCHECK_ADDRESS").map_err(|_| odd("ACTCHECK_ADDRESS is not set: actcheck starts this"))?;
     let path = address.strip_prefix("unix:").ok_or_else(|| odd("the address is no Unix socket"))?;
     let stream = UnixStream::connect(path)?;
     let mut link = Link { stream, incoming: Vec::new(), outgoing: Vec::new(), hello: Value::Null, seed: 0 };

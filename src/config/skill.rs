@@ -83,7 +83,13 @@ pub(super) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         Ok(Command { program, mut args, launched }) => {
             skill.text = [&written.value].into_iter().chain(&skill.args).cloned().collect::<Vec<_>>().join(" ");
             args.append(&mut skill.args);
-            Launcher::Program(Box::new(Skill { digest: digest(&program, &args, &skill.dir), program, args, launched, ..skill }))
+            Launcher::Program(Box::new(Skill {
+                digest: digest(&program, &args, &skill.dir),
+                program,
+                args,
+                launched,
+                ..skill
+            }))
         }
         Err(Missing { code, message, help }) => {
             table.fault(code, written.span, message, help);
@@ -207,7 +213,8 @@ fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
     let program = on_path(&name).ok_or_else(|| Missing {
         code: "C031",
         message: format!("there is no program `{name}`, neither beside the configuration nor on the search path"),
-        help: "name a file relative to the configuration, or an installed program; `reference` means our own skills".to_owned(),
+        help: "name a file relative to the configuration, or an installed program; `reference` means our own skills"
+            .to_owned(),
     })?;
     Ok(Command { program, args, launched: None })
 }

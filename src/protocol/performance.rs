@@ -15,6 +15,9 @@ use crate::world::World;
 /// Longest message of an action's end that is kept. Unit: characters.
 const LONGEST_MESSAGE: usize = 1000;
 
+/// Longest part of the line that it printed last that is told with a fault. Unit: characters.
+const LONGEST_LINE: usize = 160;
+
 /// What a program is told of the run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunName {
@@ -75,7 +78,10 @@ impl<'a> Performance<'a> {
     fn named(&self, fault: OutsideFault) -> OutsideFault {
         let text = &self.lent.programs.skill.text;
         let last = self.output.iter().flatten().rev().find(|line| !line.trim().is_empty());
-        let printed = last.map_or_else(String::new, |line| format!("; it printed last: {}", line.trim()));
+        let printed = last.map_or_else(String::new, |line| {
+            let line: String = line.trim().chars().take(LONGEST_LINE).collect();
+            format!("; it printed last: {line}")
+        });
         OutsideFault { reason: format!("the program `{text}`: {}{printed}", fault.reason), ..fault }
     }
 }

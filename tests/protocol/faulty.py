@@ -137,7 +137,7 @@ def main():
             choice = link.run["seed"] % (2 * len(KINDS))
             if choice < len(KINDS):
                 wrong(link, KINDS[choice])
-        elif kind not in starts and kind != "late_exit" and now(once):
+        elif kind not in starts and kind != "stays" and now(once):
             wrong(link, kind)
         return {"type": "end", "succeeded": True, "message": "did nothing"}
 

@@ -1,15 +1,22 @@
-"""Performs the first and the last of three actions."""
+"""Perceives what is truly there, for others to go by: it has to be privileged."""
 
 from wire import serve
 
 
 def perform(link, begin):
-    if begin["action"] == "MoveTo":
-        link.ask({"type": "command", "ticks": 3, "base_velocity": [0, 0, 0]})
-        return {"type": "end", "succeeded": True, "message": "stayed"}
-    arm = link.hello["robot"]["arm_joints"]
-    link.ask({"type": "command", "ticks": 3, "velocities": {arm[0]: 0.1}})
-    return {"type": "end", "succeeded": False, "message": "waved"}
+    things = {thing["id"]: thing for thing in begin["observation"]["truth"]["objects"]}
+    table = things.pop(begin["parameters"]["objectSurface"][0])
+    width, depth, height = table["size_m"]
+    x, y, z = table["pose"]["position_m"]
+    top = {"position_m": [x, y, z + height], "quaternion_xyzw": table["pose"]["quaternion_xyzw"]}
+    link.ask({"type": "command", "ticks": 3})
+    return {
+        "type": "end",
+        "succeeded": True,
+        "message": f"perceived {len(things)}",
+        "perceived": [{key: thing[key] for key in ("pose", "size_m", "category")} for thing in things.values()],
+        "plane": {"pose": top, "size_m": [width, depth]},
+    }
 
 
-serve(perform, ["MoveTo", "Pick"])
+serve(perform, ["PerceivePlane"])
