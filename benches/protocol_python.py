@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """How many lockstep exchanges a second does the Python client make?
 
-    python benches/protocol_python.py          (where clients/python is installed)
+    pip install clients/python
+    python benches/protocol_python.py
 
 The simulation's side is a process that answers every command with the same bytes, so that what is measured is the client: a
-command of eight joints at each tick, and the observation that comes back. Beside it the same without the client: what sockets alone
-allow.
+command for eight joints at each tick, and the observation that comes back as arrays. Beside it the same without the client: what
+sockets alone allow.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ import socket
 import struct
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "clients/python"))
 from actcheck import Robot
-from actcheck.messages import Call
 from actcheck.session import Session
 from actcheck.wire import Wire
 from tests.fake import ARM, BASE, Simulation, hello
@@ -29,50 +30,52 @@ EXCHANGES = 20_000
 
 
 def frame(message: dict[str, object]) -> bytes:
+    """A message as it goes over the wire."""
     payload = json.dumps(message).encode()
     return struct.pack("<IB", len(payload), ord("J")) + payload
 
 
-def answer(connection: socket.socket, first: bytes, reply: bytes) -> None:
-    """Says hello, and then the same to everything."""
-    connection.sendall(first)
+def answer(connection: socket.socket, greeting: bytes, reply: bytes) -> None:
+    """Begins an action, and then says the same to everything."""
+    connection.sendall(greeting)
+    connection.recv(65536)
     while connection.recv(65536):
         connection.sendall(reply)
 
 
-def rate(work: object) -> float:
-    """Times a second that something was done."""
+def rate(work: Callable[[], object]) -> float:
+    """Times a second that something is done."""
     began = time.perf_counter()
     for _ in range(EXCHANGES):
-        work()  # type: ignore[operator]
+        work()
     return EXCHANGES / (time.perf_counter() - began)
 
 
 def main() -> None:
-    reply = Simulation(lambda simulation: None).observation()
+    """Measures both, and prints them."""
+    observation = Simulation(lambda simulation: None).observation()
+    begin = {"type": "begin", "action": "Pick", "parameters": {}, "budget_s": 60.0, "observation": observation}
     here, there = socket.socketpair()
-    server = multiprocessing.Process(target=answer, args=(there, frame(hello()), frame(reply)), daemon=True)
-    server.start()
-    there.close()
+    greeting, reply = frame(hello()) + frame(begin), frame(observation)
+    simulation = multiprocessing.Process(target=answer, args=(there, greeting, reply), daemon=True)
+    simulation.start()
     session = Session(Wire(here), "bench", ["Pick"])
-    call_observation = session._receive("observation")
-    from actcheck.messages import Observation
-
-    robot = Robot(session, Call("Pick", {}, {}, 60.0, Observation.from_wire(call_observation)))
-    targets = dict.fromkeys([*BASE, *ARM], 0.1)
+    call = session.next_call()
+    assert call is not None
+    robot, targets = Robot(session, call), dict.fromkeys([*BASE, *ARM], 0.1)
     client = rate(lambda: robot.step(targets))
-    request, length = frame({"type": "command", "ticks": 1, "positions": targets}), len(frame(reply))
+    request = frame({"type": "command", "ticks": 1, "positions": targets})
 
     def bare() -> None:
         here.sendall(request)
-        left = length
+        left = len(reply)
         while left:
             left -= len(here.recv(65536))
 
     sockets = rate(bare)
     print(f"client   {client:8.0f} exchanges a second")
     print(f"sockets  {sockets:8.0f} exchanges a second, {sockets / client:.1f} times as many")
-    server.kill()
+    simulation.kill()
 
 
 if __name__ == "__main__":
