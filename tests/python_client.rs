@@ -50,7 +50,7 @@ fn campaign(folder: &Path, example: &str, arguments: &[&str]) -> (Value, String)
     let named = pick.replace("test_launcher = \"reference\"", &format!("test_launcher = {:?}", launcher.display()));
     assert_ne!(named, pick);
     std::fs::write(&config, named).unwrap();
-    let history = folder.join(arguments.join("")).display().to_string();
+    let history = folder.join(format!("{example}{}", arguments.join(""))).display().to_string();
     let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args(["run", "configs/python.toml", "--format", "json", "--history", &history])
         .args(arguments)
@@ -80,4 +80,21 @@ fn a_pick_in_python_goes_the_same_way_at_any_number_of_workers() {
     // It does what it is there for: in most scenes, whichever they are today.
     let score = one["runs"].as_array().unwrap().iter().map(|run| run["score"].as_f64().unwrap()).sum::<f64>() / 3.0;
     assert!(score > 0.5, "{one:#}");
+}
+
+/// The careless one and the one that has learned end their action by their own reports, and are judged.
+#[test]
+fn the_other_examples_perform_their_action_too() {
+    let folder = project();
+    for (example, words) in [("clumsy_pick.py", "of course"), ("learned_pick.py", "hold")] {
+        let (told, _) = campaign(folder.path(), example, &["--runs", "2"]);
+        for run in told["runs"].as_array().unwrap() {
+            assert_eq!((&run["status"], &run["reason"]), (&"completed".into(), &Value::Null), "{example}: {run:#}");
+        }
+        let messages = "SELECT ?message { [] act:ofRun ?run ; act:message ?message }";
+        let history = folder.path().join(format!("{example}--runs2")).display().to_string();
+        let kept = stdout(&actcheck(folder.path(), &["query", messages, "--history", &history, "--format", "csv"]));
+        assert!(kept.lines().skip(1).all(|line| !line.contains("Error")), "{example}: {kept}");
+        assert!(kept.contains(words) || kept.contains("the hand is empty"), "{example}: {kept}");
+    }
 }

@@ -63,6 +63,8 @@ class Connection:
         self._output = tempfile.TemporaryFile(mode="w+")
         self._process: subprocess.Popen[str] | None = None
         self._robot: Robot | None = None
+        self._relay: socket.socket | None = None
+        self._session: Session | None = None
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as door:
                 door.bind(str(path))
@@ -73,10 +75,17 @@ class Connection:
                 self._relay = self._answered(door)
             with self._relay.makefile("r") as said:
                 address = said.readline().strip()
-            self.session = Session(Wire.dial(address), "notebook", list(actions))
+            self._session = Session(Wire.dial(address), "notebook", list(actions))
         except BaseException:
             self.close()
             raise
+
+    @property
+    def session(self) -> Session:
+        """The connection to the simulation. Raises `Closed` once the run is over."""
+        if self._session is None:
+            raise Closed("the run is over")
+        return self._session
 
     def begin(self) -> Robot:
         """Waits for the next action and hands out the robot. Raises `Closed` when there are no more."""
@@ -123,8 +132,7 @@ class Connection:
             self.end(False, "it was not ended")
         while self.session.next_call() is not None:
             self.session.end(Report(False, "nobody performed it"))
-        self.session.close()
-        self._relay.close()
+        self._hang_up()
         code = 2 if self._process is None else self._process.wait()
         result = Result(code, self._said())
         self.close()
@@ -132,14 +140,18 @@ class Connection:
 
     def close(self) -> None:
         """Ends whatever is left of it."""
-        for name in ("session", "_relay"):
-            if name in self.__dict__:
-                self.__dict__[name].close()
+        self._hang_up()
         if self._process is not None and self._process.poll() is None:
             self._process.terminate()
             self._process.wait()
         self._folder.cleanup()
         self._config.unlink(missing_ok=True)
+
+    def _hang_up(self) -> None:
+        for end in (self._session, self._relay):
+            if end is not None:
+                end.close()
+        self._session = self._relay = None
 
     def __enter__(self) -> Connection:
         return self

@@ -19,6 +19,8 @@ from actcheck.wire import Wire
 
 Info = dict[str, Any]
 
+BETWEEN = "no episode is going on: call `reset` first"
+
 
 @dataclass(frozen=True, eq=False)
 class Box:
@@ -94,7 +96,7 @@ class ActionEnv:
     def robot(self) -> Robot:
         """The robot of the episode, for whatever else is to be known or done. Raises `RuntimeError` between episodes."""
         if self._robot is None:
-            raise RuntimeError("no episode is going on: call `reset` first")
+            raise RuntimeError(BETWEEN)
         return self._robot
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
@@ -136,8 +138,9 @@ class ActionEnv:
 
     def end(self, succeeded: bool, message: str = "") -> None:
         """Ends the episode with the action's own report, by which and by the rules it is judged."""
-        robot, self._robot = self.robot, None
-        del robot
+        if self._robot is None:
+            raise RuntimeError(BETWEEN)
+        self._robot = None
         self._session.end(Report(succeeded, message))
 
     def close(self) -> None:
