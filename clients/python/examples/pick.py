@@ -1,6 +1,5 @@
 """A scripted pick: from the side or from above, from where furniture and other things leave room."""
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 
@@ -28,10 +27,10 @@ def ways(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[
 def take(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Report:
     """Drives there, closes the hand on the thing, lifts it and takes it away."""
     x, y, heading = robot.description.base_joints
-    best = sorted(ways(robot, thing, others), key=lambda way: way[0])
-    for (_, back, hand), posture in itertools.product(best, robot.description.postures):
-        try:
-            at = robot.ik(hand, near=posture)
+    for _, back, hand in sorted(ways(robot, thing, others), key=lambda way: way[0]):
+        level = hand.rotation[2, 0] > -0.5
+        try:  # with the upper arm level, so that it does not meet the table
+            at = robot.ik(hand, near=robot.description.postures[2 if level else 4])
         except Unreachable:
             continue
         if all(one.beside(np.array([at[x], at[y], 0.0])) > 0.2 for one in others if one.furniture):
@@ -41,7 +40,7 @@ def take(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Report:
     away = {x: at[x] - back * math.cos(at[heading]), y: at[y] - back * math.sin(at[heading])}
     robot.drive(away[x], away[y], at[heading])
     robot.gripper(robot.description.max_opening_m, wait=False)
-    before, level = hand.ahead(-0.12), hand.rotation[2, 0] > -0.5
+    before = hand.ahead(-0.12)
     robot.move_joints((at if level else robot.ik(before, near=at, base=False)) | away)
     robot.move_straight(before, base=True)
     robot.move_straight(hand, base=level, seconds=2.5)
