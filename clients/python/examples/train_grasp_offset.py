@@ -2,7 +2,7 @@ r"""Learns the weights of `learned_pick.py` from an exported dataset of its runs
 
     sed 's|^test_launcher.*|test_launcher = "../clients/python/examples/learned_pick.py --untrained"|' \
         configs/pick.toml > configs/collect.toml
-    actcheck run configs/collect.toml --runs 160 --seed 1000 --history collected
+    actcheck run configs/collect.toml --runs 400 --seed 1000 --history collected
     actcheck export --history collected --dataset runs
     python clients/python/examples/train_grasp_offset.py runs
 
