@@ -19,6 +19,8 @@ pub struct Grasped(Option<Taken>);
 struct Taken {
     grasp: Isometry3<f64>,
     heading: f64,
+    /// How many things had been seen by then: what is seen later is in the hand already.
+    n_percepts: usize,
 }
 
 impl Grasped {
@@ -35,7 +37,7 @@ impl Grasped {
 impl Taken {
     fn now(robot: &Operator<'_>) -> Self {
         let grasp = robot.kinematics().grasp(&robot.observe().positions);
-        Self { grasp, heading: Pose::from_isometry(&robot.base()).yaw() }
+        Self { grasp, heading: Pose::from_isometry(&robot.base()).yaw(), n_percepts: robot.percepts.len() }
     }
 }
 
@@ -58,7 +60,8 @@ pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Oper
         return Ok(());
     }
     let Some(id) = call.value(TARGET) else { return Ok(()) };
-    let Some((foot, size_m)) = told.or_else(|| seen(id, robot)) else { return Ok(()) };
+    let before = told.or_else(|| seen_before(id, &taken, robot)).map(|(foot, size_m)| (foot, size_m, taken));
+    let Some((foot, size_m, taken)) = before.or_else(|| seen_now(id, robot)) else { return Ok(()) };
     let opening_m = robot.observe().gripper_opening_m;
     let grasp_from_foot = foot.inverse() * taken.grasp;
     let held = Held { id: id.to_owned(), size_m, foot, grasp_from_foot, heading: taken.heading, opening_m };
@@ -66,17 +69,22 @@ pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Oper
     Ok(())
 }
 
-/// Where the robot last saw a thing: in this action, or in an earlier one's pictures. Otherwise it looks now.
-fn seen(id: &str, robot: &mut Operator<'_>) -> Option<(Isometry3<f64>, [f64; 3])> {
-    let before = robot.percepts.iter().rev().find(|percept| percept.id == id);
-    if let Some(percept) = before {
-        return Some((percept.pose.to_isometry(), percept.size_m));
+/// The foot of a thing, and its size.
+type Seen = (Isometry3<f64>, [f64; 3]);
+
+/// Where the robot saw a thing last before the hand closed: in this action, or in an earlier one's pictures.
+fn seen_before(id: &str, taken: &Taken, robot: &Operator<'_>) -> Option<Seen> {
+    let percept = robot.percepts.iter().take(taken.n_percepts).rev().find(|percept| percept.id == id);
+    match percept {
+        Some(percept) => Some((percept.pose.to_isometry(), percept.size_m)),
+        None => robot.recall(id).map(|known| (known.pose.to_isometry(), known.size_m)),
     }
-    if let Some(known) = robot.recall(id) {
-        return Some((known.pose.to_isometry(), known.size_m));
-    }
+}
+
+/// The thing in the hand as the reference perception sees it now, and the hand as it is now.
+fn seen_now(id: &str, robot: &mut Operator<'_>) -> Option<(Isometry3<f64>, [f64; 3], Taken)> {
     let now = robot.see(id)?;
-    Some((now.pose.to_isometry(), now.size_m))
+    Some((now.pose.to_isometry(), now.size_m, Taken::now(robot)))
 }
 
 fn perceived(end: &End) -> Result<Perceived, OutsideFault> {
