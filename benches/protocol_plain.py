@@ -11,10 +11,10 @@ from wire import serve
 
 def perform(link, begin):
     ticks, total = int(os.environ["TICKS"]), int(os.environ["TOTAL"])
-    began = time.perf_counter()
+    began = time.process_time()
     for _ in range(total // ticks):
         link.ask({"type": "command", "ticks": ticks})
-    return {"type": "end", "succeeded": True, "message": str(time.perf_counter() - began)}
+    return {"type": "end", "succeeded": True, "message": str(time.process_time() - began)}
 
 
 serve(perform)
