@@ -4,7 +4,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{project, root};
+use crate::support::{copy, project, root};
 
 /// The texts of the fenced blocks in a language.
 fn blocks(text: &str, language: &str) -> Vec<String> {
@@ -23,6 +23,7 @@ fn every_command_of_the_readme_works() {
     let project = project();
     let folder = project.path();
     std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
+    copy(&root().join("clients"), &folder.join("clients"));
     // The program as the README calls it, with its exit codes written down.
     let program = env!("CARGO_BIN_EXE_actcheck");
     script(
