@@ -196,7 +196,9 @@ pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
         }
         rest = shorter;
     }
-    base.join(rest)
+    let path = base.join(rest);
+    // The folder that the program runs in has no name of its own.
+    if path.as_os_str().is_empty() { PathBuf::from(".") } else { path }
 }
 
 #[cfg(test)]
@@ -209,5 +211,6 @@ mod tests {
         assert_eq!(beside(Path::new(""), "../models"), Path::new("../models"));
         assert_eq!(beside(Path::new("a/b"), "../../../m"), Path::new("../m"));
         assert_eq!(beside(Path::new("a"), "/m"), Path::new("/m"));
+        assert_eq!(beside(Path::new("a"), ".."), Path::new("."));
     }
 }

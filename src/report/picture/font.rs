@@ -51,20 +51,20 @@ pub(super) fn outline(text: &str, at: [f64; 2], size: f64, bold: bool) -> Vec<Co
 }
 
 /// Splits a text into lines no wider than `most`, between words where that is possible.
-pub(super) fn wrapped(text: &str, size: f64, most: f64) -> Vec<String> {
+pub(super) fn wrapped(text: &str, size: f64, bold: bool, most: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
         let mut rest = word;
         while let Some(line) = lines.last_mut() {
             let longer = if line.is_empty() { rest.to_owned() } else { format!("{line} {rest}") };
-            if width(&longer, size, false) <= most {
+            if width(&longer, size, bold) <= most {
                 *line = longer;
                 break;
             }
             if line.is_empty() {
                 // A word that is wider than a line is broken.
                 let fits = rest.char_indices().map(|(at, letter)| at + letter.len_utf8());
-                let end = fits.take_while(|end| width(&rest[..*end], size, false) <= most).last();
+                let end = fits.take_while(|end| width(&rest[..*end], size, bold) <= most).last();
                 let first = rest.chars().next().map_or(rest.len(), char::len_utf8);
                 let (head, tail) = rest.split_at(end.unwrap_or(first));
                 line.push_str(head);
@@ -138,7 +138,7 @@ mod tests {
     fn text_is_wrapped_and_nothing_of_it_is_lost() {
         let text = "the fingers did not close on glass_1 averyveryverylongwordthatfitsnowhere ok";
         for most in [5.0, 60.0, 200.0, 5000.0] {
-            let lines = wrapped(text, 12.0, most);
+            let lines = wrapped(text, 12.0, false, most);
             let letters = |text: &str| text.chars().filter(|letter| *letter != ' ').collect::<String>();
             assert_eq!(letters(&lines.concat()), letters(text));
             assert!(
@@ -146,6 +146,6 @@ mod tests {
                 "{lines:?}"
             );
         }
-        assert_eq!(wrapped("", 12.0, 100.0), [""]);
+        assert_eq!(wrapped("", 12.0, false, 100.0), [""]);
     }
 }

@@ -101,7 +101,7 @@ impl Writer<'_> {
     }
 
     fn lines(&mut self, text: &str, indent: f64, rgb: u32) {
-        let mut lines = font::wrapped(text, SIZE_PX, self.width - indent - ELLIPSIS_PX);
+        let mut lines = font::wrapped(text, SIZE_PX, false, self.width - indent - ELLIPSIS_PX);
         if lines.len() > MOST_LINES {
             lines.truncate(MOST_LINES);
             lines[MOST_LINES - 1].push_str(" …");

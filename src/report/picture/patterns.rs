@@ -57,7 +57,7 @@ pub fn patterns_picture(findings: &FindingsSummary) -> Option<Drawing> {
 
 /// Writes a sentence from a corner on; returns where it ends.
 fn words(drawing: &mut Drawing, text: &str, [left, top]: [f64; 2], width: f64) -> f64 {
-    font::wrapped(text, SIZE_PX + 0.5, width).into_iter().fold(top, |y, text| {
+    font::wrapped(text, SIZE_PX, true, width).into_iter().fold(top, |y, text| {
         let paint = Paint::solid(paint::INK);
         drawing.words(Words { text, at: [left, y + LINE_PX - 3.0], size: SIZE_PX, bold: true, paint, rim: false });
         y + LINE_PX
