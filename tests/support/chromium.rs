@@ -176,7 +176,17 @@ impl Chromium {
     /// What can be seen, as PNG.
     pub fn picture(&mut self) -> Vec<u8> {
         use base64::Engine as _;
-        let letters = self.call("Page.captureScreenshot", json!({ "format": "png" }))["data"].clone();
+        let began = Instant::now();
+        let letters = loop {
+            match self.asked("Page.captureScreenshot", json!({ "format": "png" })) {
+                Ok(answer) => break answer["data"].clone(),
+                // A page that was just asked for takes the place of another one.
+                Err(fault) if fault.contains("Not attached") && began.elapsed() < PATIENCE => {
+                    std::thread::sleep(Duration::from_millis(20));
+                }
+                Err(fault) => panic!("Page.captureScreenshot: {fault}"),
+            }
+        };
         base64::engine::general_purpose::STANDARD.decode(letters.as_str().unwrap()).unwrap()
     }
 }
