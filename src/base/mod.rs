@@ -13,6 +13,7 @@ mod source;
 mod stream;
 mod suggest;
 mod term;
+mod whole;
 
 pub use choices::{Choice, ChoiceKind, Choices};
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
@@ -24,3 +25,4 @@ pub use source::{Source, Span};
 pub use stream::Stream;
 pub use suggest::{did_you_mean, nearest};
 pub use term::{Term, TermId, Terms};
+pub use whole::write_whole;

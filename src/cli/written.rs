@@ -1,10 +1,9 @@
 //! Results into files: whole or not at all.
 
-use std::fs::{self, File};
-use std::io::Write as _;
+use std::fs;
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics};
+use crate::base::{Diagnostic, Diagnostics, write_whole};
 
 /// Writes a file. Where that fails, on a full disk say, what was there before is there still.
 ///
@@ -16,23 +15,9 @@ pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnost
     let written = match fs::metadata(&target) {
         // A pipe or a terminal has no other to take its place, and a folder says itself that it is none.
         Ok(found) if !found.is_file() => fs::write(&target, bytes),
-        _ => replace(&target, bytes.as_ref()),
+        _ => write_whole(&target, bytes.as_ref()),
     };
     written.map_err(|error| unwritten(file, &error).into())
-}
-
-fn replace(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut name = file.file_name().unwrap_or_default().to_os_string();
-    name.push(".part");
-    let beside = file.with_file_name(name);
-    let written = File::create(&beside).and_then(|mut part| {
-        part.write_all(bytes)?;
-        part.sync_all()
-    });
-    written.and_then(|()| fs::rename(&beside, file)).inspect_err(|_| {
-        // Half a file is of no use to anybody; where it can't be removed either, its name says what it is.
-        let _ = fs::remove_file(&beside);
-    })
 }
 
 /// X007: a file or folder that can't be written.

@@ -5,10 +5,10 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use crate::base::Diagnostics;
+use crate::base::{Diagnostics, write_whole};
 use crate::history::fault;
 
 /// Format of the folder that this program writes, and the newest that it reads.
@@ -114,25 +114,5 @@ fn lock(dir: &Path, how: fn(&File) -> Result<(), TryLockError>) -> Result<File, 
         // Some network file systems know no locks; the store's own still guards.
         Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(file),
         Err(TryLockError::Error(error)) => Err(fault::io(dir, "locking it", &error)),
-    }
-}
-
-/// Writes a file so that it is there whole or not at all, also after a power cut.
-pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(".tmp");
-    let temporary = path.with_file_name(name);
-    let written = File::create(&temporary).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.sync_all()
-    });
-    if let Err(error) = written.and_then(|()| fs::rename(&temporary, path)) {
-        // Half a file is of no use; where it can't be removed either, the next campaign does.
-        let _ = fs::remove_file(&temporary);
-        return Err(error);
-    }
-    match path.parent() {
-        Some(parent) => File::open(parent)?.sync_all(),
-        None => Ok(()),
     }
 }

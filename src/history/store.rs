@@ -10,9 +10,9 @@ use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::{StorageError, Store};
 
 use crate::actions::Trace;
-use crate::base::{Choice, Diagnostic, Diagnostics, Digest, Source, nearest};
+use crate::base::{Choice, Diagnostic, Diagnostics, Digest, Source, nearest, write_whole};
 use crate::facts::{RunFacts, extract};
-use crate::history::folder::{Folder, write_whole};
+use crate::history::folder::Folder;
 use crate::history::read::{short_id, subjects, text_of};
 use crate::history::statements::iri;
 use crate::history::write_campaign::{self, campaign_node};

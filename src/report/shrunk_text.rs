@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use crate::base::names;
-use crate::history::{Role, RunDetail};
+use crate::history::RunDetail;
 use crate::report::Table;
 use crate::report::table::ruled;
 
@@ -62,8 +62,7 @@ pub struct ShrunkChoice {
 impl ShrunkSummary {
     /// Other objects that are left.
     pub fn others(&self) -> usize {
-        let is_other = |role| matches!(role, Role::Other | Role::PlaceOther | Role::Obstacle);
-        self.run.objects.iter().filter(|object| is_other(object.role)).count()
+        self.run.objects.iter().filter(|object| object.role.is_bystander()).count()
     }
 }
 

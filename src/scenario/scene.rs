@@ -81,6 +81,11 @@ impl Role {
         }
     }
 
+    /// Whether it only stands around: neither handled nor furniture.
+    pub fn is_bystander(self) -> bool {
+        matches!(self, Self::Other | Self::PlaceOther | Self::Obstacle)
+    }
+
     /// The role of a word.
     pub fn from_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|role| role.word() == word)

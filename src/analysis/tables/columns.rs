@@ -183,7 +183,7 @@ const COLUMNS: &[Column] = &[
         Cell::Number(p.scene.target.and_then(|target| target.max_tilt_rad))
     }),
     number("others_displacement_m", "m", "how far any other thing came from its place during the run", |p| {
-        let others = p.run.objects.iter().filter(|object| object.role == Role::Other);
+        let others = p.run.objects.iter().filter(|object| object.role.is_bystander());
         Cell::Number(others.filter_map(|object| object.displacement_m).max_by(f64::total_cmp))
     }),
 ];

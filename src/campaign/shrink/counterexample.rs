@@ -275,8 +275,7 @@ fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
     let left = things.map(left_out).filter(|removal| !has(recorded, removal));
     let objects = &record.scene.objects;
     let target = objects.iter().find(|object| object.role == Role::Target).map(|object| object.pose.position);
-    let is_other = |role| matches!(role, Role::Other | Role::PlaceOther | Role::Obstacle);
-    let others = objects.iter().filter(|object| is_other(object.role));
+    let others = objects.iter().filter(|object| object.role.is_bystander());
     let mut ranked: Vec<(f64, f64, Choice)> = left
         .zip(others)
         .map(|(removal, object)| {

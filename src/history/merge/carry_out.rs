@@ -6,8 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use oxigraph::model::{GraphName, GraphNameRef, Literal, NamedNode, Quad};
 use oxigraph::store::{StorageError, Store};
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::history::folder::write_whole;
+use crate::base::{Diagnostic, Diagnostics, write_whole};
 use crate::history::merge::copy::about;
 use crate::history::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
 use crate::history::merge::renames::Renames;
