@@ -31,6 +31,8 @@ mod regressions;
 mod report;
 mod report_formats;
 mod report_html;
+#[cfg(feature = "rerun")]
+mod report_rrd;
 mod rules;
 mod run;
 mod serve;
@@ -39,6 +41,7 @@ mod show;
 mod shrink;
 mod since;
 mod stop;
+mod watched;
 mod why;
 mod written;
 

@@ -8,8 +8,13 @@ use crate::base::{Diagnostic, Diagnostics, Severity};
 
 /// Writes results. A reader that has gone away (`| head`) ends the process quietly.
 pub fn print(text: &str) {
+    print_bytes(text.as_bytes());
+}
+
+/// Writes results that are no text, as [`print`] does.
+pub fn print_bytes(results: &[u8]) {
     let mut out = std::io::stdout().lock();
-    if let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    if let Err(error) = out.write_all(results).and_then(|()| out.flush()) {
         if error.kind() == std::io::ErrorKind::BrokenPipe {
             std::process::exit(0);
         }

@@ -5,24 +5,41 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::analyse::{Analysed, Question, analysed};
 use crate::cli::chosen::{ChosenRuns, is_meant};
 use crate::cli::report_formats::{self, FormatArgs};
 use crate::cli::{output, report_html, written};
+use crate::history::{History, RunDetail};
+use crate::report::HTML_COLUMNS;
+
+/// Patterns have at most so many conditions, and a chance of so much to be false, as `actcheck analyse` has them by default.
+const DEPTH: u8 = 3;
+const LEVEL: f64 = 0.05;
+/// Letters that stand for bytes take a third more room.
+const BYTES_IN_A_MB: f64 = 1e6;
 
 /// `actcheck report`
 #[derive(Debug, Args)]
-#[group(id = "written", required = true, multiple = true, args = ["html", "allure", "junit", "earl", "jsonl", "markdown"])]
+#[group(id = "written", required = true, multiple = true, args = ["html", "allure", "junit", "earl", "jsonl", "markdown", "rrd"])]
 pub struct ReportArgs {
     /// Write the report as one page (HTML); `-` prints it
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
+    /// Write runs in 3D over simulated time, with contacts and outcomes, for the viewer of rerun; `-` prints them
+    #[cfg_attr(
+        not(feature = "rerun"),
+        doc = "",
+        doc = "This actcheck was built without it: `cargo build --release --locked --features rerun`"
+    )]
+    #[arg(long, value_name = "FILE.rrd")]
+    pub rrd: Option<PathBuf>,
     /// The same for other tools.
     #[command(flatten)]
     pub formats: FormatArgs,
     /// Only this property, by its name in the ontology (may be given several times)
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
-    /// Room for the replays of failed runs in the page: more take longer to make and to send
+    /// Room for the replays of failed runs in the page, and for recordings of runs: more take longer to make and to send
     #[arg(long, value_name = "MB", default_value_t = 5.0, value_parser = megabytes)]
     pub replay_mb: f64,
     /// Of which runs, and where the history lies.
@@ -43,16 +60,36 @@ impl ReportArgs {
         self.property.iter().any(|name| is_meant(property, name))
     }
 
-    /// Whether a report goes to the output stream.
-    fn prints(&self) -> Result<bool, Diagnostics> {
-        let page = self.html.as_deref().is_some_and(|file| file.as_os_str() == "-");
-        match self.formats.printed() + usize::from(page) {
-            0 => Ok(false),
-            1 => Ok(true),
-            _ => Err(Diagnostic::error("X051", "several reports can't share the output stream")
-                .help("print one of them, and name files for the others")
-                .into()),
+    /// Leaves a run those outcomes that were asked for.
+    pub(super) fn keep_wanted(&self, run: &mut RunDetail) {
+        for action in &mut run.actions {
+            action.judgements.retain(|judgement| self.property.is_empty() || self.wants(&judgement.property));
         }
+    }
+
+    /// Whether a report goes to the output stream.
+    ///
+    /// # Errors
+    /// X051: several would share it. X055: a report needs what this program was built without.
+    fn prints(&self) -> Result<bool, Diagnostics> {
+        let mut faults = Diagnostics::new();
+        let printed = |file: &Option<PathBuf>| file.as_deref().is_some_and(|file| file.as_os_str() == "-");
+        let files = [&self.html, &self.rrd].into_iter().filter(|file| printed(file)).count();
+        let streams = self.formats.printed() + files;
+        if streams > 1 {
+            faults.push(
+                Diagnostic::error("X051", "several reports can't share the output stream")
+                    .help("print one of them, and name files for the others"),
+            );
+        }
+        if self.rrd.is_some() && !cfg!(feature = "rerun") {
+            faults.push(
+                Diagnostic::error("X055", "this actcheck was built without recordings for rerun (`--rrd`)").help(
+                    "build it with them: `cargo build --release --locked --features rerun`; `--html` has runs in 3D without",
+                ),
+            );
+        }
+        faults.or(streams == 1)
     }
 }
 
@@ -61,8 +98,20 @@ pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
     let printed = args.prints()?;
     let history = args.chosen.open()?;
     let mut told = report_formats::write(args, &history)?;
+    if args.html.is_some() || args.rrd.is_some() {
+        told.extend(write_watched(args, &history)?);
+    }
+    report_formats::tell(&told, printed);
+    Ok(())
+}
+
+/// Writes the reports in which runs can be watched, of what analysis found. Returns what there is to say of them.
+fn write_watched(args: &ReportArgs, history: &History) -> Result<Vec<String>, Diagnostics> {
+    let found = found(args, history)?;
+    let room = args.replay_mb * BYTES_IN_A_MB;
+    let mut told = Vec::new();
     if let Some(file) = &args.html {
-        let page = report_html::page(args, &history)?;
+        let page = report_html::page(&found, history, room)?;
         if file.as_os_str() == "-" {
             output::print(&page);
         } else {
@@ -70,6 +119,21 @@ pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
             told.push(format!("{} holds the report ({:.1} MB)", file.display(), page.len() as f64 / 1e6));
         }
     }
-    report_formats::tell(&told, printed);
-    Ok(())
+    #[cfg(feature = "rerun")]
+    if let Some(file) = &args.rrd {
+        told.extend(crate::cli::report_rrd::write(file, args, &found, history, room)?);
+    }
+    Ok(told)
+}
+
+fn found(args: &ReportArgs, history: &History) -> Result<Analysed, Diagnostics> {
+    let asked = Question {
+        chosen: &args.chosen,
+        property: &args.property,
+        by: &[],
+        usual_maps: true,
+        depth: DEPTH,
+        level: LEVEL,
+    };
+    analysed(&asked, history, &HTML_COLUMNS)
 }

@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::base::Diagnostics;
 use crate::cli::report::ReportArgs;
-use crate::cli::{chosen, output, report_html, written};
+use crate::cli::{chosen, output, watched, written};
 use crate::history::{CampaignRow, History, RunDetail, RunFilter, RunRow};
 use crate::report::{
     Attachment, Caption, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results, markdown,
@@ -60,10 +60,9 @@ pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>,
     let mut judged = BTreeSet::new();
     for row in &rows {
         let mut run = history.run(&row.run)?;
-        for action in &mut run.actions {
-            judged.extend(action.judgements.iter().map(|judgement| judgement.property.clone()));
-            action.judgements.retain(|judgement| args.property.is_empty() || args.wants(&judgement.property));
-        }
+        let judgements = run.actions.iter().flat_map(|action| &action.judgements);
+        judged.extend(judgements.map(|judgement| judgement.property.clone()));
+        args.keep_wanted(&mut run);
         sinks.take(&run)?;
     }
     chosen::all_judged(&args.property, judged.iter().map(String::as_str))?;
@@ -207,7 +206,7 @@ impl<'a> AllureFolder<'a> {
             return Vec::new();
         };
         let rules = self.rules.as_ref();
-        let explained = rules.map(|rules| report_html::explained(self.history, rules, run, &self.budget));
+        let explained = rules.map(|rules| watched::explained(self.history, rules, run, &self.budget));
         let mut attachments: Vec<Attachment> = explained
             .unwrap_or_default()
             .into_iter()

@@ -43,5 +43,5 @@ pub use vitals::RunVitals;
 pub use wire::{WireFault, WireSyntax};
 
 // What the readers of a history meet in its products.
-pub use crate::actions::{BodyState, Form, Snapshot, Trace};
+pub use crate::actions::{BodyState, ContactEpisode, Form, Snapshot, Trace};
 pub use crate::scenario::{Part, Role, Shape};

@@ -100,7 +100,7 @@ pub fn markdown(report: &MarkdownReport) -> String {
     }
     for ((action, property), counts) in &report.properties {
         let decided = counts.decided();
-        let _ = write!(out, "| {} | {} | {} |", cell(action), cell(property), rate(counts.passed, decided));
+        let _ = write!(out, "| {} | {} | {} |", plain(action), plain(property), rate(counts.passed, decided));
         Outcome::ALL.iter().for_each(|outcome| out.push_str(&format!(" {} |", counts.get(*outcome))));
         out.push('\n');
     }
@@ -136,12 +136,12 @@ fn failures(report: &MarkdownReport, out: &mut String) {
 }
 
 fn failure(run: &RunDetail) -> String {
-    let mut out = format!("- {} ({})\n", code(&run.row.run), cell(&run.row.test));
+    let mut out = format!("- {} ({})\n", code(&run.row.run), plain(&run.row.test));
     for action in &run.actions {
         for judgement in action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed) {
             let Judgement { property, witness, .. } = judgement;
             let (action, property) = (names::local(&action.action), names::local(property));
-            let _ = writeln!(out, "  - {} **{}**: {}", cell(action), cell(property), cell(witness));
+            let _ = writeln!(out, "  - {} **{}**: {}", plain(action), plain(property), plain(witness));
         }
     }
     out
@@ -163,7 +163,7 @@ fn word<'a>(count: u64, one: &'a str, several: &'a str) -> &'a str {
 }
 
 /// Text as one line in which nothing is markup, in a table too.
-fn cell(text: &str) -> String {
+pub fn plain(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
         match letter {
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn witnesses_can_not_become_markup() {
-        assert_eq!(cell("a|b\n<img> @all [x](y) *z*"), "a\\|b &lt;img&gt; &#64;all \\[x\\](y) \\*z\\*");
+        assert_eq!(plain("a|b\n<img> @all [x](y) *z*"), "a\\|b &lt;img&gt; &#64;all \\[x\\](y) \\*z\\*");
     }
 
     #[test]

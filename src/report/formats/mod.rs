@@ -14,5 +14,7 @@ pub use allure::{Attachment, RESULTS_COMMON_FILES, allure_common, allure_results
 pub use earl::EarlReport;
 pub use identity::Repetitions;
 pub use junit::JunitReport;
+#[cfg(feature = "rerun")]
+pub(super) use markdown::plain;
 pub use markdown::{MarkdownReport, markdown};
 pub use observation::observation;

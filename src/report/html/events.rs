@@ -4,12 +4,10 @@ use serde_json::{Value, json};
 
 use crate::base::{Pose, names};
 use crate::history::{RunDetail, Trace};
+use crate::report::contacts::strongest;
 use crate::report::html::Explained;
-use crate::report::html::moment::decided;
+use crate::report::moment::decided;
 use crate::verdict::Outcome;
-
-/// Contacts of an action that are told at most: the strongest.
-const MOST_CONTACTS: usize = 60;
 
 /// An action by its place in the run.
 pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explained: &[Explained]) -> Value {
@@ -41,10 +39,11 @@ fn events(told: &mut Value, trace: &Trace, idx: usize) {
     let state = trace.snapshots.get(idx).or(trace.snapshots.last());
     told["start"] = json!(state.map_or(0.0, |state| state.time_secs - begin));
     told["phases"] = action.phases.iter().map(|phase| json!([phase.name, phase.start_secs])).collect();
-    told["contacts"] = contacts(action.contacts.iter().map(|contact| {
+    let contacts = strongest(&action.contacts).into_iter().map(|contact| {
         let [a, b] = &contact.pair;
-        (contact.max_force_n, json!([a, b, contact.start_secs, contact.end_secs, contact.max_force_n]))
-    }));
+        json!([a, b, contact.start_secs, contact.end_secs, contact.max_force_n])
+    });
+    told["contacts"] = contacts.collect();
     let asked = action.percepts.iter().map(|percept| seen(&percept.id, &percept.pose, percept.size_m));
     let things = action.perceived.iter().flat_map(|perceived| &perceived.things);
     let things =
@@ -56,16 +55,4 @@ fn events(told: &mut Value, trace: &Trace, idx: usize) {
 fn seen(name: &str, pose: &Pose, size_m: [f64; 3]) -> Value {
     let at: Vec<f64> = pose.position.iter().chain(&pose.rotation).copied().collect();
     json!({ "name": name, "at": at, "size": size_m })
-}
-
-/// The strongest contacts, in the order in which they began.
-fn contacts(all: impl Iterator<Item = (f64, Value)>) -> Value {
-    let mut all: Vec<(f64, Value)> = all.collect();
-    if all.len() > MOST_CONTACTS {
-        all.sort_by(|a, b| b.0.total_cmp(&a.0));
-        all.truncate(MOST_CONTACTS);
-        let start = |contact: &Value| contact[2].as_f64().unwrap_or_default();
-        all.sort_by(|a, b| start(&a.1).total_cmp(&start(&b.1)));
-    }
-    all.into_iter().map(|(_, contact)| contact).collect()
 }

@@ -9,7 +9,6 @@
 mod columns;
 mod events;
 mod input;
-mod moment;
 mod order;
 mod pack;
 mod page;

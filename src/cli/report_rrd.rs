@@ -1,0 +1,61 @@
+//! `actcheck report --rrd`: runs for the viewer of rerun.
+
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::analyse::Analysed;
+use crate::cli::report::ReportArgs;
+use crate::cli::{output, watched, written};
+use crate::history::History;
+use crate::report::{RecordingFault, Recordings, replay_order};
+
+/// Writes recordings of the runs that were asked for, as many as there is room for. Unit of room: bytes. Returns what there is to say
+/// of them.
+///
+/// # Errors
+/// The history can't be read, or the file can't be written.
+pub(super) fn write(
+    file: &Path,
+    args: &ReportArgs,
+    found: &Analysed,
+    history: &History,
+    room: f64,
+) -> Result<Option<String>, Diagnostics> {
+    let order = order(found);
+    let mut recordings = Recordings::new().map_err(unrecorded)?;
+    watched::in_order(history, &found.ontology, &order, |(mut run, trace, explained)| {
+        // One run is worth its room, however large it is.
+        if recordings.runs() > 0 && recordings.bytes() as f64 >= room {
+            return Ok(ControlFlow::Break(()));
+        }
+        args.keep_wanted(&mut run);
+        recordings.add(&run, trace.as_ref(), &explained).map_err(unrecorded)?;
+        Ok(ControlFlow::Continue(()))
+    })?;
+    let runs = recordings.runs();
+    let bytes = recordings.finish().map_err(unrecorded)?;
+    if file.as_os_str() == "-" {
+        output::print_bytes(&bytes);
+        return Ok(None);
+    }
+    written::write(file, &bytes)?;
+    let (name, all, size) = (file.display(), order.len(), bytes.len() as f64 / 1e6);
+    let more = if runs < all { "; `--replay-mb` makes room for more" } else { "" };
+    Ok(Some(format!("{name} holds {runs} of {all} runs ({size:.1} MB{more}): rerun {name}")))
+}
+
+/// All runs: first those that the page replays, which show every failure, then the others.
+fn order(found: &Analysed) -> Vec<String> {
+    let mut order = replay_order(&found.summary, &found.table);
+    let known: BTreeSet<String> = order.iter().cloned().collect();
+    order.extend(found.table.text("run").texts.iter().filter(|run| !known.contains(*run)).cloned());
+    order
+}
+
+fn unrecorded(fault: RecordingFault) -> Diagnostics {
+    Diagnostic::error("X056", format!("a run can't be recorded: {fault}"))
+        .help("leave `--rrd` out, and report this as a fault of actcheck")
+        .into()
+}

@@ -1,0 +1,38 @@
+//! Which contacts of an action are told where not all can be.
+
+use crate::history::ContactEpisode;
+
+/// Contacts of an action that are told at most: the strongest.
+const MOST_CONTACTS: usize = 60;
+
+/// The strongest contacts, in the order in which they began.
+pub(super) fn strongest(contacts: &[ContactEpisode]) -> Vec<&ContactEpisode> {
+    let mut all: Vec<&ContactEpisode> = contacts.iter().collect();
+    if all.len() > MOST_CONTACTS {
+        all.sort_by(|a, b| b.max_force_n.total_cmp(&a.max_force_n));
+        all.truncate(MOST_CONTACTS);
+        all.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_many_contacts_the_strongest_are_told_as_they_began() {
+        let contact = |idx: u32| ContactEpisode {
+            pair: ["floor".to_owned(), "mug_1".to_owned()],
+            start_secs: f64::from(100 - idx),
+            end_secs: 200.0,
+            max_force_n: f64::from(idx % 50),
+        };
+        let all: Vec<ContactEpisode> = (0..100).map(contact).collect();
+        let told = strongest(&all);
+        assert_eq!(told.len(), MOST_CONTACTS);
+        assert!(told.iter().all(|contact| contact.max_force_n >= 20.0));
+        assert!(told.is_sorted_by(|a, b| a.start_secs <= b.start_secs));
+        assert_eq!(strongest(&all[..3]), all[..3].iter().collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,102 @@
+//! The surface of a convex solid of which only the corners are known.
+
+use nalgebra::{Point3, Vector3};
+
+/// Points so near to a plane are on it. Unit: metres.
+const FLAT_M: f64 = 1e-6;
+/// Corners that are looked at. Traces keep 26 of a solid at most.
+const MOST_CORNERS: usize = 64;
+
+/// A flat face: its outward normal and its corners, counter-clockwise seen from outside.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Face {
+    /// Unit vector.
+    pub normal: Vector3<f64>,
+    /// Unit: metres.
+    pub corners: Vec<Point3<f64>>,
+}
+
+/// Faces of the hull of points: every plane through three of them that has none beyond it. Points that lie in one plane make
+/// its two sides; those on a line none.
+///
+/// Takes the fourth power of their number.
+pub(super) fn faces(points: &[[f64; 3]]) -> Vec<Face> {
+    let finite = points.iter().filter(|point| point.iter().all(|value| value.is_finite()));
+    let points: Vec<Point3<f64>> = finite.take(MOST_CORNERS).map(|point| Point3::from(*point)).collect();
+    let mut faces: Vec<Face> = Vec::new();
+    for (i, a) in points.iter().enumerate() {
+        for (j, b) in points.iter().enumerate().skip(i + 1) {
+            for c in points.iter().skip(j + 1) {
+                let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-12) else { continue };
+                for normal in [normal, -normal] {
+                    let reach = normal.dot(&a.coords);
+                    let known = faces.iter().any(|face| is_same(face, &normal, reach));
+                    if !known && points.iter().all(|point| normal.dot(&point.coords) <= reach + FLAT_M) {
+                        let on = |point: &&Point3<f64>| normal.dot(&point.coords) >= reach - FLAT_M;
+                        faces.push(Face {
+                            normal,
+                            corners: around(points.iter().filter(on).copied().collect(), &normal),
+                        });
+                    }
+                }
+            }
+        }
+    }
+    faces
+}
+
+fn is_same(face: &Face, normal: &Vector3<f64>, reach: f64) -> bool {
+    let corner = face.corners.first().map_or(f64::NAN, |corner| normal.dot(&corner.coords));
+    face.normal.dot(normal) > 1.0 - 1e-6 && (corner - reach).abs() < 10.0 * FLAT_M
+}
+
+/// Points of a plane by their angle about their middle.
+fn around(mut points: Vec<Point3<f64>>, normal: &Vector3<f64>) -> Vec<Point3<f64>> {
+    let middle = points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64;
+    let away = |point: &Point3<f64>| point.coords - middle;
+    let Some(u) = points.iter().find_map(|point| away(point).try_normalize(1e-9)) else { return points };
+    let v = normal.cross(&u);
+    let angle = |point: &Point3<f64>| libm::atan2(away(point).dot(&v), away(point).dot(&u));
+    points.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Corners of a box.
+    fn corners([x, y, z]: [f64; 3]) -> Vec<[f64; 3]> {
+        (0..8).map(|idx| [x * f64::from(idx & 1), y * f64::from(idx >> 1 & 1), z * f64::from(idx >> 2)]).collect()
+    }
+
+    /// Volume within faces, and their area. Both are wrong where a face is missing, there twice, or the wrong way round.
+    fn measured(faces: &[Face]) -> (f64, f64) {
+        let triangles =
+            faces.iter().flat_map(|face| face.corners[1..].windows(2).map(|pair| (face.corners[0], pair[0], pair[1])));
+        triangles.fold((0.0, 0.0), |(volume, area), (a, b, c)| {
+            let turned = (b - a).cross(&(c - a));
+            (volume + a.coords.dot(&turned) / 6.0, area + turned.norm() / 2.0)
+        })
+    }
+
+    #[test]
+    fn a_box_has_six_faces_that_enclose_it() {
+        let mut points = corners([1.0, 2.0, 3.0]);
+        points.extend([[0.5, 1.0, 1.5], [0.5, 1.0, 0.0], [f64::NAN, 0.0, 0.0]]);
+        let faces = faces(&points);
+        let (volume, area) = measured(&faces);
+        assert_eq!(faces.len(), 6);
+        assert!((volume - 6.0).abs() < 1e-9 && (area - 22.0).abs() < 1e-9, "{volume} {area}");
+    }
+
+    #[test]
+    fn points_in_a_plane_make_its_two_sides_and_those_on_a_line_none() {
+        let flat: Vec<[f64; 3]> = corners([1.0, 1.0, 0.0])[..4].to_vec();
+        let two_sides = faces(&flat);
+        let (volume, area) = measured(&two_sides);
+        assert_eq!(two_sides.len(), 2);
+        assert!(volume.abs() < 1e-9 && (area - 2.0).abs() < 1e-9);
+        assert!(faces(&[[0.0; 3], [1.0; 3], [2.0; 3]]).is_empty() && faces(&[]).is_empty());
+    }
+}

@@ -1,0 +1,53 @@
+//! What came of a run, as a document beside its bodies.
+
+use std::fmt::Write as _;
+
+use crate::base::names;
+use crate::history::{ActionDetail, RunDetail};
+use crate::report::Caption;
+use crate::report::formats::plain;
+use crate::report::html::Explained;
+use crate::verdict::{Judgement, Outcome};
+
+/// What a recording is called.
+pub(super) fn title(run: &RunDetail) -> String {
+    Caption::of(run).title
+}
+
+/// Outcomes of all properties with witness, margin and explanation (Markdown). No word of a model, rule or message is markup.
+pub(super) fn document(run: &RunDetail, explained: &[Explained]) -> String {
+    let caption = Caption::of(run);
+    let mut out = format!("# {}\n", plain(&caption.title));
+    if let Some(reason) = &run.reason {
+        let _ = writeln!(out, "\n{}", plain(reason));
+    }
+    for (action, told) in run.actions.iter().zip(&caption.actions) {
+        let _ = writeln!(out, "\n## {}\n", plain(told));
+        for judgement in &action.judgements {
+            told_of(&mut out, action, judgement, explained);
+        }
+    }
+    out
+}
+
+fn told_of(out: &mut String, action: &ActionDetail, judgement: &Judgement, explained: &[Explained]) {
+    let (property, outcome) = (names::local(&judgement.property), judgement.outcome.word());
+    let outcome = if judgement.outcome == Outcome::Passed { outcome.to_owned() } else { format!("**{outcome}**") };
+    let _ = write!(out, "- {}: {outcome}", plain(property));
+    if let Some(margin) = judgement.margin {
+        let _ = write!(out, ", margin {margin:.4}");
+    }
+    if !judgement.witness.is_empty() {
+        let _ = write!(out, ". {}", plain(&judgement.witness));
+    }
+    out.push('\n');
+    let why = explained.iter().find(|why| why.step == action.step && why.property == judgement.property);
+    if let Some(why) = why {
+        // Indented text is shown as it is.
+        out.push('\n');
+        why.text.lines().for_each(|line| {
+            let _ = writeln!(out, "      {line}");
+        });
+        out.push('\n');
+    }
+}

@@ -1,0 +1,108 @@
+//! One recording as the format has it: messages with chunks of rows.
+
+use re_chunk::{Chunk, ChunkError, ChunkId, RowId, TimeColumn, TimePoint};
+use re_log_encoding::{EncodeError, Encoder};
+use re_log_types::{EntityPath, EntityPathPart, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource};
+use re_sdk_types::{AsComponents, SerializationError, SerializedComponentColumn};
+
+/// Recordings of one application share how they are looked at.
+const APPLICATION: &str = "actcheck";
+/// The name of the only time line: simulated time since the run began.
+const SIM_TIME: &str = "sim_time";
+
+/// Why something can't be recorded. (No run can bring it about; the library has it all the same.)
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingFault {
+    /// Values have no form in columns.
+    #[error("values can't be laid out in columns: {0}")]
+    Values(#[from] SerializationError),
+    /// Columns don't belong together.
+    #[error("columns don't fit together: {0}")]
+    Columns(#[from] ChunkError),
+    /// The file has no room for it.
+    #[error("a message can't be encoded: {0}")]
+    Message(#[from] EncodeError),
+}
+
+/// A recording that is being written. Ids are counted: they need to differ within a recording only.
+pub(super) struct Recording<'a> {
+    encoder: &'a mut Encoder<Vec<u8>>,
+    store: StoreId,
+    chunks: u128,
+    rows: u128,
+    bytes: u64,
+}
+
+impl<'a> Recording<'a> {
+    /// Begins the recording of a run.
+    ///
+    /// # Errors
+    /// The message can't be encoded.
+    pub fn begin(encoder: &'a mut Encoder<Vec<u8>>, run: &str) -> Result<Self, RecordingFault> {
+        let store = StoreId::recording(APPLICATION, run);
+        let info = StoreInfo::new(store.clone(), StoreSource::Other(APPLICATION.to_owned()));
+        let begun = LogMsg::SetStoreInfo(SetStoreInfo { row_id: RowId::ZERO.as_tuid(), info });
+        let bytes = encoder.append(&begun)?;
+        Ok(Self { encoder, store, chunks: 0, rows: 0, bytes })
+    }
+
+    /// Bytes that it took so far.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Says what holds at all times.
+    ///
+    /// # Errors
+    /// It can't be laid out or encoded.
+    pub fn still(&mut self, at: EntityPath, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
+        let batches = what.iter().flat_map(|what| what.as_serialized_batches());
+        let row = self.row();
+        let chunk = Chunk::builder_with_id(self.chunk(), at).with_serialized_batches(row, TimePoint::STATIC, batches);
+        self.write(&chunk.build()?)
+    }
+
+    /// Says what holds from each of some moments on. Columns have a row for each moment. Unit: seconds since the run began.
+    ///
+    /// # Errors
+    /// It can't be laid out or encoded.
+    pub fn course(
+        &mut self,
+        at: EntityPath,
+        secs: impl IntoIterator<Item = f64>,
+        columns: impl IntoIterator<Item = SerializedComponentColumn>,
+    ) -> Result<(), RecordingFault> {
+        let nanos: Vec<i64> = secs.into_iter().map(nanos).collect();
+        let rows: Vec<RowId> = nanos.iter().map(|_| self.row()).collect();
+        let times = TimeColumn::new_duration_nanos(SIM_TIME, nanos);
+        let timelines = std::iter::once((*times.timeline().name(), times)).collect();
+        let components = columns.into_iter().map(|column| (column.descriptor, column.list_array)).collect();
+        let chunk = Chunk::from_native_row_ids(self.chunk(), at, Some(true), &rows, timelines, components)?;
+        self.write(&chunk)
+    }
+
+    fn chunk(&mut self) -> ChunkId {
+        self.chunks += 1;
+        ChunkId::from_u128(self.chunks)
+    }
+
+    fn row(&mut self) -> RowId {
+        self.rows += 1;
+        RowId::from_u128(self.rows)
+    }
+
+    fn write(&mut self, chunk: &Chunk) -> Result<(), RecordingFault> {
+        self.bytes += self.encoder.append(&LogMsg::ArrowMsg(self.store.clone(), chunk.to_arrow_msg()?))?;
+        Ok(())
+    }
+}
+
+/// Whole nanoseconds. What is no number is the beginning.
+fn nanos(secs: f64) -> i64 {
+    (secs * 1e9).round() as i64
+}
+
+/// Where something stands in the tree of a recording. Names are taken as they are, whatever letters they have.
+pub(super) fn place<'a>(names: impl IntoIterator<Item = &'a str>) -> EntityPath {
+    names.into_iter().map(EntityPathPart::new).collect()
+}
