@@ -31,7 +31,7 @@
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store) |
 //! | [`campaign`] | the conductor; the only module that calls many stages | rayon |
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, campaigns side by side, when it fails | polars, statrs |
-//! | [`report`] | verdicts and tables as text, JSON and pages, in the formats of other people's tools; runs as pictures and in 3D | |
+//! | [`report`] | verdicts and tables as text, JSON and pages, in the formats of other people's tools; runs as pictures and in 3D | rerun (feature `rerun`) |
 //! | [`serve`] | a history over HTTP: SPARQL endpoint, a page to ask from, the report | oxhttp |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap |
 //!

@@ -38,6 +38,7 @@ mod protocol;
 mod python_client;
 mod readme;
 mod recheck;
+mod recording;
 mod repeat;
 mod replay;
 mod resume;

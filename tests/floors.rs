@@ -31,7 +31,7 @@ const FLOORS: [(&str, &[&str]); 16] = [
 ];
 
 /// Libraries of the field and where they may be named.
-const FENCES: [(&str, &[&str]); 15] = [
+const FENCES: [(&str, &[&str]); 19] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh_loader", &["config"]),
@@ -47,6 +47,10 @@ const FENCES: [(&str, &[&str]); 15] = [
     ("rayon", &["campaign"]),
     ("clap", &["cli"]),
     ("oxhttp", &["serve"]),
+    ("re_chunk", &["report"]),
+    ("re_log_encoding", &["report"]),
+    ("re_log_types", &["report"]),
+    ("re_sdk_types", &["report"]),
 ];
 
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {

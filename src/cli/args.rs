@@ -186,7 +186,7 @@ pub enum Command {
     ///
     /// Reads the tables beside the history, which are brought up to date first. Exit code: 0 written, 2 it could not be done.
     #[command(
-        after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper\n  actcheck report --allure allure-results --junit junit.xml --markdown"
+        after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper\n  actcheck report --rrd runs.rrd    (built with `--features rerun`; `rerun runs.rrd` shows it)\n  actcheck report --allure allure-results --junit junit.xml --markdown"
     )]
     Report(crate::cli::report::ReportArgs),
     /// List all properties: label, language, rule file, actions, and how often each passed in the history
