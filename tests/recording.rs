@@ -138,7 +138,7 @@ mod with_recordings {
             let expected: Vec<i64> =
                 (0..frames.rows.len()).map(|idx| (idx as f64 * period_nanos).round() as i64).collect();
             assert_eq!(moments(course), expected);
-            let told: Vec<[f32; 3]> = course.iter_slices(translation).map(|at: &[[f32; 3]]| at[0]).collect();
+            let told: Vec<[f32; 3]> = course.iter_slices::<[f32; 3]>(translation).map(|at| at[0]).collect();
             let traced: Vec<&[f32]> = frames.rows.iter().map(|row| &row[7 * slot..7 * slot + 3]).collect();
             assert!(told.iter().zip(&traced).all(|(told, traced)| told == traced) && told.len() == traced.len());
         }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use re_sdk_types::archetypes::Mesh3D;
 use re_sdk_types::components::AlbedoFactor;
 
@@ -25,9 +25,8 @@ impl Mesh {
         for face in faces {
             let first = self.positions.len() as u32;
             let normal = at.rotation * face.normal;
-            self.positions
-                .extend(face.corners.iter().map(|corner| (at * corner).coords.map(|value| value as f32).into()));
-            self.normals.extend(face.corners.iter().map(|_| normal.map(|value| value as f32).into()));
+            self.positions.extend(face.corners.iter().map(|corner| single((at * corner).coords)));
+            self.normals.extend(face.corners.iter().map(|_| single(normal)));
             let corners = first..self.positions.len() as u32;
             self.triangles.extend(corners.clone().skip(2).map(|corner| [first, corner - 1, corner]));
         }
@@ -43,6 +42,11 @@ impl Mesh {
         };
         (!self.triangles.is_empty()).then(mesh)
     }
+}
+
+/// As exact as the viewer's numbers are.
+fn single(vector: Vector3<f64>) -> [f32; 3] {
+    vector.map(|value| value as f32).into()
 }
 
 /// Faces of a hollow wall about z, open above and below. Unit: metres. Radii are those of its outside.
