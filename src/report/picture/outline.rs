@@ -57,8 +57,8 @@ fn rings(circles: impl IntoIterator<Item = (f64, f64)>) -> Vec<Point3<f64>> {
     circles.into_iter().flat_map(ring).collect()
 }
 
-/// The convex hull of points of a plane, always the same way round (by Andrew's chains of lower and upper points).
-pub(super) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+/// The convex hull of points of a plane, counter-clockwise where y is left of x (by Andrew's chains of lower and upper points).
+pub(in crate::report) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.retain(|point| point.iter().all(|value| value.is_finite()));
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();

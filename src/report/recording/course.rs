@@ -125,8 +125,7 @@ fn perceived(recording: &mut Recording<'_>, trace: &Trace) -> Result<(), Recordi
         }
         let boxes =
             boxes.boxes(Look::PERCEIVED).with_labels(seen.iter().map(|(name, ..)| *name)).with_show_labels(false);
-        let columns = boxes.columns([seen.len()])?;
-        recording.course(place([SCENE, PERCEIVED]), [end.time_secs - begin], columns)?;
+        recording.from(place([SCENE, PERCEIVED]), end.time_secs - begin, &boxes)?;
     }
     Ok(())
 }

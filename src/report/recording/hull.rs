@@ -2,6 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::report::picture::flat_hull;
+
 /// Points so near to a plane are on it. Unit: metres.
 const FLAT_M: f64 = 1e-6;
 /// Corners that are looked at. Traces keep 26 of a solid at most.
@@ -32,11 +34,7 @@ pub(super) fn faces(points: &[[f64; 3]]) -> Vec<Face> {
                     let reach = normal.dot(&a.coords);
                     let known = faces.iter().any(|face| is_same(face, &normal, reach));
                     if !known && points.iter().all(|point| normal.dot(&point.coords) <= reach + FLAT_M) {
-                        let on = |point: &&Point3<f64>| normal.dot(&point.coords) >= reach - FLAT_M;
-                        faces.push(Face {
-                            normal,
-                            corners: around(points.iter().filter(on).copied().collect(), &normal),
-                        });
+                        faces.extend(face(&points, normal, reach));
                     }
                 }
             }
@@ -45,20 +43,25 @@ pub(super) fn faces(points: &[[f64; 3]]) -> Vec<Face> {
     faces
 }
 
+/// The face of points that lie as far along a normal as any.
+fn face(points: &[Point3<f64>], normal: Vector3<f64>, reach: f64) -> Option<Face> {
+    let on = points.iter().filter(|point| normal.dot(&point.coords) >= reach - FLAT_M);
+    let corners = around(&on.copied().collect::<Vec<_>>(), &normal);
+    (corners.len() > 2).then_some(Face { normal, corners })
+}
+
 fn is_same(face: &Face, normal: &Vector3<f64>, reach: f64) -> bool {
     let corner = face.corners.first().map_or(f64::NAN, |corner| normal.dot(&corner.coords));
     face.normal.dot(normal) > 1.0 - 1e-6 && (corner - reach).abs() < 10.0 * FLAT_M
 }
 
-/// Points of a plane by their angle about their middle.
-fn around(mut points: Vec<Point3<f64>>, normal: &Vector3<f64>) -> Vec<Point3<f64>> {
-    let middle = points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64;
-    let away = |point: &Point3<f64>| point.coords - middle;
-    let Some(u) = points.iter().find_map(|point| away(point).try_normalize(1e-9)) else { return points };
+/// Corners of the hull of points of a plane, counter-clockwise seen from where its normal points to.
+fn around(points: &[Point3<f64>], normal: &Vector3<f64>) -> Vec<Point3<f64>> {
+    let Some(first) = points.first() else { return Vec::new() };
+    let Some(u) = points.iter().find_map(|point| (point - first).try_normalize(FLAT_M)) else { return Vec::new() };
     let v = normal.cross(&u);
-    let angle = |point: &Point3<f64>| libm::atan2(away(point).dot(&v), away(point).dot(&u));
-    points.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
-    points
+    let flat = points.iter().map(|point| [(point - first).dot(&u), (point - first).dot(&v)]);
+    flat_hull(flat.collect()).into_iter().map(|[x, y]| first + u * x + v * y).collect()
 }
 
 #[cfg(test)]

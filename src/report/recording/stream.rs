@@ -1,6 +1,6 @@
 //! One recording as the format has it: messages with chunks of rows.
 
-use re_chunk::{Chunk, ChunkError, ChunkId, RowId, TimeColumn, TimePoint};
+use re_chunk::{Chunk, ChunkError, ChunkId, RowId, TimeColumn, TimePoint, Timeline};
 use re_log_encoding::{EncodeError, Encoder};
 use re_log_types::{EntityPath, EntityPathPart, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource};
 use re_sdk_types::{AsComponents, SerializationError, SerializedComponentColumn};
@@ -56,9 +56,21 @@ impl<'a> Recording<'a> {
     /// # Errors
     /// It can't be laid out or encoded.
     pub fn still(&mut self, at: EntityPath, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
+        self.since(at, TimePoint::STATIC, what)
+    }
+
+    /// Says what holds from a moment on. Unit: seconds since the run began.
+    ///
+    /// # Errors
+    /// It can't be laid out or encoded.
+    pub fn from(&mut self, at: EntityPath, secs: f64, what: &dyn AsComponents) -> Result<(), RecordingFault> {
+        self.since(at, TimePoint::default().with(Timeline::new_duration(SIM_TIME), nanos(secs)), &[what])
+    }
+
+    fn since(&mut self, at: EntityPath, time: TimePoint, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
         let batches = what.iter().flat_map(|what| what.as_serialized_batches());
         let row = self.row();
-        let chunk = Chunk::builder_with_id(self.chunk(), at).with_serialized_batches(row, TimePoint::STATIC, batches);
+        let chunk = Chunk::builder_with_id(self.chunk(), at).with_serialized_batches(row, time, batches);
         self.write(&chunk.build()?)
     }
 
