@@ -31,7 +31,7 @@ const FLOORS: [(&str, &[&str]); 16] = [
 ];
 
 /// Libraries of the field and where they may be named.
-const FENCES: [(&str, &[&str]); 19] = [
+const FENCES: [(&str, &[&str]); 20] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh_loader", &["config"]),
@@ -50,6 +50,7 @@ const FENCES: [(&str, &[&str]); 19] = [
     ("re_chunk", &["report"]),
     ("re_log_encoding", &["report"]),
     ("re_log_types", &["report"]),
+    ("re_protos", &["report"]),
     ("re_sdk_types", &["report"]),
 ];
 

@@ -7,6 +7,7 @@
 
 mod course;
 mod events;
+mod footer;
 mod hull;
 mod look;
 mod mesh;

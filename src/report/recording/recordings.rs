@@ -7,7 +7,7 @@ use re_sdk_types::archetypes::{RecordingInfo, TextDocument};
 use crate::history::{RunDetail, Trace};
 use crate::report::html::Explained;
 use crate::report::recording::stream::{Recording, RecordingFault, place};
-use crate::report::recording::{course, events, outcomes};
+use crate::report::recording::{course, events, footer, outcomes};
 
 /// Recordings, one for each run that was added.
 pub struct Recordings {
@@ -23,10 +23,7 @@ impl Recordings {
     /// The beginning of a file can't be encoded.
     pub fn new() -> Result<Self, RecordingFault> {
         let options = EncodingOptions::PROTOBUF_COMPRESSED;
-        let mut encoder = Encoder::new_eager(CrateVersion::LOCAL, options, Vec::new())?;
-        // The library lists several recordings at the end of a file in an order that is another one each time. The list is optional:
-        // it serves to fetch parts of large files from afar.
-        encoder.do_not_emit_footer();
+        let encoder = Encoder::new_eager(CrateVersion::LOCAL, options, Vec::new())?;
         Ok(Self { encoder, runs: 0, bytes: 0 })
     }
 
@@ -69,6 +66,6 @@ impl Recordings {
     /// The end of a file can't be encoded.
     pub fn finish(mut self) -> Result<Vec<u8>, RecordingFault> {
         self.encoder.finish()?;
-        Ok(self.encoder.into_inner()?)
+        footer::sorted(self.encoder.into_inner()?)
     }
 }
