@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::support::chromium::Chromium;
 use crate::support::planted::Dice;
-use crate::support::{actcheck, made_up, paged, project, stderr, stdout};
+use crate::support::{actcheck, made_up, paged, shipped, stderr, stdout};
 
 use actcheck::report::{Explained, PropertyWords, Replays};
 use actcheck::verdict::{Outcome, wilson};
@@ -18,12 +18,8 @@ const VIEWS: [&str; 7] = ["/", "/properties", "/modes", "/patterns", "/map", "/h
 const DESKTOP: (u32, u32) = (1280, 860);
 const PHONE: (u32, u32) = (390, 844);
 
-/// A history of some picks, of which at least one failed, and its report.
+/// The report of the shipped picks, of which at least one failed.
 fn reported(folder: &Path) -> PathBuf {
-    // Where things are seen so badly, grasps soon fail.
-    let run = ["run", "configs/pick.toml", "--runs", "40", "--max-failures", "2", "--jobs", "2", "--history", "h"];
-    let output = actcheck(folder, &run);
-    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let output = actcheck(folder, &["report", "--html", "report.html", "--history", "h"]);
     assert!(output.status.success(), "{}", stderr(&output));
     folder.join("report.html")
@@ -47,7 +43,7 @@ fn keep(browser: &mut Chromium, name: &str) -> Vec<u8> {
 
 #[test]
 fn a_report_is_read_filtered_and_watched_in_a_browser() {
-    let project = project();
+    let project = shipped("pick").copied();
     let file = reported(project.path());
     let mut browser = Chromium::start();
     browser.size(DESKTOP.0, DESKTOP.1);

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::support::look::looking;
 use crate::support::{actcheck, edit, project, stderr, stdout};
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
@@ -19,11 +20,11 @@ fn listed(folder: &Path, history: &str) -> String {
 /// The run at which a count of failures or the width of intervals ends a campaign is the same at any number of workers.
 #[test]
 fn failures_and_widths_end_a_campaign_at_the_same_run_whoever_makes_it() {
-    let project = project();
+    let project = looking();
     for (name, budget) in [("failures", ["--max-failures", "2"]), ("width", ["--until-width", "0.6"])] {
         let of = |jobs: &str| {
             let history = format!("{name}{jobs}");
-            let all = ["run", "configs/pick.toml", "--runs", "40", "--jobs", jobs, "--history", &history];
+            let all = ["run", "configs/look.toml", "--runs", "40", "--jobs", jobs, "--history", &history];
             let summary = json(project.path(), &[&all[..], &budget].concat());
             let text = listed(project.path(), &history);
             assert_eq!(summary["ended_by"], name);

@@ -1,5 +1,6 @@
 //! The main job with the built program: campaigns, their exit codes, and what they leave behind.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -9,7 +10,8 @@ use actcheck::config::Overrides;
 use actcheck::history::History;
 use serde_json::Value;
 
-use crate::support::{actcheck, edit, project, stderr, stdout};
+use crate::support::look::looking;
+use crate::support::{actcheck, edit, project, shipped, stderr, stdout};
 
 const COUNT: &str = "PREFIX act: <http://actions#> SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }";
 
@@ -44,73 +46,70 @@ fn outcomes(json: &Value) -> Vec<(u64, String, f64)> {
 
 #[test]
 fn the_shipped_pick_has_passed_and_failed_runs_and_exits_with_one() {
-    let project = project();
-    let output = actcheck(project.path(), &["run", "configs/pick.toml", "--history", "h"]);
-    let text = stdout(&output);
-    assert_eq!(output.status.code(), Some(1), "{text}\n{}", stderr(&output));
+    let (made, text) = (shipped("pick"), &shipped("pick").text);
+    assert_eq!(made.code, Some(1), "{text}");
+    let folder = made.copied();
     for property in ["CloseObject", "ObjectGrasped", "NoGraspCollisions", "MovedObject", "ObjectInGripper"] {
         assert!(text.contains(property), "{property} is not in the table:\n{text}");
     }
     assert!(text.contains("over 15 runs"), "{text}");
     assert!(text.contains("actcheck show "), "no command that shows more:\n{text}");
-    let count = actcheck(project.path(), &["query", "--history", "h", "--format", "csv", COUNT]);
+    let count = actcheck(folder.path(), &["query", "--history", "h", "--format", "csv", COUNT]);
     assert_eq!(stdout(&count), "n\n15\n", "{}", stderr(&count));
-    let json = actcheck(project.path(), &["list", "--history", "h", "--format", "json"]);
+    let json = actcheck(folder.path(), &["list", "--history", "h", "--format", "json"]);
     let rows: Vec<Value> = serde_json::from_str(&stdout(&json)).unwrap();
     assert!(rows.iter().any(|row| row["score"] == 1.0), "no run passed fully");
     assert!(rows.iter().any(|row| row["score"].as_f64().unwrap() < 1.0), "no run failed");
 }
 
+/// In as many runs as it takes, at most ninety-six: what one seed does is not the point.
 #[test]
 fn a_campaign_shows_several_ways_to_fail() {
     let project = project();
-    let (code, json) = run_json(project.path(), &["--runs", "60", "--history", "h"]);
-    assert_eq!(code, 1);
-    assert_eq!(json["finished_runs"], 60);
-    let passed = json["runs_passed"]["count"].as_u64().unwrap();
-    assert!((18..=57).contains(&passed), "{passed} of 60 runs passed fully");
-    let mut modes: Vec<Vec<&str>> = Vec::new();
-    for run in json["runs"].as_array().unwrap() {
-        let failed: Vec<&str> = run["actions"][0]["outcomes"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .filter(|outcome| outcome["outcome"] == "failed")
-            .map(|outcome| outcome["property"].as_str().unwrap())
-            .collect();
-        if !failed.is_empty() && !modes.contains(&failed) {
-            modes.push(failed);
+    let (mut passed, mut finished) = (0, 0);
+    let mut modes: BTreeSet<Vec<String>> = BTreeSet::new();
+    for seed in 7..13 {
+        let history = format!("h{seed}");
+        let seed = seed.to_string();
+        let (code, json) = run_json(project.path(), &["--runs", "16", "--seed", &seed, "--history", &history]);
+        assert!(code <= 1 && json["finished_runs"] == 16, "{json:#}");
+        assert_eq!(json["counts"]["broken"], 0, "a broken run in a sound simulation");
+        assert_eq!(json["counts"]["timeout"], 0, "a timeout in a sound simulation");
+        passed += json["runs_passed"]["count"].as_u64().unwrap();
+        finished += 16;
+        for run in json["runs"].as_array().unwrap() {
+            let outcomes = run["actions"][0]["outcomes"].as_array().unwrap();
+            let failed = outcomes.iter().filter(|outcome| outcome["outcome"] == "failed");
+            modes.insert(failed.map(|outcome| outcome["property"].to_string()).collect());
+        }
+        modes.remove(&Vec::new());
+        if modes.len() >= 3 && finished >= 32 {
+            break;
         }
     }
+    assert!((30..=95).contains(&(100 * passed / finished)), "{passed} of {finished} runs passed fully");
     assert!(modes.len() >= 3, "only these failure modes: {modes:?}");
-    assert_eq!(json["counts"]["broken"], 0, "a broken run in a sound simulation");
-    assert_eq!(json["counts"]["timeout"], 0, "a timeout in a sound simulation");
 }
 
 #[test]
 fn a_lone_glass_and_perfect_senses_make_a_pick_that_works() {
-    let project = project();
-    let (code, json) = run_json(project.path(), &["--runs", "1", "--history", "warm"]);
-    assert!(code <= 1 && json["finished_runs"] == 1);
-    let output = actcheck(
-        project.path(),
-        &["run", "configs/lone_glass.toml", "--runs", "30", "--history", "h", "--format", "json"],
-    );
-    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
-    let passed = json["runs_passed"]["count"].as_u64().unwrap();
-    assert!(passed >= 28, "{passed} of 30 runs passed fully with a lone object and no noise");
+    let folder = shipped("lone_glass").copied();
+    let listed = actcheck(folder.path(), &["list", "--history", "h", "--format", "json"]);
+    let rows: Vec<Value> = serde_json::from_str(&stdout(&listed)).unwrap();
+    let passed = rows.iter().filter(|row| row["score"] == 1.0).count();
+    assert!(rows.len() == 20 && passed >= 19, "{passed} of 20 runs passed fully with a lone object and no noise");
 }
 
 #[test]
 fn the_number_of_workers_and_the_day_change_nothing() {
     let project = project();
-    let one = run_json(project.path(), &["--runs", "8", "--jobs", "1", "--history", "one"]);
-    let two = run_json(project.path(), &["--runs", "8", "--jobs", "2", "--history", "two"]);
-    let again = run_json(project.path(), &["--runs", "8", "--jobs", "2", "--history", "again"]);
+    let one = run_json(project.path(), &["--runs", "4", "--jobs", "1", "--history", "one"]);
+    let two = run_json(project.path(), &["--runs", "4", "--jobs", "2", "--history", "two"]);
+    let again = run_json(project.path(), &["--runs", "4", "--jobs", "2", "--history", "again"]);
     assert_eq!(outcomes(&one.1), outcomes(&two.1));
     assert_eq!(outcomes(&one.1), outcomes(&again.1));
     let lists = ["one", "two", "again"].map(|history| listed(project.path(), history));
-    assert_eq!(lists[0].len(), 8);
+    assert_eq!(lists[0].len(), 4);
     assert_eq!(lists[0], lists[1]);
     assert_eq!(lists[0], lists[2]);
     let other = run_json(project.path(), &["--runs", "2", "--seed", "99", "--history", "other"]);
@@ -157,13 +156,13 @@ fn runs_shown(typescript: &Path) -> usize {
 
 #[test]
 fn killing_a_campaign_loses_no_reported_run_and_leaves_no_half_one() {
-    let project = project();
+    let project = looking();
     for round in 0..3 {
         let (history, seen) = (format!("h{round}"), project.path().join(format!("seen{round}")));
         let program = env!("CARGO_BIN_EXE_actcheck");
         // Progress is shown to terminals only: `script` is one. The shell gives its process number to what it becomes.
         let command =
-            format!("echo $$ > pid{round}; exec {program} run configs/pick.toml --runs 400 --history {history}");
+            format!("echo $$ > pid{round}; exec {program} run configs/look.toml --runs 400 --history {history}");
         let mut child = Command::new("script")
             .args(["-qfc", &command, seen.to_str().unwrap()])
             .current_dir(project.path())
@@ -175,7 +174,7 @@ fn killing_a_campaign_loses_no_reported_run_and_leaves_no_half_one() {
         let start = Instant::now();
         while runs_shown(&seen) < 3 + round {
             assert!(start.elapsed() < Duration::from_secs(120), "no runs in two minutes");
-            std::thread::sleep(Duration::from_millis(20));
+            std::thread::sleep(Duration::from_millis(5));
         }
         let kill = format!("kill -9 $(cat pid{round})");
         assert!(Command::new("sh").args(["-c", &kill]).current_dir(project.path()).status().unwrap().success());
@@ -184,12 +183,12 @@ fn killing_a_campaign_loses_no_reported_run_and_leaves_no_half_one() {
         let rows = listed(project.path(), &history);
         assert!(rows.len() >= reported, "{} of {reported} reported runs are in the history", rows.len());
         assert!(rows.len() < 400, "the campaign was over before it was killed");
-        // A whole run has its score and hash, its three graphs, and an outcome of each of the five properties.
+        // A whole run has its score and hash, its three graphs, and an outcome of each of the three properties.
         let whole = "SELECT ?r WHERE { ?r a act:Run ; act:score ?s ; act:traceHash ?h . \
                      ?e act:ofRun ?r ; act:before ?b ; act:after ?a ; act:during ?d . \
                      ?assertion earl:subject ?e ; earl:result/act:outcome ?o . \
                      FILTER EXISTS { GRAPH ?b { ?x ?y ?z } } FILTER EXISTS { GRAPH ?a { ?x ?y ?z } } \
-                     FILTER EXISTS { GRAPH ?d { ?x ?y ?z } } } GROUP BY ?r HAVING (COUNT(?assertion) = 5)";
+                     FILTER EXISTS { GRAPH ?d { ?x ?y ?z } } } GROUP BY ?r HAVING (COUNT(?assertion) = 3)";
         let output = actcheck(project.path(), &["query", "--history", &history, "--format", "csv", whole]);
         assert_eq!(stdout(&output).lines().count(), rows.len() + 1, "half-written runs\n{}", stderr(&output));
     }
@@ -205,7 +204,11 @@ fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_secs(4));
+    let start = Instant::now();
+    while std::fs::read_dir(project.path().join("h/traces")).map_or(0, Iterator::count) < 2 {
+        assert!(start.elapsed() < Duration::from_secs(120), "no runs in two minutes");
+        std::thread::sleep(Duration::from_millis(20));
+    }
     let killed = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
     assert!(killed.success());
     let output = child.wait_with_output().unwrap();

@@ -4,14 +4,18 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::support::look::blurred;
 use crate::support::{actcheck, copy, edit, project, root, stderr, stdout};
 
 /// A project in which the second run of a campaign of two fails; the campaign's id.
 fn failing(folder: &Path) -> String {
-    let output =
-        actcheck(folder, &["run", "configs/clutter.toml", "--runs", "1", "--history", "h", "--format", "json"]);
+    failing_of(folder, "configs/clutter.toml")
+}
+
+fn failing_of(folder: &Path, config: &str) -> String {
+    let output = actcheck(folder, &["run", config, "--runs", "1", "--history", "h", "--format", "json"]);
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
-    assert_eq!(json["exit_code"], 1, "the first run of clutter.toml fails: {json:#}");
+    assert_eq!(json["exit_code"], 1, "the first run of {config} fails: {json:#}");
     format!("{}-1", json["campaign"].as_str().unwrap())
 }
 
@@ -177,12 +181,11 @@ fn values_that_can_not_be_are_refused_at_their_lines() {
 
 #[test]
 fn a_shrunk_run_and_a_run_of_several_tests_travel_too() {
-    let project = project();
-    let config = project.path().join("configs/clutter.toml");
-    edit(&config, "position_noise_m = 0.025", "position_noise_m = 0.2");
-    edit(&config, "count = [8, 12]", "count = [2, 3]");
-    edit(&config, "tests = [[\"Pick\"]]", "tests = [[\"Pick\", \"Pick\"], [\"Pick\"]]");
-    let run = failing(project.path());
+    let project = blurred();
+    let config = project.path().join("configs/look.toml");
+    let look = "\"PerceivePlane\"";
+    edit(&config, &format!("tests = [[{look}]]"), &format!("tests = [[{look}, {look}], [{look}]]"));
+    let run = failing_of(project.path(), "configs/look.toml");
     let output = actcheck(project.path(), &["shrink", &run, "--trials", "8", "--history", "h", "--format", "json"]);
     let small: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     let small = small["run"].as_str().unwrap();

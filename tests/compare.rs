@@ -10,6 +10,7 @@ use actcheck::verdict::Outcome;
 use serde_json::Value;
 
 use crate::history::{sample_campaign, sample_run};
+use crate::support::look::looking;
 use crate::support::{actcheck, edit, project, stderr, stdout};
 
 const LEVEL: f64 = 0.05;
@@ -159,16 +160,16 @@ fn whole(json: &Value) -> &Value {
 
 #[test]
 fn a_skill_that_sees_worse_is_worse_on_the_same_scenes_and_an_equal_one_is_not() {
-    let project = project();
+    let project = looking();
     let folder = project.path();
-    let sharp = std::fs::read_to_string(folder.join("configs/pick.toml")).unwrap();
-    let sensing = |position: &str| {
-        let (before, _) = sharp.split_once("[sensing]").unwrap();
-        let (_, after) = sharp.split_once("[budget]").unwrap();
-        format!("{before}[sensing]\nposition_noise_m = {position}\n\n[budget]{after}")
+    let look = std::fs::read_to_string(folder.join("configs/look.toml")).unwrap();
+    let with_camera = |range_noise: &str| {
+        let (before, rest) = look.split_once("[camera]").unwrap();
+        let (_, after) = rest.split_once("[sensing]").unwrap();
+        format!("{before}[camera]\nwidth = 320\nheight = 240\nrange_noise_m = {range_noise}\n\n[sensing]{after}")
     };
-    std::fs::write(folder.join("configs/sharp.toml"), sensing("0.0")).unwrap();
-    std::fs::write(folder.join("configs/blind.toml"), sensing("0.3")).unwrap();
+    std::fs::write(folder.join("configs/sharp.toml"), with_camera("0.0")).unwrap();
+    std::fs::write(folder.join("configs/blind.toml"), with_camera("0.1")).unwrap();
     let [good, again] = ["a", "a"].map(|history| run(folder, "configs/sharp.toml", history));
     let bad = run(folder, "configs/blind.toml", "b");
 
@@ -178,7 +179,7 @@ fn a_skill_that_sees_worse_is_worse_on_the_same_scenes_and_an_equal_one_is_not()
 
     let (code, json) = compared(folder, &["a", &format!("b#{bad}"), "--fail-if-worse", "0.05"]);
     assert_eq!((code, &json["pairs"]), (1, &Value::from(12)), "{json:#}");
-    assert_eq!(json["config_only_in_b"], serde_json::json!(["[sensing] position_noise_m = 0.3"]));
+    assert_eq!(json["config_only_in_b"], serde_json::json!(["[camera] range_noise_m = 0.1"]));
     assert_eq!(json["changes"].as_array().unwrap().len(), 1, "{json:#}");
     assert!(!json["worse"].as_array().unwrap().is_empty(), "{json:#}");
     let whole = whole(&json);

@@ -8,7 +8,7 @@ use actcheck::world::{Mishap, Poison, World};
 use serde_json::Value;
 
 use crate::support::line::{env_of, nominal, outcomes, report, run};
-use crate::support::{actcheck, edit, project, stderr, stdout};
+use crate::support::{COARSE, actcheck, edit, project, stderr, stdout};
 
 /// Two tables, a glass on the first, and what a test adds.
 fn env(actions: &str, more: &str) -> Env {
@@ -115,29 +115,27 @@ const OBSTACLES: &str = "[surfaceObjects]\nmodel_list = [\"can\"]\ncount = 2\n";
 /// difference to anything, and it is never asked.
 #[test]
 fn with_a_camera_nothing_is_known_by_the_abstract_detector() {
-    let runs =
-        ["", "[sensing]\nposition_noise_m = 0.4\nheight_noise_m = 0.4\nyaw_noise_rad = 1.5\nsize_noise_m = 0.4\n"];
-    let runs = runs.map(|sensing| {
+    let of = |index: u64, sensing: &str| {
         let text = format!(
             "nav_obstacle_list = [\"bottle\", \"mini_coffee_table\"]\nnav_obstacle_count = 4\n\
             tests = [{TASK}]\ntest_count = 1\nseed = 5\n[objectLocation]\nlocation_list = [\"front\"]\n\
             [objectSurface]\nobject_surfaces = [\"coffee_table\"]\n[placeSurface]\nplace_object_surfaces = [\"table\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
-            {OBSTACLES}{sensing}"
+            {OBSTACLES}{COARSE}{sensing}"
         );
-        (0..3).map(|index| run(&env_of(&text), Choices::random(5, index), None)).collect::<Vec<RunRecord>>()
-    });
-    let [quiet, noisy] = &runs;
-    for (quiet, noisy) in quiet.iter().zip(noisy) {
-        let ids = || quiet.scene.objects.iter().map(|object| format!("sense.{}.", object.id));
-        let asked: Vec<&str> = noisy.choices.iter().map(|choice| choice.name.as_str()).collect();
-        assert!(!asked.iter().any(|name| ids().any(|id| name.starts_with(&id))), "{asked:?}");
-        assert_eq!(quiet.trace.hash, noisy.trace.hash);
-        let percepts = quiet.trace.actions.iter().flat_map(|action| &action.percepts);
-        let targets = &quiet.scene.designators["pickObject"];
-        assert!(percepts.clone().all(|percept| targets.contains(&percept.id)), "{:?}", percepts.collect::<Vec<_>>());
-    }
-    let placed = quiet.iter().filter(|run| run.trace.actions[3].phases.iter().any(|phase| phase.name == "look"));
-    assert!(placed.count() > 0, "no run came so far that the robot looked at where to place something");
+        run(&env_of(&text), Choices::random(5, index), None)
+    };
+    let looks_where_to_place = |run: &RunRecord| run.trace.actions[3].phases.iter().any(|phase| phase.name == "look");
+    let quiet = (0..12).map(|index| (index, of(index, ""))).find(|(_, run)| looks_where_to_place(run));
+    let (index, quiet) = quiet.expect("no run came so far that the robot looked at where to place something");
+    let noise = "[sensing]\nposition_noise_m = 0.4\nheight_noise_m = 0.4\nyaw_noise_rad = 1.5\nsize_noise_m = 0.4\n";
+    let noisy = of(index, noise);
+    let ids = || quiet.scene.objects.iter().map(|object| format!("sense.{}.", object.id));
+    let asked: Vec<&str> = noisy.choices.iter().map(|choice| choice.name.as_str()).collect();
+    assert!(!asked.iter().any(|name| ids().any(|id| name.starts_with(&id))), "{asked:?}");
+    assert_eq!(quiet.trace.hash, noisy.trace.hash);
+    let percepts = quiet.trace.actions.iter().flat_map(|action| &action.percepts);
+    let targets = &quiet.scene.designators["pickObject"];
+    assert!(percepts.clone().all(|percept| targets.contains(&percept.id)), "{:?}", percepts.collect::<Vec<_>>());
 }
 
 /// The glass has no friction at all.
@@ -159,23 +157,11 @@ fn json(folder: &std::path::Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)))
 }
 
+/// (`determinism` has it that the number of workers changes nothing.)
 #[test]
-fn the_whole_task_is_the_same_at_any_number_of_workers_and_is_told_by_action() {
+fn the_whole_task_is_told_by_action() {
     let project = project();
-    let run = ["run", "configs/pick_and_place.toml", "--runs", "3"];
-    let of = |jobs: &str| json(project.path(), &[&run[..], &["--jobs", jobs, "--history", jobs]].concat());
-    let (one, two) = (of("1"), of("2"));
-    let hashes = |jobs: &str| {
-        let listed = json(project.path(), &["list", "--history", jobs]);
-        let rows = listed.as_array().unwrap().iter();
-        rows.map(|row| row["trace_hash"].clone()).collect::<Vec<_>>()
-    };
-    assert_eq!((hashes("1").len(), hashes("1")), (3, hashes("2")));
-    assert_eq!(one["score"], two["score"]);
-    for count in ["broken", "timeout"] {
-        assert_eq!(one["counts"][count], 0, "{one:#}");
-    }
-    let output = actcheck(project.path(), &[&run[..], &["--history", "text"]].concat());
+    let output = actcheck(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "2", "--history", "text"]);
     let text = stdout(&output);
     for title in ["A1 MoveTo", "A2 PerceivePlane", "A3 Pick", "A4 Place", "mean"] {
         assert!(text.contains(title), "{title} is missing:\n{text}");
@@ -183,6 +169,9 @@ fn the_whole_task_is_the_same_at_any_number_of_workers_and_is_told_by_action() {
     // Seventeen properties, by action.
     let lines = |line: &&str| line.contains(" % [");
     assert_eq!(text.lines().skip_while(|line| !line.contains("pass rate")).filter(lines).take(17).count(), 17);
+    let listed = json(project.path(), &["list", "--history", "text"]);
+    let statuses = listed.as_array().unwrap().iter().map(|row| row["status"].clone()).collect::<Vec<_>>();
+    assert_eq!(statuses, ["completed", "completed"], "{text}");
 }
 
 /// With nothing in the way, nothing else on the table and perfect senses, the task works as a whole.
@@ -191,6 +180,7 @@ fn without_noise_clutter_and_obstacles_nearly_everything_passes() {
     let project = project();
     let config = project.path().join("configs/pick_and_place.toml");
     edit(&config, "nav_obstacle_count = 5", "nav_obstacle_count = 0");
+    edit(&config, "[physics]\n", COARSE);
     edit(&config, "\ncount = [1, 4] # beside it", "\ncount = 0");
     edit(&config, "\ncount = [1, 4] # there", "\ncount = 0");
     let text = std::fs::read_to_string(&config).unwrap();
@@ -199,7 +189,7 @@ fn without_noise_clutter_and_obstacles_nearly_everything_passes() {
         |line: &str| ["_noise", "_drift", "dropout"].iter().any(|word| line.split('=').next().unwrap().contains(word));
     let quiet: Vec<&str> = text.lines().filter(|line| line.starts_with('#') || !is_noise(line)).collect();
     std::fs::write(&config, quiet.join("\n")).unwrap();
-    let told = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "6", "--history", "h"]);
+    let told = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "4", "--history", "h"]);
     assert!(told["score"].as_f64().unwrap() > 0.9, "{told:#}");
 }
 

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -188,43 +189,56 @@ const FAULTS: [(&str, &str, &str); 36] = [
     ("stays", "completed", ""),
 ];
 
+/// What is wrong about how the first two runs of a campaign with a fault end.
+fn wrong_about((fault, status, words): (&str, &str, &str)) -> Option<String> {
+    // A busy machine takes its time for an interpreter: only who shall be late has little.
+    let startup_secs = if ["never_connects", "silent_at_start"].contains(&fault) { 4.0 } else { 60.0 };
+    let timeout_secs = if ["silent", "short_garbage", "drip"].contains(&fault) { 2.0 } else { 60.0 };
+    let limits = match fault {
+        "memory" => "memory_mb = 1024",
+        "busy" => "cpu_s = 2",
+        _ => "",
+    };
+    let skill = format!(
+        "startup_s = {startup_secs:?}\ntimeout_s = {timeout_secs:?}\n{limits}\n\
+         env = {{ FAULT = \"{fault}\", FAULT_ONCE = \"once\" }}"
+    );
+    let folder = project("faulty.py", "[[\"Pick\"]]", 2, &skill);
+    std::fs::write(folder.path().join("once"), "").unwrap();
+    let (_, json, complaints) = run(folder.path(), &["--jobs", "1"]);
+    let [first, second] = runs(&json) else { panic!("{fault}: {json:#}\n{complaints}") };
+    nothing_is_left(folder.path());
+    if fault == "raise" {
+        let all = stdout(&actcheck(folder.path(), &["show", of(first, "run"), "--history", ".actcheck"]));
+        assert!(all.contains("the program printed last:\n  Traceback (most recent call last)"), "{all}");
+    }
+    let told = of(first, "reason");
+    let right = of(first, "status") == status && told.contains(words) && of(second, "status") == "completed";
+    (!right).then(|| format!("{fault}: {} ({told}), then {}", of(first, "status"), of(second, "status")))
+}
+
 #[test]
 fn each_fault_of_a_program_ends_one_run_and_the_next_one_begins_with_a_new_program() {
-    let mut wrong = Vec::new();
-    for (fault, status, words) in FAULTS {
-        // A busy machine takes its time for an interpreter: only who shall be late has little.
-        let startup_secs = if ["never_connects", "silent_at_start"].contains(&fault) { 4.0 } else { 60.0 };
-        let timeout_secs = if ["silent", "short_garbage", "drip"].contains(&fault) { 2.0 } else { 60.0 };
-        let limits = match fault {
-            "memory" => "memory_mb = 1024",
-            "busy" => "cpu_s = 2",
-            _ => "",
-        };
-        let skill = format!(
-            "startup_s = {startup_secs:?}\ntimeout_s = {timeout_secs:?}\n{limits}\n\
-             env = {{ FAULT = \"{fault}\", FAULT_ONCE = \"once\" }}"
-        );
-        let folder = project("faulty.py", "[[\"Pick\"]]", 2, &skill);
-        std::fs::write(folder.path().join("once"), "").unwrap();
-        let (_, json, complaints) = run(folder.path(), &["--jobs", "1"]);
-        let [first, second] = runs(&json) else { panic!("{fault}: {json:#}\n{complaints}") };
-        let told = of(first, "reason");
-        if of(first, "status") != status || !told.contains(words) || of(second, "status") != "completed" {
-            wrong.push(format!("{fault}: {} ({told}), then {}", of(first, "status"), of(second, "status")));
+    // Several campaigns at a time: most of it is waiting for programs that do not answer.
+    let next = Mutex::new(FAULTS.into_iter());
+    let tried = || -> Vec<String> {
+        let mut wrong = Vec::new();
+        loop {
+            let Some(fault) = next.lock().unwrap().next() else { return wrong };
+            wrong.extend(wrong_about(fault));
         }
-        nothing_is_left(folder.path());
-        if fault == "raise" {
-            let all = stdout(&actcheck(folder.path(), &["show", of(first, "run"), "--history", ".actcheck"]));
-            assert!(all.contains("the program printed last:\n  Traceback (most recent call last)"), "{all}");
-        }
-    }
+    };
+    let wrong: Vec<String> = std::thread::scope(|scope| {
+        let workers = [(); 4].map(|()| scope.spawn(tried));
+        workers.into_iter().flat_map(|worker| worker.join().unwrap()).collect()
+    });
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
 fn a_hundred_runs_with_faults_by_chance_end_and_nothing_is_lost() {
     let folder = project("faulty.py", "[[\"Pick\"]]", 100, "timeout_s = 4.0\nmax_broken = 100");
-    let (code, json, complaints) = run(folder.path(), &["--jobs", "4"]);
+    let (code, json, complaints) = run(folder.path(), &["--jobs", "8"]);
     assert!(code <= 1, "{complaints}");
     let counted = |status: &str| runs(&json).iter().filter(|run| of(run, "status") == status).count();
     let [completed, broken, timeout] = ["completed", "broken", "timeout"].map(counted);

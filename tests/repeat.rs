@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::support::look::looking;
 use crate::support::{actcheck, edit, project, stderr, stdout};
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
@@ -29,11 +30,11 @@ fn scene(folder: &Path, run: &Value, history: &str) -> String {
 
 #[test]
 fn repetitions_have_the_scene_and_not_the_noise() {
-    let project = project();
+    let project = looking();
     let folder = project.path();
-    let run = ["run", "configs/pick.toml", "--runs", "3"];
+    let run = ["run", "configs/look.toml", "--runs", "3"];
     actcheck(folder, &[&run[..], &["--repeat", "3", "--jobs", "1", "--history", "one"]].concat());
-    edit(&folder.join("configs/pick.toml"), "test_count = 15", "test_count = 15\nrepeat = 3");
+    edit(&folder.join("configs/look.toml"), "test_count = 15", "test_count = 15\nrepeat = 3");
     actcheck(folder, &[&run[..], &["--jobs", "2", "--history", "two"]].concat());
     actcheck(folder, &[&run[..], &["--repeat", "1", "--history", "single"]].concat());
 
@@ -57,15 +58,15 @@ fn repetitions_have_the_scene_and_not_the_noise() {
 
 #[test]
 fn repeated_runs_can_be_replayed_and_shrunk() {
-    let project = project();
+    let project = looking();
     let folder = project.path();
-    let told = json(folder, &["run", "configs/pick.toml", "--runs", "4", "--repeat", "2", "--history", "h"]);
+    let told = json(folder, &["run", "configs/look.toml", "--runs", "12", "--repeat", "2", "--history", "h"]);
     let rows = list(folder, "h");
     let runs: Vec<&str> = rows.iter().map(|row| row["run"].as_str().unwrap()).collect();
     let replayed = actcheck(folder, &[&["replay", "--history", "h"], &runs[..]].concat());
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
     let failing = told["runs"].as_array().unwrap().iter().rev().find(|run| run["score"].as_f64().unwrap() < 1.0);
-    let failing = failing.expect("the shipped seed fails in its first scenes")["run"].as_str().unwrap();
+    let failing = failing.expect("one in four looks sees what is not there, or not what is")["run"].as_str().unwrap();
     let shrunk = actcheck(folder, &["shrink", failing, "--history", "h", "--trials", "8"]);
     assert_eq!(shrunk.status.code(), Some(0), "{}{}", stdout(&shrunk), stderr(&shrunk));
     // The small run is one of its own.
@@ -78,9 +79,9 @@ fn repeated_runs_can_be_replayed_and_shrunk() {
 /// The shares are counted again here, from the outcomes of the runs.
 #[test]
 fn the_report_counts_what_the_runs_say() {
-    let project = project();
+    let project = looking();
     let folder = project.path();
-    let told = json(folder, &["run", "configs/pick.toml", "--runs", "6", "--repeat", "3", "--history", "h"]);
+    let told = json(folder, &["run", "configs/look.toml", "--runs", "6", "--repeat", "3", "--history", "h"]);
     let whole = told["repetitions"].as_array().unwrap().last().unwrap().clone();
     assert_eq!(whole["property"], Value::Null);
     let mut passed: BTreeMap<u64, u64> = (0..6).map(|scene| (scene, 0)).collect();
@@ -114,9 +115,9 @@ fn the_report_counts_what_the_runs_say() {
         assert!((power["probability"].as_f64().unwrap() - expected).abs() < 1e-12, "{power}");
     }
     let text =
-        stdout(&actcheck(folder, &["run", "configs/pick.toml", "--runs", "2", "--repeat", "2", "--history", "t"]));
+        stdout(&actcheck(folder, &["run", "configs/look.toml", "--runs", "2", "--repeat", "2", "--history", "t"]));
     assert!(text.contains("pass^2") && text.contains("always passed"), "{text}");
-    let once = stdout(&actcheck(folder, &["run", "configs/pick.toml", "--runs", "1", "--history", "o"]));
+    let once = stdout(&actcheck(folder, &["run", "configs/look.toml", "--runs", "1", "--history", "o"]));
     assert!(!once.contains("pass^"), "{once}");
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::support::look::looking;
 use crate::support::{actcheck, edit, project, stderr, stdout};
 
 /// The only campaign of a new history with so many runs of the shipped pick.
@@ -42,8 +43,8 @@ fn stored_runs_go_the_same_way_in_a_new_process_at_any_number_of_workers() {
 
 #[test]
 fn runs_by_chance_go_the_same_way_at_one_and_two_workers() {
-    let project = project();
-    let arguments = ["run", "configs/lone_glass.toml", "--runs", "12", "--history", "h"];
+    let project = looking();
+    let arguments = ["run", "configs/look.toml", "--runs", "12", "--history", "h"];
     assert_ne!(actcheck(project.path(), &arguments).status.code(), Some(2));
     let (code, one) = replayed(project.path(), &["--sample", "10", "--jobs", "1", "--exact"]);
     let (_, two) = replayed(project.path(), &["--sample", "10", "--jobs", "2", "--exact"]);

@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use crate::support::look::looking;
 use crate::support::{actcheck, edit, project, stderr, stdout};
 
-/// A crowded small table on which scenes are discarded too.
-const CROWDED: &str = "tests = [[\"Pick\"]]\ntest_count = 24\nseed = 3\nontology = \"../ontology/actions.ttl\"\n\
+/// A look at a crowded small table, on which scenes are discarded too: runs that end one after the other within moments.
+const CROWDED: &str = "tests = [[\"PerceivePlane\"]]\ntest_count = 24\nseed = 3\nontology = \"../ontology/actions.ttl\"\n\
     model_dir = \"../models\"\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n[pickObject]\n\
     model_list = [\"glass\"]\n[surfaceObjects]\nmodel_list = [\"bottle\", \"plate\", \"bowl\", \"mug\"]\n\
-    count = [6, 9]\n[sensing]\nposition_noise_m = 0.025\n";
+    count = [6, 9]\n[camera]\nwidth = 80\nheight = 60\n";
 
 fn crowded() -> tempfile::TempDir {
     let project = project();
@@ -96,7 +97,7 @@ fn twenty_kills_change_nothing() {
             while state % 3 != 0 && traces(folder, &history) <= before && started.elapsed() < Duration::from_secs(60) {
                 std::thread::sleep(Duration::from_millis(5));
             }
-            std::thread::sleep(Duration::from_millis(state % 500));
+            std::thread::sleep(Duration::from_millis(state % 120));
             if child.try_wait().unwrap().is_some() {
                 break;
             }
@@ -125,8 +126,8 @@ fn twenty_kills_change_nothing() {
 /// Ctrl-C keeps the runs in flight, and the campaign goes on later with another number of workers; budgets count what was there.
 #[test]
 fn an_interrupted_campaign_goes_on_with_its_budgets() {
-    let project = project();
-    let budgets = ["--runs", "60", "--max-failures", "6", "--seed", "11"];
+    let project = looking();
+    let budgets = ["--runs", "90", "--max-failures", "20", "--seed", "11"];
     assert_eq!(interrupted_and_resumed(project.path(), &budgets)["ended_by"], "failures");
     // A configuration is found by its path, and another one has no campaign here.
     let other = actcheck(project.path(), &["run", "configs/clutter.toml", "--resume", "--history", "h"]);
@@ -137,7 +138,7 @@ fn an_interrupted_campaign_goes_on_with_its_budgets() {
 /// A guided search decides by what came of earlier scenes; those of before the interruption count as if there had been none.
 #[test]
 fn an_interrupted_search_goes_on_to_the_same_scenes() {
-    let project = project();
+    let project = looking();
     let search = ["--runs", "30", "--strategy", "cross-entropy", "--seed", "5"];
     let whole = interrupted_and_resumed(project.path(), &search);
     assert_eq!((&whole["finished_runs"], &whole["ended_by"]), (&Value::from(30), &Value::Null));
@@ -146,9 +147,9 @@ fn an_interrupted_search_goes_on_to_the_same_scenes() {
 /// Runs a campaign as a whole, and once more with a Ctrl-C in between and another number of workers. Both must come out the
 /// same. Returns the summary.
 fn interrupted_and_resumed(folder: &Path, options: &[&str]) -> Value {
-    let whole = json(folder, &[&["run", "configs/pick.toml", "--history", "whole"][..], options].concat());
+    let whole = json(folder, &[&["run", "configs/look.toml", "--history", "whole"][..], options].concat());
     assert_eq!(whole["interrupted"], false);
-    let begin = [&["run", "configs/pick.toml", "--history", "h", "--jobs", "1"][..], options].concat();
+    let begin = [&["run", "configs/look.toml", "--history", "h", "--jobs", "1"][..], options].concat();
     let mut child = start(folder, &begin);
     let started = Instant::now();
     while traces(folder, "h") < 2 {
@@ -159,7 +160,7 @@ fn interrupted_and_resumed(folder: &Path, options: &[&str]) -> Value {
     assert_eq!(child.wait().unwrap().code(), Some(130));
     let there = listed(folder, "h").lines().count();
     assert!(there > 1 && there < listed(folder, "whole").lines().count(), "{there}");
-    let resumed = json(folder, &["run", "configs/pick.toml", "--resume", "--history", "h", "--jobs", "2"]);
+    let resumed = json(folder, &["run", "configs/look.toml", "--resume", "--history", "h", "--jobs", "2"]);
     assert_eq!(without_place(resumed), without_place(whole.clone()));
     assert_eq!(listed(folder, "h"), listed(folder, "whole"));
     whole

@@ -101,11 +101,11 @@ fn a_campaign_of_the_fixed_arm_comes_out_the_same_and_replays() {
     let project = project();
     let run = |history: &str, jobs: &str| {
         let arguments =
-            ["run", "configs/fixed_arm.toml", "--runs", "6", "--jobs", jobs, "--history", history, "--format", "csv"];
+            ["run", "configs/fixed_arm.toml", "--runs", "4", "--jobs", jobs, "--history", history, "--format", "csv"];
         stdout(&actcheck(project.path(), &arguments))
     };
     assert_eq!(run("h1", "1"), run("h2", "2"));
-    let replayed = actcheck(project.path(), &["replay", "--sample", "3", "--history", "h1"]);
+    let replayed = actcheck(project.path(), &["replay", "--sample", "2", "--history", "h1"]);
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
 }
 

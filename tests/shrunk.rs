@@ -6,9 +6,10 @@ use std::process::{Child, Command, Stdio};
 
 use serde_json::Value;
 
+use crate::support::look::blurred;
 use crate::support::{actcheck, edit, project, stderr, stdout};
 
-/// A project whose campaigns all fail: what the robot sees lies decimetres beside what is there.
+/// A project whose picks all fail, which takes its time: what the robot sees lies decimetres beside what is there.
 fn blind() -> tempfile::TempDir {
     let project = project();
     let config = project.path().join("configs/clutter.toml");
@@ -18,14 +19,17 @@ fn blind() -> tempfile::TempDir {
     project
 }
 
+/// The configuration of a project whose runs all fail within moments.
+const LOOK: &str = "configs/look.toml";
+
 fn json(folder: &Path, arguments: &[&str]) -> Value {
     let output = actcheck(folder, &[arguments, &["--history", "h", "--format", "json"]].concat());
     serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)))
 }
 
 /// Names of what failed in each run of a new campaign, with the runs' ids.
-fn campaign(folder: &Path) -> Vec<(String, Vec<String>)> {
-    let json = json(folder, &["run", "configs/clutter.toml", "--runs", "1"]);
+fn campaign(folder: &Path, config: &str) -> Vec<(String, Vec<String>)> {
+    let json = json(folder, &["run", config, "--runs", "1"]);
     let runs = json["runs"].as_array().unwrap();
     runs.iter().map(|run| (run["run"].as_str().unwrap().to_owned(), failed(run))).collect()
 }
@@ -58,8 +62,8 @@ fn failed_of(folder: &Path, run: &str) -> Vec<String> {
 
 #[test]
 fn the_small_run_is_kept_fails_the_same_and_can_be_drawn() {
-    let project = blind();
-    let (run, failing) = campaign(project.path()).remove(0);
+    let project = blurred();
+    let (run, failing) = campaign(project.path(), LOOK).remove(0);
     let small = json(project.path(), &["shrink", &run, "--picture", "small.svg"]);
     assert_eq!(names(&small["failed"]), failing, "{small:#}");
     let id = small["run"].as_str().unwrap();
@@ -77,8 +81,8 @@ fn the_small_run_is_kept_fails_the_same_and_can_be_drawn() {
 
 #[test]
 fn limits_and_repetitions_are_kept_to() {
-    let project = blind();
-    let (run, failing) = campaign(project.path()).remove(0);
+    let project = blurred();
+    let (run, failing) = campaign(project.path(), LOOK).remove(0);
     let short = json(project.path(), &["shrink", &run, "--time", "0.001"]);
     assert_eq!((&short["minimal"], &short["simulations"]), (&false.into(), &0.into()), "{short:#}");
     assert_eq!(short["others"], short["others_before"]);
@@ -98,8 +102,8 @@ fn limits_and_repetitions_are_kept_to() {
 
 #[test]
 fn one_property_can_be_kept_instead_of_all() {
-    let project = blind();
-    let (run, failing) = campaign(project.path()).remove(0);
+    let project = blurred();
+    let (run, failing) = campaign(project.path(), LOOK).remove(0);
     let name = failing[0].rsplit('#').next().unwrap();
     let small = json(project.path(), &["shrink", &run, "--property", name, "--trials", "8"]);
     assert!(failed_of(project.path(), small["run"].as_str().unwrap()).contains(&failing[0]), "{small:#}");
@@ -111,9 +115,13 @@ fn one_property_can_be_kept_instead_of_all() {
 /// Once the run of a configuration's second test was shrunk to fewer actions, it was taken for a run of the first.
 #[test]
 fn a_run_of_several_actions_loses_those_that_the_failure_does_not_need() {
-    let project = blind();
-    edit(&project.path().join("configs/clutter.toml"), "[[\"Pick\"]]", "[[\"Pick\"], [\"Pick\", \"Pick\", \"Pick\"]]");
-    let (run, failing) = campaign(project.path()).remove(1);
+    let project = blurred();
+    edit(
+        &project.path().join("configs/look.toml"),
+        "[[\"PerceivePlane\"]]",
+        "[[\"PerceivePlane\"], [\"PerceivePlane\", \"PerceivePlane\", \"PerceivePlane\"]]",
+    );
+    let (run, failing) = campaign(project.path(), LOOK).remove(1);
     let small = json(project.path(), &["shrink", &run, "--trials", "10"]);
     let id = small["run"].as_str().unwrap();
     assert_eq!(failed_of(project.path(), id), failing, "{small:#}");
@@ -125,8 +133,8 @@ fn a_run_of_several_actions_loses_those_that_the_failure_does_not_need() {
 
 #[test]
 fn a_campaign_that_shrinks_prints_one_document() {
-    let project = blind();
-    let run = ["run", "configs/clutter.toml", "--runs", "1", "--shrink"];
+    let project = blurred();
+    let run = ["run", LOOK, "--runs", "1", "--shrink"];
     let all = json(project.path(), &run);
     let [small] = all["shrunk"].as_array().unwrap().as_slice() else { panic!("{all:#}") };
     assert_eq!(small["shrunk_from"], all["runs"][0]["run"]);
@@ -168,7 +176,7 @@ fn until_it_catches(child: &mut Child) {
 #[cfg(target_os = "linux")]
 fn an_interrupt_gives_the_smallest_so_far() {
     let project = blind();
-    let (run, failing) = campaign(project.path()).remove(0);
+    let (run, failing) = campaign(project.path(), "configs/clutter.toml").remove(0);
     let mut child = started(project.path(), &["shrink", &run, "--history", "h", "--format", "json"]);
     until_it_catches(&mut child);
     interrupt(&child);

@@ -3,13 +3,16 @@
 pub mod chromium;
 pub mod foreign;
 pub mod line;
+pub mod look;
 pub mod made_up;
 pub mod paged;
 pub mod planted;
 pub mod wrong;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::{Mutex, OnceLock};
 
 /// The checkout's root.
 pub fn root() -> &'static Path {
@@ -69,9 +72,12 @@ pub fn edit(file: &Path, from: &str, to: &str) {
     std::fs::write(file, text.replacen(from, to, 1)).unwrap();
 }
 
+/// Physics at a third of the price, where a test is not about physics: what the hand holds stays in it.
+pub const COARSE: &str = "[physics]\nsteps_per_second = 120\niterations = 2\n";
+
 /// A history of four runs that simulation made, for tests that only read it.
 pub fn made_history() -> &'static Path {
-    static MADE: std::sync::OnceLock<PathBuf> = std::sync::OnceLock::new();
+    static MADE: OnceLock<PathBuf> = OnceLock::new();
     MADE.get_or_init(|| {
         // Statics are never dropped: a folder of the system for passing files would stay.
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made-history");
@@ -80,5 +86,37 @@ pub fn made_history() -> &'static Path {
         let output = actcheck(root(), &["run", "configs/quick.toml", "--runs", "4", "--jobs", "2", "--history", &name]);
         assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
         folder
+    })
+}
+
+/// A shipped campaign that was run as a whole.
+pub struct Shipped {
+    pub code: Option<i32>,
+    /// What was printed.
+    pub text: String,
+    /// A project with the history in `h`.
+    folder: PathBuf,
+}
+
+impl Shipped {
+    /// A folder of a test's own: one process at a time may have a history open.
+    pub fn copied(&self) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        copy(&self.folder, folder.path());
+        folder
+    }
+}
+
+/// A shipped campaign, run once for all tests.
+pub fn shipped(name: &'static str) -> &'static Shipped {
+    static MADE: Mutex<BTreeMap<&str, &OnceLock<Shipped>>> = Mutex::new(BTreeMap::new());
+    let made = *MADE.lock().unwrap().entry(name).or_insert_with(|| Box::leak(Box::default()));
+    made.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("shipped-{name}"));
+        let _ = std::fs::remove_dir_all(&folder);
+        copy(project().path(), &folder);
+        let output = actcheck(&folder, &["run", &format!("configs/{name}.toml"), "--jobs", "2", "--history", "h"]);
+        assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
+        Shipped { code: output.status.code(), text: stdout(&output), folder }
     })
 }
