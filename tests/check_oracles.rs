@@ -204,7 +204,9 @@ fn who_only_lies_changes_no_physics() {
 
 #[test]
 fn faults_are_the_same_for_any_number_of_workers() {
-    let env = env(root(), 2);
+    let project = project();
+    sure(project.path());
+    let env = env(project.path(), 2);
     let faults = named(&["release", "wrong-object"]);
     assert_eq!(trials(&env, &faults, 1), trials(&env, &faults, 2));
 }

@@ -49,7 +49,10 @@ fn traces(folder: &Path, history: &str) -> usize {
 
 /// The summary but for where its history lies: all outcomes, margins, witnesses, scores and discards.
 fn without_place(mut summary: Value) -> Value {
-    summary.as_object_mut().unwrap().remove("history");
+    let history = summary.as_object_mut().unwrap().remove("history").unwrap();
+    // Commands that tell more name it.
+    let named = format!("--history {}", history.as_str().unwrap());
+    let mut summary: Value = serde_json::from_str(&summary.to_string().replace(&named, "--history H")).unwrap();
     // How long runs took is no part of what came out.
     if let Some(health) = summary["health"].as_object_mut() {
         health.retain(|key, _| !key.starts_with("wall_"));
