@@ -101,7 +101,7 @@ fn the_shipped_properties_notice_every_fault() {
 }
 
 /// The actions of the whole task, each with what it needs before it, in a room with nothing unusual.
-const TASK: &str = "tests = [[\"MoveTo\"], [\"PerceivePlane\"], [\"Pick\", \"Place\"]]\ntest_count = 8\nseed = 3\n\
+const TASK: &str = "tests = [[\"MoveTo\"], [\"PerceivePlane\"], [\"Pick\", \"Place\"]]\ntest_count = 9\nseed = 3\n\
     nav_obstacle_list = [\"bottle\"]\nnav_obstacle_count = 1\n[world]\nworlds = [\"empty_room\"]\n\
     [objectLocation]\nlocation_list = [\"left_corner\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n\
     [placeSurface]\nplace_object_surfaces = [\"coffee_table\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
@@ -111,7 +111,7 @@ const TASK: &str = "tests = [[\"MoveTo\"], [\"PerceivePlane\"], [\"Pick\", \"Pla
 #[test]
 fn every_property_of_the_whole_task_notices_a_fault() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("task.toml"), format!("{TASK}{COARSE}")).unwrap();
+    std::fs::write(folder.path().join("task.toml"), TASK).unwrap();
     let env = Env::prepare(&folder.path().join("task.toml"), &Overrides::default()).unwrap();
     let faults: Vec<Fault> = FAULTS
         .into_iter()
