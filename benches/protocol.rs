@@ -2,8 +2,9 @@
 //! Rust and from Python; and a whole simulated run with a controller that does nothing, at every control tick, beside the same
 //! ticks asked for at once.
 //!
-//! Aims: 20,000 exchanges a second from Rust and 3,000 from Python, simulator and program sharing one core: what counts is the time
-//! of both on the processor. What an exchange takes is that time of a run in which each tick is a command, less that of the same run
+//! Aims: 20,000 exchanges a second from Rust and 3,000 from Python, simulator and program sharing one core, to which `taskset` binds
+//! them: what counts is the time of both on the processor. On two cores that have nothing else to do an exchange costs up to four
+//! times as much, since each core falls asleep while the other one works, and has to be woken; `-- two-cores` measures that. What an exchange takes is that time of a run in which each tick is a command, less that of the same run
 //! in which one command asks for all, in the cheapest physics there is. Python's own package is measured where its one dependency,
 //! numpy, is installed; beside it stands what Python does with sockets and JSON alone.
 
@@ -12,6 +13,7 @@ mod link;
 mod support;
 
 use std::path::Path;
+use std::process::Command;
 use std::time::Instant;
 
 use actcheck::base::{Choices, Source};
@@ -40,6 +42,14 @@ fn main() {
         return;
     }
     let itself = std::env::current_exe().expect("a program has a file");
+    let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
+    if wanted.is_none() {
+        let bound = Command::new("taskset").args(["-c", "0"]).arg(&itself).arg("bound").status();
+        if bound.is_ok_and(|status| status.success()) {
+            return;
+        }
+        println!("not bound to one core: there is no `taskset`, or no core 0 for it");
+    }
     let programs = [
         ("Rust", format!("{} client", itself.display()), 20_000.0),
         ("Python, sockets and JSON alone", format!("python3 {}", file("benches/protocol_plain.py")), 3_000.0),

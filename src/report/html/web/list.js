@@ -30,10 +30,10 @@ function runList(runs, filter) {
       }),
       make("span", { class: "words", role: "gridcell" }, told));
   };
-  const draw = () => {
+  const draw = (more) => {
     body.style.height = `${filter.shown.length * ROW}px`;
-    const first = Math.max(0, Math.floor(list.scrollTop / ROW) - MORE);
-    const last = Math.min(filter.shown.length, Math.ceil((list.scrollTop + list.clientHeight) / ROW) + MORE);
+    const first = Math.max(0, Math.floor(list.scrollTop / ROW) - more);
+    const last = Math.min(filter.shown.length, Math.ceil((list.scrollTop + list.clientHeight) / ROW) + more);
     for (const [at, element] of shownRows) {
       if (at < first || at >= last) {
         element.remove();
@@ -48,14 +48,17 @@ function runList(runs, filter) {
       shownRows.get(at).classList.toggle("active", at === active);
     }
   };
+  const drawMore = () => draw(MORE);
   const anew = () => {
     for (const element of shownRows.values()) element.remove();
     shownRows.clear();
     active = -1;
     list.scrollTop = 0;
-    draw();
+    draw(0);
+    // What can't be seen yet waits until the rest is on the screen.
+    requestAnimationFrame(() => setTimeout(drawMore));
   };
-  list.addEventListener("scroll", () => requestAnimationFrame(draw), { passive: true });
+  list.addEventListener("scroll", () => requestAnimationFrame(drawMore), { passive: true });
   list.addEventListener("keydown", (event) => {
     const page = Math.max(1, Math.floor(list.clientHeight / ROW) - 2);
     const step = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity }[event.key];
@@ -65,12 +68,12 @@ function runList(runs, filter) {
       if (top < list.scrollTop) list.scrollTop = top;
       if (top + 3 * ROW > list.scrollTop + list.clientHeight) list.scrollTop = top + 3 * ROW - list.clientHeight;
       list.setAttribute("aria-activedescendant", `row-${active}`);
-      draw();
+      drawMore();
       event.preventDefault();
     } else if (event.key === "Enter" && active >= 0) {
       location.hash = `#/run/${encodeURIComponent(runs.runs[filter.shown[active]])}`;
     }
   });
-  new ResizeObserver(draw).observe(list);
+  new ResizeObserver(drawMore).observe(list);
   return [list, anew];
 }

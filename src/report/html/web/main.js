@@ -3,6 +3,8 @@
 const VIEWS = [["", "Overview"], ["properties", "Properties"], ["modes", "Failure modes"], ["patterns", "Patterns"], ["map", "From above"],
   ["history", "History"], ["runs", "Runs"]];
 
+const AT_A_TIME = 400;
+
 /** The parts of a view, what follows the filter, and what ends it. */
 function view(report, [name, chosen]) {
   switch (name) {
@@ -32,6 +34,13 @@ function frame(summary, main) {
   return links;
 }
 
+/** Makes a search's letters ready, a few runs in each idle moment: no filter waits for them, and the first search hardly does. */
+function gatherLetters(runs) {
+  const later = window.requestIdleCallback ?? setTimeout;
+  const some = () => runs.gather(AT_A_TIME) || later(some);
+  later(some);
+}
+
 async function main() {
   const element = document.getElementById("main");
   try {
@@ -59,8 +68,7 @@ async function main() {
     };
     addEventListener("hashchange", () => go(false));
     go(true);
-    // The first search need not wait for its letters.
-    (window.requestIdleCallback ?? setTimeout)(() => runs.letters());
+    gatherLetters(runs);
     document.documentElement.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
     fill(element, make("h1", {}, "The report can't be read"), make("p", {}, error.message),

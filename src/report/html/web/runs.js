@@ -5,6 +5,7 @@ class Runs {
     Object.assign(this, columns);
     this.summary = summary;
     this.count = columns.runs.length;
+    this.searched = [];
     this.slots = summary.slots;
     this.place = new Map(columns.runs.map((id, run) => [id, run]));
     this.replayed = new Map(summary.replays.map((id, number) => [id, number]));
@@ -65,18 +66,27 @@ class Runs {
     return Object.fromEntries(OUTCOMES.map((word, i) => [word, sums[i]]));
   }
 
-  /** Letters of a run that a search looks through, in lower case; made when first asked for. */
+  /** Letters of all runs that a search looks through, in lower case; those that are missing are made now. */
   letters() {
-    this.searched ??= Array.from({ length: this.count }, (_, run) => {
-      const words = [this.runs[run], this.text(this.test, run), this.text(this.status, run), this.text(this.campaign, run)];
-      for (const parameter of this.parameters) if (parameter.values.kind === "texts") words.push(this.text(parameter.values, run));
-      for (const step of this.steps) words.push(this.text(step.message, run));
-      for (let slot = 0; slot < this.slots.length; slot++) {
-        const outcome = this.outcome(run, slot);
-        if (outcome === FAILED) words.push(this.slots[slot].property, this.why(run, slot));
-      }
-      return words.join(" ").toLowerCase();
-    });
+    this.gather(this.count);
     return this.searched;
+  }
+
+  /** Makes the letters of some more runs. Tells whether all are there. */
+  gather(some) {
+    const end = Math.min(this.count, this.searched.length + some);
+    for (let run = this.searched.length; run < end; run++) this.searched.push(this.lettersOf(run));
+    return end === this.count;
+  }
+
+  lettersOf(run) {
+    const words = [this.runs[run], this.text(this.test, run), this.text(this.status, run), this.text(this.campaign, run)];
+    for (const parameter of this.parameters) if (parameter.values.kind === "texts") words.push(this.text(parameter.values, run));
+    for (const step of this.steps) words.push(this.text(step.message, run));
+    for (let slot = 0; slot < this.slots.length; slot++) {
+      const outcome = this.outcome(run, slot);
+      if (outcome === FAILED) words.push(this.slots[slot].property, this.why(run, slot));
+    }
+    return words.join(" ").toLowerCase();
   }
 }
