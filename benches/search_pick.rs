@@ -1,11 +1,13 @@
 //! In how many runs does a guided search find the commonest failure modes of a real pick, against random scenes?
 //!
-//! A failure mode is the set of properties that fail together. Each seed makes the same number of runs by each strategy;
-//! the three commonest modes of all random runs are looked for, and the median over seeds of the first run that shows each
-//! is printed, with its share among all runs. Runs that strategies share (guided ones begin alike) are made once.
+//! A failure mode is the set of properties that fail together. Random scenes are made first, and the three commonest modes of them
+//! are looked for. They are independent of each other, so that the waits from one find to the next are as many first finds. A
+//! guided search has to begin anew for each: it does so with many seeds, and ends when it has found all three. Told are the median
+//! of the first run that shows a mode, interpolated within its step, and its ratio to random's with an interval by bootstrap.
 //!
-//! `cargo bench --bench search_pick` takes `configs/pick.toml`, 12 seeds, 40 runs, and all guided strategies;
-//! `-- --config benches/quiet_pick.toml --seeds 10 --runs 120 --strategies bandit,boundary` says otherwise.
+//! `cargo bench --bench search_pick` takes `configs/pick.toml`, 2,000 random scenes, 200 searches of 60 runs at most, and all guided
+//! strategies; `-- --config benches/quiet_pick.toml --random 500 --seeds 40 --runs 120 --strategies bandit,boundary
+//! --first-seed 7001` says otherwise.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -15,14 +17,20 @@ use actcheck::campaign::{Clock, Env, Failure, Manner, Planned, Told, run_line, s
 use actcheck::config::Overrides;
 use actcheck::search::Strategy;
 use actcheck::verdict::Outcome;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 /// Failure modes that are looked for.
 const MODES: usize = 3;
 
+/// Resamplings for an interval of 95 %.
+const RESAMPLED: usize = 2_000;
+
 type Signature = BTreeSet<String>;
 
-/// What a run came to, by what decides it: seed, scene, and the bits of what a search steered.
-type Known = BTreeMap<(u64, u64, Vec<u64>), Told>;
+/// What a run of one seed came to, by what decides it: the scene, and the bits of what a search steered.
+type Known = BTreeMap<(u64, Vec<u64>), Told>;
 
 fn argument(name: &str) -> Option<String> {
     let mut arguments = std::env::args().skip_while(|argument| argument != name);
@@ -51,8 +59,14 @@ fn make(env: &Env, planned: &Planned) -> Told {
     unreachable!("the shipped scenes can be built")
 }
 
-/// The signatures of a campaign's runs, in order.
-fn campaign(config: &Path, (seed, runs): (u64, u32), strategy: Strategy, known: &mut Known) -> Vec<Signature> {
+/// The signatures of a campaign's runs, in order, until `enough` says so.
+fn campaign(
+    config: &Path,
+    (seed, runs): (u64, u32),
+    strategy: Strategy,
+    known: &mut Known,
+    enough: impl Fn(&[Signature]) -> bool,
+) -> Vec<Signature> {
     let overrides = Overrides {
         runs: Some(runs),
         seed: Some(seed),
@@ -68,58 +82,110 @@ fn campaign(config: &Path, (seed, runs): (u64, u32), strategy: Strategy, known: 
         if batch.is_empty() {
             return signatures;
         }
-        let one = |planned: &Planned| {
+        told.clear();
+        for planned in &batch {
             let steered = planned.steering.iter().flat_map(|steering| steering.quantiles.values());
-            let key = (seed, planned.scene, steered.map(|value| value.to_bits()).collect());
-            known.entry(key).or_insert_with(|| make(&env, planned)).clone()
-        };
-        told = batch.iter().map(one).collect();
-        signatures.extend(told.iter().map(signature));
+            let key = (planned.scene, steered.map(|value| value.to_bits()).collect());
+            let run = known.entry(key).or_insert_with(|| make(&env, planned)).clone();
+            signatures.push(signature(&run));
+            told.push(run);
+            if enough(&signatures) {
+                return signatures;
+            }
+        }
     }
 }
 
-fn median(mut values: Vec<usize>) -> f64 {
+/// The commonest failure modes, and how many runs of these show each.
+fn commonest(runs: &[Signature]) -> Vec<(Signature, usize)> {
+    let mut counts: BTreeMap<&Signature, usize> = BTreeMap::new();
+    for failed in runs.iter().filter(|failed| !failed.is_empty()) {
+        *counts.entry(failed).or_default() += 1;
+    }
+    let mut modes: Vec<(Signature, usize)> = counts.into_iter().map(|(mode, count)| (mode.clone(), count)).collect();
+    modes.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    modes.truncate(MODES);
+    modes
+}
+
+/// How many runs it takes from each find to the next one.
+fn waits(runs: &[Signature], mode: &Signature) -> Vec<usize> {
+    let finds = runs.iter().enumerate().filter(|(_, failed)| *failed == mode).map(|(at, _)| at + 1);
+    finds.scan(0, |last, at| Some(at - std::mem::replace(last, at))).collect()
+}
+
+/// The median of numbers so small that many are equal: where within its step the half is passed, as of grouped data.
+fn median(values: &[usize]) -> f64 {
+    let mut values = values.to_vec();
     values.sort_unstable();
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] as f64 } else { (values[middle - 1] + values[middle]) as f64 / 2.0 }
+    let half = values.len() as f64 / 2.0;
+    let middle = values[values.len() / 2];
+    let below = values.partition_point(|value| *value < middle);
+    let equal = values.partition_point(|value| *value <= middle) - below;
+    middle as f64 - 1.0 + (half - below as f64) / equal as f64
+}
+
+/// The ratio of two medians, with what 95 % of resamplings lie between.
+fn ratio(guided: &[usize], random: &[usize]) -> [f64; 3] {
+    let mut generator = ChaCha8Rng::seed_from_u64(1);
+    let mut again = |values: &[usize]| {
+        let drawn: Vec<usize> = values.iter().map(|_| values[generator.next_u64() as usize % values.len()]).collect();
+        median(&drawn)
+    };
+    let mut ratios: Vec<f64> = (0..RESAMPLED).map(|_| again(guided) / again(random)).collect();
+    ratios.sort_by(f64::total_cmp);
+    [median(guided) / median(random), ratios[RESAMPLED / 40], ratios[RESAMPLED - 1 - RESAMPLED / 40]]
 }
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = root.join(argument("--config").unwrap_or_else(|| "configs/pick.toml".to_owned()));
-    let (seeds, runs) = (u64::from(number("--seeds", 12)), number("--runs", 40));
+    let (seeds, runs, scenes) = (u64::from(number("--seeds", 200)), number("--runs", 60), number("--random", 2_000));
     let named = argument("--strategies").unwrap_or_else(|| "cross-entropy,bandit,boundary".to_owned());
-    let guided = named.split(',').map(|name| Strategy::by_name(name).expect("the name of a strategy"));
-    let mut known = Known::new();
-    let mut found: Vec<(Strategy, Vec<Vec<Signature>>)> = Vec::new();
-    for strategy in std::iter::once(Strategy::Random).chain(guided) {
-        let campaigns = (1..=seeds).map(|seed| campaign(&config, (seed, runs), strategy, &mut known));
-        found.push((strategy, campaigns.collect()));
-        eprintln!("{} done", strategy.name());
+    let guided: Vec<Strategy> =
+        named.split(',').map(|name| Strategy::by_name(name).expect("the name of a strategy")).collect();
+    let first = u64::from(number("--first-seed", 1));
+    // Seeds beyond those of the searches; a campaign for each, so that they can be made side by side.
+    let part = |at: u64| campaign(&config, (first + seeds + at, 50), Strategy::Random, &mut Known::new(), |_| false);
+    let parts: Vec<Vec<Signature>> = (0..u64::from(scenes.div_ceil(50))).into_par_iter().map(part).collect();
+    let random = parts.concat();
+    let modes = commonest(&random);
+    println!("{}: {} random scenes, {seeds} searches of {runs} runs at most", config.display(), random.len());
+    println!("strategy       finds  share of runs  median first  ratio [95 %]         mode");
+    for (mode, count) in &modes {
+        let share = 100.0 * *count as f64 / random.len() as f64;
+        line(("random", *count), share, &waits(&random, mode), [1.0; 3], mode);
     }
-    let mut counts: BTreeMap<&Signature, usize> = BTreeMap::new();
-    for failed in found[0].1.iter().flatten().filter(|failed| !failed.is_empty()) {
-        *counts.entry(failed).or_default() += 1;
-    }
-    let mut modes: Vec<(&Signature, usize)> = counts.into_iter().collect();
-    modes.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    println!("{}: {seeds} seeds of {runs} runs; not found counts as one run more", config.display());
-    println!("strategy          share of runs  median first  ratio  mode");
-    for (mode, _) in modes.iter().take(MODES) {
-        let mut random = None;
-        for (strategy, campaigns) in &found {
-            let firsts = campaigns.iter().map(|campaign| campaign.iter().position(|failed| failed == *mode));
-            let firsts: Vec<usize> = firsts.map(|first| first.map_or(runs as usize, |first| first) + 1).collect();
-            let seen = campaigns.iter().flatten().filter(|failed| failed == mode).count();
-            let first = median(firsts);
-            let random = *random.get_or_insert(first);
-            println!(
-                "{:<16} {:>13.1} % {first:>13.1} {:>6.2}  {}",
-                strategy.name(),
-                100.0 * seen as f64 / (seeds * u64::from(runs)) as f64,
-                first / random,
-                mode.iter().map(String::as_str).collect::<Vec<_>>().join(" + ")
-            );
+    let all = |found: &[Signature]| modes.iter().all(|(mode, _)| found.contains(mode));
+    let search = |seed: u64| {
+        let mut known = Known::new();
+        let one = |strategy: &Strategy| campaign(&config, (seed, runs), *strategy, &mut known, all);
+        guided.iter().map(one).collect::<Vec<_>>()
+    };
+    let searches: Vec<Vec<Vec<Signature>>> = (first..first + seeds).into_par_iter().map(search).collect();
+    for (at, strategy) in guided.iter().enumerate() {
+        for (mode, _) in &modes {
+            let of = |search: &Vec<Vec<Signature>>| search[at].iter().position(|failed| failed == mode);
+            let found = searches.iter().filter(|search| of(search).is_some()).count();
+            // One that never found it counts as one run more.
+            let firsts: Vec<usize> = searches.iter().map(|search| of(search).unwrap_or(runs as usize) + 1).collect();
+            let made: usize = searches.iter().map(|search| search[at].len()).sum();
+            let seen: usize =
+                searches.iter().map(|search| search[at].iter().filter(|failed| *failed == mode).count()).sum();
+            let ratio = ratio(&firsts, &waits(&random, mode));
+            line((strategy.name(), found), 100.0 * seen as f64 / made as f64, &firsts, ratio, mode);
         }
     }
+}
+
+fn line(
+    (strategy, finds): (&str, usize),
+    share: f64,
+    firsts: &[usize],
+    [ratio, low, high]: [f64; 3],
+    mode: &Signature,
+) {
+    let mode = mode.iter().map(String::as_str).collect::<Vec<_>>().join(" + ");
+    let first = median(firsts);
+    println!("{strategy:<14} {finds:>5} {share:>12.1} % {first:>13.1}  {ratio:.2} [{low:.2}, {high:.2}]  {mode}");
 }

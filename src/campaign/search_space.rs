@@ -13,8 +13,8 @@ pub(super) struct SearchSpace {
 }
 
 impl SearchSpace {
-    /// The scene's parameters, and where the target seems to stand. Where scenes are repeated noise is left alone: it is
-    /// what the repetitions differ in.
+    /// The scene's parameters, and how wrong the robot is about where things and itself are. Where scenes are repeated noise is
+    /// left alone: it is what the repetitions differ in.
     pub fn new(env: &Env) -> Self {
         let parameters = env.space.parameters();
         let index_of = |name: &str| parameters.iter().position(|parameter| parameter.name == name);
@@ -26,17 +26,8 @@ impl SearchSpace {
         };
         let mut axes: Vec<(Vec<String>, Dimension)> =
             parameters.iter().map(|parameter| (vec![parameter.name.clone()], of(parameter.kind))).collect();
-        let (targets, sensing) = (env.space.target_ids(), &env.campaign.sensing);
-        if env.campaign.repeat == 1 && !targets.is_empty() {
-            let noises =
-                [("x", sensing.position_noise_m), ("y", sensing.position_noise_m), ("z", sensing.height_noise_m)];
-            for (side, sigma) in noises {
-                if sigma > 0.0 {
-                    // Whichever model the target is of: one axis for the same noise.
-                    let names = targets.iter().map(|id| format!("sense.{id}.{side}")).collect();
-                    axes.push((names, Dimension::Normal));
-                }
-            }
+        if env.campaign.repeat == 1 {
+            axes.extend(noises(env));
         }
         Self { axes }
     }
@@ -51,4 +42,30 @@ impl SearchSpace {
         let pairs = self.axes.iter().zip(point);
         pairs.flat_map(|((names, _), value)| names.iter().map(|name| (name.clone(), *value))).collect()
     }
+}
+
+/// The noise of where things seem to be: of the target, of the robot itself, and of the first other thing of each model.
+fn noises(env: &Env) -> Vec<(Vec<String>, Dimension)> {
+    let (sensing, targets) = (&env.campaign.sensing, env.space.target_ids());
+    let (flat, turning) = (sensing.position_noise_m, sensing.heading_noise_rad);
+    let mut axes = Vec::new();
+    let mut add = |names: Vec<String>, sigma: f64, dimension| {
+        if sigma > 0.0 && !names.is_empty() {
+            axes.push((names, dimension));
+        }
+    };
+    for (side, sigma) in [("x", flat), ("y", flat), ("z", sensing.height_noise_m)] {
+        // Whichever model the target is of: one axis for the same noise.
+        add(targets.iter().map(|id| format!("sense.{id}.{side}")).collect(), sigma, Dimension::Normal);
+    }
+    let itself = sensing.localisation_noise_m;
+    for (side, sigma) in [("x", itself), ("y", itself), ("heading", turning)] {
+        add(vec![format!("sense.localisation.{side}")], sigma, Dimension::Normal);
+    }
+    for id in env.space.other_ids() {
+        for side in ["x", "y"] {
+            add(vec![format!("sense.{id}.{side}")], flat, Dimension::Aside);
+        }
+    }
+    axes
 }

@@ -72,6 +72,14 @@ impl Space {
         found
     }
 
+    /// Ids that another object may have, the first of each model.
+    pub fn other_ids(&self) -> Vec<String> {
+        let targets = self.target_ids();
+        let mut ids: Vec<String> = self.others.iter().map(|model| format!("{}_1", model.name)).collect();
+        ids.retain(|id| !targets.contains(id));
+        ids
+    }
+
     /// Ids that the target may have, one for each model that it may be of.
     pub fn target_ids(&self) -> Vec<String> {
         self.targets.iter().map(|model| format!("{}_1", model.name)).collect()

@@ -18,6 +18,7 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
         let arms = match dimension {
             Dimension::Continuous | Dimension::Normal | Dimension::Beside(_) => SLICES,
             Dimension::Categorical(count) | Dimension::Rising(count) => *count,
+            Dimension::Aside => 1,
         };
         play(&open, axis, arms)
     });

@@ -39,6 +39,7 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
 /// A cloud about a point; a category is kept in most draws.
 fn about(space: &Space, point: &[f64], sigma: f64) -> Component {
     let axes = space.dimensions().iter().zip(point).map(|(dimension, value)| match dimension.categories() {
+        _ if !dimension.is_learnt() => Marginal::uniform(),
         None => Marginal::Normal { mean: *value, sigma },
         Some(count) => {
             let mut shares = vec![sigma; count];
@@ -93,6 +94,7 @@ impl Model {
         for dimension in space.dimensions() {
             let own = self.coefficients.rows(at, terms(*dimension));
             let value = match dimension.categories() {
+                _ if !dimension.is_learnt() => 0.5,
                 None => least_of_parabola(own[0], own[1]),
                 Some(count) => (own.imin() as f64 + 0.5) / count as f64,
             };
@@ -104,13 +106,14 @@ impl Model {
 }
 
 fn terms(dimension: Dimension) -> usize {
-    dimension.categories().unwrap_or(2)
+    if dimension.is_learnt() { dimension.categories().unwrap_or(2) } else { 0 }
 }
 
 fn features(space: &Space, point: &[f64]) -> DVector<f64> {
     let mut row = vec![1.0];
     for (dimension, value) in space.dimensions().iter().zip(point) {
         match dimension.categories() {
+            _ if !dimension.is_learnt() => {}
             None => row.extend([value - 0.5, (value - 0.5) * (value - 0.5)]),
             Some(count) => {
                 row.extend((0..count).map(|category| f64::from(u8::from(category == bucket(*value, count)))));

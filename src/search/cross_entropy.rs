@@ -30,6 +30,9 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
 }
 
 fn fit(dimension: Dimension, elite: &[&[f64]], axis: usize) -> Marginal {
+    if !dimension.is_learnt() {
+        return Marginal::uniform();
+    }
     let count = elite.len() as f64;
     match dimension.categories() {
         None => {

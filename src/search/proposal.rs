@@ -9,7 +9,7 @@ use super::space::bucket;
 /// The largest number below 1, so that a point stays in the half-open cube.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// No number is spread beyond so many of its own standard deviations: noise is never drawn from beyond them.
+/// No number is farther from its mean than so many standard deviations: noise is never drawn from beyond them.
 const FARTHEST: f64 = 4.0;
 
 /// The distribution of one axis.
@@ -22,8 +22,9 @@ pub enum Marginal {
         /// Standard deviation before the cut, positive.
         sigma: f64,
     },
-    /// The quantile of a number whose spread is multiplied, brought back to four of its own standard deviations.
-    Spread(f64),
+    /// The quantile of a normally distributed number that is far from its mean: so many of its standard deviations at
+    /// least, [`FARTHEST`] at most, every distance as often as any other.
+    Far(f64),
     /// Normal about the value of an earlier axis, cut off at 0 and 1.
     Beside {
         /// Index of that axis.
@@ -36,13 +37,18 @@ pub enum Marginal {
 }
 
 impl Marginal {
+    /// The nominal distribution.
+    pub fn uniform() -> Self {
+        Self::Steps(vec![1.0])
+    }
+
     /// A distribution in steps, with shares in proportion to these numbers; uniform where they are no proportion.
     pub fn steps(proportions: &[f64]) -> Self {
         let sum: f64 = proportions.iter().sum();
         if sum.is_finite() && sum > 0.0 && proportions.iter().all(|share| *share >= 0.0) {
             Self::Steps(proportions.iter().map(|share| share / sum).collect())
         } else {
-            Self::Steps(vec![1.0])
+            Self::uniform()
         }
     }
 
@@ -56,14 +62,14 @@ impl Marginal {
                 let peak = 1.0 / (sigma * libm::sqrt(std::f64::consts::TAU));
                 peak * libm::exp(-0.5 * distance * distance) / (high - low)
             }
-            Self::Spread(factor) => {
-                let (low, high) = spread_cut(*factor);
+            Self::Far(nearest) => {
                 let deviation = quantile(value);
-                if deviation.abs() > FARTHEST {
+                if !(*nearest..=FARTHEST).contains(&deviation.abs()) {
                     return 0.0;
                 }
-                // Two normal densities by each other.
-                libm::exp(0.5 * deviation * deviation * (1.0 - 1.0 / (factor * factor))) / (factor * (high - low))
+                // By the density of a normal distribution, which is how the quantiles lie along the deviations.
+                let normal = libm::exp(-0.5 * deviation * deviation) / libm::sqrt(std::f64::consts::TAU);
+                0.5 / (FARTHEST - nearest) / normal
             }
             Self::Steps(shares) => shares[bucket(value, shares.len())] * shares.len() as f64,
         }
@@ -81,9 +87,9 @@ impl Marginal {
             }
             // Drawn above, by what it is.
             Self::Beside { .. } => share,
-            Self::Spread(factor) => {
-                let (low, high) = spread_cut(*factor);
-                below((factor * quantile(low + (high - low) * share)).clamp(-FARTHEST, FARTHEST))
+            Self::Far(nearest) => {
+                let along = (2.0 * share - 1.0) * (FARTHEST - nearest);
+                below(along + nearest.copysign(along))
             }
             Self::Steps(shares) => {
                 let mut below = 0.0;
@@ -110,11 +116,6 @@ fn cut(mean: f64, sigma: f64) -> (f64, f64) {
     (below((0.0 - mean) / sigma), below((1.0 - mean) / sigma))
 }
 
-/// The shares of the standard normal distribution that stay where its spread is multiplied.
-fn spread_cut(factor: f64) -> (f64, f64) {
-    (below(-FARTHEST / factor), below(FARTHEST / factor))
-}
-
 /// The standard normal distribution function.
 fn below(deviation: f64) -> f64 {
     0.5 * (1.0 + erf(deviation / std::f64::consts::SQRT_2))
@@ -130,11 +131,13 @@ fn quantile(share: f64) -> f64 {
 pub struct Component(pub Vec<Marginal>);
 
 impl Component {
-    fn density(&self, point: &[f64]) -> f64 {
+    /// Against the uniform density.
+    pub(super) fn density(&self, point: &[f64]) -> f64 {
         self.0.iter().zip(point).map(|(marginal, value)| marginal.density(*value, point)).product()
     }
 
-    fn draw(&self, generator: &mut ChaCha8Rng) -> Vec<f64> {
+    /// A point of its own for a generator.
+    pub(super) fn draw(&self, generator: &mut ChaCha8Rng) -> Vec<f64> {
         let mut point = Vec::with_capacity(self.0.len());
         for marginal in &self.0 {
             let value = marginal.draw(generator, &point);
@@ -177,7 +180,7 @@ mod tests {
         Proposal(vec![
             Component(vec![normal(0.1, 0.2), Marginal::steps(&[1.0, 3.0, 0.5])]),
             Component(vec![normal(0.9, 0.4), Marginal::steps(&[2.0, 1.0])]),
-            Component(vec![Marginal::Spread(2.0), Marginal::Spread(1.5)]),
+            Component(vec![Marginal::Far(0.5), Marginal::Far(1.0)]),
         ])
     }
 

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use super::archive::{Archive, Closed, Told, Tried};
 use super::estimate::{Estimate, Weighted};
 use super::fill;
-use super::proposal::Proposal;
+use super::proposal::{Component, Proposal};
 use super::space::Space;
 use super::strategy::Strategy;
 use super::{bandit, boundary, cross_entropy, unusual};
@@ -184,12 +184,14 @@ impl Search {
         let proposal = focus.map(|property| self.propose(property)).unwrap_or_default();
         // A proposal of nothing is the uniform distribution, of which plain points are as good.
         let chosen = if proposal == Proposal::default() { 0 } else { self.credit(size) };
-        let hard = unusual::propose(&self.space);
-        let unusual = if hard == Proposal::default() { 0 } else { (UNUSUAL * (size - chosen) as f64) as usize };
+        let kinds = unusual::kinds(&self.space);
+        let unusual = if kinds.is_empty() { 0 } else { (UNUSUAL * (size - chosen) as f64) as usize };
         let plain_count = size - chosen - unusual;
         let mut generator = fill::stream(self.seed, 5, self.generation);
+        let turns = (self.unusual..self.unusual + unusual).map(|number| unusual::kind_at(number, kinds.len()));
+        let of_kinds: Vec<&Component> = turns.map(|kind| &kinds[kind]).collect();
         let mut points: Vec<(Vec<f64>, Option<usize>)> =
-            (0..unusual).map(|_| (hard.draw(&mut generator, self.width()), None)).collect();
+            of_kinds.iter().map(|kind| (kind.draw(&mut generator), None)).collect();
         points.extend(self.plain_points(plain_count).into_iter().map(|point| (point, None)));
         let mut generator = fill::stream(self.seed, 4, self.generation);
         points.extend((0..chosen).map(|_| (proposal.draw(&mut generator, self.width()), focus)));
@@ -199,8 +201,8 @@ impl Search {
         let weighted = |(point, focus): (Vec<f64>, Option<usize>)| {
             // The balance heuristic of Veach and Guibas (1995), within a generation: what a proposal depends on is then
             // told before any of its points is drawn, and the estimate stays unbiased.
-            let density =
-                plain_count as f64 + unusual as f64 * hard.density(&point) + chosen as f64 * proposal.density(&point);
+            let unusual: f64 = of_kinds.iter().map(|kind| kind.density(&point)).sum();
+            let density = plain_count as f64 + unusual + chosen as f64 * proposal.density(&point);
             Ask { point, weight: size as f64 / density, largest_weight, focus }
         };
         points.into_iter().map(weighted).collect()

@@ -15,6 +15,9 @@ pub enum Dimension {
     /// A quantile in [0, 1) that says where something is along the same side as the axis with this earlier index says it of
     /// another thing: equal values put the two next to each other, which is unusual.
     Beside(usize),
+    /// The same as [`Dimension::Normal`] of something that matters only where things are close to each other. There are
+    /// many of these, and each matters seldom: no strategy learns from them.
+    Aside,
 }
 
 impl Dimension {
@@ -22,8 +25,13 @@ impl Dimension {
     pub(crate) fn categories(self) -> Option<usize> {
         match self {
             Self::Categorical(count) => Some(count),
-            Self::Continuous | Self::Normal | Self::Rising(_) | Self::Beside(_) => None,
+            Self::Continuous | Self::Normal | Self::Rising(_) | Self::Beside(_) | Self::Aside => None,
         }
+    }
+
+    /// Whether a strategy learns where along it margins are low.
+    pub(crate) fn is_learnt(self) -> bool {
+        self != Self::Aside
     }
 }
 
@@ -40,7 +48,7 @@ impl Space {
             Dimension::Beside(other) if other >= index => Dimension::Continuous,
             Dimension::Categorical(count) => Dimension::Categorical(count.max(1)),
             Dimension::Rising(count) => Dimension::Rising(count.max(1)),
-            Dimension::Continuous | Dimension::Normal | Dimension::Beside(_) => dimension,
+            Dimension::Continuous | Dimension::Normal | Dimension::Beside(_) | Dimension::Aside => dimension,
         };
         Self { dimensions: dimensions.into_iter().enumerate().map(whole).collect() }
     }
@@ -50,17 +58,20 @@ impl Space {
         &self.dimensions
     }
 
-    /// How far apart two points are: root mean square over the axes; two values of a categorical axis are 1 apart.
+    /// How far apart two points are: root mean square over the axes that are learnt; two values of a categorical axis are 1 apart.
     pub(crate) fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
-        let mut sum = 0.0;
-        for ((dimension, a), b) in self.dimensions.iter().zip(a).zip(b) {
+        let (mut sum, mut count) = (0.0, 0);
+        for ((dimension, a), b) in
+            self.dimensions.iter().zip(a).zip(b).filter(|((dimension, _), _)| dimension.is_learnt())
+        {
             let gap = match dimension.categories() {
                 None => a - b,
                 Some(count) => f64::from(u8::from(bucket(*a, count) != bucket(*b, count))),
             };
             sum += gap * gap;
+            count += 1;
         }
-        libm::sqrt(sum / self.dimensions.len().max(1) as f64)
+        libm::sqrt(sum / f64::from(count.max(1)))
     }
 }
 
