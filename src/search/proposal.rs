@@ -180,8 +180,12 @@ mod tests {
         Proposal(vec![
             Component(vec![normal(0.1, 0.2), Marginal::steps(&[1.0, 3.0, 0.5])]),
             Component(vec![normal(0.9, 0.4), Marginal::steps(&[2.0, 1.0])]),
-            Component(vec![Marginal::Far(0.5), Marginal::Far(1.0)]),
         ])
+    }
+
+    fn far() -> Proposal {
+        let everywhere = Component(vec![Marginal::uniform(), Marginal::uniform()]);
+        Proposal(vec![Component(vec![Marginal::Far(0.0), Marginal::Far(1.0)]), everywhere])
     }
 
     #[test]
@@ -194,14 +198,25 @@ mod tests {
     /// What is drawn has the density that is told: weighted by its inverse, every quarter has its share.
     #[test]
     fn what_is_drawn_has_the_density() {
-        let density = skewed();
-        let mut generator = stream(3, 9, 0);
-        let mut quarters = [0.0; 4];
-        for _ in 0..40_000 {
-            let point = density.draw(&mut generator, 2);
-            quarters[bucket(point[0], 2) * 2 + bucket(point[1], 2)] += 1.0 / density.density(&point) / 40_000.0;
+        for density in [skewed(), far()] {
+            let mut generator = stream(3, 9, 0);
+            let mut quarters = [0.0; 4];
+            for _ in 0..40_000 {
+                let point = density.draw(&mut generator, 2);
+                quarters[bucket(point[0], 2) * 2 + bucket(point[1], 2)] += 1.0 / density.density(&point) / 40_000.0;
+            }
+            assert!(quarters.iter().all(|share| (share - 0.25).abs() < 0.01), "{quarters:?}");
         }
-        assert!(quarters.iter().all(|share| (share - 0.25).abs() < 0.01), "{quarters:?}");
+    }
+
+    /// On a grid: so steep a density that random points tell little of its mean.
+    #[test]
+    fn far_numbers_have_a_density_of_mean_one() {
+        for nearest in [0.0, 1.0, 2.0, 3.0] {
+            let at = |cell: u32| Marginal::Far(nearest).density((f64::from(cell) + 0.5) / 1e6, &[]);
+            let mean = (0..1_000_000).map(at).sum::<f64>() / 1e6;
+            assert!((mean - 1.0).abs() < 0.02, "{nearest}: {mean}");
+        }
     }
 
     #[test]

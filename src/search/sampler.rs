@@ -188,7 +188,7 @@ impl Search {
         let unusual = if kinds.is_empty() { 0 } else { (UNUSUAL * (size - chosen) as f64) as usize };
         let plain_count = size - chosen - unusual;
         let mut generator = fill::stream(self.seed, 5, self.generation);
-        let turns = (self.unusual..self.unusual + unusual).map(|number| unusual::kind_at(number, kinds.len()));
+        let turns = (0..unusual).map(|number| unusual::kind_at(number, kinds.len()));
         let of_kinds: Vec<&Component> = turns.map(|kind| &kinds[kind]).collect();
         let mut points: Vec<(Vec<f64>, Option<usize>)> =
             of_kinds.iter().map(|kind| (kind.draw(&mut generator), None)).collect();

@@ -33,8 +33,9 @@ pub(crate) fn kinds(space: &Space) -> Vec<Component> {
     [of(astray), of(crowded)].into_iter().flatten().collect()
 }
 
-/// Which of so many kinds the unusual point of this number is of: in turns, the first of two points and each next one three
-/// times as long. What is common in the first kind takes few points, and the next one need not wait for what is rare in it.
+/// Which of so many kinds the unusual point of this number in its generation is of: in turns, the first of two points and
+/// each next one three times as long. What is common in the first kind takes few points, and the next one need not wait for
+/// what is rare in it.
 pub(crate) fn kind_at(number: usize, kinds: usize) -> usize {
     let (mut turn, mut end) = (0, FIRST_TURN);
     while number >= end {
