@@ -23,7 +23,7 @@ pub enum Marginal {
         sigma: f64,
     },
     /// The quantile of a normally distributed number that is far from its mean: so many of its standard deviations at
-    /// least, [`FARTHEST`] at most, every distance as often as any other.
+    /// least, four at most, every distance as often as any other.
     Far(f64),
     /// Normal about the value of an earlier axis, cut off at 0 and 1.
     Beside {
