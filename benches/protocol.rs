@@ -2,11 +2,14 @@
 //! Rust and from Python; and a whole simulated run with a controller that does nothing, at every control tick, beside the same
 //! ticks asked for at once.
 //!
-//! Aims: 20,000 exchanges a second from Rust and 3,000 from Python, simulator and program sharing one core, to which `taskset` binds
-//! them: what counts is the time of both on the processor. On two cores that have nothing else to do an exchange costs up to four
-//! times as much, since each core falls asleep while the other one works, and has to be woken; `-- two-cores` measures that. What an exchange takes is that time of a run in which each tick is a command, less that of the same run
-//! in which one command asks for all, in the cheapest physics there is. Python's own package is measured where its one dependency,
-//! numpy, is installed; beside it stands what Python does with sockets and JSON alone.
+//! Aims: 20,000 exchanges a second from Rust and 3,000 from Python, simulator and program sharing one core, to which `taskset`
+//! binds them: what counts is the time of both on the processor. On two cores that have nothing else to do an exchange costs up
+//! to four times as much, since each core falls asleep while the other one works, and has to be woken; `-- two-cores` measures
+//! that.
+//!
+//! What an exchange takes is that time of a run in which each tick is a command, less that of the same run in which one command
+//! asks for all, in the cheapest physics there is. Python's own package is measured where its one dependency, numpy, is
+//! installed; beside it stands what Python does with sockets and JSON alone.
 
 #[path = "../clients/rust/link.rs"]
 mod link;
@@ -27,6 +30,9 @@ const TICKS: u32 = 6_000;
 /// The best of so many runs counts.
 const REPEATS: usize = 3;
 
+/// What `taskset` ends with where it may not bind to that core; ours ends with 0, or 101 after a panic.
+const CANNOT_BIND: i32 = 1;
+
 /// Physics that costs little: an arm before a table with one glass, a step for each tick.
 const CHEAP: &str = "
 [robot]
@@ -44,11 +50,10 @@ fn main() {
     let itself = std::env::current_exe().expect("a program has a file");
     let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
     if wanted.is_none() {
-        let bound = Command::new("taskset").args(["-c", "0"]).arg(&itself).arg("bound").status();
-        if bound.is_ok_and(|status| status.success()) {
-            return;
+        match Command::new("taskset").args(["-c", "0"]).arg(&itself).arg("bound").status() {
+            Ok(status) if status.code() != Some(CANNOT_BIND) => std::process::exit(status.code().unwrap_or(1)),
+            _ => println!("not bound to one core: there is no `taskset`, or no core 0 for it"),
         }
-        println!("not bound to one core: there is no `taskset`, or no core 0 for it");
     }
     let programs = [
         ("Rust", format!("{} client", itself.display()), 20_000.0),

@@ -23,6 +23,7 @@ mod health;
 mod history;
 mod merge;
 mod models;
+mod more_scenes;
 mod move_to;
 mod no_panic;
 mod notebooks;

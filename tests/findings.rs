@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 
 use actcheck::analysis::{
-    Condition, FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, Parameter, PatternOptions, TableFilter, Values,
-    cascades, columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Condition, FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns,
+    flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck::history::{Repetition, RunDetail};
-use actcheck::report::{FindingsSummary, PropertyReport, patterns_picture, scene_rule};
+use actcheck::report::{FindingsSummary, PropertyReport, patterns_picture};
 use actcheck::verdict::Outcome::{self, Failed, Inapplicable, Passed, Untested};
 
-use crate::support::planted::{Dice, kind, range};
-use crate::support::{actcheck, made_up, project, stderr};
+use crate::support::made_up;
+use crate::support::planted::Dice;
 
 fn outcome(failed: bool) -> Outcome {
     if failed { Failed } else { Passed }
@@ -197,44 +197,4 @@ fn rows_are_chosen_by_campaign_and_time() {
     assert_eq!(table(all(), &since).len(), 4 * 28);
     let other = TableFilter { campaigns: Some(vec!["other".to_owned()]), ..TableFilter::default() };
     assert!(table(all(), &other).is_empty());
-}
-
-/// A rule that asks for scenes of a pattern gives such scenes, and no others.
-#[test]
-fn more_scenes_of_a_pattern_can_be_asked_for() {
-    let names =
-        ["target_category", "others", "neighbour_distance_m", "surface_y_m", "target_turned_rad", "target_ahead_m"];
-    let parameter = |name: &str| Parameter { name: name.to_owned(), unit: None, values: Values::Numbers(Vec::new()) };
-    let parameters: Vec<Parameter> = names.into_iter().map(parameter).collect();
-    let conditions = [
-        kind(0, "Cup"),
-        range(1, Some(2.0), None),
-        range(2, Some(0.12), None),
-        range(3, Some(0.0), None),
-        range(4, Some(-2.5), Some(2.5)),
-        range(5, Some(0.0), Some(2.0)),
-    ];
-    let rule = scene_rule(&conditions, &parameters, "a made-up pattern").unwrap();
-    let project = project();
-    std::fs::write(project.path().join("configs/more.rls"), rule).unwrap();
-    let config = project.path().join("configs/pick.toml");
-    let text = std::fs::read_to_string(&config).unwrap();
-    std::fs::write(&config, text + "\n[scene]\nrequire = \"more.rls\"\n").unwrap();
-    let output = actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
-    assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
-    assert!(actcheck(project.path(), &["export", "--csv", "t", "--history", "h"]).status.success());
-    let mut table = csv::Reader::from_path(project.path().join("t/outcomes.csv")).unwrap();
-    let rows: Vec<BTreeMap<String, String>> = table.deserialize().map(Result::unwrap).collect();
-    assert_eq!(rows.len(), 20);
-    for row in rows {
-        let number = |name: &str| row[name].parse::<f64>().unwrap();
-        // Things settle by less than this.
-        const SETTLED: f64 = 0.01;
-        assert!(number("others") >= 2.0 && number("neighbour_distance_m") > 0.12 - SETTLED, "{row:?}");
-        assert!(number("surface_y_m") > -SETTLED && number("target_turned_rad").abs() < 2.5 + SETTLED, "{row:?}");
-        assert!(number("target_ahead_m") > 0.0 && number("target_ahead_m") < 2.0 + SETTLED, "{row:?}");
-        assert!(row["target_kinds"].contains("Cup"));
-    }
-    let unknown = scene_rule(&[range(0, None, Some(1.0))], &[parameter("position_noise_m")], "");
-    assert_eq!(unknown, Err(vec!["position_noise_m".to_owned()]));
 }

@@ -21,6 +21,7 @@ mod requirement;
 mod resume;
 mod rule_set;
 mod run_all;
+mod scene_facts;
 mod schedule;
 mod search_space;
 mod searching;

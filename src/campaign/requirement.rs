@@ -2,7 +2,7 @@
 
 use crate::actions::{ActionTrace, Frames, Trace};
 use crate::base::{Diagnostics, digest_of, names};
-use crate::campaign::Failure;
+use crate::campaign::{Failure, scene_facts};
 use crate::config::Campaign;
 use crate::facts::{self, ActionFacts};
 use crate::ontology::{Ontology, Property, RuleFile, RuleLanguage};
@@ -50,6 +50,7 @@ impl Requirement {
         };
         let mut alone = ontology.clone();
         alone.properties = [(iri.clone(), property)].into();
+        alone.vocabulary.terms.extend(scene_facts::vocabulary());
         Ok(Some(Self { rules: RuleBook::prepare_within(&alone, budget)?, iri, path }))
     }
 
@@ -68,7 +69,8 @@ impl Requirement {
             forms: Vec::new(),
             robot_courses: Vec::new(),
         };
-        let facts = facts::extract(&trace);
+        let mut facts = facts::extract(&trace);
+        scene_facts::add(scene, &mut facts);
         let state = &facts.snapshots[0];
         let asked = ActionFacts {
             terms: &facts.terms,

@@ -15,7 +15,7 @@ use crate::report::HTML_COLUMNS;
 /// Patterns have at most so many conditions, and a chance of so much to be false, as `actcheck analyse` has them by default.
 const DEPTH: u8 = 3;
 const LEVEL: f64 = 0.05;
-/// Letters that stand for bytes take a third more room.
+/// Millions, not 2^20, as browsers and file listings count them.
 const BYTES_IN_A_MB: f64 = 1e6;
 
 /// `actcheck report`

@@ -8,6 +8,7 @@ use oxigraph::store::{StorageError, Store};
 use crate::base::names;
 use crate::history::read::{Node, id_of, subjects, text_of};
 use crate::history::statements::iri;
+use crate::history::write_scene::NOISE_TERMS;
 use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail, RunRow, RunStatus};
 use crate::scenario::Role;
 use crate::verdict::{Judgement, Outcome};
@@ -81,11 +82,7 @@ pub(super) fn version(node: &Node) -> String {
 }
 
 fn noise(node: &Node) -> BTreeMap<String, f64> {
-    node.properties()
-        .filter_map(|(property, _)| property.strip_prefix(names::ACT))
-        .filter(|name| name.ends_with("Noise"))
-        .filter_map(|name| Some((name.to_owned(), node.number(&names::act(name))?)))
-        .collect()
+    NOISE_TERMS.into_iter().filter_map(|name| Some((name.to_owned(), node.number(&names::act(name))?))).collect()
 }
 
 /// Values of the designators that a run or an execution names as such.

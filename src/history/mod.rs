@@ -41,6 +41,7 @@ pub use scene_digest::SceneDigest;
 pub use store::History;
 pub use vitals::RunVitals;
 pub use wire::{WireFault, WireSyntax};
+pub use write_scene::{NOISE_TERMS, noise};
 
 // What the readers of a history meet in its products.
 pub use crate::actions::{BodyState, ContactEpisode, Form, Snapshot, Trace};

@@ -8,25 +8,44 @@ use crate::history::RunRecord;
 use crate::history::statements::{Statements, iri};
 use crate::scenario::{Role, Scene, SceneObject};
 
-/// What makes sensing wrong, standard deviations for the most part, by local name of their terms.
-pub(super) fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
+/// Local names of the terms for what makes sensing wrong, in the order of [`noise`].
+pub const NOISE_TERMS: [&str; 13] = [
+    "positionNoise",
+    "heightNoise",
+    "yawNoise",
+    "sizeNoise",
+    "localisationNoise",
+    "headingNoise",
+    "gripperNoise",
+    "rangeNoise",
+    "odometryDrift",
+    "odometryHeadingDrift",
+    "landmarkDistance",
+    "landmarkNoise",
+    "landmarkHeadingNoise",
+];
+
+/// What makes sensing wrong in a scene, standard deviations for the most part, by local name of their terms. Units: those of the
+/// terms.
+pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
     let sensing = &scene.sensing;
     let odometry = &sensing.odometry;
-    [
-        ("positionNoise", sensing.position_noise_m),
-        ("heightNoise", sensing.height_noise_m),
-        ("yawNoise", sensing.yaw_noise_rad),
-        ("sizeNoise", sensing.size_noise_m),
-        ("localisationNoise", sensing.localisation_noise_m),
-        ("headingNoise", sensing.heading_noise_rad),
-        ("gripperNoise", sensing.gripper_noise_m),
-        ("rangeNoise", sensing.camera.range_noise_m),
-        ("odometryDrift", odometry.drift),
-        ("odometryHeadingDrift", odometry.heading_drift),
-        ("landmarkDistance", odometry.landmark_every_m),
-        ("landmarkNoise", odometry.landmark_noise_m),
-        ("landmarkHeadingNoise", odometry.landmark_noise_rad),
-    ]
+    let values = [
+        sensing.position_noise_m,
+        sensing.height_noise_m,
+        sensing.yaw_noise_rad,
+        sensing.size_noise_m,
+        sensing.localisation_noise_m,
+        sensing.heading_noise_rad,
+        sensing.gripper_noise_m,
+        sensing.camera.range_noise_m,
+        odometry.drift,
+        odometry.heading_drift,
+        odometry.landmark_every_m,
+        odometry.landmark_noise_m,
+        odometry.landmark_noise_rad,
+    ];
+    std::array::from_fn(|idx| (NOISE_TERMS[idx], values[idx]))
 }
 
 /// States the scene of a run: on the run's node what belongs to the whole, and one node for each object.

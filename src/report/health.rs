@@ -43,7 +43,10 @@ impl HealthSummary {
                 "S032",
                 format!("{discards} of {drawn} scenes were discarded; the first, for run {run}: {reason}"),
             )
-            .help("fewer or smaller objects, or a larger surface, waste less and bias the sample less"),
+            .help(
+                "fewer or smaller objects, a larger surface, or ranges nearer to what `[scene] require` asks for, waste less and \
+                 bias the sample less",
+            ),
             Ailment::Inapplicable(property, not, of) => Diagnostic::warning(
                 "Q001",
                 format!("{} was inapplicable in {not} of {of} judgements", names::local(property)),

@@ -6,8 +6,8 @@ use crate::analysis::{Condition, Parameter};
 use crate::base::names;
 
 /// What a parameter of the tables is in the facts of a scene: the rest of a rule for `value(?v)`, where `?o` is the target, `?s` its
-/// surface, `?n` any other loose thing. (`ontology/world.ttl` and `rules/lib/geometry.rls` say what the terms mean.)
-const NUMBERS: [(&str, &str); 19] = [
+/// surface, `?n` any other thing that is no platform. (`ontology/world.ttl` and `ontology/history.ttl` say what the terms mean.)
+const NUMBERS: [(&str, &str); 35] = [
     ("target_friction", "target(?o), before(?o, w:friction, ?v)"),
     ("target_mass_kg", "target(?o), before(?o, w:mass, ?v)"),
     ("target_restitution", "target(?o), before(?o, w:restitution, ?v)"),
@@ -39,7 +39,31 @@ const NUMBERS: [(&str, &str); 19] = [
         "nearest(?d), target(?o), away(?n, ?dx, ?dy, ?d), from_base(?o, ?x, ?y), ?b = ATAN2(?dy, ?dx) - ATAN2(0.0 - ?y, 0.0 - ?x), \
          ?v = ATAN2(SIN(?b), COS(?b))",
     ),
-    ("others", "others(?v)"),
+    ("others", "number_of(\"other\", ?v)"),
+    ("place_others", "number_of(\"place-other\", ?v)"),
+    ("obstacles", "number_of(\"obstacle\", ?v)"),
+    ("obstacle_distance_m", "obstacle_distance(?v)"),
+    ("position_noise_m", "before(_, act:positionNoise, ?v)"),
+    ("height_noise_m", "before(_, act:heightNoise, ?v)"),
+    ("yaw_noise_rad", "before(_, act:yawNoise, ?v)"),
+    ("size_noise_m", "before(_, act:sizeNoise, ?v)"),
+    ("localisation_noise_m", "before(_, act:localisationNoise, ?v)"),
+    ("heading_noise_rad", "before(_, act:headingNoise, ?v)"),
+    ("gripper_noise_m", "before(_, act:gripperNoise, ?v)"),
+    ("range_noise_m", "before(_, act:rangeNoise, ?v)"),
+    ("odometry_drift", "before(_, act:odometryDrift, ?v)"),
+    ("heading_drift_rad", "before(_, act:odometryHeadingDrift, ?v)"),
+    ("landmark_every_m", "before(_, act:landmarkDistance, ?v)"),
+    ("landmark_noise_m", "before(_, act:landmarkNoise, ?v)"),
+    ("landmark_noise_rad", "before(_, act:landmarkHeadingNoise, ?v)"),
+];
+
+/// Names, in the same way: the rest of a rule for `named(?t)`.
+const NAMES: [(&str, &str); 4] = [
+    ("world", "before(_, act:worldName, ?t)"),
+    ("target_model", "target(?o), before(?o, act:model, ?t)"),
+    ("surface_model", "parameter(act:objectSurface, ?s), before(?s, act:model, ?t)"),
+    ("neighbour_model", "nearest(?d), away(?n, _, _, ?d), before(?n, act:model, ?t)"),
 ];
 
 /// Classes of things, in the same way: the rest of a rule for `thing(?t)`.
@@ -50,9 +74,9 @@ const KINDS: [(&str, &str); 3] = [
 ];
 
 /// What the rules above build on.
-const DEFINITIONS: &str = "\
-target(?o) :- parameter(act:pickObject, ?o) .
-loose(?n) :- before(?n, w:fixed, false) .
+const DEFINITIONS: &str = r#"target(?o) :- parameter(act:pickObject, ?o) .
+role(?n, ?r) :- before(?n, act:role, ?r) .
+loose(?n) :- role(?n, ?r), ?r != "platform" .
 from_base(?o, ?x, ?y) :- before(?o, w:x, ?ox), before(?o, w:y, ?oy), before(w:robot, w:baseX, ?bx), before(w:robot, w:baseY, ?by),
     ?x = ?ox - ?bx, ?y = ?oy - ?by .
 on_surface(?x, ?y, ?a) :- target(?o), parameter(act:objectSurface, ?s), before(?o, w:x, ?ox), before(?o, w:y, ?oy),
@@ -60,10 +84,23 @@ on_surface(?x, ?y, ?a) :- target(?o), parameter(act:objectSurface, ?s), before(?
 away(?n, ?dx, ?dy, ?d) :- target(?o), loose(?n), ?n != ?o, before(?o, w:x, ?ox), before(?o, w:y, ?oy),
     before(?n, w:x, ?nx), before(?n, w:y, ?ny), ?dx = ?nx - ?ox, ?dy = ?ny - ?oy, ?d = SQRT(?dx * ?dx + ?dy * ?dy) .
 nearest(#min(?d)) :- away(_, _, _, ?d) .
-others(#count(?n)) :- away(?n, _, _, _) .
+counted(?r, #count(?n)) :- role(?n, ?r) .
+there(?r) :- role(_, ?r) .
+number_of(?r, ?v) :- counted(?r, ?v) .
+number_of("other", 0) :- ~there("other") .
+number_of("place-other", 0) :- ~there("place-other") .
+number_of("obstacle", 0) :- ~there("obstacle") .
+way(?ox, ?oy, ?x, ?y, ?share) :- target(?o), from_base(?o, ?x, ?y), role(?n, "obstacle"), from_base(?n, ?ox, ?oy),
+    ?share = (?ox * ?x + ?oy * ?y) / (?x * ?x + ?y * ?y) .
+from_way(?d) :- way(?ox, ?oy, _, _, ?share), ?share <= 0.0, ?d = SQRT(?ox * ?ox + ?oy * ?oy) .
+from_way(?d) :- way(?ox, ?oy, ?x, ?y, ?share), ?share > 0.0, ?share < 1.0,
+    ?d = ABS(?ox * ?y - ?oy * ?x) / SQRT(?x * ?x + ?y * ?y) .
+from_way(?d) :- way(?ox, ?oy, ?x, ?y, ?share), ?share >= 1.0,
+    ?d = SQRT((?ox - ?x) * (?ox - ?x) + (?oy - ?y) * (?oy - ?y)) .
+obstacle_distance(#min(?d)) :- from_way(?d) .
 kind(?t, ?c) :- before(?t, rdf:type, ?c) .
 kind(?t, ?c) :- kind(?t, ?below), ontology(?below, rdfs:subClassOf, ?c) .
-";
+"#;
 
 /// The rule file that a scene satisfies where all conditions hold.
 ///
@@ -91,7 +128,7 @@ pub fn scene_rule(conditions: &[Condition], parameters: &[Parameter], sentence: 
     {
         let _ = writeln!(text, "@prefix {prefix}: <{namespace}> .");
     }
-    let _ = writeln!(text, "\nsuccess(?o) :- target(?o), {} .\n", asked.join(", "));
+    let _ = writeln!(text, "\nsuccess(w:robot) :- {} .\n", asked.join(", "));
     text.push_str(&rules);
     text.push('\n');
     text.push_str(DEFINITIONS);
@@ -103,9 +140,19 @@ fn asked_of(condition: &Condition, name: &str, number: usize) -> Option<(String,
     let known = |among: &[(&str, &'static str)]| among.iter().find(|(known, _)| *known == name).map(|(_, body)| *body);
     match condition {
         Condition::Kind { kind, .. } => {
+            if let Some(body) = known(&NAMES) {
+                let rule = format!("named_{number}(?t) :- {body} .\n");
+                return Some((rule, format!("named_{number}({kind:?})")));
+            }
             let body = known(&KINDS)?;
-            let rule = format!("thing_{number}(?t) :- {body} .\n");
-            Some((rule, format!("thing_{number}(?t{number}), kind(?t{number}, act:{kind})")))
+            // Tables know classes by their local names.
+            let rule = ['#', '/'].map(|mark| {
+                format!(
+                    "thing_{number}(?t) :- {body}, kind(?t, ?c), STRENDS(STR(?c), {:?}) .\n",
+                    format!("{mark}{kind}")
+                )
+            });
+            Some((rule.concat(), format!("thing_{number}(_)")))
         }
         Condition::Range { low, high, .. } => {
             let body = known(&NUMBERS)?;

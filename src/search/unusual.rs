@@ -23,7 +23,8 @@ const LONGER: usize = 3;
 ///
 /// One at a time, because together they hide each other: a hand that goes astray in a crowd always fails in the same way.
 ///
-/// Source: scaled-sigma sampling of Sun, Li and others (2015), which finds rare failures of circuits.
+/// The idea is that of scaled-sigma sampling (Sun, Li and others, 2015), which finds rare failures of circuits where noise is
+/// made larger; here every distance, from where it is unusual up to four deviations, is as frequent as any other.
 pub(crate) fn kinds(space: &Space) -> Vec<Component> {
     let of = |axis: fn(&Dimension) -> Option<Marginal>| {
         let axes: Vec<Option<Marginal>> = space.dimensions().iter().map(axis).collect();

@@ -3,6 +3,7 @@
 const VIEWS = [["", "Overview"], ["properties", "Properties"], ["modes", "Failure modes"], ["patterns", "Patterns"], ["map", "From above"],
   ["history", "History"], ["runs", "Runs"]];
 
+/** Runs whose letters are gathered in an idle moment: a few milliseconds, so that no click waits for more. */
 const AT_A_TIME = 400;
 
 /** The parts of a view, what follows the filter, and what ends it. */
