@@ -163,7 +163,7 @@ const COLUMNS: &[Column] = &[
     number("heading_noise_rad", "rad", "how wrong the robot's own heading is", |p| noise(p, "headingNoise")).of_scene(),
     number("gripper_noise_m", "m", "how wrong the gripper's opening is", |p| noise(p, "gripperNoise")).of_scene(),
     number("range_noise_m", "m", "how wrong the camera's ranges are", |p| noise(p, "rangeNoise")).of_scene(),
-    number("odometry_drift", "1", "how wrong wheels are about the way, as a share of it", |p| {
+    number("odometry_drift", "1", "how wrong wheels are about the way, as a share of it (standard deviation)", |p| {
         noise(p, "odometryDrift")
     })
     .of_scene(),
