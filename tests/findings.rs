@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use actcheck::analysis::{
-    Condition, FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns,
-    flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Condition, FINDING_COLUMNS, Hierarchy, Interval, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades,
+    columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck::history::{Repetition, RunDetail};
 use actcheck::report::{FindingsSummary, PropertyReport, patterns_picture};
@@ -174,6 +174,38 @@ fn runs_that_are_alike_count_once() {
     let (flaky, scenes) = flaky_scenes(&table, &judged[0]);
     assert_eq!(scenes, 3);
     assert!(flaky.iter().all(|scene| scene.passed > 0 && scene.passed < scene.of && scene.of == 3), "{flaky:?}");
+}
+
+/// Five runs of each scene that all went the same way are worth one: no interval is narrower for them, and no test surer.
+#[test]
+fn repeated_runs_of_a_scene_make_nothing_surer() {
+    let once = runs("k", 60, 0.3);
+    let repeat = |number: u64| {
+        once.iter().cloned().map(move |mut run| {
+            run.row.repetition = Some(Repetition { scene: run.row.index, number });
+            run.row.index += 60 * number;
+            run.row.run = format!("k-{}", run.row.index + 1);
+            run.row.trace_hash = format!("{:032x}", run.row.index);
+            run
+        })
+    };
+    let five = table((0..5).flat_map(repeat), &TableFilter::default());
+    let once = table(once.clone(), &TableFilter::default());
+    assert_eq!(five.len(), 5 * once.len());
+    let alike = |a: Interval, b: Interval| {
+        [a.rate - b.rate, a.low - b.low, a.high - b.high].into_iter().all(|apart| apart.abs() < 1e-12)
+    };
+    for (a, b) in table_failure_modes(&once).into_iter().zip(table_failure_modes(&five)) {
+        assert!(a.failed == b.failed && 5 * a.runs.len() == b.runs.len() && alike(a.share, b.share), "{a:?} {b:?}");
+    }
+    assert!(!cascades(&once, 0.05).is_empty());
+    assert_eq!(cascades(&once, 0.05), cascades(&five, 0.05));
+    for (a, b) in judged(&once).iter().zip(judged(&five).iter()) {
+        assert_eq!(trend(&once, a, 0.05).points, trend(&five, b, 0.05).points);
+        let [a, b] = [(&once, a), (&five, b)]
+            .map(|(table, of)| property_findings(table, of, &hierarchy(), &PatternOptions::default()).failing);
+        assert!(a.zip(b).is_none_or(|(a, b)| alike(a, b)), "{a:?} {b:?}");
+    }
 }
 
 #[test]

@@ -85,7 +85,7 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
     let numbers = |number: &dyn Fn(&Repeated) -> f64| -> Vec<Vec<f64>> {
         scenes.values().map(|runs| runs.iter().map(|run| number(run)).collect()).collect()
     };
-    let outcome = variance(&numbers(&|run| f64::from(u8::from(run.passed))));
+    let shares: Vec<[u64; 2]> = counts.iter().map(|scene| [scene.passed, scene.of]).collect();
     let told = runs.iter().all(|run| run.margin.is_some_and(f64::is_finite));
     Consistency {
         always_passed: several().filter(|scene| scene.passed == scene.of).count() as u64,
@@ -94,9 +94,9 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
         pass_powers: (1..=counts.iter().map(|scene| scene.of).max().unwrap_or(0))
             .filter_map(|k| pass_power(&counts, k))
             .collect(),
-        outcome,
+        outcome: outcome_variance(&shares),
         margin: told.then(|| variance(&numbers(&|run| run.margin.unwrap_or_default()))).flatten(),
-        rate: clustered_rate(&counts, outcome),
+        rate: share_of_scenes(&shares),
     }
 }
 
@@ -124,17 +124,43 @@ fn pass_power(counts: &[Flaky], k: u64) -> Option<PassPower> {
 /// Source: the one-way model with random effects, by the method of moments of the analysis of variance (Searle, 1971,
 /// for groups of unequal size): both are unbiased.
 fn variance(groups: &[Vec<f64>]) -> Option<Variance> {
-    let (count, total) = (groups.len() as f64, groups.iter().map(Vec::len).sum::<usize>() as f64);
+    let spread = |values: &Vec<f64>| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        Spread {
+            size: values.len() as f64,
+            mean,
+            squares: values.iter().map(|value| (value - mean) * (value - mean)).sum(),
+        }
+    };
+    components(&groups.iter().map(spread).collect::<Vec<Spread>>())
+}
+
+/// The same of what is true or false, from how often it is true, of how many, in each group.
+fn outcome_variance(groups: &[[u64; 2]]) -> Option<Variance> {
+    let spread = |[is, of]: &[u64; 2]| {
+        let (size, mean) = (*of as f64, *is as f64 / *of as f64);
+        Spread { size, mean, squares: size * mean * (1.0 - mean) }
+    };
+    components(&groups.iter().map(spread).collect::<Vec<Spread>>())
+}
+
+/// How many values a group has, their mean, and the sum of their squared distances from it.
+struct Spread {
+    size: f64,
+    mean: f64,
+    squares: f64,
+}
+
+fn components(groups: &[Spread]) -> Option<Variance> {
+    let (count, total) = (groups.len() as f64, groups.iter().map(|group| group.size).sum::<f64>());
     if groups.len() < 2 || total <= count {
         return None;
     }
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let grand = groups.iter().flatten().sum::<f64>() / total;
+    let grand = groups.iter().map(|group| group.size * group.mean).sum::<f64>() / total;
     let (mut within, mut between, mut squares) = (0.0, 0.0, 0.0);
-    for group in groups {
-        let (own, size) = (mean(group), group.len() as f64);
-        within += group.iter().map(|value| (value - own) * (value - own)).sum::<f64>();
-        between += size * (own - grand) * (own - grand);
+    for Spread { size, mean, squares: own } in groups {
+        within += own;
+        between += size * (mean - grand) * (mean - grand);
         squares += size * size;
     }
     let noise = within / (total - count);
@@ -142,17 +168,51 @@ fn variance(groups: &[Vec<f64>]) -> Option<Variance> {
     Some(Variance { noise, scene: (between / (count - 1.0) - noise) / size })
 }
 
-/// Wilson's interval with as many runs as are worth their number: so many runs of one scene less, as they are alike.
+/// The share of runs of which something is true, from how many of how many runs of each scene: Wilson's interval with as many runs
+/// as are worth their number, as those of one scene are alike. Where every scene was run once, it is Wilson's own.
 ///
 /// Source: the design effect of Kish (1965), 1 + (m - 1) ρ, with ρ from the components of the variance.
-fn clustered_rate(counts: &[Flaky], outcome: Option<Variance>) -> Option<Interval> {
-    let runs = counts.iter().map(|scene| scene.of as f64).sum::<f64>();
-    let passed = counts.iter().map(|scene| scene.passed as f64).sum::<f64>();
-    let squares = counts.iter().map(|scene| (scene.of * scene.of) as f64).sum::<f64>();
+fn share_of_scenes(scenes: &[[u64; 2]]) -> Option<Interval> {
+    let sum = |number: fn(&[u64; 2]) -> u64| scenes.iter().map(number).sum::<u64>() as f64;
+    let (is, runs, squares) = (sum(|[is, _]| *is), sum(|[_, of]| *of), sum(|[_, of]| of * of));
     // Where all runs went alike nothing tells noise from scenes: then each scene counts once.
-    let alike = outcome.and_then(|variance| variance.noise_share()).map_or(1.0, |noise| 1.0 - noise);
+    let alike = outcome_variance(scenes).and_then(|variance| variance.noise_share()).map_or(1.0, |noise| 1.0 - noise);
     let worth = runs / (1.0 + (squares / runs - 1.0) * alike);
-    wilson_share(passed / runs, worth)
+    wilson_share(is / runs, worth)
+}
+
+/// Which of some runs are of the same scene.
+#[derive(Debug, Clone, Default)]
+pub struct SceneRuns {
+    /// For each run the place of its scene.
+    scene_of: Vec<usize>,
+    /// How many runs each scene has.
+    sizes: Vec<u64>,
+}
+
+impl SceneRuns {
+    /// Of runs by what tells their scenes apart.
+    pub fn new<K: Ord>(scenes: impl IntoIterator<Item = K>) -> Self {
+        let mut places = BTreeMap::new();
+        let mut found = Self::default();
+        for scene in scenes {
+            let next = places.len();
+            let place = *places.entry(scene).or_insert(next);
+            if place == found.sizes.len() {
+                found.sizes.push(0);
+            }
+            found.sizes[place] += 1;
+            found.scene_of.push(place);
+        }
+        found
+    }
+
+    /// The share of some of the runs, by their places among all, with an interval that knows which are of one scene.
+    pub fn share(&self, runs: impl IntoIterator<Item = usize>) -> Option<Interval> {
+        let mut scenes: Vec<[u64; 2]> = self.sizes.iter().map(|size| [0, *size]).collect();
+        runs.into_iter().for_each(|run| scenes[self.scene_of[run]][0] += 1);
+        share_of_scenes(&scenes)
+    }
 }
 
 #[cfg(test)]

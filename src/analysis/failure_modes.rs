@@ -1,9 +1,11 @@
 //! Runs that fail alike: the same set of failed properties.
 
+use std::collections::BTreeMap;
+
 use polars::prelude::{Column, DataFrame, IntoLazy, ListChunked, PolarsError, SortMultipleOptions, col, len, lit};
 
 use crate::analysis::frame::{AnalysisError, frame};
-use crate::analysis::{Interval, wilson};
+use crate::analysis::{Interval, SceneRuns};
 use crate::history::OutcomeRow;
 use crate::verdict::Outcome;
 
@@ -17,19 +19,23 @@ pub struct FailureMode {
     pub failed: Vec<String>,
     /// Ids of the runs, in the order given.
     pub runs: Vec<String>,
-    /// Share among the runs that tested anything.
+    /// Share among the runs that tested anything. Its interval knows which runs are of one scene.
     pub share: Interval,
 }
 
 /// Failure modes, the most frequent first, then by their properties.
 ///
-/// A run in which no property passed or failed tested nothing, and is left out.
+/// A run in which no property passed or failed tested nothing, and is left out. `scenes` tells the scene of a run by its id, where
+/// scenes are run more than once.
 ///
 /// # Errors
 /// The table library failed.
-pub fn failure_modes(rows: &[OutcomeRow]) -> Result<Vec<FailureMode>, AnalysisError> {
+pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>) -> Result<Vec<FailureMode>, AnalysisError> {
     let signatures = signatures(&frame(rows)?)?;
-    let total = signatures.height() as u64;
+    let tested: Vec<String> = signatures.column("run")?.str()?.iter().flatten().map(str::to_owned).collect();
+    let places: BTreeMap<&str, usize> = tested.iter().enumerate().map(|(place, run)| (run.as_str(), place)).collect();
+    // A run whose scene nobody tells is a scene of its own.
+    let of_scenes = SceneRuns::new(tested.iter().map(|run| scenes.get(run).ok_or(run)));
     let modes = signatures
         .lazy()
         .group_by_stable([col("signature")])
@@ -44,7 +50,7 @@ pub fn failure_modes(rows: &[OutcomeRow]) -> Result<Vec<FailureMode>, AnalysisEr
     for (idx, signature) in texts.iter().enumerate() {
         let runs = texts_of(lists, idx)?;
         let failed = signature.unwrap_or_default().split(BETWEEN).filter(|iri| !iri.is_empty()).map(str::to_owned);
-        if let Some(share) = wilson(runs.len() as u64, total) {
+        if let Some(share) = of_scenes.share(runs.iter().filter_map(|run| places.get(run.as_str()).copied())) {
             found.push(FailureMode { failed: failed.collect(), runs, share });
         }
     }
@@ -81,6 +87,7 @@ fn texts_of(lists: &ListChunked, idx: usize) -> Result<Vec<String>, PolarsError>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::wilson;
 
     fn row(run: &str, property: &str, outcome: Outcome) -> OutcomeRow {
         OutcomeRow {
@@ -111,7 +118,7 @@ mod tests {
             row("k-4", "b", Broken),
             row("k-5", "a", Failed),
         ];
-        let modes = failure_modes(&rows).expect("a table");
+        let modes = failure_modes(&rows, &BTreeMap::new()).expect("a table");
         let plain: Vec<(Vec<&str>, Vec<&str>)> = modes
             .iter()
             .map(|mode| {
@@ -120,7 +127,12 @@ mod tests {
             .collect();
         assert_eq!(plain, [(vec!["a", "b"], vec!["k-1", "k-3"]), (vec![], vec!["k-2"]), (vec!["a"], vec!["k-5"])]);
         assert_eq!(modes[0].share, wilson(2, 4).expect("four runs"));
-        assert!(failure_modes(&[]).expect("an empty table").is_empty());
-        assert!(failure_modes(&rows[7..9]).expect("an empty table").is_empty());
+        // As one scene they are worth fewer runs than they are: the share stays, and its interval is wider.
+        let scenes = [("k-1", 1), ("k-3", 1), ("k-2", 2), ("k-5", 2)].map(|(run, scene)| (run.to_owned(), scene));
+        let alike = failure_modes(&rows, &scenes.into()).expect("a table");
+        let (alone, alike) = (modes[0].share, alike[0].share);
+        assert!(alike.rate == alone.rate && alike.low < alone.low && alike.high > alone.high, "{alike:?} {alone:?}");
+        assert!(failure_modes(&[], &BTreeMap::new()).expect("an empty table").is_empty());
+        assert!(failure_modes(&rows[7..9], &BTreeMap::new()).expect("an empty table").is_empty());
     }
 }

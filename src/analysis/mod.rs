@@ -21,7 +21,7 @@ mod score_interval;
 mod tables;
 
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
-pub use consistency::{Consistency, Flaky, PassPower, Repeated, Variance, consistency};
+pub use consistency::{Consistency, Flaky, PassPower, Repeated, SceneRuns, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
 pub use dataset::{Dataset, export_dataset};
 pub use failure_modes::{FailureMode, failure_modes};

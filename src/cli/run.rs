@@ -212,8 +212,11 @@ fn finish(
 }
 
 fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureMode>, Diagnostics> {
-    let rows = history.outcomes(&RunFilter { campaign: Some(id), ..RunFilter::default() })?;
-    analysis::failure_modes(&rows)
+    let filter = RunFilter { campaign: Some(id), ..RunFilter::default() };
+    let rows = history.outcomes(&filter)?;
+    let runs = history.runs(&filter)?;
+    let scenes = runs.into_iter().filter_map(|run| Some((run.run, run.repetition?.scene))).collect();
+    analysis::failure_modes(&rows, &scenes)
         .map_err(|error| Diagnostic::error("X020", format!("failure modes could not be computed: {error}")).into())
 }
 

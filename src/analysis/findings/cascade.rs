@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::analysis::findings::judged::{failed, outcomes};
+use crate::analysis::findings::scenes::Scenes;
 use crate::analysis::{OutcomeTable, TwoByTwo, benjamini_hochberg};
 
 /// A property of an action at a step.
@@ -33,9 +34,10 @@ pub struct Cascade {
 
 /// Pairs of failures at different steps of the same run that go together beyond chance, the surest first.
 ///
-/// A later action that was not reached, or that could not be judged, counts neither way.
+/// A later action that was not reached, or that could not be judged, counts neither way. Of the runs of one scene the first counts.
 pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
     let runs = table.text("run");
+    let further = Scenes::of(table).further_runs();
     let mut slots: BTreeMap<(u32, u32, u32), usize> = BTreeMap::new();
     let mut counts: BTreeMap<(usize, usize), TwoByTwo> = BTreeMap::new();
     let mut run: Vec<(u32, usize, bool)> = Vec::new();
@@ -43,6 +45,9 @@ pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
         if row > 0 && runs.of_row[row] != runs.of_row[row - 1] {
             count(&run, &mut counts);
             run.clear();
+        }
+        if runs.of_row[row].is_some_and(|run| further.contains(&run)) {
+            continue;
         }
         if let (Some(key), Some(failed)) = (key(table, row), failed(outcome)) {
             let next = slots.len();

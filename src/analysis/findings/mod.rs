@@ -11,6 +11,7 @@ mod margins;
 mod modes;
 mod parameters;
 mod property;
+mod scenes;
 mod trend;
 mod two_way;
 

@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 use crate::analysis::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::analysis::findings::margins::{Quantiles, quantiles};
 use crate::analysis::findings::parameters::parameters;
+use crate::analysis::findings::scenes::Scenes;
 use crate::analysis::{Hierarchy, Interval, OutcomeTable, PatternOptions, Patterns, Subject, mine, wilson};
 use crate::base::digest_of;
-use crate::verdict::Counts;
+use crate::verdict::{Counts, Outcome};
 
 /// One run of so many is kept aside to confirm what the others show.
 const HELD_OUT_EVERY: u64 = 3;
@@ -21,7 +22,7 @@ pub struct PropertyFindings {
     pub property: String,
     /// How often each outcome occurred.
     pub counts: Counts,
-    /// Share of failed among passed and failed.
+    /// Share of failed among passed and failed. Its interval knows which runs are of one scene.
     pub failing: Option<Interval>,
     /// Margins of its decided outcomes.
     pub margins: Option<Quantiles>,
@@ -74,7 +75,12 @@ pub fn property_findings(
         action: of.action.clone(),
         property: of.property.clone(),
         counts: of.counts,
-        failing: wilson(of.counts.failed, of.counts.decided()),
+        failing: match Scenes::of(table).runs(decided.iter().map(|row| *row as usize)) {
+            Some(runs) => {
+                runs.share((0..decided.len()).filter(|at| outcomes[decided[*at] as usize] == Outcome::Failed))
+            }
+            None => wilson(of.counts.failed, of.counts.decided()),
+        },
         margins: quantiles(decided.iter().filter_map(|row| margin.get(*row as usize).copied())),
         examples: rows
             .iter()

@@ -1,6 +1,7 @@
 //! How often a property fails from campaign to campaign, and where that changed.
 
 use crate::analysis::findings::judged::{JudgedProperty, failed, outcomes};
+use crate::analysis::findings::scenes::Scenes;
 use crate::analysis::{Interval, OutcomeTable, TwoByTwo, wilson};
 
 /// One campaign.
@@ -10,7 +11,7 @@ pub struct TrendPoint {
     pub campaign: String,
     /// When its first run in the table began (RFC 3339).
     pub started: String,
-    /// Decided runs.
+    /// Decided runs, the first of each scene.
     pub runs: u64,
     /// Of them failed.
     pub failed: u64,
@@ -46,8 +47,12 @@ pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
     let outcomes = outcomes(table);
     let (campaign, started) = (table.text("campaign"), table.text("started"));
     let mut points: Vec<TrendPoint> = Vec::new();
+    let (runs, further) = (table.text("run"), Scenes::of(table).further_runs());
     for row in of.rows.iter().map(|row| *row as usize) {
         let (Some(id), Some(failed)) = (campaign.get(row), failed(outcomes[row])) else { continue };
+        if runs.of_row[row].is_some_and(|run| further.contains(&run)) {
+            continue;
+        }
         if points.last().is_none_or(|point| point.campaign != id) {
             let started = started.get(row).unwrap_or_default().to_owned();
             points.push(TrendPoint { campaign: id.to_owned(), started, runs: 0, failed: 0, failing: None });
