@@ -125,9 +125,19 @@ impl Process {
         self.child.try_wait().ok().flatten().map(how)
     }
 
-    /// Waits a moment for an end that is to be expected, and says how it came.
+    /// Waits a moment for an end that may come, and says how it came.
     pub fn ends_soon(&mut self) -> Option<String> {
-        for _ in 0..GRACE_POLLS / 4 {
+        self.ends_within(GRACE_POLLS / 4)
+    }
+
+    /// Waits for an end that is to be expected, as the program has closed its connection, and says how it came. On a machine that
+    /// has much else to do an interpreter takes a while to end.
+    pub fn ends_after_closing(&mut self) -> Option<String> {
+        self.ends_within(3 * GRACE_POLLS)
+    }
+
+    fn ends_within(&mut self, polls: u32) -> Option<String> {
+        for _ in 0..polls {
             if let Some(how) = self.ended() {
                 return Some(how);
             }
@@ -138,12 +148,7 @@ impl Process {
 
     /// Waits for the end of a program that was told to end, a second at most.
     pub fn let_end(&mut self) {
-        for _ in 0..GRACE_POLLS {
-            if self.ended().is_some() {
-                return;
-            }
-            std::thread::sleep(POLL);
-        }
+        self.ends_within(GRACE_POLLS);
     }
 
     /// Ends it with all that it started. Gives the last lines that it printed.

@@ -191,7 +191,7 @@ fn cause_of(process: &mut Process, fault: OutsideFault) -> OutsideFault {
     if fault.late || !fault.reason.contains("closed the connection") {
         return fault;
     }
-    process.ends_soon().map_or(fault, broke)
+    process.ends_after_closing().map_or(fault, broke)
 }
 
 fn expect(kind: &str, expected: &str) -> Result<(), OutsideFault> {
