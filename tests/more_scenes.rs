@@ -108,6 +108,8 @@ fn rules_know_every_parameter_of_the_tables() {
         parameters.push(parameter(column.name));
     }
     assert!(parameters.len() > 40);
+    let unknown = scene_rule(&[range(0, None, Some(1.0))], &[parameter("phase_of_the_moon")], "");
+    assert_eq!(unknown, Err(vec!["phase_of_the_moon".to_owned()]));
     let record = asked(&held, &parameters).unwrap_or_else(|failure| panic!("{failure}"));
     assert_eq!(record.trace.hash, row["trace_hash"]);
 }
