@@ -62,7 +62,8 @@ pub fn property_findings(
     let outcomes = outcomes(table);
     let decided: Vec<u32> = of.rows.iter().copied().filter(|row| failed(outcomes[*row as usize]).is_some()).collect();
     let newest = newest_of_alike(table, &decided);
-    let rows = first_of_scenes(table, &newest);
+    let scenes = Scenes::of(table);
+    let rows = scenes.first_rows(&newest);
     let weight = table.number("weight");
     let subject = Subject {
         failed: rows.iter().map(|row| failed(outcomes[*row as usize]) == Some(true)).collect(),
@@ -75,7 +76,7 @@ pub fn property_findings(
         action: of.action.clone(),
         property: of.property.clone(),
         counts: of.counts,
-        failing: match Scenes::of(table).runs(decided.iter().map(|row| *row as usize)) {
+        failing: match scenes.runs(decided.iter().map(|row| *row as usize)) {
             Some(runs) => {
                 runs.share((0..decided.len()).filter(|at| outcomes[decided[*at] as usize] == Outcome::Failed))
             }
@@ -114,22 +115,6 @@ fn newest_of_alike(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
         .collect();
     kept.reverse();
     kept
-}
-
-/// Of rows whose runs have the same scene the first one, at the same step.
-fn first_of_scenes(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
-    let (campaign, scene, step) = (table.text("campaign"), table.number("scene"), table.number("step"));
-    let mut seen = BTreeSet::new();
-    let is_first = |row: &u32| {
-        let at = *row as usize;
-        match (scene.get(at), campaign.of_row.get(at)) {
-            (Some(scene), Some(campaign)) if !scene.is_nan() => {
-                seen.insert((*campaign, scene.to_bits(), step.get(at).map(|step| step.to_bits())))
-            }
-            _ => true,
-        }
-    };
-    rows.iter().copied().filter(is_first).collect()
 }
 
 fn is_held_out(table: &OutcomeTable, row: usize) -> bool {

@@ -9,6 +9,7 @@ pub(super) struct Scenes<'a> {
     campaign: &'a [Option<u32>],
     run: &'a [Option<u32>],
     scene: &'a [f64],
+    step: &'a [f64],
 }
 
 /// A scene in a table: one that was run several times in a campaign, or a run that is alone.
@@ -20,7 +21,12 @@ enum Key {
 
 impl<'a> Scenes<'a> {
     pub fn of(table: &'a OutcomeTable) -> Self {
-        Self { campaign: &table.text("campaign").of_row, run: &table.text("run").of_row, scene: table.number("scene") }
+        Self {
+            campaign: &table.text("campaign").of_row,
+            run: &table.text("run").of_row,
+            scene: table.number("scene"),
+            step: table.number("step"),
+        }
     }
 
     fn key(&self, row: usize) -> Key {
@@ -28,6 +34,16 @@ impl<'a> Scenes<'a> {
             Some(scene) if !scene.is_nan() => Key::Repeated(self.campaign.get(row).copied().flatten(), scene.to_bits()),
             _ => Key::Alone(self.run.get(row).copied().flatten()),
         }
+    }
+
+    /// Of rows of the same scene and step the first.
+    pub fn first_rows(&self, rows: &[u32]) -> Vec<u32> {
+        let mut seen = BTreeSet::new();
+        let is_first = |row: &u32| match self.key(*row as usize) {
+            key @ Key::Repeated(..) => seen.insert((key, self.step.get(*row as usize).map(|step| step.to_bits()))),
+            Key::Alone(_) => true,
+        };
+        rows.iter().copied().filter(is_first).collect()
     }
 
     /// Runs whose scene another run before them has had.

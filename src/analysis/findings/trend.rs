@@ -47,12 +47,9 @@ pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
     let outcomes = outcomes(table);
     let (campaign, started) = (table.text("campaign"), table.text("started"));
     let mut points: Vec<TrendPoint> = Vec::new();
-    let (runs, further) = (table.text("run"), Scenes::of(table).further_runs());
-    for row in of.rows.iter().map(|row| *row as usize) {
+    let decided: Vec<u32> = of.rows.iter().copied().filter(|row| failed(outcomes[*row as usize]).is_some()).collect();
+    for row in Scenes::of(table).first_rows(&decided).into_iter().map(|row| row as usize) {
         let (Some(id), Some(failed)) = (campaign.get(row), failed(outcomes[row])) else { continue };
-        if runs.of_row[row].is_some_and(|run| further.contains(&run)) {
-            continue;
-        }
         if points.last().is_none_or(|point| point.campaign != id) {
             let started = started.get(row).unwrap_or_default().to_owned();
             points.push(TrendPoint { campaign: id.to_owned(), started, runs: 0, failed: 0, failing: None });
