@@ -1,16 +1,10 @@
 //! Runs that fail alike: the same set of failed properties.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use polars::prelude::{Column, DataFrame, IntoLazy, ListChunked, PolarsError, SortMultipleOptions, col, len, lit};
-
-use crate::analysis::frame::{AnalysisError, frame};
 use crate::analysis::{Interval, SceneRuns};
 use crate::history::OutcomeRow;
 use crate::verdict::Outcome;
-
-/// Stands between the properties of a signature; no IRI has it.
-const BETWEEN: &str = "\n";
 
 /// A set of failed properties and the runs that have just it.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,69 +13,50 @@ pub struct FailureMode {
     pub failed: Vec<String>,
     /// Ids of the runs, in the order given.
     pub runs: Vec<String>,
-    /// Share among the runs that tested anything. Its interval knows which runs are of one scene.
+    /// Share among the runs that tested anything. Its interval accounts for runs of the same scene.
     pub share: Interval,
 }
 
 /// Failure modes, the most frequent first, then by their properties.
 ///
-/// A run in which no property passed or failed tested nothing, and is left out. `scenes` tells the scene of a run by its id, where
+/// A run in which no property passed or failed tested nothing, and is left out. `scenes` maps the id of a run to its scene, where
 /// scenes are run more than once.
-///
-/// # Errors
-/// The table library failed.
-pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>) -> Result<Vec<FailureMode>, AnalysisError> {
-    let signatures = signatures(&frame(rows)?)?;
-    let tested: Vec<String> = signatures.column("run")?.str()?.iter().flatten().map(str::to_owned).collect();
-    let places: BTreeMap<&str, usize> = tested.iter().enumerate().map(|(place, run)| (run.as_str(), place)).collect();
-    // A run whose scene nobody tells is a scene of its own.
-    let of_scenes = SceneRuns::new(tested.iter().map(|run| scenes.get(run).ok_or(run)));
-    let modes = signatures
-        .lazy()
-        .group_by_stable([col("signature")])
-        .agg([col("run"), len().alias("times")])
-        .sort_by_exprs(
-            [col("times"), col("signature")],
-            SortMultipleOptions::default().with_order_descending_multi([true, false]),
-        )
-        .collect()?;
-    let (texts, lists) = (modes.column("signature")?.str()?, modes.column("run")?.list()?);
-    let mut found = Vec::with_capacity(modes.height());
-    for (idx, signature) in texts.iter().enumerate() {
-        let runs = texts_of(lists, idx)?;
-        let failed = signature.unwrap_or_default().split(BETWEEN).filter(|iri| !iri.is_empty()).map(str::to_owned);
-        if let Some(share) = of_scenes.share(runs.iter().filter_map(|run| places.get(run.as_str()).copied())) {
-            found.push(FailureMode { failed: failed.collect(), runs, share });
+pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>) -> Vec<FailureMode> {
+    let tested = signatures(rows);
+    // A run without a known scene counts as a scene of its own.
+    let of_scenes = SceneRuns::new(tested.iter().map(|(run, _)| scenes.get(*run).ok_or(*run)));
+    let mut modes: BTreeMap<&BTreeSet<&str>, Vec<usize>> = BTreeMap::new();
+    for (place, (_, failed)) in tested.iter().enumerate() {
+        modes.entry(failed).or_default().push(place);
+    }
+    let mut found: Vec<FailureMode> = modes
+        .into_iter()
+        .filter_map(|(failed, places)| {
+            Some(FailureMode {
+                failed: failed.iter().map(|iri| (*iri).to_owned()).collect(),
+                runs: places.iter().map(|place| tested[*place].0.to_owned()).collect(),
+                share: of_scenes.share(places)?,
+            })
+        })
+        .collect();
+    // The sort is stable: modes of one size stay sorted by their properties.
+    found.sort_by_key(|mode| std::cmp::Reverse(mode.runs.len()));
+    found
+}
+
+/// The runs that tested something, in the order given, each with the properties that failed in it.
+fn signatures(rows: &[OutcomeRow]) -> Vec<(&str, BTreeSet<&str>)> {
+    let mut runs: Vec<(&str, BTreeSet<&str>)> = Vec::new();
+    for row in rows.iter().filter(|row| matches!(row.outcome, Outcome::Passed | Outcome::Failed)) {
+        // The rows of a run follow each other.
+        if runs.last().is_none_or(|(run, _)| *run != row.run) {
+            runs.push((&row.run, BTreeSet::new()));
+        }
+        if let (Outcome::Failed, Some((_, failed))) = (row.outcome, runs.last_mut()) {
+            failed.insert(&row.property);
         }
     }
-    Ok(found)
-}
-
-/// Columns: run, signature. Shape: one row for each run that tested something, in the order given.
-fn signatures(outcomes: &DataFrame) -> Result<DataFrame, PolarsError> {
-    let is = |outcome: Outcome| col("outcome").eq(lit(outcome.word()));
-    let runs = outcomes
-        .clone()
-        .lazy()
-        .filter(is(Outcome::Passed).or(is(Outcome::Failed)))
-        .group_by([col("place"), col("run")])
-        .agg([col("property").filter(is(Outcome::Failed)).unique().sort(Default::default()).alias("failed")])
-        .sort(["place"], SortMultipleOptions::default())
-        .collect()?;
-    let mut texts = Vec::with_capacity(runs.height());
-    let failed = runs.column("failed")?.list()?;
-    for idx in 0..runs.height() {
-        texts.push(texts_of(failed, idx)?.join(BETWEEN));
-    }
-    DataFrame::new(runs.height(), vec![runs.column("run")?.clone(), Column::new("signature".into(), texts)])
-}
-
-/// The texts of one list of a column of lists.
-fn texts_of(lists: &ListChunked, idx: usize) -> Result<Vec<String>, PolarsError> {
-    match lists.get_as_series(idx) {
-        Some(texts) => Ok(texts.str()?.iter().flatten().map(str::to_owned).collect()),
-        None => Ok(Vec::new()),
-    }
+    runs
 }
 
 #[cfg(test)]
@@ -118,7 +93,7 @@ mod tests {
             row("k-4", "b", Broken),
             row("k-5", "a", Failed),
         ];
-        let modes = failure_modes(&rows, &BTreeMap::new()).expect("a table");
+        let modes = failure_modes(&rows, &BTreeMap::new());
         let plain: Vec<(Vec<&str>, Vec<&str>)> = modes
             .iter()
             .map(|mode| {
@@ -129,10 +104,10 @@ mod tests {
         assert_eq!(modes[0].share, wilson(2, 4).expect("four runs"));
         // As one scene they are worth fewer runs than they are: the share stays, and its interval is wider.
         let scenes = [("k-1", 1), ("k-3", 1), ("k-2", 2), ("k-5", 2)].map(|(run, scene)| (run.to_owned(), scene));
-        let alike = failure_modes(&rows, &scenes.into()).expect("a table");
+        let alike = failure_modes(&rows, &scenes.into());
         let (alone, alike) = (modes[0].share, alike[0].share);
         assert!(alike.rate == alone.rate && alike.low < alone.low && alike.high > alone.high, "{alike:?} {alone:?}");
-        assert!(failure_modes(&[], &BTreeMap::new()).expect("an empty table").is_empty());
-        assert!(failure_modes(&rows[7..9], &BTreeMap::new()).expect("an empty table").is_empty());
+        assert!(failure_modes(&[], &BTreeMap::new()).is_empty());
+        assert!(failure_modes(&rows[7..9], &BTreeMap::new()).is_empty());
     }
 }

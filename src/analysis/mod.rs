@@ -10,7 +10,6 @@ mod failure_modes;
 mod false_discovery;
 mod findings;
 mod fisher;
-mod frame;
 mod health;
 mod holm;
 mod oracles;
@@ -32,7 +31,6 @@ pub use findings::{
     table_failure_modes, trend, two_way,
 };
 pub use fisher::{FisherTest, TwoByTwo};
-pub use frame::AnalysisError;
 pub use health::{Ailment, Health, HealthMeter};
 pub use holm::holm;
 pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};

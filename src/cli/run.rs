@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use indicatif::ProgressBar;
 
 use crate::analysis::{self, Interval, Mirror};
-use crate::base::{Diagnostic, Diagnostics};
+use crate::base::Diagnostics;
 use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, WeightedRate, resume_all};
 use crate::cli::args::{Format, RunArgs};
 use crate::cli::progress::Progress;
@@ -216,8 +216,7 @@ fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureM
     let rows = history.outcomes(&filter)?;
     let runs = history.runs(&filter)?;
     let scenes = runs.into_iter().filter_map(|run| Some((run.run, run.repetition?.scene))).collect();
-    analysis::failure_modes(&rows, &scenes)
-        .map_err(|error| Diagnostic::error("X020", format!("failure modes could not be computed: {error}")).into())
+    Ok(analysis::failure_modes(&rows, &scenes))
 }
 
 fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
