@@ -1,33 +1,28 @@
-# make         what the machine lacks, then the program, as ./actcheck
-# make test    all tests (the report's in Chromium, which is installed where it is missing)
-# make bench   what things cost, as ratios
+# make             builds ./actcheck; on Debian and Ubuntu it installs first what the build needs from the system
+# make test        builds and passes all tests
+# make bench       what things cost, as ratios
 # make notebooks   runs the notebooks on fresh campaigns and keeps their outputs (RUNS=200)
 #
-# RocksDB and polars are compiled once, in one profile, into a folder that outlives this checkout.
+# RocksDB and polars are compiled once, in one profile, into a folder that outlives this checkout (`.ci/env`).
 
-export CARGO_TARGET_DIR ?= $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/actcheck/target
+.PHONY: build test bench notebooks
 
-.PHONY: build test bench notebooks system
+build:
+	@sh .ci/system
+	@sh .ci/build
 
-build: system
-	cargo build --release --locked
-	ln -sfn "$(CARGO_TARGET_DIR)/release/actcheck" actcheck
+test:
+	@sh .ci/system tests
+	@sh .ci/build
+	@sh .ci/test
 
-test: build
-	@sh .ci/system browser
-	cargo test --release --locked
-
-bench: system
-	@sh .ci/system browser
-	cargo bench --locked
+bench:
+	@sh .ci/system tests
+	@. .ci/env && cargo bench --locked
 
 RUNS ?= 200
-PYTHON_FOR_NOTEBOOKS := $(CARGO_TARGET_DIR)/tmp/python
 
 notebooks: build
-	python3 -m venv "$(PYTHON_FOR_NOTEBOOKS)"
-	"$(PYTHON_FOR_NOTEBOOKS)/bin/python" -m pip install --quiet --disable-pip-version-check -r tests/foreign/requirements.txt
-	"$(PYTHON_FOR_NOTEBOOKS)/bin/python" notebooks/regenerate.py --runs $(RUNS)
-
-system:
-	@sh .ci/system
+	@. .ci/env && python="$$CARGO_TARGET_DIR/tmp/notebooks" && python3 -m venv "$$python" && \
+		"$$python/bin/python" -m pip install --quiet --disable-pip-version-check -r tests/foreign/requirements.txt && \
+		"$$python/bin/python" notebooks/regenerate.py --runs $(RUNS)

@@ -48,6 +48,7 @@ mod rules;
 mod scenario;
 mod search;
 mod serve;
+mod set_up;
 mod shrink;
 mod shrunk;
 mod statistics;

@@ -1,0 +1,166 @@
+/* Does bindgen's libclang work here? Looks where bindgen looks, loads what it would load, and lets it read what RocksDB's header reads.
+
+   Prints nothing and exits with 0 where it works; else prints why not and exits with 1.
+   With a folder as its argument, that is looked at in place of the root (for tests).
+
+   The order of the search is that of clang-sys 1.9 (its build/common.rs and build/dynamic.rs): LIBCLANG_PATH alone, if it is set; else
+   what llvm-config names, LD_LIBRARY_PATH, LIBRARY_PATH and the usual folders; of all files the one with the highest version. */
+
+#include <dlfcn.h>
+#include <glob.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* The folders in which clang-sys looks on Linux, and the names of files that it takes. */
+static const char *const FOLDERS[] = {
+    "/usr/local/llvm*/lib*", "/usr/local/lib*/*/*", "/usr/local/lib*/*", "/usr/local/lib*", "/usr/lib*/*/*", "/usr/lib*/*", "/usr/lib*",
+};
+static const char *const NAMES[] = {"libclang.so", "libclang-*.so", "libclang.so.*", "libclang-*.so.*"};
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+
+static char best[PATH_MAX];
+static char best_version[NAME_MAX + 1];
+
+/* The version in a file's name, as clang-sys reads it: "" in `libclang.so`, "14" in `libclang-14.so`, "1" in `libclang.so.1`. */
+static void version_of(const char *name, char *version) {
+    version[0] = '\0';
+    if (strncmp(name, "libclang.so.", 12) == 0) {
+        strcpy(version, name + 12);
+    } else if (strncmp(name, "libclang-", 9) == 0 && strlen(name) > 12) {
+        strcpy(version, name + 9);
+        version[strlen(version) - 3] = '\0';
+    }
+}
+
+/* Compares two versions part by part; a part that is not a number counts as 0. */
+static int is_higher(const char *one, const char *other) {
+    while (*one && *other) {
+        char *one_end, *other_end;
+        long one_part = strtol(one, &one_end, 10), other_part = strtol(other, &other_end, 10);
+        if (*one_end && *one_end != '.') one_part = 0;
+        if (*other_end && *other_end != '.') other_part = 0;
+        if (one_part != other_part) return one_part > other_part;
+        one += strcspn(one, "."), other += strcspn(other, ".");
+        one += *one == '.', other += *other == '.';
+    }
+    return *one != '\0' && *other == '\0';
+}
+
+/* Only libraries for this machine's word size count. */
+static int is_library(const char *path) {
+    unsigned char head[5] = {0};
+    FILE *file = fopen(path, "rb");
+    if (!file) return 0;
+    size_t length = fread(head, 1, sizeof head, file);
+    fclose(file);
+    return length == sizeof head && memcmp(head, "\177ELF", 4) == 0 && head[4] == (sizeof(void *) == 8 ? 2 : 1);
+}
+
+static void consider(const char *path) {
+    const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
+    char version[NAME_MAX + 1];
+    /* libclang-cpp is another library. */
+    if (strstr(name, "-cpp.") || strlen(path) >= sizeof best || strlen(name) > NAME_MAX || !is_library(path)) return;
+    version_of(name, version);
+    if (!best[0] || is_higher(version, best_version)) {
+        strcpy(best, path);
+        strcpy(best_version, version);
+    }
+}
+
+static void look_in(const char *folder) {
+    for (size_t idx = 0; idx < COUNT(NAMES); idx++) {
+        char pattern[PATH_MAX];
+        glob_t found;
+        if (snprintf(pattern, sizeof pattern, "%s/%s", folder, NAMES[idx]) >= (int)sizeof pattern) continue;
+        if (glob(pattern, 0, NULL, &found) == 0) {
+            for (size_t at = 0; at < found.gl_pathc; at++) consider(found.gl_pathv[at]);
+            globfree(&found);
+        }
+    }
+}
+
+static void look_in_list(const char *folders) {
+    char *copy = folders ? strdup(folders) : NULL;
+    for (char *folder = copy ? strtok(copy, ":") : NULL; folder; folder = strtok(NULL, ":")) look_in(folder);
+    free(copy);
+}
+
+static void look_where_llvm_is(void) {
+    const char *command = getenv("LLVM_CONFIG_PATH");
+    char line[PATH_MAX], folder[PATH_MAX + 8];
+    snprintf(line, sizeof line, "'%s' --prefix 2>/dev/null", command ? command : "llvm-config");
+    FILE *answer = popen(line, "r");
+    if (answer && fgets(line, sizeof line, answer)) {
+        static const char *const BELOW[] = {"bin", "lib", "lib64"};
+        line[strcspn(line, "\n")] = '\0';
+        for (size_t idx = 0; idx < COUNT(BELOW); idx++) {
+            snprintf(folder, sizeof folder, "%s/%s", line, BELOW[idx]);
+            look_in(folder);
+        }
+    }
+    if (answer) pclose(answer);
+}
+
+static void look_everywhere(const char *root) {
+    look_where_llvm_is();
+    look_in_list(getenv("LD_LIBRARY_PATH"));
+    look_in_list(getenv("LIBRARY_PATH"));
+    for (size_t idx = 0; idx < COUNT(FOLDERS); idx++) {
+        char pattern[PATH_MAX];
+        glob_t found;
+        if (snprintf(pattern, sizeof pattern, "%s%s", root, FOLDERS[idx]) >= (int)sizeof pattern) continue;
+        if (glob(pattern, 0, NULL, &found) == 0) {
+            for (size_t at = 0; at < found.gl_pathc; at++) look_in(found.gl_pathv[at]);
+            globfree(&found);
+        }
+    }
+}
+
+/* Lets a library read the headers that RocksDB's C interface includes: without clang's own headers it can't. */
+static int reads_headers(const char *path) {
+    static const char HEADERS[] = "/tmp/actcheck-libclang-XXXXXX";
+    static const char TEXT[] = "#include <stdarg.h>\n#include <stdbool.h>\n#include <stddef.h>\n#include <stdint.h>\n";
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (!library) return printf("%s can't be loaded: %s\n", path, dlerror()), 0;
+    void *(*make_index)(int, int);
+    void *(*parse)(void *, const char *, const char *const *, int, void *, unsigned, unsigned);
+    unsigned (*faults)(void *);
+    *(void **)&make_index = dlsym(library, "clang_createIndex");
+    *(void **)&parse = dlsym(library, "clang_parseTranslationUnit");
+    *(void **)&faults = dlsym(library, "clang_getNumDiagnostics");
+    if (!make_index || !parse || !faults) return printf("%s is not libclang\n", path), 0;
+
+    char header[sizeof HEADERS + 2];
+    strcpy(header, HEADERS);
+    int file = mkstemp(header);
+    if (file < 0 || write(file, TEXT, sizeof TEXT - 1) != (ssize_t)(sizeof TEXT - 1)) {
+        return printf("%s can't be tried: nothing can be written to /tmp\n", path), 0;
+    }
+    close(file);
+    static const char *const AS_C[] = {"-x", "c"};
+    void *unit = parse(make_index(0, 0), header, AS_C, 2, NULL, 0, 0);
+    int works = unit && faults(unit) == 0;
+    unlink(header);
+    if (!works) printf("%s lacks clang's own headers, such as stddef.h\n", path);
+    return works;
+}
+
+int main(int count, char **words) {
+    const char *named = getenv("LIBCLANG_PATH");
+    if (named) {
+        /* A file, or a folder. */
+        struct stat found;
+        if (stat(named, &found) == 0 && !S_ISDIR(found.st_mode)) consider(named);
+        else look_in(named);
+        if (!best[0]) return printf("LIBCLANG_PATH leads nowhere: there is no libclang at %s\n", named), 1;
+    } else {
+        look_everywhere(count > 1 ? words[1] : "");
+        if (!best[0]) return printf("there is no libclang\n"), 1;
+    }
+    return reads_headers(best) ? 0 : 1;
+}

@@ -1,0 +1,273 @@
+//! What the build's scripts do on machines that lack something: made-up roots and search paths, and an apt-get that writes down what it
+//! is asked for.
+
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use tempfile::TempDir;
+
+use crate::support::{foreign::left_out, root};
+
+/// Commands that the scripts and the compilers call, as they are on this machine.
+const TOOLS: [&str; 29] = [
+    "as", "awk", "cat", "chmod", "cmp", "cp", "cut", "date", "df", "dirname", "env", "flock", "grep", "head", "id",
+    "ld", "ln", "mkdir", "mktemp", "mv", "rm", "sed", "sh", "sort", "tail", "tee", "touch", "tr", "uname",
+];
+
+/// A machine that has only what it is given: a search path of its own, and a root in which libclang is looked for.
+struct Machine {
+    folder: TempDir,
+}
+
+impl Machine {
+    /// With Rust and compilers, and an apt-get that has nothing to install.
+    fn new() -> Self {
+        let machine = Self::bare();
+        for tool in ["cc", "c++"] {
+            machine.has(tool);
+        }
+        machine.command("clang++", "exit 0");
+        machine.command("cargo", "exit 0");
+        machine.command("rustc", "echo 'rustc 1.95.0 (59807616e 2026-04-14)'; echo 'host: x86_64-unknown-linux-gnu'");
+        machine.command("apt-get", "echo \"$@\" >> \"$MACHINE/apt\"");
+        machine
+    }
+
+    fn bare() -> Self {
+        let machine = Self { folder: tempfile::tempdir().unwrap() };
+        for folder in ["bin", "root/usr/lib/llvm-14/lib", "target"] {
+            std::fs::create_dir_all(machine.path(folder)).unwrap();
+        }
+        TOOLS.iter().for_each(|tool| machine.has(tool));
+        machine
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// A command of this machine's.
+    fn has(&self, name: &str) {
+        let folders = std::env::var_os("PATH").unwrap();
+        let found = std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| path.is_file());
+        symlink(found.unwrap_or_else(|| panic!("this machine has no `{name}`")), self.path("bin").join(name)).unwrap();
+    }
+
+    /// A made-up command.
+    fn command(&self, name: &str, script: &str) {
+        let path = self.path("bin").join(name);
+        let _ = std::fs::remove_file(&path);
+        std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
+    fn lacks(&self, name: &str) {
+        std::fs::remove_file(self.path("bin").join(name)).unwrap();
+    }
+
+    /// A library in the folder of LLVM.
+    fn library(&self, name: &str, file: &Path) {
+        symlink(file, self.path("root/usr/lib/llvm-14/lib").join(name)).unwrap();
+    }
+
+    /// Runs a script of `.ci`: its exit code and what it printed to the error stream.
+    fn run(&self, script: &str, variables: &[(&str, &str)]) -> (i32, String) {
+        let output = Command::new("/bin/sh")
+            .arg(root().join(".ci").join(script))
+            .env_clear()
+            .env("PATH", self.path("bin"))
+            .env("HOME", self.path("home"))
+            .env("MACHINE", self.folder.path())
+            .env("CARGO_TARGET_DIR", self.path("target"))
+            .env("ACTCHECK_ROOT", self.path("root"))
+            .env("LLVM_CONFIG_PATH", "/nowhere")
+            .envs(variables.iter().copied())
+            .output()
+            .unwrap();
+        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    }
+
+    /// What apt-get was asked for.
+    fn installed(&self) -> String {
+        std::fs::read_to_string(self.path("apt")).unwrap_or_default()
+    }
+}
+
+/// The libclang that this program was built with, unless it was named by `LIBCLANG_PATH`.
+fn libclang() -> Option<PathBuf> {
+    let folders =
+        ["/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib64", "/usr/lib"].map(PathBuf::from);
+    let llvm = std::fs::read_dir("/usr/lib").into_iter().flatten().flatten().map(|entry| entry.path());
+    let llvm = llvm.filter(|path| path.to_string_lossy().contains("llvm-")).map(|path| path.join("lib"));
+    let found = llvm.chain(folders).filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
+    let found = found.map(|entry| entry.path()).find(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        (name.starts_with("libclang.so") || name.starts_with("libclang-1")) && name.contains(".so") && path.is_file()
+    });
+    if found.is_none() {
+        left_out("the search for libclang", "this machine's is in none of the usual folders");
+    }
+    found
+}
+
+#[test]
+fn libclang_cpp_is_not_taken_for_libclang() {
+    let Some(real) = libclang() else { return };
+    let machine = Machine::new();
+    machine.library("libclang-cpp.so.14", &real);
+    let (code, told) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{told}");
+    assert!(machine.installed().contains("install -y -qq --no-install-recommends clang\n"), "{}", machine.installed());
+    assert!(told.contains("'clang' is installed, and still there is no libclang"), "{told}");
+
+    // The same, where apt-get brings it.
+    let brings = format!(
+        "case $1 in install) ln -sf '{}' \"$ACTCHECK_ROOT/usr/lib/llvm-14/lib/libclang.so.1\" ;; esac",
+        real.display()
+    );
+    machine.command("apt-get", &brings);
+    assert_eq!(machine.run("system", &[]), (0, "installing from the system: clang\n".to_owned()));
+}
+
+#[test]
+fn a_library_of_another_machine_is_not_taken() {
+    let machine = Machine::new();
+    let other = machine.path("other");
+    // The head of a 32-bit library.
+    std::fs::write(&other, b"\x7fELF\x01\x01\x01").unwrap();
+    machine.library("libclang.so.1", &other);
+    let (code, told) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{told}");
+    assert!(told.contains("there is no libclang"), "{told}");
+}
+
+#[test]
+fn libclang_without_the_name_for_linkers_is_enough() {
+    let Some(real) = libclang() else { return };
+    let machine = Machine::new();
+    machine.library("libclang.so.1", &real);
+    assert_eq!(machine.run("system", &[]), (0, String::new()));
+    assert_eq!(machine.installed(), "");
+}
+
+#[test]
+fn a_libclang_path_that_leads_nowhere_is_named() {
+    let Some(real) = libclang() else { return };
+    let machine = Machine::new();
+    machine.library("libclang.so.1", &real);
+    let (code, told) = machine.run("system", &[("LIBCLANG_PATH", "/nowhere")]);
+    assert_eq!(code, 2);
+    let expected = "actcheck needs libclang. LIBCLANG_PATH leads nowhere: there is no libclang at /nowhere. Unset LIBCLANG_PATH, or set \
+                    it to the folder that has it\n";
+    assert_eq!(told, expected);
+    assert_eq!(machine.installed(), "", "installing would not change it");
+    // As a folder and as a file it is taken, whatever lies elsewhere.
+    let named = machine.path("root/usr/lib/llvm-14/lib");
+    let file = named.join("libclang.so.1");
+    for named in [named, file] {
+        assert_eq!(machine.run("system", &[("LIBCLANG_PATH", named.to_str().unwrap())]), (0, String::new()));
+    }
+}
+
+#[test]
+fn without_a_compiler_one_is_installed() {
+    let machine = Machine::new();
+    machine.lacks("cc");
+    machine.lacks("c++");
+    machine.lacks("clang++");
+    let (code, told) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{told}");
+    assert!(
+        machine.installed().contains("install -y -qq --no-install-recommends g++ clang\n"),
+        "{}",
+        machine.installed()
+    );
+    assert!(told.contains("actcheck needs g++ clang: 'g++ clang' is installed, and still"), "{told}");
+}
+
+#[test]
+fn without_apt_the_packages_are_named() {
+    let machine = Machine::new();
+    machine.lacks("apt-get");
+    let (code, told) = machine.run("system", &[]);
+    assert_eq!(code, 2);
+    let expected = "actcheck needs clang: install them with this system's package manager (the names are Debian's), then run this again\n";
+    assert_eq!(told, expected);
+}
+
+#[test]
+fn packages_that_are_not_necessary_may_be_missing() {
+    let Some(real) = libclang() else { return };
+    let machine = Machine::new();
+    machine.library("libclang.so.1", &real);
+    machine.lacks("clang++");
+    machine.command("apt-get", "echo 'E: Unable to locate package' >&2; exit 100");
+    let (code, told) = machine.run("system", &[]);
+    assert_eq!(code, 0, "{told}");
+    assert!(told.contains("missing, and not necessary: clang (apt-get could not install it)"), "{told}");
+}
+
+#[test]
+fn rust_is_asked_for_before_anything_else() {
+    let machine = Machine::new();
+    machine.command("rustc", "echo 'rustc 1.70.0 (90c541806 2023-05-31)'");
+    let wanted = env!("CARGO_PKG_RUST_VERSION");
+    let (code, told) = machine.run("system", &[]);
+    let expected = format!("actcheck needs Rust {wanted} or later, and this is 1.70.0: run 'rustup update stable'\n");
+    assert_eq!((code, told), (2, expected));
+    machine.lacks("cargo");
+    let (code, told) = machine.run("system", &[]);
+    assert_eq!(code, 2);
+    assert!(told.starts_with(&format!("actcheck needs Rust's toolchain, version {wanted} or later")), "{told}");
+}
+
+#[test]
+fn a_target_folder_that_cannot_be_written_is_named() {
+    let machine = Machine::new();
+    let (code, told) = machine.run("build", &[("CARGO_TARGET_DIR", "/dev/null/target")]);
+    assert_eq!(code, 2);
+    assert!(told.contains("actcheck was not built: /dev/null/target can't be written; set CARGO_TARGET_DIR"), "{told}");
+}
+
+#[test]
+fn a_full_disk_is_named_before_and_after() {
+    let machine = Machine::new();
+    machine.command("df", "echo head; echo 'disk 1 1 204800 1 /'");
+    let (code, told) = machine.run("build", &[]);
+    assert_eq!(code, 2);
+    assert!(told.contains("actcheck was not built: it needs 3000 MB in "), "{told}");
+    assert!(
+        told.contains("and 200 MB are free; make room, or set CARGO_TARGET_DIR to a folder on another disk"),
+        "{told}"
+    );
+    // It fills up while crates compile.
+    machine.command("df", "[ -e \"$MACHINE/full\" ] && free=0 || free=9000000; echo head; echo \"disk 1 1 $free 1 /\"");
+    machine.command("cargo", "[ \"$1\" = fetch ] || { touch \"$MACHINE/full\"; exit 101; }");
+    let (code, told) = machine.run("build", &[]);
+    assert_eq!(code, 2);
+    assert!(told.contains("actcheck was not built: no space is left in "), "{told}");
+}
+
+#[test]
+fn a_missing_network_is_named() {
+    let machine = Machine::new();
+    machine.command("cargo", "[ \"$1\" != fetch ] || { echo 'error: failed to download' >&2; exit 101; }");
+    let (code, told) = machine.run("build", &[]);
+    assert_eq!(code, 2);
+    assert!(told.contains("error: failed to download"), "{told}");
+    assert!(
+        told.contains("actcheck was not built: its crates can't be downloaded: see cargo's message above"),
+        "{told}"
+    );
+}
+
+/// A fault of the code itself is cargo's to explain.
+#[test]
+fn a_failed_build_keeps_its_exit_code() {
+    let machine = Machine::new();
+    machine.command("cargo", "[ \"$1\" = fetch ] || exit 101");
+    let (code, told) = machine.run("build", &[]);
+    assert_eq!(code, 101, "{told}");
+    assert!(told.contains("The first build compiles RocksDB"), "{told}");
+}
