@@ -11,7 +11,7 @@ use actcheck::history::History;
 use serde_json::Value;
 
 use crate::support::look::looking;
-use crate::support::{actcheck, edit, project, shipped, stderr, stdout};
+use crate::support::{actcheck, edit, project, shipped, signal, stderr, stdout};
 
 const COUNT: &str = "PREFIX act: <http://actions#> SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }";
 
@@ -209,8 +209,7 @@ fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
         assert!(start.elapsed() < Duration::from_secs(120), "no runs in two minutes");
         std::thread::sleep(Duration::from_millis(20));
     }
-    let killed = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
-    assert!(killed.success());
+    signal(child.id(), "INT");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap();

@@ -12,7 +12,7 @@ use actcheck::scenario;
 use actcheck::world::{Mishap, World};
 use serde_json::Value;
 
-use crate::support::{COARSE, actcheck, edit, project, root, shipped, stderr, stdout};
+use crate::support::{actcheck, edit, project, root, shipped, stderr, stdout};
 
 const STILL: Clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
 
@@ -63,7 +63,6 @@ fn the_shipped_campaigns_are_healthy() {
 fn a_crowded_table_and_an_idle_property_are_told() {
     let project = project();
     edit(&project.path().join("configs/pick.toml"), "count = [1, 5]", "count = [16, 20]");
-    edit(&project.path().join("configs/pick.toml"), "[physics]\n", COARSE);
     std::fs::write(
         project.path().join("rules/idle.rls"),
         "applicable(?o) :- after(?o, w:knockedOver, true), after(?o, w:z, ?z), ?z > 1000.0 .\n\

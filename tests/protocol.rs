@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{actcheck, root, stderr, stdout};
+use crate::support::{actcheck, root, signal, stderr, stdout};
 
 /// A glass alone on a table.
 const SCENE: &str = "
@@ -331,7 +331,7 @@ fn an_action_that_takes_too_long_ends_for_the_program_too() {
 
 #[test]
 fn nothing_is_left_when_the_simulator_itself_is_ended() {
-    for signal in ["INT", "KILL"] {
+    for name in ["INT", "KILL"] {
         let folder = project("faulty.py", "[[\"Pick\"]]", 50, "timeout_s = 60.0\nenv = { FAULT = \"silent\" }");
         let mut simulator = Command::new(env!("CARGO_BIN_EXE_actcheck"))
             .args(["run", "c.toml", "--jobs", "2"])
@@ -350,10 +350,11 @@ fn nothing_is_left_when_the_simulator_itself_is_ended() {
         while !has_program() && Instant::now() < patience {
             std::thread::sleep(Duration::from_millis(20));
         }
-        let id = simulator.id().to_string();
-        // The second interrupt insists.
+        // The second interrupt insists, where the first has not ended it.
         for _ in 0..2 {
-            Command::new("kill").args(["-s", signal, &id]).stderr(Stdio::null()).status().unwrap();
+            if simulator.try_wait().unwrap().is_none() {
+                signal(simulator.id(), name);
+            }
             std::thread::sleep(Duration::from_millis(300));
         }
         simulator.wait().unwrap();

@@ -4,7 +4,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{copy, project, root};
+use crate::support::{copy, edit, project, root};
 
 /// The texts of the fenced blocks in a language.
 fn blocks(text: &str, language: &str) -> Vec<String> {
@@ -22,6 +22,8 @@ fn every_command_of_the_readme_works() {
     let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
     let project = project();
     let folder = project.path();
+    // Among six scenes there are failures to look at.
+    edit(&folder.join("configs/pick.toml"), "test_count = 15", "test_count = 6");
     std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
     copy(&root().join("clients"), &folder.join("clients"));
     // The program as the README calls it, with its exit codes written down.

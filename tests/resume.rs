@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::support::look::looking;
-use crate::support::{actcheck, edit, project, stderr, stdout};
+use crate::support::{actcheck, edit, project, signal, stderr, stdout};
 
 /// A look at a crowded small table, on which scenes are discarded too: runs that end one after the other within moments.
 const CROWDED: &str = "tests = [[\"PerceivePlane\"]]\ntest_count = 24\nseed = 3\nontology = \"../ontology/actions.ttl\"\n\
@@ -159,7 +159,7 @@ fn interrupted_and_resumed(folder: &Path, options: &[&str]) -> Value {
         assert!(started.elapsed() < Duration::from_secs(120), "no runs in two minutes");
         std::thread::sleep(Duration::from_millis(5));
     }
-    assert!(Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap().success());
+    signal(child.id(), "INT");
     assert_eq!(child.wait().unwrap().code(), Some(130));
     let there = listed(folder, "h").lines().count();
     assert!(there > 1 && there < listed(folder, "whole").lines().count(), "{there}");

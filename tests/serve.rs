@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{actcheck, foreign, made_history, stderr, stdout};
+use crate::support::{actcheck, foreign, made_history, signal, stderr, stdout};
 
 /// A server that ends with the test.
 struct Server {
@@ -418,8 +418,7 @@ fn a_second_process_has_the_history_beside_the_server() {
 #[test]
 fn ctrl_c_ends_it_in_order() {
     let mut server = Server::start(made_history(), &[]);
-    let killed = Command::new("kill").args(["-INT", &server.process.id().to_string()]).status().unwrap();
-    assert!(killed.success());
+    signal(server.process.id(), "INT");
     assert_eq!(server.process.wait().unwrap().code(), Some(0));
     assert!(TcpStream::connect(("127.0.0.1", server.port)).is_err());
 }

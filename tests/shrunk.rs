@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use serde_json::Value;
 
 use crate::support::look::blurred;
-use crate::support::{actcheck, edit, project, stderr, stdout};
+use crate::support::{actcheck, edit, project, signal, stderr, stdout};
 
 /// A project whose picks all fail, which takes its time: what the robot sees lies decimetres beside what is there.
 fn blind() -> tempfile::TempDir {
@@ -153,8 +153,7 @@ fn started(folder: &Path, arguments: &[&str]) -> Child {
 }
 
 fn interrupt(child: &Child) {
-    let killed = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
-    assert!(killed.success());
+    signal(child.id(), "INT");
 }
 
 /// Waits until a process catches Ctrl-C, as Linux says of it.

@@ -15,7 +15,7 @@ use actcheck::ontology::{self, RuleLanguage};
 use actcheck::rules::standalone::{Engine, Program, run};
 use actcheck::rules::{Budget, Findings, RuleBook, RuleFault};
 
-use crate::support::{root, stderr};
+use crate::support::{root, signal, stderr};
 
 /// Programs that never end, each stuck in another part of an evaluation.
 const ENDLESS: [&str; 2] = [
@@ -177,8 +177,7 @@ fn waiting(folder: &Path, rest: &str) -> Child {
 }
 
 fn interrupted(child: Child) {
-    let killed = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
-    assert!(killed.success());
+    signal(child.id(), "INT");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
     assert!(stderr(&output).contains("interrupted"), "{}", stderr(&output));

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::{COARSE, actcheck, edit, project, root, stderr, stdout};
+use crate::support::{actcheck, edit, project, root, stderr, stdout};
 
 fn csv(file: &Path) -> Vec<BTreeMap<String, String>> {
     csv::Reader::from_path(file).unwrap().deserialize().map(Result::unwrap).collect()
@@ -30,7 +30,6 @@ fn files(folder: &Path) -> Vec<String> {
 fn a_history_as_tables_rdf_and_findings() {
     let project = project();
     let here = project.path();
-    edit(&here.join("configs/pick.toml"), "[physics]\n", COARSE);
     let run = |runs: &str| actcheck(here, &["run", "configs/pick.toml", "--runs", runs, "--jobs", "1"]);
     assert!(run("6").status.code().is_some_and(|code| code < 2));
     let history = here.join("configs/.actcheck");

@@ -29,6 +29,12 @@ pub fn actcheck(folder: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
+/// Sends a signal, such as `INT`, to a process. The shell's own `kill` does it: a small system has no other.
+pub fn signal(process: u32, name: &str) {
+    let sent = Command::new("sh").args(["-c", &format!("kill -s {name} {process}")]).status().unwrap();
+    assert!(sent.success(), "process {process} is gone");
+}
+
 /// Its output stream as text.
 pub fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).unwrap()
@@ -39,8 +45,19 @@ pub fn stderr(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// A copy of what a project of a user's has: configurations, ontology, rules and models.
+/// A copy of the shipped project, with coarse physics in its configurations: most tests are about campaigns, whatever they test.
 pub fn project() -> tempfile::TempDir {
+    let folder = shipped_project();
+    for entry in std::fs::read_dir(folder.path().join("configs")).unwrap() {
+        let file = entry.unwrap().path();
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(&file, text.replace("[physics]\n", COARSE)).unwrap();
+    }
+    folder
+}
+
+/// A copy of the shipped project: configurations, ontology, rules and models. For tests of what the robot achieves.
+pub fn shipped_project() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in ["configs", "ontology", "rules", "models"] {
         copy(&root().join(name), &folder.path().join(name));
@@ -114,7 +131,7 @@ pub fn shipped(name: &'static str) -> &'static Shipped {
     made.get_or_init(|| {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("shipped-{name}"));
         let _ = std::fs::remove_dir_all(&folder);
-        copy(project().path(), &folder);
+        copy(shipped_project().path(), &folder);
         let output = actcheck(&folder, &["run", &format!("configs/{name}.toml"), "--jobs", "2", "--history", "h"]);
         assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
         Shipped { code: output.status.code(), text: stdout(&output), folder }
