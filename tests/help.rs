@@ -78,7 +78,7 @@ fn rendered(page: &Path) -> String {
         foreign::left_out("how manual pages look", "there is no groff");
         return std::fs::read_to_string(page).unwrap().replace("\\-", "-");
     }
-    let output = Command::new("groff").args(["-man", "-Tutf8", "-P-c", "-ww"]).arg(page).output().unwrap();
+    let output = Command::new("groff").args(["-Kutf8", "-man", "-Tutf8", "-P-c", "-ww"]).arg(page).output().unwrap();
     assert!(output.status.success() && stderr(&output).is_empty(), "{}", stderr(&output));
     // Bold letters are overstruck.
     stdout(&output).replace("_\u{8}", "").chars().fold(String::new(), |mut text, c| {

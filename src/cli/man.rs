@@ -56,9 +56,14 @@ fn section_of(command: &Command) -> io::Result<Vec<u8>> {
     man.render_description_section(&mut page)?;
     man.render_options_section(&mut page)?;
     man.render_extra_section(&mut page)?;
-    let text = String::from_utf8_lossy(&page).replace(".SH EXTRA\n", ".SH EXAMPLES\n");
     // A line of text never begins with a dot.
-    Ok(format!("\n{text}").replace("\n.SH ", "\n.SS ").into_bytes())
+    Ok(format!("\n{}", with_examples(&page)).replace("\n.SH ", "\n.SS ").into_bytes())
+}
+
+/// A page in which the section after the options is named for its examples.
+fn with_examples(page: &[u8]) -> String {
+    let page = String::from_utf8_lossy(page);
+    page.replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n").replace(".SH EXTRA\nExample:\n", ".SH EXAMPLES\n")
 }
 
 fn write_pages(root: &Command, folder: &Path) -> Result<(), Diagnostics> {
@@ -68,7 +73,7 @@ fn write_pages(root: &Command, folder: &Path) -> Result<(), Diagnostics> {
         let man = manual(command);
         let mut page = Vec::new();
         man.render(&mut page).map_err(unrendered)?;
-        written::write(&folder.join(man.get_filename()), page)?;
+        written::write(&folder.join(man.get_filename()), with_examples(&page))?;
     }
     let first = folder.join("actcheck.1");
     output::print(&format!("wrote {} pages: man -l {}\n", commands.len(), first.display()));
