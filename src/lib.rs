@@ -33,7 +33,7 @@
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, campaigns side by side, when it fails | polars, statrs |
 //! | [`report`] | verdicts and tables as text, JSON and pages, in the formats of other people's tools; runs as pictures and in 3D | rerun (feature `rerun`) |
 //! | [`serve`] | a history over HTTP: SPARQL endpoint, a page to ask from, the report | oxhttp |
-//! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap |
+//! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap, clap_complete, clap_mangen |
 //!
 //! A module imports only from modules above it in this table ([`campaign`] and [`cli`] from all), and a library of the field is used
 //! only where the table names it: `tests/floors.rs` holds both.

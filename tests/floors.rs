@@ -31,7 +31,7 @@ const FLOORS: [(&str, &[&str]); 16] = [
 ];
 
 /// Libraries of the field and where they may be named.
-const FENCES: [(&str, &[&str]); 20] = [
+const FENCES: [(&str, &[&str]); 22] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh_loader", &["config"]),
@@ -46,6 +46,8 @@ const FENCES: [(&str, &[&str]); 20] = [
     ("polars", &["analysis"]),
     ("rayon", &["campaign"]),
     ("clap", &["cli"]),
+    ("clap_complete", &["cli"]),
+    ("clap_mangen", &["cli"]),
     ("oxhttp", &["serve"]),
     ("re_chunk", &["report"]),
     ("re_log_encoding", &["report"]),

@@ -85,6 +85,15 @@ impl Files {
         paths
     }
 
+    /// Paths of all shipped files in a folder and the folders in it, sorted.
+    pub fn all_shipped(folder: &Path) -> Vec<PathBuf> {
+        let files = Ontology::iter().chain(Rules::iter()).chain(Models::iter());
+        let mut paths: Vec<PathBuf> =
+            files.map(|name| PathBuf::from(name.as_ref())).filter(|path| path.starts_with(folder)).collect();
+        paths.sort();
+        paths
+    }
+
     /// Paths of the folders directly in a folder, sorted; none where there is no such folder.
     pub fn folders(&self, folder: &Path) -> Vec<PathBuf> {
         let mut paths: Vec<PathBuf> = match self {

@@ -192,12 +192,27 @@ pub enum Command {
     /// List all properties: label, language, rule file, actions, and how often each passed in the history
     #[command(after_help = "Example:\n  actcheck rules --format csv")]
     Rules(crate::cli::rules::RulesArgs),
-    /// Write something new, ready to edit
-    #[command(after_help = "Example:\n  actcheck new property StaysUpright --for Pick")]
-    New(NewArgs),
+    /// Write a configuration or a property, ready to edit
+    #[command(after_help = "Examples:\n  actcheck new campaign\n  actcheck new property StaysUpright --for Pick")]
+    New(crate::cli::new::NewArgs),
     /// Run a Datalog program of its own, with its imports and exports
     #[command(after_help = "Example:\n  actcheck datalog program.rls -D results")]
     Datalog(DatalogArgs),
+    /// Print the JSON schema of configurations, with which editors complete and check them
+    ///
+    /// Editors that use taplo, such as VS Code with Even Better TOML, read it if a configuration begins with the line
+    /// `#:schema campaign.schema.json`. Names of models and relations between keys are checked by `actcheck check` alone.
+    #[command(after_help = "Example:\n  actcheck schema > campaign.schema.json")]
+    Schema,
+    /// Print a script with which a shell completes commands and options
+    ///
+    /// Files that shells read at their start: `~/.local/share/bash-completion/completions/actcheck` for bash, `_actcheck` in a folder of
+    /// `$fpath` for zsh, `~/.config/fish/completions/actcheck.fish` for fish.
+    #[command(after_help = "Examples:\n  actcheck completions bash > actcheck.bash\n  . ./actcheck.bash")]
+    Completions(crate::cli::completions::CompletionsArgs),
+    /// Print the manual as a man page, or write one page for each command
+    #[command(after_help = "Examples:\n  actcheck man | man -l -\n  actcheck man --out man1")]
+    Man(crate::cli::man::ManArgs),
 }
 
 /// A search strategy by its name.
@@ -210,7 +225,6 @@ fn strategy(name: &str) -> Result<Strategy, String> {
 #[derive(Debug, Args)]
 pub struct RunArgs {
     /// The campaign's configuration (TOML)
-    #[arg(required_unless_present = "resume")]
     pub config: Option<PathBuf>,
     /// Go on with the newest campaign that was killed or interrupted (of CONFIG, where one is named), or with the one
     /// with this id, as it was begun: what comes out is the same as without the interruption
@@ -267,9 +281,8 @@ fn width(text: &str) -> Result<f64, String> {
 /// `actcheck check`
 #[derive(Debug, Args)]
 pub struct CheckArgs {
-    /// The campaign's configuration (TOML)
-    #[arg(default_value = "configs/pick.toml")]
-    pub config: PathBuf,
+    /// The campaign's configuration (TOML) [default: configs/pick.toml]
+    pub config: Option<PathBuf>,
 }
 
 /// Where a history lies.
@@ -350,35 +363,6 @@ pub struct WhyArgs {
     /// How explanations are printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: ProofFormat,
-}
-
-/// `actcheck new`
-#[derive(Debug, Args)]
-pub struct NewArgs {
-    /// What is new.
-    #[command(subcommand)]
-    pub kind: NewKind,
-}
-
-/// What can be new.
-#[derive(Debug, Subcommand)]
-pub enum NewKind {
-    /// A success property: its rule file and its entry in the ontology
-    #[command(after_help = "Example:\n  actcheck new property StaysUpright --for Pick")]
-    Property(NewPropertyArgs),
-}
-
-/// `actcheck new property`
-#[derive(Debug, Args)]
-pub struct NewPropertyArgs {
-    /// Its name, such as StaysUpright
-    pub name: String,
-    /// The action that it is a success property of
-    #[arg(long = "for", value_name = "ACTION")]
-    pub action: String,
-    /// The ontology that gets the entry; the rule file goes to `rules` beside its folder
-    #[arg(long, value_name = "FILE", default_value = "ontology/actions.ttl")]
-    pub ontology: PathBuf,
 }
 
 /// `actcheck datalog`

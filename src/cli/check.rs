@@ -1,24 +1,31 @@
 //! `actcheck check`
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::base::Diagnostics;
 use crate::campaign::Env;
 use crate::cli::args::CheckArgs;
-use crate::cli::{output, regressions};
+use crate::cli::{configurations, output, regressions};
 use crate::config::Overrides;
 use crate::rules::Budget;
 
 /// Says what a campaign would use, or everything that is wrong with it, unless somebody stops it.
 pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
+    let usual = Path::new("configs/pick.toml");
+    let config = match &args.config {
+        Some(config) => config.as_path(),
+        None if usual.exists() => usual,
+        None => return Err(configurations::none_given("check").into()),
+    };
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
-    let env = Env::prepare_within(&args.config, &Overrides::default(), budget.clone())?;
+    let env = Env::prepare_within(config, &Overrides::default(), budget.clone())?;
     let cases = if env.campaign.case.is_some() { Vec::new() } else { regressions::prepare(&env, &budget)? };
     output::print_diagnostics(&env.warnings());
     output::print(&format!(
         "{}: {} tests, {} runs, {} regressions; {} actions and {} properties in {}; {} models; robot {}\n",
-        args.config.display(),
+        config.display(),
         env.campaign.tests.len(),
         env.planned_runs(),
         cases.len(),

@@ -6,8 +6,10 @@ use clap::Parser;
 
 use crate::cli::args::{Arguments, Command};
 use crate::cli::{
-    check, check_oracles, datalog, export, list, new, output, query, recheck, rules, show, shrink, stop, why,
+    check, check_oracles, completions, datalog, export, list, man, new, output, query, recheck, rules, show, shrink,
+    stop, why,
 };
+use crate::config::SCHEMA;
 
 /// Parses the process's arguments and does what they ask.
 ///
@@ -37,6 +39,15 @@ pub fn run() -> ExitCode {
         Command::Why(args) => stop::interruptible(|stop| why::why(&args, stop)),
         Command::New(args) => new::new(&args).map(|()| 0),
         Command::Datalog(args) => stop::interruptible(|stop| datalog::datalog(&args, stop)),
+        Command::Schema => {
+            output::print(SCHEMA);
+            Ok(0)
+        }
+        Command::Completions(args) => {
+            completions::completions(&args);
+            Ok(0)
+        }
+        Command::Man(args) => man::man(&args).map(|()| 0),
     };
     match done {
         Ok(code) => ExitCode::from(code),

@@ -1,67 +1,42 @@
 //! `actcheck new`
 
-use std::path::Path;
+use clap::{Args, Subcommand};
 
-use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean};
-use crate::cli::args::{NewArgs, NewKind, NewPropertyArgs};
-use crate::cli::{output, written};
-use crate::ontology::{self, property_template};
+use crate::base::Diagnostics;
+use crate::cli::new_campaign::{self, NewCampaignArgs};
+use crate::cli::new_property::{self, NewPropertyArgs};
+
+/// `actcheck new`
+#[derive(Debug, Args)]
+pub struct NewArgs {
+    /// What is new.
+    #[command(subcommand)]
+    pub kind: NewKind,
+}
+
+/// What can be new.
+#[derive(Debug, Subcommand)]
+pub enum NewKind {
+    /// A configuration of a campaign, explained line by line, which runs as it is
+    ///
+    /// It uses the ontology, the rules and the models that the program carries, and needs no other file. With `--with` they are copied
+    /// into this folder, to be edited, and the configuration uses the copies. Existing files are never overwritten.
+    #[command(
+        after_help = "Examples:\n  actcheck new campaign\n  actcheck new campaign crowded --with ontology,skill,model"
+    )]
+    Campaign(NewCampaignArgs),
+    /// A success property: its rule file and its entry in the ontology
+    ///
+    /// If this folder has no ontology, the one that the program carries is written first, with its rules, and configurations from
+    /// `actcheck new campaign` use it from then on.
+    #[command(after_help = "Example:\n  actcheck new property StaysUpright --for Pick")]
+    Property(NewPropertyArgs),
+}
 
 /// Writes what is new.
 pub fn new(args: &NewArgs) -> Result<(), Diagnostics> {
     match &args.kind {
-        NewKind::Property(args) => property(args),
+        NewKind::Campaign(args) => new_campaign::campaign(args),
+        NewKind::Property(args) => new_property::property(args),
     }
-}
-
-/// Writes a rule file and its entry in the ontology, ready to edit.
-fn property(args: &NewPropertyArgs) -> Result<(), Diagnostics> {
-    let known = ontology::load(&Files::Disk, &args.ontology)?;
-    let Some(action) = known.actions.get(&args.action) else {
-        let names = known.actions.keys().map(String::as_str);
-        return Err(Diagnostic::error("X011", format!("{} has no action `{}`", args.ontology.display(), args.action))
-            .help(did_you_mean(&args.action, names))
-            .into());
-    };
-    let iri = crate::base::names::act(&args.name);
-    let fits = args.name.starts_with(|c: char| c.is_ascii_uppercase()) && args.name.chars().all(char::is_alphanumeric);
-    if !fits {
-        return Err(Diagnostic::error("X011", format!("`{}` is no name for a property", args.name))
-            .help("begin with a capital and use letters and digits only, such as `StaysUpright`")
-            .into());
-    }
-    if known.vocabulary.terms.contains_key(&iri) {
-        return Err(Diagnostic::error("X011", format!("the ontology has a `{}` already", args.name))
-            .help("choose another name, or edit what is there")
-            .into());
-    }
-    // The example speaks of a thing that is handled: `pickObject` rather than a surface or a place.
-    let things = action.parameters.iter().find(|name| name.ends_with("Object"));
-    let designator = things.or(action.parameters.first()).map_or("pickObject", String::as_str);
-    let template = property_template(&args.name, &args.action, designator, "../rules/");
-    let folder = args.ontology.parent().and_then(Path::parent).unwrap_or(Path::new(""));
-    let rule = folder.join("rules").join(&template.rule_file);
-    if rule.exists() {
-        return Err(Diagnostic::error("X011", format!("{} is there already", rule.display()))
-            .help("choose another name, or edit that file")
-            .into());
-    }
-    let text = Files::Disk
-        .read(&args.ontology)
-        .map_err(|why| {
-            written::unwritten(&args.ontology, why)
-                .help("name an ontology in a folder that may be written, with `--ontology FILE`")
-        })?
-        .text;
-    written::write(&rule, &template.rule_text)?;
-    written::write(
-        &args.ontology,
-        format!("{}{}", text.trim_end(), template.ontology_entry.replacen('\n', "\n\n", 1)),
-    )?;
-    output::print(&format!(
-        "wrote {} and an entry in {}: edit both, then `actcheck check CONFIG`\n",
-        rule.display(),
-        args.ontology.display()
-    ));
-    Ok(())
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::base::{Diagnostics, digest_of};
 use crate::campaign::{Env, unfinished};
 use crate::cli::args::{HistoryArgs, RunArgs};
-use crate::cli::{history_dir, regressions};
+use crate::cli::{configurations, history_dir, regressions};
 use crate::config::{self, Overrides};
 use crate::history::{ActionDetail, CampaignRecord, History, RunDetail, RunFilter};
 use crate::report::CaseSummary;
@@ -41,9 +41,8 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
     let going_on = args.resume.as_deref().map(|id| find(args, id)).transpose()?;
     let env = match &going_on {
         Some((history, record)) => Env::resume(history, record, budget.clone())?,
-        // clap asks for a configuration where no campaign is resumed.
         None => {
-            let config = args.config.as_deref().unwrap_or(Path::new(""));
+            let config = args.config.as_deref().ok_or_else(|| configurations::none_given("run"))?;
             Env::prepare_within(config, &overrides(args), budget.clone())?
         }
     };

@@ -1,0 +1,39 @@
+//! `actcheck completions`
+
+use clap::{Args, ValueEnum};
+use clap_complete::generate;
+use clap_complete::shells;
+
+use crate::cli::command_tree::command_tree;
+use crate::cli::output;
+
+/// `actcheck completions`
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// The shell that reads the script
+    #[arg(value_enum)]
+    pub shell: Shell,
+}
+
+/// Shells with completions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Shell {
+    /// GNU Bash
+    Bash,
+    /// The Z shell
+    Zsh,
+    /// The friendly interactive shell
+    Fish,
+}
+
+/// Prints the script for a shell.
+pub fn completions(args: &CompletionsArgs) {
+    let mut script = Vec::new();
+    let mut commands = command_tree();
+    match args.shell {
+        Shell::Bash => generate(shells::Bash, &mut commands, "actcheck", &mut script),
+        Shell::Zsh => generate(shells::Zsh, &mut commands, "actcheck", &mut script),
+        Shell::Fish => generate(shells::Fish, &mut commands, "actcheck", &mut script),
+    }
+    output::print_bytes(&script);
+}

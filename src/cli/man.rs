@@ -1,0 +1,97 @@
+//! `actcheck man`
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Command};
+use clap_mangen::Man;
+
+use crate::base::{Diagnostic, Diagnostics};
+use crate::cli::command_tree::command_tree;
+use crate::cli::{output, written};
+
+/// `actcheck man`
+#[derive(Debug, Args)]
+pub struct ManArgs {
+    /// Write a page for each command into this folder, such as `actcheck-run.1`, instead of printing one with all of them
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Prints the manual, or writes its pages.
+pub fn man(args: &ManArgs) -> Result<(), Diagnostics> {
+    let mut root = command_tree();
+    // Gives every command its full name.
+    root.build();
+    match &args.out {
+        None => {
+            output::print_bytes(&page_of_all(&root).map_err(unrendered)?);
+            Ok(())
+        }
+        Some(folder) => write_pages(&root, folder),
+    }
+}
+
+/// One page: the program, then a section for each command.
+fn page_of_all(root: &Command) -> io::Result<Vec<u8>> {
+    let man = manual(root);
+    let mut page = Vec::new();
+    man.render_title(&mut page)?;
+    man.render_name_section(&mut page)?;
+    man.render_synopsis_section(&mut page)?;
+    man.render_description_section(&mut page)?;
+    for command in below(root).into_iter().filter(|command| !command.has_subcommands()) {
+        let name = command.get_bin_name().unwrap_or(command.get_name());
+        writeln!(page, ".SH \"{}\"", name.replace('-', "\\-"))?;
+        page.extend(section_of(command)?);
+    }
+    Ok(page)
+}
+
+/// Synopsis, description, options and examples of a command, as parts of its section.
+fn section_of(command: &Command) -> io::Result<Vec<u8>> {
+    let man = manual(command);
+    let mut page = Vec::new();
+    man.render_synopsis_section(&mut page)?;
+    man.render_description_section(&mut page)?;
+    man.render_options_section(&mut page)?;
+    man.render_extra_section(&mut page)?;
+    // A line of text never begins with a dot.
+    Ok(format!("\n{}", with_examples(&page)).replace("\n.SH ", "\n.SS ").into_bytes())
+}
+
+/// A page in which the section after the options is named for its examples.
+fn with_examples(page: &[u8]) -> String {
+    let page = String::from_utf8_lossy(page);
+    page.replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n").replace(".SH EXTRA\nExample:\n", ".SH EXAMPLES\n")
+}
+
+fn write_pages(root: &Command, folder: &Path) -> Result<(), Diagnostics> {
+    std::fs::create_dir_all(folder).map_err(|error| written::unwritten(folder, error))?;
+    let commands: Vec<&Command> = std::iter::once(root).chain(below(root)).collect();
+    for command in &commands {
+        let man = manual(command);
+        let mut page = Vec::new();
+        man.render(&mut page).map_err(unrendered)?;
+        written::write(&folder.join(man.get_filename()), with_examples(&page))?;
+    }
+    let first = folder.join("actcheck.1");
+    output::print(&format!("wrote {} pages: man -l {}\n", commands.len(), first.display()));
+    Ok(())
+}
+
+fn manual(command: &Command) -> Man {
+    Man::new(command.clone()).manual("actcheck").source(concat!("actcheck ", env!("CARGO_PKG_VERSION")))
+}
+
+/// All commands below one, each before those below it.
+fn below(command: &Command) -> Vec<&Command> {
+    let each = command.get_subcommands().map(|command| std::iter::once(command).chain(below(command)));
+    each.flatten().collect()
+}
+
+fn unrendered(error: io::Error) -> Diagnostics {
+    Diagnostic::error("X001", format!("the manual could not be written: {error}"))
+        .help("report this: the manual is made in memory")
+        .into()
+}

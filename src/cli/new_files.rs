@@ -1,0 +1,120 @@
+//! Files of a new project: all of them are written, or none is.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::base::{Diagnostic, Diagnostics, Files};
+use crate::cli::written;
+
+/// Files to write, relative to the folder that the program runs in. None may exist.
+#[derive(Debug, Default)]
+pub(super) struct NewFiles {
+    files: BTreeMap<PathBuf, Vec<u8>>,
+}
+
+impl NewFiles {
+    /// Adds a file, or replaces one that was added before.
+    pub(super) fn add(&mut self, file: impl Into<PathBuf>, bytes: impl Into<Vec<u8>>) {
+        self.files.insert(file.into(), bytes.into());
+    }
+
+    /// Adds all files of a shipped folder, such as `rules`.
+    ///
+    /// # Errors
+    /// X016: the program does not hold one of them, which is a fault of the program.
+    pub(super) fn add_shipped(&mut self, folder: &str) -> Result<(), Diagnostics> {
+        for file in Files::all_shipped(Path::new(folder)) {
+            let bytes = Files::Shipped.read_bytes(&file).map_err(|why| {
+                Diagnostic::error("X016", format!("{} can't be copied: {why}", file.display()))
+                    .help("report this: the file is part of the program")
+            })?;
+            self.add(file, bytes);
+        }
+        Ok(())
+    }
+
+    /// Writes all files and the folders that they need. On a fault, what was written is removed again.
+    ///
+    /// # Errors
+    /// X015: one of the files exists. X007: one can't be written.
+    pub(super) fn write(&self, help: &str) -> Result<(), Diagnostics> {
+        // A link that leads nowhere exists, too.
+        if let Some(file) = self.files.keys().find(|file| fs::symlink_metadata(file).is_ok()) {
+            return Err(Diagnostic::error("X015", format!("{} exists already", file.display())).help(help).into());
+        }
+        let mut made = Vec::new();
+        for (file, bytes) in &self.files {
+            if let Err(faults) = make_folders(file, &mut made).and_then(|()| written::write(file, bytes)) {
+                take_back(&made);
+                return Err(faults);
+            }
+            made.push(file.clone());
+        }
+        Ok(())
+    }
+
+    /// The files in words: `pick.toml, rules/ (27 files)`.
+    pub(super) fn in_words(&self) -> String {
+        let mut folders: BTreeMap<&Path, Vec<&Path>> = BTreeMap::new();
+        for file in self.files.keys() {
+            let first = file.components().next().map_or(Path::new(""), |first| Path::new(first.as_os_str()));
+            folders.entry(first).or_default().push(file);
+        }
+        let words = folders.into_iter().map(|(folder, files)| match files.as_slice() {
+            [only] => only.display().to_string(),
+            several => format!("{}/ ({} files)", folder.display(), several.len()),
+        });
+        words.collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Makes the folders that a file needs, outermost first.
+fn make_folders(file: &Path, made: &mut Vec<PathBuf>) -> Result<(), Diagnostics> {
+    let mut missing: Vec<&Path> =
+        file.ancestors().skip(1).take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists()).collect();
+    missing.reverse();
+    for folder in missing {
+        fs::create_dir(folder).map_err(|error| written::unwritten(folder, error))?;
+        made.push(folder.to_owned());
+    }
+    Ok(())
+}
+
+/// Removes files and folders that were made, last first. What can't be removed is left: the fault that led here is reported.
+fn take_back(made: &[PathBuf]) {
+    for path in made.iter().rev() {
+        let _ = if path.is_dir() { fs::remove_dir(path) } else { fs::remove_file(path) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_files_are_written_or_none() {
+        let folder = tempfile::tempdir().expect("there is room for a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("taken"), "a file, where a folder is needed").expect("it can be written");
+        let mut files = NewFiles::default();
+        files.add(at("a/b/one.txt"), "1");
+        files.add(at("a/two.txt"), "2");
+        files.add(at("taken/three.txt"), "3");
+        let faults = files.write("").expect_err("a file is no folder");
+        assert!(faults.iter().all(|fault| fault.code == "X007"), "{faults}");
+        assert!(!at("a").exists(), "what was written is removed");
+        fs::remove_file(at("taken")).expect("it can be removed");
+        files.write("").expect("all can be written");
+        assert_eq!(fs::read_to_string(at("a/b/one.txt")).expect("it is there"), "1");
+        let faults = files.write("move it").expect_err("they exist");
+        assert!(faults.iter().all(|fault| fault.code == "X015"), "{faults}");
+    }
+
+    #[test]
+    fn many_files_of_a_folder_are_counted() {
+        let mut files = NewFiles::default();
+        ["rules/a.rls", "rules/lib/b.rls", "pick.toml", "skills/pick.py"].iter().for_each(|file| files.add(*file, ""));
+        assert_eq!(files.in_words(), "pick.toml, rules/ (2 files), skills/pick.py");
+    }
+}

@@ -1,0 +1,146 @@
+//! `actcheck new property`
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
+use crate::cli::new_files::NewFiles;
+use crate::cli::{configurations, output, why, written};
+use crate::config::{LinksOntology, link_ontology};
+use crate::ontology::{self, Ontology, Template, property_template};
+
+/// `actcheck new property`
+#[derive(Debug, Args)]
+pub struct NewPropertyArgs {
+    /// Its name, such as StaysUpright
+    pub name: String,
+    /// The action that it is a success property of
+    #[arg(long = "for", value_name = "ACTION")]
+    pub action: String,
+    /// The ontology that gets the entry; the rule file goes to `rules` beside its folder [default: ontology/actions.ttl here, which
+    /// is written if it does not exist]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
+}
+
+/// Writes a rule file and its entry in the ontology, ready to edit.
+pub fn property(args: &NewPropertyArgs) -> Result<(), Diagnostics> {
+    let (files, path) = why::ontology_file(args.ontology.as_deref());
+    let known = ontology::load(&files, &path)?;
+    let template = template(args, &known, &path)?;
+    let folder = path.parent().and_then(Path::parent).unwrap_or(Path::new(""));
+    let rule = folder.join("rules").join(&template.rule_file);
+    match files {
+        Files::Shipped => write_project(&path, &rule, &template)?,
+        Files::Disk => write_property(&path, &rule, &template)?,
+    }
+    if args.ontology.is_none() {
+        link_configurations(&path)?;
+    }
+    output::print(&format!(
+        "edit {} and the entry in {}, then `actcheck check CONFIG`\n",
+        rule.display(),
+        path.display()
+    ));
+    Ok(())
+}
+
+/// The texts of the property, if its name and its action fit the ontology.
+fn template(args: &NewPropertyArgs, known: &Ontology, path: &Path) -> Result<Template, Diagnostics> {
+    let Some(action) = known.actions.get(&args.action) else {
+        let names = known.actions.keys().map(String::as_str);
+        return Err(Diagnostic::error("X011", format!("{} has no action `{}`", path.display(), args.action))
+            .help(did_you_mean(&args.action, names))
+            .into());
+    };
+    let fits = args.name.starts_with(|c: char| c.is_ascii_uppercase()) && args.name.chars().all(char::is_alphanumeric);
+    if !fits {
+        return Err(Diagnostic::error("X011", format!("`{}` is no name for a property", args.name))
+            .help("begin with a capital and use letters and digits only, such as `StaysUpright`")
+            .into());
+    }
+    if known.vocabulary.terms.contains_key(&names::act(&args.name)) {
+        return Err(Diagnostic::error("X011", format!("the ontology has a `{}` already", args.name))
+            .help("choose another name, or edit what is there")
+            .into());
+    }
+    // The example speaks of a thing that is handled: `pickObject` rather than a surface or a place.
+    let things = action.parameters.iter().find(|name| name.ends_with("Object"));
+    let designator = things.or(action.parameters.first()).map_or("pickObject", String::as_str);
+    Ok(property_template(&args.name, &args.action, designator, "../rules/"))
+}
+
+/// An ontology's text with the entry of a property.
+fn with_entry(ontology: &str, template: &Template) -> String {
+    format!("{}{}", ontology.trim_end(), template.ontology_entry.replacen('\n', "\n\n", 1))
+}
+
+/// X011: the rule file exists.
+fn is_there(rule: &Path) -> Diagnostics {
+    Diagnostic::error("X011", format!("{} is there already", rule.display()))
+        .help("choose another name, or edit that file")
+        .into()
+}
+
+/// Adds a property to an ontology on disk.
+fn write_property(path: &Path, rule: &Path, template: &Template) -> Result<(), Diagnostics> {
+    if rule.exists() {
+        return Err(is_there(rule));
+    }
+    let text = Files::Disk.read(path).map_err(|why| {
+        written::unwritten(path, why).help("name an ontology in a folder that may be written, with `--ontology FILE`")
+    })?;
+    written::write(rule, &template.rule_text)?;
+    written::write(path, with_entry(&text.text, template))?;
+    output::print(&format!("wrote {} and an entry in {}\n", rule.display(), path.display()));
+    Ok(())
+}
+
+/// Writes the shipped ontology and rules into a folder that has none, with the property added.
+fn write_project(path: &Path, rule: &Path, template: &Template) -> Result<(), Diagnostics> {
+    if Files::Shipped.read_bytes(rule).is_ok() {
+        return Err(is_there(rule));
+    }
+    let mut files = NewFiles::default();
+    files.add_shipped("ontology")?;
+    files.add_shipped("rules")?;
+    let shipped = Files::Shipped.read(path).map_err(|why| written::unwritten(path, why))?;
+    files.add(path, with_entry(&shipped.text, template));
+    files.add(rule, template.rule_text.as_str());
+    files.write(
+        "this folder has no ontology/actions.ttl, so the shipped ontology and rules would be written: \
+        move that file away, or name your ontology with `--ontology FILE`",
+    )?;
+    output::print(&format!(
+        "wrote {}: the ontology and the rules that actcheck carries, with {} and its entry in {} added\n",
+        files.in_words(),
+        rule.display(),
+        path.display()
+    ));
+    Ok(())
+}
+
+/// Makes configurations from `actcheck new campaign` use the ontology of this folder, and names those that do not.
+fn link_configurations(ontology: &Path) -> Result<(), Diagnostics> {
+    for file in configurations::here() {
+        let Ok(source) = Files::Disk.read(&file) else { continue };
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+        match (link_ontology(&source.text), folder) {
+            (LinksOntology::Already, _) => {}
+            (LinksOntology::Now(text), None) => {
+                written::write(&file, text)?;
+                output::print(&format!("{} uses {} from now on\n", file.display(), ontology.display()));
+            }
+            (_, folder) => {
+                let seen = folder.map_or(ontology.to_owned(), |_| Path::new("..").join(ontology));
+                let line = format!("ontology = \"{}\"", seen.display());
+                output::print(&format!(
+                    "{} uses the shipped ontology: add `{line}` to judge the property\n",
+                    file.display()
+                ));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,116 @@
+//! Help, completions and the manual: every command is in each of them.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::support::{actcheck, foreign, root, stderr, stdout};
+
+/// The commands that the program's help lists.
+fn commands() -> Vec<String> {
+    let help = stdout(&actcheck(root(), &["-h"]));
+    let list = help.split("Commands:\n").nth(1).and_then(|rest| rest.split("\n\n").next()).expect("there is a list");
+    let first =
+        |line: &str| line.strip_prefix("  ")?.split(' ').next().filter(|word| !word.is_empty()).map(str::to_owned);
+    list.lines().filter_map(first).collect()
+}
+
+#[test]
+fn the_help_of_every_command_ends_with_an_example() {
+    let commands = commands();
+    assert!(commands.len() >= 24, "{commands:?}");
+    let below = ["campaign", "property"].map(|kind| vec!["new", kind]);
+    for mut arguments in commands.iter().map(|command| vec![command.as_str()]).chain(below) {
+        let example = format!("actcheck {}", arguments.join(" "));
+        arguments.push("--help");
+        let help = stdout(&actcheck(root(), &arguments));
+        let last = help.rsplit("\n\n").next().unwrap();
+        assert!(last.starts_with("Example") && last.contains(&example), "{arguments:?}: {last}");
+    }
+}
+
+#[test]
+fn completions_know_every_command() {
+    for shell in ["bash", "zsh", "fish"] {
+        let output = actcheck(root(), &["completions", shell]);
+        assert!(output.status.success(), "{}", stderr(&output));
+        let script = stdout(&output);
+        for command in commands() {
+            assert!(script.contains(&command), "{shell} knows no `{command}`");
+        }
+        assert!(script.contains("until-width") && script.contains("cross-entropy") || shell != "zsh");
+        assert!(!script.contains("serve-query"), "{shell} offers a hidden command");
+        if foreign::has(shell) {
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join("script");
+            std::fs::write(&file, &script).unwrap();
+            let read = Command::new(shell).arg("-n").arg(&file).output().unwrap();
+            assert!(read.status.success() && stderr(&read).is_empty(), "{shell}: {}", stderr(&read));
+        }
+    }
+    let wrong = actcheck(root(), &["completions", "tcsh"]);
+    assert_eq!(wrong.status.code(), Some(2));
+}
+
+/// What bash offers for a line whose last word is being typed.
+#[test]
+fn bash_completes_commands_and_options() {
+    let script = stdout(&actcheck(root(), &["completions", "bash"]));
+    for (line, offered) in
+        [("actcheck rech", "recheck"), ("actcheck run --unt", "--until-width"), ("actcheck new c", "campaign")]
+    {
+        let words: Vec<&str> = line.split(' ').collect();
+        let ask = format!(
+            "{script}\nCOMP_WORDS=({line}); COMP_CWORD={}; COMP_LINE='{line}'; COMP_POINT={}\n\
+             _actcheck actcheck '{}' '{}'\necho \"${{COMPREPLY[@]}}\"\n",
+            words.len() - 1,
+            line.len(),
+            words[words.len() - 1],
+            words[words.len() - 2],
+        );
+        let output = Command::new("bash").args(["--norc", "-c", &ask]).output().unwrap();
+        assert_eq!(stdout(&output).trim(), offered, "{line}: {}", stderr(&output));
+    }
+}
+
+/// A page as people see it, or its source where there is no groff; warnings are faults.
+fn rendered(page: &Path) -> String {
+    if !foreign::has("groff") {
+        foreign::left_out("how manual pages look", "there is no groff");
+        return std::fs::read_to_string(page).unwrap().replace("\\-", "-");
+    }
+    let output = Command::new("groff").args(["-Kutf8", "-man", "-Tutf8", "-P-c", "-ww"]).arg(page).output().unwrap();
+    assert!(output.status.success() && stderr(&output).is_empty(), "{}", stderr(&output));
+    // Bold letters are overstruck.
+    stdout(&output).replace("_\u{8}", "").chars().fold(String::new(), |mut text, c| {
+        if c == '\u{8}' {
+            _ = text.pop()
+        } else {
+            text.push(c)
+        }
+        text
+    })
+}
+
+#[test]
+fn the_manual_has_every_command_with_its_options_and_examples() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("actcheck.1");
+    std::fs::write(&page, stdout(&actcheck(root(), &["man"]))).unwrap();
+    let text = rendered(&page);
+    for heading in ["NAME", "SYNOPSIS", "DESCRIPTION", "actcheck new campaign"] {
+        assert!(text.lines().any(|line| line.contains(heading)), "no {heading}:\n{text}");
+    }
+    for command in commands().iter().filter(|command| *command != "new") {
+        assert!(text.contains(&format!("actcheck {command}")), "no `{command}` in:\n{text}");
+    }
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("--until-width") && words.contains("actcheck run configs/pick.toml --runs 5"), "{words}");
+    assert!(!text.contains("serve-query") && !text.contains("EXTRA"), "{text}");
+
+    let told = stdout(&actcheck(folder.path(), &["man", "--out", "man1"]));
+    assert!(told.contains("man -l man1/actcheck.1"), "{told}");
+    for command in commands().into_iter().chain(["new-campaign".to_owned(), "new-property".to_owned()]) {
+        let text = rendered(&folder.path().join(format!("man1/actcheck-{command}.1")));
+        assert!(text.contains("DESCRIPTION"), "{text}");
+    }
+}
