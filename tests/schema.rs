@@ -360,7 +360,7 @@ fn changed() -> Vec<(String, toml::Table)> {
 
 /// Faults that no schema can see: relations between keys, files and names that must exist, and durations.
 fn is_beyond_a_schema(code: &str, message: &str) -> bool {
-    let names_and_files = ["C008", "C009", "C010", "C011", "C012", "C020", "C021", "C022", "C031", "C034", "C015"];
+    let names_and_files = ["C008", "C009", "C010", "C011", "C012", "C020", "C021", "C031", "C034", "C015"];
     names_and_files.contains(&code)
         || message.contains("is no duration")
         || message.contains("there is no obstacle to choose")
