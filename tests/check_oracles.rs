@@ -106,7 +106,7 @@ fn the_shipped_properties_notice_every_fault() {
 
 /// The actions of the whole task, each with what it needs before it, in a room with nothing unusual. (What is half a metre
 /// farther away than on a cabinet is never on it any more.)
-const TASK: &str = "test_count = 6\nseed = 3\n\
+const TASK: &str = "test_count = 8\nseed = 3\n\
     nav_obstacle_list = [\"bottle\"]\nnav_obstacle_count = 1\n[world]\nworlds = [\"empty_room\"]\n\
     [objectLocation]\nlocation_list = [\"left_corner\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n\
     [placeSurface]\nplace_object_surfaces = [\"cabinet\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
