@@ -59,4 +59,5 @@ mod stops;
 mod support;
 mod tables;
 mod trust;
+mod wheel;
 mod worlds;

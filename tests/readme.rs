@@ -1,20 +1,13 @@
 //! Every command of the README is run, block by block, in a folder like a fresh checkout.
 
-use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
 use std::process::Command;
 
-use crate::support::{copy, edit, project, root};
+use crate::support::{copy, edit, project, root, script};
 
 /// The texts of the fenced blocks in a language.
 fn blocks(text: &str, language: &str) -> Vec<String> {
     let open = format!("```{language}\n");
     text.split(&open).skip(1).map(|rest| rest.split("\n```").next().unwrap().to_owned()).collect()
-}
-
-fn script(path: &Path, text: &str) {
-    std::fs::write(path, text).unwrap();
-    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
 }
 
 #[test]

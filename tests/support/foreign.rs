@@ -39,6 +39,19 @@ pub fn client_python() -> &'static Path {
     made.as_deref().unwrap_or_else(|why| panic!("clients/python can't be installed for its tests: {why}"))
 }
 
+/// Python with maturin, and a folder with what the package needs from PyPI: wheels are made and installed without a network from then on.
+pub fn maturin() -> Result<(PathBuf, PathBuf), String> {
+    let python = environment("maturin", "../../clients/wheel/maturin.txt")?;
+    let needs = Path::new(env!("CARGO_TARGET_TMPDIR")).join("package-needs");
+    let versions = root().join("tests/foreign/python_client.txt");
+    kept(&needs, &versions, |needs| {
+        let download =
+            ["-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:", "numpy"];
+        run(Command::new(&python).args(download).arg("--constraint").arg(&versions).arg("--dest").arg(needs))
+    })?;
+    Ok((python, needs))
+}
+
 /// An environment with the packages that a file in `tests/foreign` names, kept beside what was compiled: its Python.
 fn environment(name: &str, packages: &str) -> Result<PathBuf, String> {
     let wanted = root().join("tests/foreign").join(packages);
@@ -86,7 +99,8 @@ fn kept(folder: &Path, wanted: &Path, make: impl FnOnce(&Path) -> Result<(), Str
     std::fs::write(&made, text).map_err(|error| error.to_string())
 }
 
-fn run(command: &mut Command) -> Result<(), String> {
+/// Runs a command to its end; its last line of errors if it fails.
+pub fn run(command: &mut Command) -> Result<(), String> {
     let program = command.get_program().to_string_lossy().into_owned();
     let output = command.output().map_err(|error| format!("{program} can't be started: {error}"))?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
