@@ -12,6 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import nbformat
@@ -68,9 +69,10 @@ def execute(source, target, data):
     os.environ["ACTCHECK_QUERIES"] = str(ROOT / "ontology" / "queries")
     fault = None
     try:
-        # Files instead of ports: nobody else on the machine can listen or speak.
-        kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
-        NotebookClient(book, km=kernel, timeout=300, record_timing=False).execute()
+        # Sockets in a private folder instead of ports: no other user of the machine can connect.
+        with tempfile.TemporaryDirectory() as sockets:
+            kernel = AsyncKernelManager(kernel_name="python3", transport="ipc", ip=f"{sockets}/kernel")
+            NotebookClient(book, km=kernel, timeout=300, record_timing=False).execute()
     except CellExecutionError as error:
         fault = f"{source.name}: {error}"
     # What differs from machine to machine says nothing.
