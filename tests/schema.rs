@@ -275,7 +275,8 @@ fn shipped_new_and_exported_configurations_fit_the_schema() {
     let list = stdout(&actcheck(root(), &["list", "--history", &history, "--format", "csv"]));
     let run = list.lines().nth(1).and_then(|line| line.split(',').next()).expect("there is a run");
     let case = here("case.toml").display().to_string();
-    let export = actcheck(root(), &["export", run, "--history", &history, "-o", &case]);
+    let export =
+        actcheck(root(), &["export", run, "--history", &history, "--config", "configs/quick.toml", "-o", &case]);
     assert!(export.status.success(), "{}", stderr(&export));
     assert!(Files::Disk.list(folder.path()).len() >= 11);
     if let Some(refused) = refused_by_schema(folder.path()) {
