@@ -155,3 +155,31 @@ fn the_package_and_the_program_agree_on_version_and_needs() {
         assert_eq!(line(&package, key), line(&wheel, key));
     }
 }
+
+/// What a source file includes from elsewhere is in the tree that wheel and source distribution are built from: it would not compile else.
+#[test]
+fn the_source_distribution_has_every_included_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("source");
+    foreign::run(Command::new(root().join("clients/wheel/stage")).arg(&source)).unwrap();
+    let (mut folders, mut found) = (vec![source.join("src")], 0);
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                for behind in text.split("include_").skip(1) {
+                    let Some((_, name)) = behind.split_once("!(\"").filter(|(kind, _)| ["str", "bytes"].contains(kind))
+                    else {
+                        continue;
+                    };
+                    let name = name.split('"').next().unwrap();
+                    assert!(folder.join(name).is_file(), "{} includes {name}", path.display());
+                    found += 1;
+                }
+            }
+        }
+    }
+    assert!(found > 30, "{found}");
+}
