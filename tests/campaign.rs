@@ -165,6 +165,8 @@ fn killing_a_campaign_loses_no_reported_run_and_leaves_no_half_one() {
             format!("echo $$ > pid{round}; exec {program} run configs/look.toml --runs 400 --history {history}");
         let mut child = Command::new("script")
             .args(["-qfc", &command, seen.to_str().unwrap()])
+            // Whatever terminal the tests run in: a dumb one shows no bar.
+            .env("TERM", "xterm")
             .current_dir(project.path())
             .stdin(Stdio::null())
             .stdout(Stdio::null())

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::OnceLock;
 
 use crate::support::{actcheck, foreign, root, stderr, stdout};
 
@@ -74,8 +75,15 @@ fn bash_completes_commands_and_options() {
 
 /// A page as people see it, or its source where there is no groff; warnings are faults.
 fn rendered(page: &Path) -> String {
-    if !foreign::has("groff") {
-        foreign::left_out("how manual pages look", "there is no groff");
+    static HAS_GROFF: OnceLock<bool> = OnceLock::new();
+    let has_groff = *HAS_GROFF.get_or_init(|| {
+        let found = foreign::has("groff");
+        if !found {
+            foreign::left_out("how manual pages look", "there is no groff");
+        }
+        found
+    });
+    if !has_groff {
         return std::fs::read_to_string(page).unwrap().replace("\\-", "-");
     }
     let output = Command::new("groff").args(["-Kutf8", "-man", "-Tutf8", "-P-c", "-ww"]).arg(page).output().unwrap();

@@ -183,7 +183,7 @@ fn what_can_not_go_on_is_refused_with_the_reason() {
         }
     };
     refused(&["run", "--resume"], &["X002", "there is none in this folder"]);
-    refused(&["run"], &["CONFIG"]);
+    refused(&["run"], &["X014", "needs a configuration"]);
     refused(&["run", "configs/pick.toml", "--resume", "--runs", "3"], &["--runs"]);
     let done = json(folder, &["run", "configs/pick.toml", "--runs", "1", "--history", "h"]);
     let id = done["campaign"].as_str().unwrap();
