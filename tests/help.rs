@@ -73,7 +73,7 @@ fn bash_completes_commands_and_options() {
     }
 }
 
-/// A page as people see it, or its source where there is no groff; warnings are faults.
+/// The rendered page, or its source if groff is not installed. A warning of groff fails the test.
 fn rendered(page: &Path) -> String {
     static HAS_GROFF: OnceLock<bool> = OnceLock::new();
     let has_groff = *HAS_GROFF.get_or_init(|| {

@@ -34,7 +34,7 @@ impl NewFiles {
         Ok(())
     }
 
-    /// Writes all files and the folders that they need. On a fault, what was written is removed again.
+    /// Writes all files and the folders that they need. If one fails, removes those that it has written.
     ///
     /// # Errors
     /// X015: one of the files exists. X007: one can't be written.
@@ -81,7 +81,7 @@ fn make_folders(file: &Path, made: &mut Vec<PathBuf>) -> Result<(), Diagnostics>
     Ok(())
 }
 
-/// Removes files and folders that were made, last first. What can't be removed is left: the fault that led here is reported.
+/// Removes files and folders, the last one first. Ignores errors: the caller reports the fault that came before.
 fn take_back(made: &[PathBuf]) {
     for path in made.iter().rev() {
         let _ = if path.is_dir() { fs::remove_dir(path) } else { fs::remove_file(path) };
