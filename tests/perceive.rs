@@ -109,7 +109,7 @@ fn what_is_not_perceived_is_not_picked() {
     let env = env("[\"PerceivePlane\", \"Pick\"]", "[camera]\ndropout = 1\n");
     let run = run(&env, Choices::random(1, 0), None);
     assert_eq!(report(&run, 0).message, "no level surface was found");
-    assert_eq!(report(&run, 1).message, "nothing that was perceived is like glass_1");
+    assert_eq!(report(&run, 1).message, "no perceived object matches glass_1");
     assert!(outcomes(&run, 0).values().all(|outcome| *outcome == Outcome::Failed), "{:?}", run.judgements);
     assert_eq!(outcomes(&run, 1)["MovedObject"], Outcome::Failed);
 }

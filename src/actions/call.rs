@@ -1,4 +1,4 @@
-//! What can be asked for.
+//! A call of an action with its parameters.
 
 use std::collections::BTreeMap;
 

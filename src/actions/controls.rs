@@ -1,26 +1,26 @@
-//! What an outside controller asks of the robot, and the ticks that it asks for: positions, speeds and efforts joint by joint.
+//! Targets from an external controller, and the ticks it requests: positions, velocities and efforts per joint.
 //!
-//! A speed is a setpoint that moves: the position controllers follow it, as those of most robots do.
+//! A velocity is a moving setpoint that the position controllers follow, as on most robots.
 
 use crate::actions::memory;
 use crate::actions::operator::{Interrupt, Operator};
 use crate::scenario::Camera;
 use crate::world::Sighting;
 
-/// How far a moving setpoint runs ahead of a joint that is held back, at most: so long at the joint's largest speed. Unit:
-/// seconds. Less would be felt as weakness, more as a jerk once the joint is free.
+/// How far a moving setpoint may run ahead of a blocked joint, as time at the joint's velocity limit. Unit: seconds. A
+/// smaller value makes the joint feel weak, a larger one makes it jerk when it comes free.
 const AHEAD_SECS: f64 = 0.1;
 
-/// New targets. What is not named keeps the one that it has.
+/// New targets. Anything not named keeps its previous target.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Controls {
-    /// Where joints shall go, by index. Units: metres or radians.
+    /// Target positions by joint index. Units: metres or radians.
     pub positions: Vec<(usize, f64)>,
-    /// How fast joints shall move. Units: m/s or rad/s.
+    /// Target velocities by joint index. Units: m/s or rad/s.
     pub velocities: Vec<(usize, f64)>,
-    /// What joints' motors shall give, beyond what holds the robot's own weight. Units: newtons or newton metres.
+    /// Motor efforts by joint index, on top of gravity compensation. Units: newtons or newton metres.
     pub efforts: Vec<(usize, f64)>,
-    /// How fast the base shall drive: forwards, to the left, and turning to the left. Frame: the base's. Units: m/s, rad/s.
+    /// Base velocity: forwards, left, and turning left. Frame: the base's. Units: m/s, rad/s.
     pub base_velocity: Option<[f64; 3]>,
     /// Gap between the fingers. Unit: metres.
     pub opening_m: Option<f64>,
@@ -28,7 +28,7 @@ pub struct Controls {
     pub force_n: Option<f64>,
 }
 
-/// What moves by itself from tick to tick.
+/// Setpoints that move from tick to tick.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Drives {
     velocities: Vec<(usize, f64)>,
@@ -36,7 +36,7 @@ pub(super) struct Drives {
 }
 
 impl Operator<'_> {
-    /// Takes new targets. Those of the base's joints end a base velocity, and the other way round.
+    /// Sets new targets. Targets for the base's joints cancel a base velocity, and vice versa.
     pub fn steer(&mut self, controls: &Controls) {
         let named = |joint: usize| {
             let lists = [&controls.positions, &controls.velocities, &controls.efforts];
@@ -67,7 +67,7 @@ impl Operator<'_> {
         }
     }
 
-    /// Lets so many control ticks pass.
+    /// Advances the simulation by this number of control ticks.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -78,17 +78,17 @@ impl Operator<'_> {
         })
     }
 
-    /// What is left of the action's budget. Unit: seconds.
+    /// Time left in the action's budget. Unit: seconds.
     pub fn budget_left_secs(&self) -> f64 {
         (self.budget_secs - self.elapsed_secs()).max(0.0)
     }
 
-    /// The force that the fingers are told to press with. Unit: newtons.
+    /// Commanded grip force. Unit: newtons.
     pub fn grip_force_n(&self) -> f64 {
         self.command.grip_force_n
     }
 
-    /// What an earlier look around of the run perceived that may be the thing of this id.
+    /// The object perceived earlier in this run that best matches this id, if any.
     pub fn recall(&self, id: &str) -> Option<Sighting> {
         let perceived = self.memory().perceived.as_ref()?;
         let kind = self.kind_of(id)?;
@@ -100,12 +100,13 @@ impl Operator<'_> {
         self.world.camera()
     }
 
-    /// Where everything truly is. For programs that a campaign lets in on it, and for no skill of ours.
+    /// True poses of all objects. For external programs that the campaign allows to see ground truth; reference skills
+    /// must not use it.
     pub fn truth(&self) -> Vec<Sighting> {
         self.world.truth()
     }
 
-    /// Moves the setpoints of what has a speed on by one tick.
+    /// Advances the setpoints of all joints with a velocity by one tick.
     fn drive(&mut self) {
         if self.drives.velocities.is_empty() && self.drives.base.is_none() && self.command.efforts.is_empty() {
             return;
@@ -121,7 +122,7 @@ impl Operator<'_> {
             let moved = (*setpoint + speed * tick).clamp(is - ahead, is + ahead);
             *setpoint = moved.clamp(known.lower, known.upper);
         }
-        // Where effort is all that is asked for, the joint goes on from where it then is.
+        // For effort-controlled joints, the position setpoint follows the observed position.
         for (joint, _) in &self.command.efforts {
             if let (Some(setpoint), Some(is)) = (self.command.positions.get_mut(*joint), observed.get(*joint)) {
                 *setpoint = *is;

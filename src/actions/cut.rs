@@ -1,4 +1,4 @@
-//! What ends a run from outside, whatever its actions do.
+//! Limits that cut a run off, regardless of its actions.
 
 /// When a run is cut off. The action in progress then ends as [`crate::actions::ActionEnd::Cut`].
 #[derive(Debug, Clone, Copy, Default)]
@@ -6,25 +6,25 @@ pub enum Cut {
     /// Never.
     #[default]
     Never,
-    /// When the caller's clock shows this time: a run that takes too long by the clock on the wall.
+    /// When the caller's clock reaches this time, for runs that exceed their wall-clock limit.
     Clock {
         /// Seconds since any fixed moment.
         secs: fn() -> f64,
         /// The moment, by the same clock.
         at_secs: f64,
     },
-    /// At this simulated time, since the scene was built. So a run that the clock had cut off is made again, exactly.
+    /// At this simulated time since the scene was built. This reproduces exactly a run that the clock cut off.
     Simulated {
         /// Unit: seconds.
         at_secs: f64,
     },
 }
 
-/// What is said of a run that was cut off.
+/// Reason reported for a run that was cut off.
 pub(super) const REASON: &str = "the run took longer on the clock than `[budget] run_secs` allows";
 
 impl Cut {
-    /// Whether the run ends here. `time_secs` is simulated.
+    /// Whether the run ends at this simulated time.
     pub(super) fn is_due(&self, time_secs: f64) -> bool {
         match *self {
             Self::Never => false,

@@ -1,59 +1,59 @@
-//! How a thing could be taken: hand poses, by what is seen of its size.
+//! Grasp candidates: hand poses computed from an object's perceived size.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::world::Sighting;
 
-/// Where the hand comes from.
+/// Approach direction of the hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Approach {
-    /// Level, for tall things.
+    /// Horizontal, for tall objects.
     Side,
-    /// From above, for low things.
+    /// From above, for low objects.
     Top,
 }
 
-/// One way to take a thing.
+/// One grasp candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grasp {
-    /// Where the hand comes from.
+    /// Approach direction of the hand.
     pub approach: Approach,
     /// Pose of the grasp link when the fingers close. Frame: world, by the base's belief.
     pub pose: Isometry3<f64>,
-    /// Heading of the base meanwhile. Unit: radians.
+    /// Heading of the base during the grasp. Unit: radians.
     pub heading: f64,
-    /// Gap between the fingers on the way. Unit: metres.
+    /// Gap between the fingers during the approach. Unit: metres.
     pub opening_m: f64,
-    /// What speaks against it. Unit: that of a plan's cost, of which a metre of driving is 0.4.
+    /// Penalty of this candidate. Unit: that of a plan's cost, in which a metre of driving is 0.4.
     pub penalty: f64,
 }
 
-/// Things at least so high are taken from the side: the hand, 6 cm across, then clears what they stand on. Unit: metres.
+/// Objects at least this high are grasped from the side: the hand, 6 cm across, then clears the surface. Unit: metres.
 const TALL_M: f64 = 0.1;
-/// Lowest and highest place for a level hand above the foot: clear of the surface, below what is seldom as wide as the
-/// foot. Unit: metres.
+/// Lowest and highest position of a horizontal hand above the foot: clear of the surface, and below the upper part of
+/// objects, which is seldom as wide as the foot. Unit: metres.
 const SIDE_HEIGHT_M: (f64, f64) = (0.055, 0.11);
-/// How far below the top the hand goes from above. Unit: metres.
+/// How far below the top of the object the hand goes from above. Unit: metres.
 const TOP_DEPTH_M: f64 = 0.03;
-/// Lowest place of the grasp link from above: its fingers reach 2.5 cm further. Unit: metres.
+/// Lowest position of the grasp link from above: the fingers reach 2.5 cm further. Unit: metres.
 const TOP_LOWEST_M: f64 = 0.0275;
-/// Room that the widest opening has to leave beside a thing, both sides together. Unit: metres.
+/// Total room that the widest opening must leave beside an object, both sides together. Unit: metres.
 const LEAST_ROOM_M: f64 = 0.012;
-/// Sides that differ by less are taken for a round body. Unit: metres. Sensing gets sizes wrong by some millimetres.
+/// Objects whose sides differ by less are treated as round. Unit: metres. Perceived sizes are off by some millimetres.
 const ROUND_M: f64 = 0.015;
-/// How far a slanted hand points down, where one that points straight down does not reach. Unit: radians. Steep enough
-/// for the palm to clear what the fingers go around.
+/// Downward pitch of a slanted hand, used where a hand that points straight down is out of reach. Unit: radians. Steep
+/// enough for the palm to clear the object.
 const SLANT_RAD: f64 = 0.95;
-/// What speaks against a slanted hand: half a metre of driving.
+/// Penalty of a slanted hand: equal to half a metre of driving.
 const SLANT_PENALTY: f64 = 0.2;
-/// What speaks against taking a tall thing from above, or a low one from the side.
+/// Penalty for grasping a tall object from above, or a low one from the side.
 const UNUSUAL_PENALTY: f64 = 0.1;
-/// How much of a thing has to stand out above a level hand. Unit: metres.
+/// How much of an object must rise above a horizontal hand. Unit: metres.
 const SIDE_ABOVE_M: f64 = 0.01;
-/// Directions that are tried around a thing.
+/// Number of headings tried around an object.
 const N_HEADINGS: u32 = 24;
 
-/// All ways to take a thing with a gripper that opens so wide. None: it is too wide every way.
+/// All usual grasps of an object for a gripper with this opening. Empty if the object is too wide in every direction.
 pub fn grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
     let headings = (0..N_HEADINGS).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS));
     let tall = thing.size_m[2] >= TALL_M;
@@ -62,8 +62,8 @@ pub fn grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
     fitting(thing, max_opening_m, ways)
 }
 
-/// From the side, from above and slanted, whatever the thing's height: for an arm that can't choose where it stands, and for
-/// where the usual ways are not free. The fingers are across the heading.
+/// Grasps from the side, from above and slanted, regardless of the object's height: for fixed arms, and for cases where
+/// the usual grasps are not free. The fingers close across the heading.
 pub fn all_grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
     let headings = (0..N_HEADINGS).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS));
     let tall = thing.size_m[2] >= TALL_M;
@@ -81,21 +81,21 @@ pub fn all_grasps(thing: &Sighting, max_opening_m: f64) -> Vec<Grasp> {
     fitting(thing, max_opening_m, ways)
 }
 
-/// Those ways for which the gripper opens wide enough.
+/// The grasps for which the gripper opens wide enough.
 fn fitting(thing: &Sighting, max_opening_m: f64, ways: impl Iterator<Item = (f64, Grasp)>) -> Vec<Grasp> {
     ways.filter(|(across, _)| width_across(thing, *across) + LEAST_ROOM_M <= max_opening_m)
         .map(|(_, grasp)| Grasp { opening_m: max_opening_m, ..grasp })
         .collect()
 }
 
-/// The level way from one heading, and the heading to which the fingers are across.
+/// The horizontal grasp from one heading, with the heading across which the fingers close.
 fn from_side(thing: &Sighting, heading: f64) -> (f64, Grasp) {
     let height = (thing.size_m[2] / 2.0).clamp(SIDE_HEIGHT_M.0, SIDE_HEIGHT_M.1);
     let pose = hand(thing, height, heading, 0.0);
     (heading, Grasp { approach: Approach::Side, pose, heading, opening_m: 0.0, penalty: 0.0 })
 }
 
-/// The ways from above with the base at one heading, each with the heading to which the fingers are across.
+/// The grasps from above with the base at one heading, each with the heading across which the fingers close.
 fn from_above(thing: &Sighting, heading: f64) -> Vec<(f64, Grasp)> {
     let turned = |eighth: u32| {
         let (across, grasp) = straight_down(thing, heading + std::f64::consts::FRAC_PI_4 * f64::from(eighth));
@@ -118,7 +118,7 @@ fn downwards(thing: &Sighting, heading: f64, pitch: f64, penalty: f64) -> (f64, 
     (heading, Grasp { approach: Approach::Top, pose, heading, opening_m: 0.0, penalty })
 }
 
-/// The grasp link at a height above a thing's foot, heading somewhere and pointing down by an angle.
+/// Pose of the grasp link at a height above an object's foot, with this heading and downward pitch.
 fn hand(thing: &Sighting, height: f64, heading: f64, pitch: f64) -> Isometry3<f64> {
     let [x, y, z] = thing.pose.position;
     let (sin, cos) = (libm::sin(heading), libm::cos(heading));
@@ -129,7 +129,7 @@ fn hand(thing: &Sighting, height: f64, heading: f64, pitch: f64) -> Isometry3<f6
     Isometry3::from_parts(Translation3::new(x, y, z + height), rotation)
 }
 
-/// Width of a thing across the fingers of a hand that heads somewhere. Unit: metres.
+/// Width of an object across the fingers of a hand with this heading. Unit: metres.
 fn width_across(thing: &Sighting, heading: f64) -> f64 {
     let [width, depth, _] = thing.size_m;
     if (width - depth).abs() < ROUND_M {

@@ -1,25 +1,25 @@
-//! What fingers feel: whether they hold something, and whether it stays.
+//! Grip sensing: whether the fingers hold something, and whether it slips.
 
 use crate::actions::operator::{Interrupt, Operator};
 use crate::world::Observation;
 
-/// A gap under this means that the fingers met: nothing is between them. Unit: metres. Three times the usual noise.
+/// A smaller gap means that the fingers met with nothing between them. Unit: metres. Three times the usual noise.
 pub const EMPTY_M: f64 = 0.006;
-/// Longest time that fingers get to close. Unit: seconds.
+/// Longest time for the fingers to close. Unit: seconds.
 const CLOSE_SECS: f64 = 2.5;
-/// Fingers that close slower than this have stalled. Unit: m/s.
+/// Fingers that close more slowly than this have stalled. Unit: m/s.
 const STALLED: f64 = 0.003;
-/// Share of the grip force that stalled fingers have to feel.
+/// Share of the grip force that stalled fingers must exert.
 const FELT_SHARE: f64 = 0.7;
-/// Fingers that close further by this have lost their hold. Unit: metres. A mug that turns between them until they lie flat
-/// gives way by less.
+/// Fingers that close further by this much have lost their hold. Unit: metres. A mug that turns between the fingers
+/// until they lie flat gives way by less.
 const GAVE_WAY_M: f64 = 0.012;
-/// Share of the grip force below which there is nothing that resists. Half of what stalled fingers have to feel.
+/// Share of the grip force below which nothing resists the fingers. Half of the share for stalled fingers.
 const WEAK_SHARE: f64 = 0.35;
-/// Control ticks for which a hold may be weak: braking shakes it for less. A tenth of a second.
+/// Control ticks after which a weak hold counts as lost: braking weakens it for a shorter time. A tenth of a second.
 const WEAK_TICKS: u32 = 6;
 
-/// Closes the fingers until they stall. True if they stalled on something.
+/// Closes the fingers until they stall. Returns `true` if they stalled on something.
 ///
 /// # Errors
 /// [`Interrupt`] if the action has to end.
@@ -35,17 +35,17 @@ pub fn close(robot: &mut Operator<'_>) -> Result<bool, Interrupt> {
     Ok(feels(robot))
 }
 
-/// Whether both fingers push with about the force that they were told.
+/// Whether both fingers push with about the commanded force.
 pub fn feels(robot: &Operator<'_>) -> bool {
     feels_in(&robot.observe(), robot.profile().grip_force_n)
 }
 
-/// The same of what was observed, of fingers that were told to press with this force.
+/// Whether both observed finger efforts are close to the commanded force.
 pub fn feels_in(observed: &Observation, grip_force_n: f64) -> bool {
     observed.finger_efforts_n.iter().all(|effort| *effort > FELT_SHARE * grip_force_n)
 }
 
-/// Feels, tick by tick, whether a hand still holds what it closed on.
+/// Checks at every tick whether a hand still holds the object it closed on.
 #[derive(Debug, Clone)]
 pub struct GripWatch {
     opening_m: f64,
@@ -55,13 +55,13 @@ pub struct GripWatch {
 }
 
 impl GripWatch {
-    /// Begins with what is felt now, of fingers that were told to press with this force.
+    /// Starts from the current observation, with fingers commanded to press with this force.
     pub fn new(observed: &Observation, grip_force_n: f64) -> Self {
         let weak_n = WEAK_SHARE * grip_force_n;
         Self { opening_m: observed.gripper_opening_m, weak_n, weak_ticks: 0, slipped: false }
     }
 
-    /// One control tick later.
+    /// Updates with the observation of the next control tick.
     pub fn look(&mut self, observed: &Observation) {
         let weak = observed.finger_efforts_n.iter().any(|effort| *effort < self.weak_n);
         self.weak_ticks = if weak { self.weak_ticks + 1 } else { 0 };
@@ -69,7 +69,7 @@ impl GripWatch {
         self.slipped = self.slipped || gave_way || self.weak_ticks >= WEAK_TICKS;
     }
 
-    /// Whether the hold was lost at any moment.
+    /// Whether the hold was lost at any time.
     pub fn slipped(&self) -> bool {
         self.slipped
     }

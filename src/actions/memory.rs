@@ -1,4 +1,4 @@
-//! What the robot knows from earlier actions of a run.
+//! The robot's knowledge from earlier actions of a run.
 
 use std::collections::BTreeMap;
 
@@ -9,36 +9,36 @@ use crate::base::Pose;
 use crate::scenario::KnownKind;
 use crate::world::Sighting;
 
-/// The robot's beliefs about its surroundings. A new run begins with none.
+/// The robot's beliefs about its surroundings. Empty at the start of a run.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Memory {
-    /// What the last look around found; nothing where there was none.
+    /// Result of the last perception; `None` before the first.
     pub perceived: Option<Perceived>,
-    /// What the hand holds; nothing where it is believed to be empty.
+    /// The object in the hand; `None` if the hand is believed to be empty.
     pub held: Option<Held>,
-    /// What the last drive saw on the floor that is not on the map.
+    /// Obstacles that the last drive saw on the floor and that are not on the map.
     pub floor: Vec<Standing>,
 }
 
-/// A piece of the floor, as large as a cell of a grid, on which something was seen.
+/// A grid cell of the floor on which something was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
-    /// Its middle. Unit: metres. Frame: world, by the base's belief at that moment.
+    /// Centre of the cell. Unit: metres. Frame: world, by the base's belief at that moment.
     pub at_m: [f64; 2],
-    /// Height of the highest that was seen of it. Unit: metres.
+    /// Height of the highest point seen in the cell. Unit: metres.
     pub top_m: f64,
 }
 
-/// What was taken, by what was perceived of it and felt when the hand closed.
+/// A grasped object, as perceived and as felt when the hand closed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Held {
-    /// What was asked for.
+    /// Id of the requested object.
     pub id: String,
-    /// Its dimensions along the axes of its foot. Unit: metres.
+    /// Dimensions along the axes of its foot. Unit: metres.
     pub size_m: [f64; 3],
-    /// Its upright foot when it was taken. Frame: world, by the base's belief.
+    /// Upright pose of its foot when it was grasped. Frame: world, by the base's belief.
     pub foot: Isometry3<f64>,
-    /// The grasp link at that moment. Frame: that of the foot.
+    /// Pose of the grasp link at that moment. Frame: that of the foot.
     pub grasp_from_foot: Isometry3<f64>,
     /// Heading of the base at that moment. Unit: radians.
     pub heading: f64,
@@ -46,17 +46,17 @@ pub struct Held {
     pub opening_m: f64,
 }
 
-/// How much a thing may be farther away for a centimetre that it fits better. No unit: both are metres.
+/// Weight of the distance against the size mismatch. No unit: both are metres.
 const DISTANCE_SHARE: f64 = 0.02;
 
-/// Which of the perceived things is the one that is asked for, and everything else. The surface is among the others, as
-/// furniture down to the floor.
+/// Chooses the perceived object that best matches the requested one and returns it with all other objects. The surface
+/// is among the others, as furniture that reaches down to the floor.
 ///
-/// Of several things of the kind the one that is nearest to the kind's size is taken, and of equal ones the nearest to
+/// Among objects of the requested kind, the one closest to the kind's size is chosen; ties go to the one nearest to
 /// `from`. Frame: world, by the base's belief.
 ///
 /// # Errors
-/// A sentence for the action's report: nothing of that kind was perceived.
+/// If nothing of that kind was perceived, a sentence for the action's report.
 pub fn recall(
     perceived: &Perceived,
     id: &str,
@@ -71,14 +71,14 @@ pub fn recall(
     let things = perceived.things.iter().enumerate().filter(|(_, thing)| of_kind(thing));
     let (chosen, target) = things
         .min_by(|(_, a), (_, b)| miss(a).total_cmp(&miss(b)))
-        .ok_or_else(|| format!("nothing that was perceived is like {id}"))?;
+        .ok_or_else(|| format!("no perceived object matches {id}"))?;
     let others = perceived.things.iter().enumerate().filter(|(idx, _)| *idx != chosen);
     let surface = perceived.plane.map(|plane| furniture("surface", &plane));
     let others = others.map(|(idx, thing)| sighting(format!("thing_{}", idx + 1), thing)).chain(surface);
     Ok((sighting(id.to_owned(), target), others.collect()))
 }
 
-/// The furniture of a map but for the piece whose top was perceived, which is known better than by the map.
+/// The furniture of a map, except the piece whose top was perceived: its percept is more accurate than the map.
 pub fn elsewhere(map: Vec<Sighting>, perceived: &Perceived) -> Vec<Sighting> {
     let is_other = |piece: &Sighting| {
         perceived.plane.is_none_or(|plane| {
@@ -89,7 +89,7 @@ pub fn elsewhere(map: Vec<Sighting>, perceived: &Perceived) -> Vec<Sighting> {
     map.into_iter().filter(is_other).collect()
 }
 
-/// What carries a surface: a box down to the floor.
+/// The furniture below a surface, as a box down to the floor.
 pub fn furniture(id: &str, plane: &PerceivedPlane) -> Sighting {
     let [x, y, height] = plane.pose.position;
     let [width, depth] = plane.size_m;
@@ -97,10 +97,10 @@ pub fn furniture(id: &str, plane: &PerceivedPlane) -> Sighting {
     Sighting { id: id.to_owned(), pose, size_m: [width, depth, height], furniture: true }
 }
 
-/// Edge of the squares in which pieces of the floor are gathered. Unit: metres. Two cells of a grid.
+/// Edge of the squares that floor cells are merged into. Unit: metres. Two cells of a grid.
 const PIECE_M: f64 = 0.1;
 
-/// What was seen on the floor, as things that the arm and the base keep clear of: one for each square that has any.
+/// Obstacles seen on the floor, for the arm and the base to avoid: one per occupied square.
 pub fn obstacles(floor: &[Standing]) -> Vec<Sighting> {
     let mut tops: BTreeMap<[i64; 2], f64> = BTreeMap::new();
     for Standing { at_m, top_m } in floor {
@@ -117,7 +117,7 @@ pub fn obstacles(floor: &[Standing]) -> Vec<Sighting> {
     tops.into_iter().enumerate().map(piece).collect()
 }
 
-/// A thing as the abstract detector would give it.
+/// Converts a percept to a sighting, the format of the abstract detector.
 pub fn sighting(id: String, thing: &PerceivedThing) -> Sighting {
     Sighting { id, pose: thing.pose, size_m: thing.size_m, furniture: false }
 }
@@ -178,9 +178,6 @@ mod tests {
 
     #[test]
     fn what_was_not_perceived_can_not_be_taken() {
-        assert_eq!(
-            recalled(vec![thing(None, 0.5, 0.146)]),
-            Err("nothing that was perceived is like glass_1".to_owned())
-        );
+        assert_eq!(recalled(vec![thing(None, 0.5, 0.146)]), Err("no perceived object matches glass_1".to_owned()));
     }
 }

@@ -1,6 +1,6 @@
-//! The robot's actions over commands and observations: our reference skills, and the trace of what happened.
+//! The robot's actions, performed through commands and observations: the reference skills and the recorded trace.
 //!
-//! Never: reads the simulation's truth inside a skill, judges an action, or knows a property.
+//! Never: reads ground truth inside a skill, judges an action, or knows a property.
 
 mod call;
 mod controls;
@@ -39,7 +39,7 @@ pub use trace::{
     PerceivedThing, Percept, Phase, Trace,
 };
 
-// States and the map are part of a trace: its readers meet them here.
+// World states and the map are part of a trace, so they are re-exported here.
 pub use crate::scenario::SceneMap;
 pub use crate::world::{
     BodyState, HeldCourse, JointCourse, JointState, Quality, RobotCourse, RobotState, SelfCollision, Snapshot,

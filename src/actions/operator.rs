@@ -1,4 +1,4 @@
-//! What a skill has in hand: joint commands, measurements and noisy sight. The world's truth stays behind it.
+//! The interface of a skill: joint commands, measurements and noisy perception. Ground truth is not accessible.
 
 use nalgebra::Isometry3;
 
@@ -11,25 +11,25 @@ use crate::base::Choices;
 use crate::scenario::{FloorPlan, KnownKind, RobotProfile};
 use crate::world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
 
-/// Why a skill has to stop.
+/// Reason why a skill has to stop.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Interrupt {
-    /// Simulation is at fault.
+    /// A fault of the simulation.
     Fault,
-    /// The action's time is up.
+    /// The action's time budget is exhausted.
     Budget,
-    /// The run is cut off from outside.
+    /// The run is cut off.
     Cut,
-    /// What performs it from outside is at fault.
+    /// A fault of the external skill.
     Outside(OutsideFault),
 }
 
-/// Share of a joint's velocity limit that skills use: room for the controller to catch up.
+/// Share of a joint's velocity limit that skills use, so that the controller can catch up.
 const SPEED_SHARE: f64 = 0.9;
 /// Peak over mean speed of a motion that starts and ends at rest (of 3s² − 2s³).
 const PEAK_OVER_MEAN: f64 = 1.5;
 
-/// The robot as a skill sees it, for the time of one action.
+/// The robot as a skill sees it, for the duration of one action.
 pub struct Operator<'a> {
     pub(super) world: &'a mut World,
     choices: &'a mut Choices,
@@ -37,23 +37,24 @@ pub struct Operator<'a> {
     pub(super) command: Command,
     start_secs: f64,
     pub(super) budget_secs: f64,
-    /// What an outside controller keeps moving.
+    /// Moving setpoints of an external controller.
     pub(super) drives: Drives,
     cut: Cut,
-    /// Who makes things go wrong on purpose; nobody as a rule.
+    /// Injects faults on purpose; usually `None`.
     saboteur: Option<&'a mut Saboteur>,
-    /// Who feels whether the hand still holds what it took, while it does.
+    /// Watches the grip while the hand holds an object.
     grip: Option<GripWatch>,
     /// Phases begun so far.
     pub phases: Vec<Phase>,
-    /// What was seen so far.
+    /// Objects seen so far.
     pub percepts: Vec<Percept>,
-    /// What was made of pictures so far.
+    /// Interpretation of the pictures so far.
     pub perceived: Option<Perceived>,
 }
 
 impl<'a> Operator<'a> {
-    /// The robot at the beginning of an action that may take `budget_secs` of simulated time, with what interferes from outside.
+    /// The robot at the beginning of an action with a budget of `budget_secs` of simulated time, with optional
+    /// interference.
     pub fn new(
         world: &'a mut World,
         choices: &'a mut Choices,
@@ -63,7 +64,7 @@ impl<'a> Operator<'a> {
     ) -> Self {
         let (mut command, start_secs) = (world.hold(), world.time_secs());
         if memory.held.is_some() {
-            // A hand that holds something goes on pressing.
+            // A hand that holds an object keeps pressing.
             command.gripper_opening_m = 0.0;
         }
         let (phases, percepts) = (Vec::new(), Vec::new());
@@ -84,7 +85,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Lets a skill act, unless the robot is sabotaged into doing nothing. What is reported can be sabotaged too.
+    /// Runs a skill, unless the robot is sabotaged into doing nothing. The report can be sabotaged too.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -104,7 +105,7 @@ impl<'a> Operator<'a> {
         })
     }
 
-    /// Names what follows.
+    /// Begins a phase with this name.
     pub fn begin(&mut self, phase: &str) {
         self.phases.push(Phase { name: phase.to_owned(), start_secs: self.elapsed_secs() });
     }
@@ -119,17 +120,17 @@ impl<'a> Operator<'a> {
         self.world.kinematics()
     }
 
-    /// Which joints are what.
+    /// The roles of the joints.
     pub fn layout(&self) -> &Layout {
         self.world.layout()
     }
 
-    /// What the robot knows of itself.
+    /// The robot's knowledge about itself.
     pub fn profile(&self) -> &RobotProfile {
         self.world.profile()
     }
 
-    /// What the robot measures of itself.
+    /// The robot's measurements of itself.
     pub fn observe(&self) -> Observation {
         let observed = self.world.observe();
         match &self.saboteur {
@@ -138,25 +139,25 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Where the base stands. Frame: world, by its own belief.
+    /// Pose of the base. Frame: world, by the robot's own belief.
     pub fn base(&self) -> Isometry3<f64> {
         self.base_of(&self.observe().positions)
     }
 
-    /// Where the base stands for given joint positions.
+    /// Pose of the base for given joint positions.
     pub fn base_of(&self, positions: &[f64]) -> Isometry3<f64> {
         let links = self.kinematics().links(positions);
-        // The link with this number is moved by the joint before it.
+        // The link with this index is moved by the joint before it.
         let link = self.layout().base.map_or(0, |[.., heading]| heading + 1);
         links.get(link).copied().unwrap_or_else(Isometry3::identity)
     }
 
-    /// Joint positions that the controllers were last told.
+    /// The last commanded joint positions.
     pub fn commanded(&self) -> &[f64] {
         &self.command.positions
     }
 
-    /// The kinds of things that the robot can tell apart.
+    /// The kinds of objects that the robot can recognise.
     pub fn known_kinds(&self) -> &[KnownKind] {
         self.world.known_kinds()
     }
@@ -166,7 +167,7 @@ impl<'a> Operator<'a> {
         self.world.floor_plan()
     }
 
-    /// The kind of thing that a designator's value stands for.
+    /// The kind of object that a designator's value refers to.
     pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
         self.world.kind_of(id)
     }
@@ -176,28 +177,28 @@ impl<'a> Operator<'a> {
         self.world.look(self.choices)
     }
 
-    /// Which postures a planner of arm motion samples: a number from 0 to 1, recorded like every decision.
+    /// Selects the sequence of postures that an arm planner samples: a number from 0 to 1, recorded like every choice.
     pub fn choose_samples(&mut self) -> f64 {
         self.choices.real("motion.samples", 0.0, 1.0, 0.5)
     }
 
-    /// What earlier actions of the run left to know.
+    /// Knowledge from earlier actions of the run.
     pub fn memory(&self) -> &Memory {
         self.memory
     }
 
-    /// Keeps what was made of pictures, for later actions and for the trace.
+    /// Keeps the interpretation of pictures for later actions and for the trace.
     pub fn remember(&mut self, perceived: Perceived) {
         self.memory.perceived = Some(perceived.clone());
         self.perceived = Some(perceived);
     }
 
-    /// Keeps what a drive saw on the floor, for later drives and for the arm.
+    /// Keeps the obstacles that a drive saw on the floor, for later drives and for the arm.
     pub fn remember_floor(&mut self, floor: Vec<Standing>) {
         self.memory.floor = floor;
     }
 
-    /// Keeps what the hand holds now, for later actions: nothing once it is empty.
+    /// Keeps the object now held, for later actions; `None` once the hand is empty.
     pub fn hold(&mut self, held: Option<Held>) {
         if held.is_none() {
             self.grip = None;
@@ -205,32 +206,32 @@ impl<'a> Operator<'a> {
         self.memory.held = held;
     }
 
-    /// From now on the robot feels whether what it holds stays in its hand.
+    /// Starts watching whether the held object stays in the hand.
     pub fn watch_grip(&mut self) {
         self.grip = Some(GripWatch::new(&self.observe(), self.profile().grip_force_n));
     }
 
-    /// Whether it has felt something slip since it watches.
+    /// Whether a slip was felt since the watch began.
     pub fn felt_slip(&self) -> bool {
         self.grip.as_ref().is_some_and(GripWatch::slipped)
     }
 
-    /// What stands in the world for good and what shall be driven to, by the plan that the base drives with.
+    /// Fixed furniture and drive targets, according to the floor plan that the base uses.
     pub fn known_furniture(&self) -> Vec<Sighting> {
         self.world.known_furniture()
     }
 
-    /// The same, where the world is one that the robot has a map of; otherwise nothing.
+    /// The same if the robot has a map of this world, otherwise `None`.
     pub fn map_of_furniture(&self) -> Option<Vec<Sighting>> {
         self.world.map_of_furniture()
     }
 
-    /// Notes what the robot takes for an object.
+    /// Records a percept.
     pub fn take_for(&mut self, seen: &Sighting) {
         self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
     }
 
-    /// Looks at one object, by an abstract detector: the truth with noise, and never a miss.
+    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection.
     pub fn see(&mut self, id: &str) -> Option<Sighting> {
         let mut seen = self.world.perceive(id, self.choices)?;
         if let Some(saboteur) = &mut self.saboteur {
@@ -240,28 +241,29 @@ impl<'a> Operator<'a> {
         Some(seen)
     }
 
-    /// Looks at everything but one object.
+    /// Looks at every object except one.
     pub fn see_others(&mut self, but: &str) -> Vec<Sighting> {
         self.see_if(|id| id != but)
     }
 
-    /// Looks at everything whose id is asked for.
+    /// Looks at every object whose id is accepted.
     pub fn see_if(&mut self, wanted: impl Fn(&str) -> bool) -> Vec<Sighting> {
         let ids = self.world.visible();
         ids.iter().filter(|id| wanted(id)).filter_map(|id| self.see(id)).collect()
     }
 
-    /// Feels the gap between the fingers. Unit: metres.
+    /// Senses the gap between the fingers. Unit: metres.
     pub fn feel_opening(&mut self) -> f64 {
         let felt = self.world.feel_opening(self.choices);
         match &self.saboteur {
             None => felt,
-            // The gap as it was sensed, with the error that the sensor makes.
+            // The sabotaged gap plus the sensor's error.
             Some(_) => felt + self.observe().gripper_opening_m - self.world.observe().gripper_opening_m,
         }
     }
 
-    /// Moves along joint positions, at rest at both ends, no faster than the joints allow and no shorter than `secs`.
+    /// Moves through joint positions, at rest at both ends, within the joints' velocity limits and in at least
+    /// `least_secs`.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -269,7 +271,7 @@ impl<'a> Operator<'a> {
         self.follow_until(path, least_secs, |_| false).map(|_| ())
     }
 
-    /// The same, but that the robot stops where it is as soon as `enough` says so. True if it did.
+    /// Like [`Self::follow`], but stops as soon as `enough` returns `true`. Returns whether it stopped early.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -298,12 +300,12 @@ impl<'a> Operator<'a> {
         Ok(false)
     }
 
-    /// Time between two commands. Unit: seconds.
+    /// Control period. Unit: seconds.
     pub fn tick_secs(&self) -> f64 {
         self.world.tick_secs()
     }
 
-    /// Sends joints towards positions for one tick; joints that are not named go on to where they were sent.
+    /// Commands joints to positions and advances one tick; other joints keep their targets.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -312,7 +314,7 @@ impl<'a> Operator<'a> {
         self.tick()
     }
 
-    /// Sets where joints go from now on.
+    /// Sets the targets of joints.
     pub fn aim(&mut self, joints: &[usize], positions: &[f64]) {
         for (joint, position) in joints.iter().zip(positions) {
             if let Some(commanded) = self.command.positions.get_mut(*joint) {
@@ -321,13 +323,13 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Sets the finger gap that the fingers go to from now on, with the profile's grip force.
+    /// Sets the target gap between the fingers, with the profile's grip force.
     pub fn set_opening(&mut self, opening_m: f64) {
         self.command.gripper_opening_m = opening_m;
         self.command.grip_force_n = self.profile().grip_force_n;
     }
 
-    /// Waits.
+    /// Waits for a simulated time.
     ///
     /// # Errors
     /// [`Interrupt`] if the action has to end.
@@ -368,7 +370,7 @@ impl<'a> Operator<'a> {
     }
 }
 
-/// The posture at a time along a course whose legs take the given times at full speed.
+/// The posture at a time along a path whose legs take the given times at full speed.
 fn along(course: &[Vec<f64>], legs: &[f64], mut time: f64) -> Vec<f64> {
     for (pair, leg) in course.windows(2).zip(legs) {
         if time <= *leg && *leg > 0.0 {

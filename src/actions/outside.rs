@@ -1,33 +1,33 @@
-//! Who performs actions instead of the reference skills.
+//! External skills that replace the reference skills.
 
 use crate::actions::operator::{Interrupt, Operator};
 use crate::actions::{ActionCall, ActionReport};
 use crate::world::World;
 
-/// Performs actions that somebody else wrote the skill of.
+/// Performs actions with a skill that is not part of actcheck.
 pub trait Outside {
-    /// A run begins in this world. Of the world nobody outside is told more than a robot knows of itself.
+    /// Begins a run in this world. The external skill learns no more about the world than a robot knows about itself.
     ///
     /// # Errors
-    /// The run can't be performed: its first action ends for this reason.
+    /// Returns an error if the run can't be performed; its first action then ends for this reason.
     fn begin_run(&mut self, world: &World) -> Result<(), OutsideFault>;
 
-    /// Whether it performs the action, once a run has begun.
+    /// Whether it performs the action. Valid once a run has begun.
     fn performs(&self, action: &str) -> bool;
 
-    /// Performs an action by commands and observations.
+    /// Performs an action through commands and observations.
     ///
     /// # Errors
-    /// [`Interrupt`] if the action has to end: what is outside may be the cause.
+    /// [`Interrupt`] if the action has to end, possibly because of the external skill.
     fn perform(&mut self, call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
 }
 
-/// What went wrong outside.
+/// A fault of an external skill.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}")]
 pub struct OutsideFault {
-    /// Whether it did not answer in time; otherwise it did something wrong.
+    /// Whether it failed to answer in time; otherwise it did something wrong.
     pub late: bool,
-    /// For people.
+    /// The reason, for people.
     pub reason: String,
 }

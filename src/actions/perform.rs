@@ -1,4 +1,4 @@
-//! Performs a list of actions and keeps what happened.
+//! Performs a list of actions and records the trace.
 
 use crate::actions::cut::{self, Cut};
 use crate::actions::memory::Memory;
@@ -14,26 +14,26 @@ use crate::world::World;
 
 /// Performs the actions in order with the reference skills.
 ///
-/// Faults and spent budgets end the run as data: later actions are there as not reached. An action whose own report is
-/// "failed" does not end the run, as with a real robot.
+/// Faults and exhausted budgets end the run but are returned as data: later actions are recorded as not reached. An
+/// action that reports "failed" does not end the run, as with a real robot.
 pub fn perform(calls: &[ActionCall], world: &mut World, choices: &mut Choices, budget: &Budget) -> Trace {
     perform_with(calls, world, choices, budget, Interference::default())
 }
 
-/// What comes into a run from outside. The default is nothing, as it should be.
+/// External interference with a run. The default is none.
 #[derive(Default)]
 pub struct Interference<'a> {
-    /// Where the run is cut off.
+    /// Limit at which the run is cut off.
     pub cut: Cut,
-    /// Who makes things go wrong on purpose.
+    /// Injects faults on purpose.
     pub saboteur: Option<&'a mut Saboteur>,
-    /// Who performs the actions that it knows, instead of the reference skills.
+    /// Performs the actions it knows, instead of the reference skills.
     pub outside: Option<&'a mut dyn Outside>,
 }
 
 /// Performs the actions as [`perform`] does, with interference from outside.
 ///
-/// The trace tells of the calls as they were meant.
+/// The trace records the calls as given, not as sabotaged.
 pub fn perform_with(
     calls: &[ActionCall],
     world: &mut World,
@@ -119,7 +119,7 @@ fn perform_one(
     (trace, record.robot)
 }
 
-/// An action of which nothing happened, and why.
+/// An action that never began, with the reason.
 fn never_begun(call: &ActionCall, end: ActionEnd) -> ActionTrace {
     ActionTrace { end, ..ActionTrace::not_reached(&call.action, &call.parameters) }
 }

@@ -1,4 +1,4 @@
-//! The pick skill: see (or remember what was perceived), drive, reach, close, lift, take away.
+//! The pick skill: look (or recall an earlier percept), drive, reach, close, lift, retreat.
 
 use crate::actions::grip::{EMPTY_M, close, feels};
 use crate::actions::memory::Held;
@@ -9,16 +9,16 @@ use crate::actions::{ActionCall, ActionReport, grasp, memory};
 use crate::base::Pose;
 use crate::world::Sighting;
 
-/// Designator of the thing to pick.
+/// Designator of the object to pick.
 const TARGET: &str = "pickObject";
-/// Time for looking. Unit: seconds.
+/// Duration of a look. Unit: seconds.
 const LOOK_SECS: f64 = 0.5;
-/// Shortest time of the last part of the way, about 6 cm/s. Unit: seconds.
+/// Shortest duration of the last part of the approach, at about 6 cm/s. Unit: seconds.
 const APPROACH_SECS: f64 = 2.5;
-/// Shortest time of the lift. Unit: seconds.
+/// Shortest duration of the lift. Unit: seconds.
 const LIFT_SECS: f64 = 2.0;
 
-/// Picks the designated thing up and reports whether it believes to have it.
+/// Picks up the designated object and reports whether the robot believes it holds it.
 ///
 /// # Errors
 /// [`Interrupt`] if simulation broke or time ran out.
@@ -63,14 +63,15 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.follow(&way.retreat, 0.0)?;
     robot.wait(LOOK_SECS)?;
     let report = report(robot, target, held);
-    // What settled between the fingers is as wide as they are apart now.
+    // The settled object is as wide as the gap between the fingers.
     let opening_m = robot.observe().gripper_opening_m;
     let held = robot.memory().held.clone().filter(|_| report.succeeded);
     robot.hold(held.map(|held| Held { opening_m, ..held }));
     Ok(report)
 }
 
-/// The target and everything else: as an earlier action of the run perceived it, otherwise by the abstract detector.
+/// The target and all other objects: as perceived by an earlier action of the run, otherwise from the abstract
+/// detector.
 fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), String> {
     if let Some(perceived) = &robot.memory().perceived {
         let kind = robot.kind_of(target).ok_or_else(|| format!("{target} is of no known kind"))?;
@@ -85,8 +86,9 @@ fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sightin
     Ok((seen, others))
 }
 
-/// Looks again with the hand before the thing, and moves the rest of the way by what the base turns out to be astray since the
-/// look around. What was seen in pictures can be looked at again; the abstract detector would only draw another error.
+/// Looks again with the hand in front of the object and corrects the rest of the plan by the drift of the base since
+/// the first look. Only objects seen in pictures can be looked at again; the abstract detector would only draw a new
+/// error.
 fn put_right(mut way: Plan, seen: Sighting, robot: &mut Operator<'_>) -> Result<(Plan, Sighting), Interrupt> {
     let plane = robot.memory().perceived.as_ref().and_then(|perceived| perceived.plane);
     let (Some(plane), Some(kind), Some([x, y, _])) = (plane, robot.kind_of(&seen.id), robot.layout().base) else {
@@ -107,7 +109,7 @@ fn put_right(mut way: Plan, seen: Sighting, robot: &mut Operator<'_>) -> Result<
     Ok((way, again))
 }
 
-/// Keeps what the hand closed on, for later actions.
+/// Keeps the grasped object in memory for later actions.
 fn remember(robot: &mut Operator<'_>, seen: &Sighting) {
     let observed = robot.observe();
     let foot = seen.pose.to_isometry();

@@ -1,4 +1,4 @@
-//! A way to a grasp and back that the robot can reach and that keeps clear of what it sees.
+//! Plans a reachable, collision-free path to a grasp and back.
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
@@ -12,62 +12,62 @@ use crate::world::{Kinematics, Layout, SelfContact, Sighting, ik};
 /// Joint positions for each leg of a pick.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// To in front of the furniture, arm as it is for driving.
+    /// In front of the furniture, with the arm in its driving posture.
     pub drive: Vec<Vec<f64>>,
-    /// The same place with the arm as it will take the thing.
+    /// The same base pose, with the arm unfolded for the grasp.
     pub reach: Vec<Vec<f64>>,
-    /// To where the hand is a little before the thing.
+    /// To a pose of the hand a short distance before the object.
     pub near: Vec<Vec<f64>>,
-    /// From there to the thing, straight.
+    /// From there straight to the object.
     pub approach: Vec<Vec<f64>>,
-    /// Straight up from there.
+    /// From there straight up.
     pub lift: Vec<Vec<f64>>,
-    /// Back out with it.
+    /// Back out with the object.
     pub retreat: Vec<Vec<f64>>,
-    /// What makes other plans better. No unit.
+    /// Cost for comparison with other plans. No unit.
     pub(super) cost: f64,
 }
 
-/// How far the hand lifts, the best first: the arm may not reach higher. Unit: metres.
+/// Lift heights, the best first: the arm may not reach higher. Unit: metres.
 pub(super) const LIFTS_M: [f64; 3] = [0.17, 0.13, 0.09];
-/// Length of the slow last part of the way. Unit: metres.
+/// Length of the slow last part of the approach. Unit: metres.
 pub(super) const APPROACH_M: f64 = 0.12;
-/// How far in front of the furniture's edge the hand stays while the arm unfolds. Unit: metres.
+/// Distance of the hand from the furniture's edge while the arm unfolds. Unit: metres.
 const OFF_EDGE_M: f64 = 0.1;
-/// Longest way from there to the thing. Unit: metres.
+/// Longest distance from there to the object. Unit: metres.
 const LONGEST_WAY_M: f64 = 1.2;
-/// Clearance to furniture that a plan must have: fingertips go down to it to take flat things. Unit: metres.
+/// Minimum clearance to furniture: fingertips go down to it to grasp flat objects. Unit: metres.
 pub(super) const FURNITURE_CLEAR_M: f64 = 0.002;
-/// Clearance to other things that is as good as any more. Unit: metres.
+/// Clearance to other objects beyond which more brings no benefit. Unit: metres.
 pub(super) const AMPLE_CLEAR_M: f64 = 0.04;
-/// Clearance to other things without which a plan is hopeless: the hand would go through their middle. Unit: metres.
+/// Minimum clearance to other objects: below it, the hand would go through their middle. Unit: metres.
 pub(super) const LEAST_CLEAR_M: f64 = -0.025;
-/// Distance between points and between postures that are checked for clearance. Unit: metres.
+/// Distance between points and between postures checked for clearance. Unit: metres.
 const CHECK_M: f64 = 0.03;
-/// Postures that are sampled where no arm unfolds straight to any grasp.
+/// Postures sampled if the arm can't unfold straight to any grasp.
 const MOST_SAMPLES: u32 = 4000;
-/// What is said where there is no plan.
-pub(super) const NO_WAY: &str = "no reachable and free way to it was found";
+/// Reason reported if there is no plan.
+pub(super) const NO_WAY: &str = "no reachable, collision-free path to it was found";
 
-/// What the hand is to do.
+/// The planner's task.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
-    /// Usual ways to do it, for a robot that drives.
+    /// Usual grasps, for a mobile robot.
     pub grasps: &'a [Grasp],
-    /// All ways, for an arm that can't drive, and for where none of the usual ones is free; none if there are no others.
+    /// All grasps, for a fixed arm and for cases where none of the usual grasps is free; empty if there are no others.
     pub all: &'a [Grasp],
-    /// What is taken: in the way until the hand is there. Nothing where the hand is full: then the arm goes straight, for what it
-    /// holds to stay level.
+    /// The object to grasp, which is an obstacle until the hand is there. `None` if the hand is full; a fixed arm then
+    /// only moves straight, to keep its load level.
     pub taken: Option<&'a Sighting>,
 }
 
-/// The best plan among all grasps, or why there is none.
+/// Returns the best plan among all grasps.
 ///
-/// Where the base moves, the arm unfolds straight, in front of the furniture; where no grasp can be had that way, unusual
-/// grasps and ways around are tried. Where the base stands still, see [`standing`].
+/// With a mobile base, the arm unfolds straight, in front of the furniture; if no grasp is possible that way, unusual
+/// grasps and sampled paths are tried. For a fixed base, see [`standing`].
 ///
 /// # Errors
-/// A sentence for the action's report.
+/// If there is no plan, the reason as a sentence for the action's report.
 pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]) -> Result<Plan, String> {
     let Some(base) = operator.layout().base else { return standing::plan(operator, wanted, others) };
     if let Some(plan) = best(&Planner::new(operator, base, others), wanted.grasps, &mut Samples::new(0.0, 0)) {
@@ -81,7 +81,7 @@ pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]
     best(&Planner::new(operator, base, others), &all, &mut samples).ok_or_else(|| NO_WAY.to_owned())
 }
 
-/// The best plan among some grasps.
+/// The best plan among these grasps.
 fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples) -> Option<Plan> {
     let mut seeds: Vec<(f64, &Grasp, Vec<f64>)> = Vec::new();
     for grasp in grasps {
@@ -92,7 +92,7 @@ fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples) -> Optio
             }
         }
     }
-    // The nearest first, so that most of the others can't be better any more.
+    // The nearest first, so that most of the others can be skipped.
     seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut best: Option<Plan> = None;
     for (_, grasp, seed) in seeds {
@@ -104,7 +104,7 @@ fn best(planner: &Planner<'_>, grasps: &[Grasp], samples: &mut Samples) -> Optio
     best
 }
 
-/// A way of the base to a place (x, y, heading), with the arm as it is; nothing if there is none.
+/// A path of the base to a pose (x, y, heading) with the arm as it is. Returns `None` if there is none.
 pub fn drive(operator: &Operator<'_>, to: [f64; 3], others: &[Sighting]) -> Option<Vec<Vec<f64>>> {
     let [x, y, heading] = operator.layout().base?;
     let planner = Planner::new(operator, [x, y, heading], others);
@@ -114,20 +114,20 @@ pub fn drive(operator: &Operator<'_>, to: [f64; 3], others: &[Sighting]) -> Opti
     planner.drive(&posture)
 }
 
-/// A robot that drives, and what is around it.
+/// A mobile robot and the obstacles around it.
 pub(super) struct Planner<'a> {
     pub(super) kinematics: &'a Kinematics,
     pub(super) layout: &'a Layout,
     /// The joints of the base: x, y, heading.
     pub(super) base: [usize; 3],
-    /// Joint positions to begin with.
+    /// Initial joint positions.
     pub(super) start: Vec<f64>,
     postures: Vec<Vec<f64>>,
     pub(super) points: Vec<(usize, Point3<f64>)>,
     pub(super) furniture: Vec<Block>,
     pub(super) things: Vec<Pillar>,
     ground: Ground,
-    /// Which postures let links go into each other.
+    /// Self-collision checks.
     pub(super) itself: SelfContact,
 }
 
@@ -146,11 +146,11 @@ impl<'a> Planner<'a> {
         Self { kinematics, layout, base, start, postures, points, furniture, things, ground, itself }
     }
 
-    /// A plan that costs less than `bound`, if there is one near the seed.
+    /// A plan near the seed that costs less than `bound`, if there is one.
     fn plan(&self, grasp: &Grasp, seed: &[f64], bound: f64, samples: &mut Samples) -> Option<Plan> {
         let back = -Vector3::new(libm::cos(grasp.heading), libm::sin(grasp.heading), 0.0);
         let way = self.way_out(&grasp.pose.translation.vector, &back)?;
-        // What the way alone costs, before anything is solved. (Solving moves the base by centimetres.)
+        // Cost of the drive alone, before inverse kinematics. (Inverse kinematics moves the base by centimetres.)
         if self.travel_cost(&self.moved(seed, &(back * way))) + grasp.penalty > bound + 0.05 {
             return None;
         }
@@ -162,7 +162,7 @@ impl<'a> Planner<'a> {
                 let before = self.moved(&at_thing, &(back * APPROACH_M.min(way)));
                 (vec![before], vec![at_thing.clone()])
             }
-            // Above it, which is where it will be lifted to.
+            // Above the object, at the height to which it will be lifted.
             Approach::Top => {
                 (vec![lifted.clone()], lift.iter().rev().skip(1).cloned().chain([at_thing.clone()]).collect())
             }
@@ -178,20 +178,20 @@ impl<'a> Planner<'a> {
         Some(plan)
     }
 
-    /// Whether the hand of a seed points within half a right angle of where the grasp wants it.
+    /// Whether the hand of a seed points within 45 degrees of the grasp's direction.
     fn points_along(&self, seed: &[f64], grasp: &Grasp) -> bool {
         let forward = |pose: &Isometry3<f64>| pose.rotation * Vector3::x();
         forward(&self.kinematics.grasp(seed)).dot(&forward(&grasp.pose)) > std::f64::consts::FRAC_1_SQRT_2
     }
 
-    /// What driving to a posture's base pose costs.
+    /// Cost of driving to a posture's base pose.
     pub(super) fn travel_cost(&self, positions: &[f64]) -> f64 {
         let [x, y, heading] = self.base;
         let way = length(positions[x] - self.start[x], positions[y] - self.start[y]);
         0.4 * way + 0.12 * (positions[heading] - self.start[heading]).abs()
     }
 
-    /// The posture with the base put so that the hand is over the thing, heading as the grasp wants it.
+    /// The posture with the base placed so that the hand is over the object with the grasp's heading.
     fn seed(&self, grasp: &Grasp, posture: &[f64]) -> Vec<f64> {
         let mut positions = self.start.clone();
         for (idx, value) in self.layout.arm.iter().zip(posture) {
@@ -219,7 +219,7 @@ impl<'a> Planner<'a> {
         ik::solve(self.kinematics, seed, &ik::Reach { target: *target, mobility })
     }
 
-    /// Distance back from the thing at which the hand is in front of all furniture. Unit: metres.
+    /// Distance back from the object at which the hand is in front of all furniture. Unit: metres.
     fn way_out(&self, from: &Vector3<f64>, back: &Vector3<f64>) -> Option<f64> {
         let mut way = APPROACH_M;
         while way < LONGEST_WAY_M {
@@ -232,7 +232,7 @@ impl<'a> Planner<'a> {
         None
     }
 
-    /// The same posture moved level, by the base.
+    /// The posture with the base moved horizontally.
     fn moved(&self, positions: &[f64], by: &Vector3<f64>) -> Vec<f64> {
         let mut positions = positions.to_vec();
         let [x, y, _] = self.base;
@@ -241,7 +241,7 @@ impl<'a> Planner<'a> {
         positions
     }
 
-    /// Postures on a straight way up, a few centimetres apart, with the base where it is.
+    /// Postures a few centimetres apart on a straight path up, with a fixed base.
     fn vertically(&self, positions: &[f64], height: f64) -> Option<Vec<Vec<f64>>> {
         let from = self.kinematics.grasp(positions);
         let mut path: Vec<Vec<f64>> = Vec::new();
@@ -254,7 +254,7 @@ impl<'a> Planner<'a> {
         Some(path)
     }
 
-    /// The way of the base to where a posture has it, with the arm as it is at the start.
+    /// The base's path to its pose in `to`, with the arm's initial posture.
     fn drive(&self, to: &[f64]) -> Option<Vec<Vec<f64>>> {
         let [x, y, heading] = self.base;
         let route = self.ground.route(Point2::new(self.start[x], self.start[y]), Point2::new(to[x], to[y]))?;
@@ -271,7 +271,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Radius of the circle around the base in which the whole robot is. Unit: metres.
+/// Radius of the circle around the base that contains the whole robot. Unit: metres.
 fn radius(kinematics: &Kinematics, [x, y, _]: [usize; 3], positions: &[f64], points: &[(usize, Point3<f64>)]) -> f64 {
     let links = kinematics.links(positions);
     let far = |(link, point): &(usize, Point3<f64>)| {
@@ -281,7 +281,7 @@ fn radius(kinematics: &Kinematics, [x, y, _]: [usize; 3], positions: &[f64], poi
     points.iter().map(far).fold(0.0, f64::max)
 }
 
-/// An angle brought into (−π, π]. Unit: radians.
+/// Wraps an angle to (−π, π]. Unit: radians.
 pub(super) fn wrapped(angle: f64) -> f64 {
     libm::atan2(libm::sin(angle), libm::cos(angle))
 }

@@ -1,22 +1,23 @@
-//! What speaks against the plan of a robot that drives, and how its arm goes around what is in the way.
+//! The cost of a mobile robot's plan, and arm paths around obstacles.
 
 use crate::actions::motion::{self, ArmSpace, Room, Samples};
 use crate::actions::plan::{AMPLE_CLEAR_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, Plan, Planner};
 use crate::actions::route::length;
 
-/// Postures that are checked on the way of an unfolding arm.
+/// Number of postures checked along the path of an unfolding arm.
 const N_CHECKS: usize = 12;
-/// For one grasp.
+/// Samples allowed per grasp.
 const SAMPLES_A_GRASP: u32 = 400;
 
 impl Planner<'_> {
-    /// What speaks against a plan: closeness to things, then length of the way; nothing if it is not free, or no better
-    /// than `bound`. An arm that can't unfold straight goes around, as long as there are samples.
+    /// Cost of a plan: proximity to obstacles, then path length. Returns `None` if the path is not free or costs at
+    /// least `bound`. If the arm can't unfold in a straight line, a path around the obstacles is sampled while samples
+    /// remain.
     pub(super) fn cost(&self, plan: &mut Plan, bound: f64, samples: &mut Samples) -> Option<f64> {
         let travel = self.travel_cost(plan.drive.last()?) + 0.4 * self.detour(&plan.drive);
         let course = [plan.reach.last()?, &plan.near[0], plan.approach.last()?, plan.lift.last()?];
         let mut cost = travel;
-        // From the last leg, where most plans fail.
+        // Check the last leg first: most plans fail there.
         for pair in course.windows(2).rev() {
             cost = cost.max(self.leg_cost(pair[0], pair[1], travel).filter(|cost| *cost < bound)?);
         }
@@ -33,14 +34,14 @@ impl Planner<'_> {
         Some(cost).filter(|cost| *cost < bound)
     }
 
-    /// What a leg brings to the cost; nothing where something is in the way.
+    /// Cost of one leg. Returns `None` if something is in the way.
     fn leg_cost(&self, from: &[f64], to: &[f64], travel: f64) -> Option<f64> {
         let (furniture, things) = self.clearance(from, to);
         let is_free = furniture >= FURNITURE_CLEAR_M && things >= LEAST_CLEAR_M;
         is_free.then(|| travel + (AMPLE_CLEAR_M - things).max(0.0) * 50.0)
     }
 
-    /// Whether no link goes into another on the way.
+    /// Whether the path is free of self-collisions.
     fn keeps_off_itself(&self, from: &[f64], to: Option<&Vec<f64>>) -> bool {
         let Some(to) = to else { return true };
         (1..=N_CHECKS).all(|step| {
@@ -50,7 +51,7 @@ impl Planner<'_> {
         })
     }
 
-    /// A way for the arm around what is in the way.
+    /// A sampled arm path around the obstacles.
     fn around(&self, from: &[f64], to: &[f64], samples: &mut Samples) -> Option<Vec<Vec<f64>>> {
         if samples.are_spent() {
             return None;
@@ -66,7 +67,7 @@ impl Planner<'_> {
         motion::way(&space, from, to, least, samples)
     }
 
-    /// How much longer the drive is than the straight line. Unit: metres.
+    /// Length of the drive beyond the straight line. Unit: metres.
     fn detour(&self, drive: &[Vec<f64>]) -> f64 {
         let ([x, y, _], Some(end)) = (self.base, drive.last()) else { return 0.0 };
         let way = |a: &[f64], b: &[f64]| length(b[x] - a[x], b[y] - a[y]);
@@ -74,7 +75,8 @@ impl Planner<'_> {
         legs.zip(drive).map(|(a, b)| way(a, b)).sum::<f64>() - way(&self.start, end)
     }
 
-    /// Least distances to furniture and to things on the way between two postures. Unit: metres; negative inside.
+    /// Smallest distances to furniture and to objects along the path between two postures. Unit: metres; negative
+    /// inside.
     fn clearance(&self, from: &[f64], to: &[f64]) -> (f64, f64) {
         let mut least = (f64::INFINITY, f64::INFINITY);
         for step in 0..=N_CHECKS {

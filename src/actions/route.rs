@@ -1,21 +1,21 @@
-//! Ways of the base around what stands on the floor.
+//! Paths of the base around obstacles on the floor.
 
 use nalgebra::{Isometry3, Point2, Point3};
 
 use crate::world::Sighting;
 
-/// Room left beside the base on its way. Unit: metres. What is seen of furniture is off by as much.
+/// Clearance beside the base on its path. Unit: metres. The error of perceived furniture.
 const ROOM_M: f64 = 0.04;
 /// How much further out corners are rounded. Unit: metres.
 const CORNER_M: f64 = 0.03;
-/// Distance between checked points of a way. Unit: metres.
+/// Distance between checked points of a path. Unit: metres.
 const CHECK_M: f64 = 0.05;
-/// Less than anything that matters. Unit: metres.
+/// A negligible distance. Unit: metres.
 const GRAIN_M: f64 = 1e-6;
-/// Things whose foot is below this stand on the floor. Unit: metres.
+/// Objects whose foot is below this are on the floor. Unit: metres.
 const ON_FLOOR_M: f64 = 0.2;
 
-/// Furniture: a box on the floor. Nothing goes below a table.
+/// Furniture: a box on the floor. The space below a table counts as occupied.
 #[derive(Debug, Clone)]
 pub struct Block {
     from_world: Isometry3<f64>,
@@ -23,7 +23,7 @@ pub struct Block {
     height: f64,
 }
 
-/// A thing as the upright cylinder around it.
+/// The vertical cylinder around an object.
 #[derive(Debug, Clone)]
 pub struct Pillar {
     centre: Point2<f64>,
@@ -33,14 +33,14 @@ pub struct Pillar {
 }
 
 impl Block {
-    /// The box that a piece of furniture was seen as, down to the floor.
+    /// The box of a perceived piece of furniture, extended down to the floor.
     pub fn new(seen: &Sighting) -> Self {
         let [width, depth, height] = seen.size_m;
         let half = [width / 2.0, depth / 2.0];
         Self { from_world: seen.pose.to_isometry().inverse(), half, height: seen.pose.position[2] + height }
     }
 
-    /// Level distance to the outline, negative inside. Unit: metres.
+    /// Horizontal distance to the outline, negative inside. Unit: metres.
     pub fn beside(&self, point: &Point3<f64>) -> f64 {
         let local = self.from_world * point;
         let (dx, dy) = (local.x.abs() - self.half[0], local.y.abs() - self.half[1]);
@@ -52,7 +52,7 @@ impl Block {
         self.beside(point).max(point.z - self.height)
     }
 
-    /// Points beyond its corners: the straight lines between neighbours keep the distance.
+    /// Points beyond its corners: straight lines between neighbouring points keep the distance.
     fn corners(&self, out: f64) -> [Point2<f64>; 4] {
         let (x, y) = (self.half[0] + out, self.half[1] + out);
         [(x, y), (x, -y), (-x, y), (-x, -y)].map(|(x, y)| (self.from_world.inverse() * Point3::new(x, y, 0.0)).xy())
@@ -60,11 +60,11 @@ impl Block {
 }
 
 impl Pillar {
-    /// The cylinder that a thing was seen as.
+    /// The cylinder of a perceived object.
     pub fn new(seen: &Sighting) -> Self {
         let [x, y, foot] = seen.pose.position;
         let [width, depth, height] = seen.size_m;
-        // Between the circle inside and the one around: corners seldom point at the hand.
+        // Between the inscribed and the circumscribed circle: corners seldom point at the hand.
         let radius = (width.max(depth) + length(width, depth)) / 4.0;
         Self { centre: Point2::new(x, y), radius, foot, top: foot + height }
     }
@@ -82,24 +82,24 @@ impl Pillar {
     }
 }
 
-/// Where a round base may go.
+/// Free floor for a round base.
 #[derive(Debug, Clone)]
 pub struct Ground {
     blocks: Vec<Block>,
     pillars: Vec<Pillar>,
-    /// Radius of the base with what it carries. Unit: metres.
+    /// Radius of the base with its load. Unit: metres.
     radius: f64,
     corners: Vec<Point2<f64>>,
 }
 
 impl Ground {
-    /// The floor with furniture and things on it, for a base that stands somewhere. It may come as near to them as it is there:
-    /// what it carries is not all around it.
+    /// The floor with furniture and objects on it, for a base at `from`. The base may come as close to obstacles as it
+    /// is now, because its load does not extend all around it.
     pub fn new(blocks: &[Block], pillars: &[Pillar], radius: f64, from: &Point2<f64>) -> Self {
         let pillars: Vec<Pillar> = pillars.iter().filter(|pillar| pillar.foot < ON_FLOOR_M).cloned().collect();
         let mut ground = Self { corners: Vec::new(), blocks: blocks.to_vec(), pillars, radius };
         let lack = (-ground.room(from)).clamp(0.0, radius);
-        // So that a rounding does not shut it in.
+        // Keeps a rounding error from shutting the base in.
         ground.radius -= if lack > 0.0 { lack + GRAIN_M } else { 0.0 };
         let out = ground.radius + ROOM_M + CORNER_M;
         let around_blocks = ground.blocks.iter().flat_map(|block| block.corners(out));
@@ -111,8 +111,7 @@ impl Ground {
         ground
     }
 
-    /// The shortest way from one place to another over at most two corners: the points after the first.
-    /// Nothing if there is none.
+    /// The shortest path over at most two corners, without its first point. Returns `None` if no path is free.
     pub fn route(&self, from: Point2<f64>, to: Point2<f64>) -> Option<Vec<Point2<f64>>> {
         if self.free(&from, &to) {
             return Some(vec![to]);
@@ -145,7 +144,7 @@ impl Ground {
         (0..=n_steps).all(|step| self.room(&(from + way * (step as f64 / n_steps as f64))) >= 0.0)
     }
 
-    /// Room to spare around a base that stands here. Unit: metres.
+    /// Clearance to spare around a base at this position. Unit: metres.
     fn room(&self, at: &Point2<f64>) -> f64 {
         let point = Point3::new(at.x, at.y, 0.0);
         let blocks = self.blocks.iter().map(|block| block.beside(&point));
@@ -155,7 +154,7 @@ impl Ground {
     }
 }
 
-/// Length of a level vector, with the same bits on every machine.
+/// Length of a horizontal vector, bitwise reproducible on all machines.
 pub fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }

@@ -1,111 +1,115 @@
-//! Faults put on purpose between a skill and its robot, and between the robot and the world, for tests of what notices them.
+//! Deliberate faults between a skill and its robot, and between the robot and the world, to test whether properties
+//! notice them.
 //!
-//! The skill is the same as ever and the recorder sees physics only: neither is told.
+//! The skill is unmodified and the recorder sees only physics: neither is informed of the fault.
 
 use crate::actions::{ActionCall, ActionReport};
 use crate::base::Pose;
 use crate::world::{BodyState, Command, Mishap, Observation, Sighting, Snapshot, World};
 
-/// Designators of the thing that the action is about, and of what it shall be placed on.
+/// Designators of the object that the action handles and of the surface it is placed on.
 const OBJECT: &str = "pickObject";
 const PLACE: &str = "placeSurface";
-/// Distance of the hand from the box around the object at which it counts as reaching for it. Unit: metres. Every hand
-/// comes so near before it closes, and no neighbour that falls then was seen lying.
+/// Distance between the hand and the object's bounding box below which the hand is reaching for it. Unit: metres. Every
+/// hand comes this close before it closes, and a neighbour that falls then has already been seen upright.
 const REACHING_M: f64 = 0.1;
-/// Height above its place from which on an object that only the hand touches counts as carried. Unit: metres. More than
-/// half of the lowest lift: what is dropped there ends far from the hand.
+/// Height above its place from which an object touched only by the hand counts as carried. Unit: metres. More than half
+/// of the lowest lift: an object dropped there ends far from the hand.
 const CARRIED_M: f64 = 0.05;
-/// How far a teleported object goes. Unit: metres. Out of any hand, and not out of the world.
+/// Distance a teleported object moves. Unit: metres. Out of any hand, but still within the world.
 const TELEPORT_M: f64 = 0.5;
-/// A base that has gone so far drives. Unit: metres.
+/// A base that has moved this far is driving. Unit: metres.
 const DRIVEN_M: f64 = 0.5;
-/// How far outside of the rooms a robot is carried off, and how far back where there are none. Unit: metres. Beyond the walls.
+/// How far outside the rooms a robot is carried off, or how far backwards if there are no rooms. Unit: metres. Beyond
+/// the walls.
 const CARRIED_OFF_M: f64 = 1.0;
-/// Gap between a base and what is put before it. Unit: metres. A base that sees it can't stop any more.
+/// Gap between a base and an object put in front of it. Unit: metres. Too short for the base to stop when it sees the
+/// object.
 const BEFORE_BASE_M: f64 = 0.03;
 /// Radius of a base: that of a slim mobile manipulator. Unit: metres.
 const BASE_RADIUS_M: f64 = 0.22;
-/// Height of an object's foot above its new place down to which it is lowered fast. Unit: metres.
+/// Height of an object's foot above its new place at which the fast part of lowering ends. Unit: metres.
 const LOWERED_M: f64 = 0.05;
-/// How long a robot that does nothing takes for it. Unit: seconds.
+/// Duration of an action in which the robot does nothing. Unit: seconds.
 pub(super) const IDLE_SECS: f64 = 1.0;
-/// Room that the widest opening has to leave beside another object for it to be taken by mistake. Unit: metres.
+/// Margin that the widest opening must leave beside another object for it to be picked by mistake. Unit: metres.
 const ROOM_M: f64 = 0.02;
 
-/// What goes wrong: every part that is there.
+/// A combination of faults: every field that is `Some` applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sabotage {
-    /// During which action: nothing for every one.
+    /// The sabotaged action; `None` for every action.
     pub action: Option<&'static str>,
-    /// With the robot.
+    /// Fault of the robot.
     pub robot: Option<Defect>,
-    /// With the world, and when.
+    /// Accident in the world, and its moment.
     pub world: Option<(Moment, Accident)>,
-    /// What the action reports, whatever it believes.
+    /// The success that the action reports, regardless of its belief.
     pub report: Option<bool>,
 }
 
-/// What can be wrong with a robot.
+/// Faults of a robot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Defect {
     /// It does nothing.
     Idle,
-    /// It takes the nearest other object that fits into its hand for the one that was named.
+    /// It mistakes the nearest other object that fits into its hand for the named one.
     WrongObject,
-    /// Its joint and force sensors give what they gave when the action began, its camera the first sight of each object.
+    /// Its joint and force sensors are frozen at their values at the start of the action; its camera repeats the first
+    /// sighting of each object.
     FrozenSensors,
 }
 
-/// When an accident happens: once in a run, at the first control tick at which this holds.
+/// When an accident happens: once per run, at the first control tick at which this holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moment {
-    /// The hand is about to take the object.
+    /// The hand is within reach of the object.
     Reaching,
     /// Both fingers hold the object in the air, and nothing else touches it.
     Carrying,
-    /// The base is half a metre from where it began.
+    /// The base is half a metre from where the action began.
     Driving,
-    /// The hand holds the object above the surface that it is to be placed on.
+    /// The hand holds the object above the target surface.
     Lowering,
-    /// The hand has let go of what it held when the action began.
+    /// The hand has released the object it held when the action began.
     LetGo,
 }
 
-/// What can happen to the world.
+/// Accidents in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Accident {
     /// The hand opens and stays open.
     HandOpens,
-    /// The object has no friction any more.
+    /// The object's friction drops to zero.
     Slippery,
-    /// The object is farther from the robot from one moment to the next.
+    /// The object jumps away from the robot within one tick.
     Teleport,
-    /// The object's nearest neighbour lies on its side.
+    /// The object's nearest neighbour falls onto its side.
     NeighbourFalls,
-    /// The object itself lies on its side.
+    /// The object itself falls onto its side.
     Falls,
-    /// The fingers stay where they are.
+    /// The hand closes and stays closed.
     HandJams,
-    /// Something stands right before the base.
+    /// Another object appears right in front of the base.
     InTheWay,
-    /// The robot is outside of its rooms and does not know.
+    /// The robot is carried out of its rooms without noticing.
     CarriedOff,
 }
 
-/// Carries out sabotage in one run, and knows whether it came to it.
+/// Carries out sabotage in one run and records whether it took effect.
 #[derive(Debug, Clone)]
 pub struct Saboteur {
     sabotage: Sabotage,
-    /// Whether this is the action that is sabotaged.
+    /// Whether the current action is sabotaged.
     armed: bool,
-    /// The named object, and what it is to be placed on.
+    /// The named object and its target surface.
     object: Option<String>,
     place: Option<String>,
-    /// The world when the action began.
+    /// World state at the start of the action.
     start: Option<Snapshot>,
     frozen: Option<Observation>,
     first_sights: Vec<Sighting>,
-    /// Gap between the fingers, whatever they are told. Unit: metres.
+    /// Forced gap between the fingers, regardless of the command. Unit: metres.
     opening_m: Option<f64>,
     defective: bool,
     happened: bool,
@@ -130,14 +134,14 @@ impl Saboteur {
         }
     }
 
-    /// Whether every part of the sabotage came about: a hand that never held anything can't drop it.
+    /// Whether every part of the sabotage took effect: a hand that never held an object can't drop it.
     pub fn came_about(&self) -> bool {
         (self.sabotage.robot.is_none() || self.defective)
             && (self.sabotage.world.is_none() || self.happened)
             && (self.sabotage.report.is_none() || self.lied)
     }
 
-    /// An action begins. Gives what the robot understands of the call.
+    /// Begins an action and returns the call as the robot understands it.
     pub(super) fn begin(&mut self, call: &ActionCall, world: &World) -> ActionCall {
         let start = world.snapshot();
         self.object = call.value(OBJECT).map(str::to_owned);
@@ -170,7 +174,7 @@ impl Saboteur {
         self.armed && self.sabotage.robot == Some(Defect::Idle)
     }
 
-    /// One control tick.
+    /// Advances one control tick.
     pub(super) fn step(&mut self, world: &mut World, command: &Command) {
         if let (Some((moment, accident)), true, false) = (self.sabotage.world, self.armed, self.happened)
             && self.is_time_for(moment, world)
@@ -183,16 +187,16 @@ impl Saboteur {
         }
     }
 
-    /// What the robot measures, from what is so.
+    /// The robot's measurements, given the honest ones.
     pub(super) fn observation(&self, honest: Observation) -> Observation {
         match &self.frozen {
-            // Time is no sensor's.
+            // Time is not measured by a sensor, so it is not frozen.
             Some(frozen) => Observation { time_secs: honest.time_secs, ..frozen.clone() },
             None => honest,
         }
     }
 
-    /// What the robot sees, from what it would see.
+    /// The sighting that the robot receives, given the honest one.
     pub(super) fn sighting(&mut self, honest: Sighting) -> Sighting {
         if self.frozen.is_none() {
             return honest;
@@ -206,7 +210,7 @@ impl Saboteur {
         }
     }
 
-    /// What the action reports, from what it believes.
+    /// The action's report, given the honest one.
     pub(super) fn report(&mut self, honest: ActionReport) -> ActionReport {
         match self.sabotage.report {
             Some(succeeded) if self.armed && succeeded != honest.succeeded => {
@@ -239,7 +243,7 @@ impl Saboteur {
         }
     }
 
-    /// True if it could happen.
+    /// Causes the accident. Returns `true` if it was possible.
     fn happen(&mut self, accident: Accident, world: &mut World) -> bool {
         let now = world.snapshot();
         let object = self.object.as_deref().unwrap_or_default();
@@ -273,7 +277,7 @@ fn holds(snapshot: &Snapshot, object: &str) -> bool {
     touches(&snapshot.robot.left_touches) && touches(&snapshot.robot.right_touches)
 }
 
-/// Whether a body is well above another.
+/// Whether a body is well above another, within its outline.
 fn is_above(body: &BodyState, place: &BodyState) -> bool {
     let over = |axis: usize| {
         let middle = f64::midpoint(body.aabb_min[axis], body.aabb_max[axis]);
@@ -282,7 +286,7 @@ fn is_above(body: &BodyState, place: &BodyState) -> bool {
     over(0) && over(1) && body.aabb_min[2] - place.aabb_max[2] > LOWERED_M
 }
 
-/// The pose of a body that stands on the floor right before a base, as it is turned now.
+/// The pose of a body on the floor right in front of a base, with its current orientation.
 fn before(body: &BodyState, [x, y, heading]: [f64; 3]) -> Pose {
     let half = |axis: usize| (body.aabb_max[axis] - body.aabb_min[axis]) / 2.0;
     let away = BASE_RADIUS_M + libm::hypot(half(0), half(1)) + BEFORE_BASE_M;
@@ -290,7 +294,7 @@ fn before(body: &BodyState, [x, y, heading]: [f64; 3]) -> Pose {
     Pose { position: [x + libm::cos(heading) * away, y + libm::sin(heading) * away, foot], ..body.pose }
 }
 
-/// Where a base is out of all rooms, or well behind where it is.
+/// A base pose outside all rooms, or well behind the current one if there are no rooms.
 fn outside(world: &World, [x, y, heading]: [f64; 3]) -> [f64; 3] {
     let ends = world.floor_plan().rooms.iter().map(|room| room.high_m[0]);
     match ends.max_by(f64::total_cmp) {
@@ -303,13 +307,13 @@ fn body<'a>(snapshot: &'a Snapshot, id: &str) -> Option<&'a BodyState> {
     snapshot.bodies.iter().find(|body| body.id == id)
 }
 
-/// Distance of a point from the box around a body. Unit: metres.
+/// Distance from a point to the bounding box of a body. Unit: metres.
 fn box_distance(body: &BodyState, point: [f64; 3]) -> f64 {
     let outside = |axis: usize| (body.aabb_min[axis] - point[axis]).max(point[axis] - body.aabb_max[axis]).max(0.0);
     (0..3).map(|axis| outside(axis) * outside(axis)).sum::<f64>().sqrt()
 }
 
-/// The pose of a body, moved on a level line away from the robot's base.
+/// The pose of a body, moved horizontally away from the robot's base.
 fn farther(body: &BodyState, [base_x, base_y, _]: [f64; 3]) -> Pose {
     let [x, y, z] = body.pose.position;
     let (dx, dy) = (x - base_x, y - base_y);
@@ -317,7 +321,7 @@ fn farther(body: &BodyState, [base_x, base_y, _]: [f64; 3]) -> Pose {
     Pose { position: [x + dx * scale, y + dy * scale, z], ..body.pose }
 }
 
-/// Everything that can move but one object, the nearest to it first.
+/// All movable bodies except one object, nearest to it first.
 fn others_by_distance<'a>(snapshot: &'a Snapshot, object: &str) -> Vec<&'a BodyState> {
     let Some(own) = body(snapshot, object) else { return Vec::new() };
     let distance = |other: &BodyState| {

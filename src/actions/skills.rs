@@ -1,4 +1,4 @@
-//! Which actions the reference skills perform.
+//! The actions that the reference skills perform.
 
 use crate::actions::navigate::move_to;
 use crate::actions::operator::{Interrupt, Operator};
@@ -8,10 +8,10 @@ use crate::actions::place::place;
 use crate::actions::{ActionCall, ActionReport};
 use crate::base::{Diagnostic, did_you_mean};
 
-/// Performs an action by commands and observations, and gives its own report.
+/// Performs an action through commands and observations and returns the action's own report.
 pub(super) type Skill = fn(&ActionCall, &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
 
-/// The skills by the names of their actions, sorted.
+/// The skills by action name, sorted.
 const SKILLS: [(&str, Skill); 4] =
     [("MoveTo", move_to), ("PerceivePlane", perceive_plane), ("Pick", pick), ("Place", place)];
 
@@ -24,7 +24,7 @@ pub struct UnknownSkill {
 }
 
 impl UnknownSkill {
-    /// The same as a fault that a user can mend.
+    /// This error as a diagnostic with a suggestion for the user.
     pub fn diagnostic(&self) -> Diagnostic {
         let help = did_you_mean(&self.action, reference_skills());
         Diagnostic::error("W030", self.to_string()).help(help)
@@ -57,7 +57,7 @@ mod tests {
     #[test]
     fn a_mistyped_action_is_refused_with_help() {
         assert!(reference_skills().all(|action| known_skill(action).is_ok()));
-        let refused = known_skill("Pikc").expect_err("there is no such skill");
+        let refused = known_skill("Pikc").expect_err("no such skill");
         assert_eq!(refused.diagnostic().help.as_deref(), Some("did you mean `Pick`?"));
     }
 }

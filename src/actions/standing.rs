@@ -1,4 +1,4 @@
-//! A way to a grasp for an arm whose base stands where it is.
+//! Grasp planning for an arm with a fixed base.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -11,30 +11,30 @@ use crate::actions::plan::{
 use crate::actions::route::{Block, Pillar};
 use crate::world::{JointKind, Kinematics, Layout, Sighting, ik};
 
-/// Postures that may be sampled for one plan, all grasps together, and for one grasp: half a second's work.
+/// Samples allowed for one plan over all grasps: half a second's work together with the limit per grasp.
 const MOST_SAMPLES: u32 = 3000;
-/// For one grasp.
+/// Samples allowed per grasp.
 const SAMPLES_A_GRASP: u32 = 500;
-/// Room that the arm keeps on its way where both ends have it. Unit: metres.
+/// Clearance that the arm keeps on its path if both ends have it. Unit: metres.
 const WAY_CLEAR_M: f64 = 0.03;
-/// What speaks against a hand that points aside of the way from the base to the thing. Unit: of cost, for each radian.
+/// Cost of a hand heading that deviates from the direction base to object. Unit: cost per radian.
 const ASIDE_COST: f64 = 0.15;
-/// The same for one that points down, which is all the same to the arm but for its last joint.
+/// The same for a hand that points straight down, where the deviation only affects the last joint.
 const TURNED_COST: f64 = 0.03;
-/// What speaks against a metre of the arm's way.
+/// Cost per metre of the arm's path.
 const WAY_COST: f64 = 0.02;
-/// A straight way along which a joint goes further than this between two postures is none: the arm flips over. Unit: radians
-/// or metres.
+/// A straight path is rejected if a joint moves further than this between two postures, because the arm flips over.
+/// Unit: radians or metres.
 const LARGEST_STEP: f64 = 0.6;
-/// Length of a step of a straight way. Unit: metres.
+/// Step length of a straight path. Unit: metres.
 const STEP_M: f64 = 0.03;
-/// Ways back out with the thing, the best first. Unit: metres.
+/// Distances to retreat with the object, in order of preference. Unit: metres.
 const RETREATS_M: [f64; 2] = [0.1, 0.05];
 
-/// The best plan among all grasps, or why there is none.
+/// Returns the best plan among all grasps.
 ///
 /// # Errors
-/// A sentence for the action's report.
+/// If there is no plan, the reason as a sentence for the action's report.
 pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]) -> Result<Plan, String> {
     let mut samples = match wanted.taken {
         Some(_) => Samples::new(operator.choose_samples(), MOST_SAMPLES),
@@ -63,16 +63,16 @@ pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]
     best.ok_or_else(|| NO_WAY.to_owned())
 }
 
-/// The arm, where it begins, and what it keeps clear of.
+/// The arm, its initial posture, and the obstacles around it.
 struct Arm<'a> {
     kinematics: &'a Kinematics,
     layout: &'a Layout,
-    /// Joint positions to begin with.
+    /// Initial joint positions.
     start: Vec<f64>,
     postures: Vec<Vec<f64>>,
-    /// With the thing that is to be taken.
+    /// Free space including the object to grasp.
     before: ArmSpace<'a>,
-    /// Without it.
+    /// Free space without the object to grasp.
     meanwhile: ArmSpace<'a>,
 }
 
@@ -88,21 +88,21 @@ impl<'a> Arm<'a> {
         Self { kinematics, layout, start, postures, before, meanwhile }
     }
 
-    /// What a grasp costs whatever the way to it.
+    /// Lower bound of a grasp's cost, independent of the path to it.
     fn least_cost(&self, grasp: &Grasp) -> f64 {
         let aside = wrapped(grasp.heading - self.bearing(&grasp.pose.translation.vector)).abs();
         let points_down = (grasp.pose.rotation * Vector3::x()).z < -0.99;
         grasp.penalty + aside * if points_down { TURNED_COST } else { ASIDE_COST }
     }
 
-    /// Direction from the base to a place. Unit: radians.
+    /// Direction from the base to a position. Unit: radians.
     fn bearing(&self, place: &Vector3<f64>) -> f64 {
         let root = self.kinematics.links(&self.start)[0].translation.vector;
         libm::atan2(place.y - root.y, place.x - root.x)
     }
 
-    /// Where inverse kinematics looks first: the profile's postures, turned towards the thing where the arm's first joint
-    /// stands upright.
+    /// Seeds for inverse kinematics: the profile's postures, turned towards the object if the axis of the arm's first
+    /// joint is vertical.
     fn seeds(&self, grasp: &Grasp) -> Vec<Vec<f64>> {
         let place = grasp.pose.translation.vector;
         let seeds = self.postures.iter().map(|posture| {
@@ -131,7 +131,7 @@ impl<'a> Arm<'a> {
         joint.kind == JointKind::Revolute && axis.z > 0.99
     }
 
-    /// A plan near a seed that costs at least `costs.0` anyway, and less than `costs.1`.
+    /// A plan near a seed. `least` is the lower bound of its cost; returns `None` if the cost reaches `bound`.
     fn plan(&self, grasp: &Grasp, seed: &[f64], (least, bound): (f64, f64), samples: &mut Samples) -> Option<Plan> {
         let at_thing = self.solve(seed, &grasp.pose)?;
         let lift = LIFTS_M.iter().find_map(|height| self.straight(&at_thing, &(Vector3::z() * *height)))?;
@@ -163,7 +163,7 @@ impl<'a> Arm<'a> {
         (cost < bound).then_some(Plan { drive, reach, near: way, approach, lift, retreat, cost })
     }
 
-    /// From where the arm is to a posture.
+    /// A path from the current posture to another.
     fn way(&self, to: &[f64], samples: &mut Samples) -> Option<Vec<Vec<f64>>> {
         let wanted = Room { furniture_m: WAY_CLEAR_M, things_m: WAY_CLEAR_M };
         let least = wanted.least(self.before.room(&self.start).0).least(self.before.room(to).0);
@@ -179,7 +179,8 @@ impl<'a> Arm<'a> {
         ik::solve(self.kinematics, seed, &ik::Reach { target: *target, mobility })
     }
 
-    /// Postures on a straight way of the hand, not turning, a few centimetres apart; nothing where the arm can't follow.
+    /// Postures a few centimetres apart on a straight path of the hand with fixed orientation. Returns `None` if the
+    /// arm can't follow.
     fn straight(&self, from: &[f64], by: &Vector3<f64>) -> Option<Vec<Vec<f64>>> {
         let hand = self.kinematics.grasp(from);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few steps")]

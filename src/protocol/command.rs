@@ -150,7 +150,7 @@ impl Taken<'_> {
     /// A velocity of the whole base goes with no target of one of its joints.
     fn base(&self) -> Result<(), OutsideFault> {
         if !self.joints.drives {
-            return Err(wrong("the robot has no base that drives".to_owned()));
+            return Err(wrong("the robot has no mobile base".to_owned()));
         }
         let of_base =
             self.joints.by_name.iter().find(|(_, (idx, role))| *role == Role::Base && self.seen.contains(idx));

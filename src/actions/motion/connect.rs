@@ -1,4 +1,4 @@
-//! RRT-Connect in the arm's joints, and what makes its ways short.
+//! RRT-Connect in the arm's joint space, and shortening of its paths.
 //!
 //! Two trees of postures grow from both ends towards samples and towards each other (Kuffner and LaValle 2000, "RRT-Connect:
 //! an efficient approach to single-query path planning").
@@ -9,8 +9,8 @@ use crate::actions::motion::{ArmSpace, Room, Samples};
 /// Length of a branch. Unit: metres, as [`ArmSpace::span`] counts.
 const BRANCH_M: f64 = 0.4;
 
-/// The postures of a free way after its first, the last of which is `to`: one where the straight way is free, otherwise as
-/// the trees found it. Nothing if there is none or the samples ran out.
+/// The postures of a free path without its first, ending with `to`: a single posture if the straight path is free,
+/// otherwise the path that the trees found. Returns `None` if there is no path or the samples run out.
 pub fn way(
     space: &ArmSpace<'_>,
     from: &[f64],
@@ -30,13 +30,14 @@ pub fn way(
     Some(shortened(space, &shortened(space, &finer, least), least).split_off(1))
 }
 
-/// Postures that grew from one end; each but the first has one before it.
+/// Postures grown from one end; each but the root has a parent.
 struct Tree {
     nodes: Vec<(Vec<f64>, usize)>,
 }
 
 impl Tree {
-    /// A branch towards a posture, to it where it is near; the new end, unless something is in the way.
+    /// Grows one branch towards a posture, or to it if it is near. Returns the new node, or `None` if something is in
+    /// the way.
     fn extend(&mut self, space: &ArmSpace<'_>, towards: &[f64], least: Room) -> Option<usize> {
         let spans = self.nodes.iter().map(|(node, _)| space.span(node, towards));
         let (nearest, span) = spans.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -48,7 +49,7 @@ impl Tree {
         Some(self.nodes.len() - 1)
     }
 
-    /// Branches towards a posture until one ends there; nothing where something is in the way.
+    /// Grows branches until one reaches a posture. Returns `None` if something is in the way.
     fn reach(&mut self, space: &ArmSpace<'_>, target: &[f64], least: Room) -> Option<usize> {
         loop {
             let end = self.extend(space, target, least)?;
@@ -69,7 +70,7 @@ impl Tree {
     }
 }
 
-/// A way with both its ends.
+/// A path including both ends.
 fn connect(
     space: &ArmSpace<'_>,
     from: &[f64],
@@ -77,7 +78,7 @@ fn connect(
     least: Room,
     samples: &mut Samples,
 ) -> Option<Vec<Vec<f64>>> {
-    // Whatever else moves, such as the fingers, does so before the arm.
+    // All other joints, such as the fingers, move before the arm.
     let mut start = to.to_vec();
     space.copy_arm(from, &mut start);
     let mut trees = [start, to.to_vec()].map(|root| Tree { nodes: vec![(root, 0)] });
@@ -103,7 +104,7 @@ fn connect(
     None
 }
 
-/// The same way with corners left out: from each posture to the farthest that the straight way to is free.
+/// The path with corners removed: from each posture to the farthest one that a free straight path reaches.
 fn shortened(space: &ArmSpace<'_>, way: &[Vec<f64>], least: Room) -> Vec<Vec<f64>> {
     let mut kept: Vec<Vec<f64>> = way.first().cloned().into_iter().collect();
     let mut at = 0;

@@ -1,9 +1,9 @@
-//! Points spread evenly over a cube, as many as a plan may cost.
+//! Evenly spread sample points in a unit cube, with a limit on their number.
 
-/// Samples of one plan. They run out, so that a plan ends on every machine after the same work.
+/// Samples of one plan. They are limited in number, so that planning ends after the same work on every machine.
 #[derive(Debug, Clone)]
 pub struct Samples {
-    /// Which of the sequences, from 0 to 1.
+    /// Start of the sequence, from 0 to 1.
     start: f64,
     n_drawn: u32,
     most: u32,
@@ -11,18 +11,18 @@ pub struct Samples {
 
 /// Bases of the Halton sequence, one for each joint.
 const PRIMES: [u32; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
-/// What turns one number into many that have little to do with each other: the golden section.
+/// The golden ratio conjugate, which turns one number into many nearly independent ones.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 impl Samples {
-    /// At most so many samples of the sequence that a number from 0 to 1 stands for.
+    /// At most `most` samples of the sequence selected by a number from 0 to 1.
     pub fn new(start: f64, most: u32) -> Self {
         Self { start, n_drawn: 0, most }
     }
 
-    /// The next point, each coordinate from 0 to 1; nothing when all are drawn.
+    /// The next point, with coordinates from 0 to 1. Returns `None` when all samples are used.
     ///
-    /// A Halton sequence, turned around in each dimension by the sequence's own shift (Cranley and Patterson 1976).
+    /// A Halton sequence with a random shift modulo 1 in each dimension (Cranley and Patterson 1976).
     pub fn next(&mut self, n_dimensions: usize) -> Option<Vec<f64>> {
         if self.n_drawn >= self.most {
             return None;
@@ -35,12 +35,12 @@ impl Samples {
         Some((0..n_dimensions).map(coordinate).collect())
     }
 
-    /// Whether none are left.
+    /// Whether no samples are left.
     pub fn are_spent(&self) -> bool {
         self.n_drawn >= self.most
     }
 
-    /// A part of what is left, for one of several tries.
+    /// Takes at most `most` of the remaining samples, for one of several attempts.
     pub fn share(&mut self, most: u32) -> Self {
         let part = Self { most: (self.n_drawn + most).min(self.most), ..self.clone() };
         self.n_drawn = part.most;
@@ -48,7 +48,7 @@ impl Samples {
     }
 }
 
-/// The digits of a number, mirrored at the point.
+/// The digits of a number mirrored at the radix point.
 fn radical_inverse(mut number: u32, base: u32) -> f64 {
     let (mut place, mut inverse) = (1.0, 0.0);
     while number > 0 {

@@ -1,55 +1,55 @@
-//! What the arm keeps clear of: furniture and things as they are seen, the floor, and the robot itself.
+//! Obstacles of the arm: perceived furniture and objects, the floor, and the robot itself.
 
 use nalgebra::{Isometry3, Point3};
 
 use crate::actions::route::{Block, Pillar};
 use crate::world::{JointKind, Kinematics, Layout, SelfContact};
 
-/// Distance between checked points of the arm, and the farthest that one goes between checked postures. Unit: metres.
+/// Spacing of checked points on the arm, and the largest movement of a point between checked postures. Unit: metres.
 const CHECK_M: f64 = 0.03;
-/// Most postures that are checked on one straight way.
+/// Largest number of postures checked on one straight path.
 const MOST_CHECKS: f64 = 400.0;
-/// Joints without limits are sampled this far to both sides. Unit: radians.
+/// Joints without limits are sampled this far in both directions. Unit: radians.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
-/// Distances that the arm keeps. Unit: metres; negative inside.
+/// Clearances of the arm. Unit: metres; negative inside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Room {
     /// To furniture and to the floor.
     pub furniture_m: f64,
-    /// To things.
+    /// To objects.
     pub things_m: f64,
 }
 
 impl Room {
-    /// What both have.
+    /// The smaller clearances of both.
     #[must_use]
     pub fn least(self, other: Self) -> Self {
         Self { furniture_m: self.furniture_m.min(other.furniture_m), things_m: self.things_m.min(other.things_m) }
     }
 
-    /// Whether there is at least as much room.
+    /// Whether both clearances are at least these.
     fn holds(self, least: Self) -> bool {
         self.furniture_m >= least.furniture_m && self.things_m >= least.things_m
     }
 }
 
-/// The postures of an arm among what is seen, the base and all other joints being where they are.
+/// The free space of an arm among perceived obstacles, with the base and all other joints fixed.
 #[derive(Clone)]
 pub struct ArmSpace<'a> {
     kinematics: &'a Kinematics,
     arm: &'a [usize],
-    /// Points of what the arm moves: link, and place on it.
+    /// Points on the links that the arm moves: link, and position on it.
     points: Vec<(usize, Point3<f64>)>,
     furniture: &'a [Block],
     things: &'a [Pillar],
     itself: SelfContact,
-    /// How far a point can go at most for each unit that a joint of the arm goes. Unit: metres, or 1.
+    /// Largest movement of a point per unit of each arm joint's movement. Unit: metres, or 1.
     levers: Vec<f64>,
 }
 
 impl<'a> ArmSpace<'a> {
-    /// The space of a robot's arm; `right` are postures in which links that meet are meant to.
+    /// The space of a robot's arm. Links that touch in the `right` postures are allowed to touch.
     pub fn new(
         kinematics: &'a Kinematics,
         layout: &'a Layout,
@@ -65,12 +65,12 @@ impl<'a> ArmSpace<'a> {
         Self { kinematics, arm: &layout.arm, points, furniture, things, itself, levers }
     }
 
-    /// The same among other things.
+    /// The same space with other objects.
     pub fn among(&self, things: &'a [Pillar]) -> Self {
         Self { things, ..self.clone() }
     }
 
-    /// The posture at a point of the unit cube: joints of the arm within their limits, all others as in `like`.
+    /// The posture at a point of the unit cube: arm joints within their limits, all others as in `like`.
     pub(super) fn posture(&self, point: &[f64], like: &[f64]) -> Vec<f64> {
         let mut positions = like.to_vec();
         for (idx, share) in self.arm.iter().zip(point) {
@@ -81,22 +81,23 @@ impl<'a> ArmSpace<'a> {
         positions
     }
 
-    /// Gives a posture the arm of another.
+    /// Copies the arm's joint positions from one posture to another.
     pub(super) fn copy_arm(&self, from: &[f64], to: &mut [f64]) {
         self.arm.iter().for_each(|idx| to[*idx] = from[*idx]);
     }
 
-    /// How many joints the arm has.
+    /// Number of arm joints.
     pub(super) fn n_joints(&self) -> usize {
         self.arm.len()
     }
 
-    /// No point of the arm goes further than this on the straight way between two postures. Unit: metres.
+    /// Upper bound of the distance that any point of the arm moves on the straight path between two postures. Unit:
+    /// metres.
     pub fn span(&self, from: &[f64], to: &[f64]) -> f64 {
         self.arm.iter().zip(&self.levers).map(|(idx, lever)| (to[*idx] - from[*idx]).abs() * lever).sum()
     }
 
-    /// The room around a posture, and whether the robot keeps clear of itself.
+    /// The clearances of a posture, and whether it is free of self-collisions.
     pub fn room(&self, positions: &[f64]) -> (Room, bool) {
         let links = self.kinematics.links(positions);
         (self.room_of(&links), !self.itself.touches(&links))
@@ -115,27 +116,27 @@ impl<'a> ArmSpace<'a> {
         room
     }
 
-    /// Whether a posture keeps clear of everything.
+    /// Whether a posture is free of collisions and keeps these clearances.
     pub fn is_free(&self, positions: &[f64], least: Room) -> bool {
         let (room, clear_of_itself) = self.room(positions);
         clear_of_itself && room.holds(least)
     }
 
-    /// Whether the straight way between two postures does, its first end apart.
+    /// Whether the straight path between two postures is free, not counting its first end.
     pub fn is_way_free(&self, from: &[f64], to: &[f64], least: Room) -> bool {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred at most")]
         let n_steps = (self.span(from, to) / CHECK_M).ceil().clamp(1.0, MOST_CHECKS) as usize;
-        // From the far end, where most ways are not free.
+        // Start at the far end, where most blocked paths are blocked.
         (1..=n_steps).rev().all(|step| self.is_free(&between(from, to, step as f64 / n_steps as f64), least))
     }
 }
 
-/// The posture at a share of the straight way.
+/// The posture at a fraction of the straight path.
 pub(super) fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
     from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect()
 }
 
-/// Which links a joint of the arm moves.
+/// Whether each link is moved by the arm.
 fn moved_links(kinematics: &Kinematics, arm: &[usize]) -> Vec<bool> {
     let mut moved = vec![false];
     for (idx, joint) in kinematics.joints().iter().enumerate() {
@@ -144,8 +145,8 @@ fn moved_links(kinematics: &Kinematics, arm: &[usize]) -> Vec<bool> {
     moved
 }
 
-/// How far the farthest point behind a joint can be from it: with all links in line. A joint that slides moves them by as
-/// much as it goes.
+/// Largest possible distance between a joint and the points behind it, with all links in line. A prismatic joint moves
+/// the points by its own displacement.
 fn lever(kinematics: &Kinematics, joint: usize, points: &[(usize, Point3<f64>)]) -> f64 {
     let joints = kinematics.joints();
     if joints[joint].kind == JointKind::Prismatic {

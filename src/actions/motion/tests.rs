@@ -1,4 +1,4 @@
-//! Ways of the fixed arm around a wall between two places on a table.
+//! Paths of the fixed arm around a wall between two places on a table.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -1,19 +1,19 @@
-//! A way driven: where the base is to be at each moment, within limits of speed and acceleration.
+//! Follows a path: the base pose at each tick, within speed and acceleration limits.
 
 use crate::actions::route::length;
 
-/// Largest change of velocity at a corner of the way. Unit: m/s.
+/// Largest change of velocity at a corner of the path. Unit: m/s.
 const JOLT: f64 = 0.08;
-/// A base that faces so far beside its way turns first. Unit: radians.
+/// A base whose heading deviates this much from its path turns on the spot first. Unit: radians.
 const ASIDE_RAD: f64 = 0.7;
-/// Distance ahead on the way that the base faces. Unit: metres.
+/// Distance ahead on the path that the base faces. Unit: metres.
 const AHEAD_M: f64 = 0.3;
-/// From here on the base turns to where it is to face in the end. Unit: metres.
+/// At this distance from the goal, the base starts turning to its final heading. Unit: metres.
 const ARRIVAL_M: f64 = 0.15;
-/// What is nearer is reached. Units: metres, or radians.
+/// Tolerance within which a goal is reached. Units: metres, or radians.
 const THERE: f64 = 1e-4;
 
-/// What a base may do.
+/// Motion limits of a base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Unit: m/s.
@@ -26,14 +26,14 @@ pub struct Limits {
     pub turn_acceleration: f64,
 }
 
-/// A base on its way.
+/// A base following its path.
 #[derive(Debug, Clone)]
 pub struct Follower {
-    /// x, y, heading. Headings keep counting beyond a full turn.
+    /// x, y, heading. Headings are not wrapped.
     at: [f64; 3],
-    /// Ends of the legs that are left, the nearest first.
+    /// Ends of the remaining legs, the nearest first.
     left: Vec<[f64; 2]>,
-    /// Where to face in the end. Unit: radians.
+    /// Final heading. Unit: radians.
     heading: f64,
     speed: f64,
     turn_speed: f64,
@@ -45,12 +45,12 @@ impl Follower {
         Self { at, left: way, heading, speed: 0.0, turn_speed: 0.0 }
     }
 
-    /// Where the base is to be now.
+    /// Commanded pose of the base at the moment.
     pub fn at(&self) -> [f64; 3] {
         self.at
     }
 
-    /// What is left of the way, from where the base is.
+    /// The rest of the path, starting at the base.
     pub fn left(&self) -> impl Iterator<Item = [f64; 2]> {
         std::iter::once([self.at[0], self.at[1]]).chain(self.left.iter().copied())
     }
@@ -60,12 +60,12 @@ impl Follower {
         self.speed == 0.0 && self.turn_speed == 0.0
     }
 
-    /// Whether the base is where it was to go, and at rest.
+    /// Whether the base is at its goal and at rest.
     pub fn has_arrived(&self) -> bool {
         self.left.is_empty() && self.is_still() && wrapped(self.heading - self.at[2]).abs() <= THERE
     }
 
-    /// The point of the way so far ahead, or its end. Unit: metres.
+    /// The point at this distance ahead on the path, or its end. Unit: metres.
     pub fn ahead(&self, mut distance: f64) -> [f64; 2] {
         let mut from = [self.at[0], self.at[1]];
         for to in &self.left {
@@ -79,7 +79,7 @@ impl Follower {
         from
     }
 
-    /// One tick later. A base that is to stop does so as fast as it may.
+    /// Advances one tick. With `stop`, the base brakes as fast as its limits allow.
     pub fn advance(&mut self, limits: &Limits, tick_secs: f64, stop: bool) {
         let end = self.left_m();
         let wanted = if end <= ARRIVAL_M { self.heading } else { self.towards_way() };
@@ -107,7 +107,7 @@ impl Follower {
 
     fn turn(&mut self, aside: f64, limits: &Limits, tick_secs: f64) {
         let change = limits.turn_acceleration * tick_secs;
-        // The speed from which it can stop in time, a tick from now.
+        // The turning speed from which the base can still stop in time.
         let fastest = (2.0 * limits.turn_acceleration * aside.abs()).sqrt().min(limits.turn_speed);
         let fastest = fastest.min(aside.abs() / tick_secs);
         let goal = fastest.copysign(aside);
@@ -120,7 +120,7 @@ impl Follower {
         self.at[2] += self.turn_speed * tick_secs;
     }
 
-    /// The fastest that still allows for the corners of the way and for its end. Unit: m/s.
+    /// The highest speed that allows braking for the remaining corners and for the end. Unit: m/s.
     fn braking(&self, limits: &Limits) -> f64 {
         let ends: Vec<[f64; 2]> = self.left().collect();
         let mut fastest = f64::INFINITY;
@@ -149,14 +149,14 @@ impl Follower {
     }
 }
 
-/// The fastest around a corner. Unit: m/s.
+/// The highest speed around a corner. Unit: m/s.
 fn corner_speed(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     let heading = |from: [f64; 2], to: [f64; 2]| libm::atan2(to[1] - from[1], to[0] - from[0]);
     let half = wrapped(heading(b, c) - heading(a, b)).abs() / 2.0;
     JOLT / (2.0 * libm::sin(half)).max(1e-3)
 }
 
-/// An angle brought into (−π, π]. Unit: radians.
+/// Wraps an angle to (−π, π]. Unit: radians.
 pub fn wrapped(angle: f64) -> f64 {
     libm::atan2(libm::sin(angle), libm::cos(angle))
 }
@@ -168,7 +168,7 @@ mod tests {
     const LIMITS: Limits = Limits { speed: 0.2, acceleration: 0.3, turn_speed: 0.9, turn_acceleration: 1.5 };
     const TICK: f64 = 1.0 / 60.0;
 
-    /// Poses at each tick until it has arrived.
+    /// Poses at each tick until arrival.
     fn drive(from: [f64; 3], way: &[[f64; 2]], heading: f64) -> Vec<[f64; 3]> {
         let mut follower = Follower::new(from, way.to_vec(), heading);
         let mut poses = vec![from];

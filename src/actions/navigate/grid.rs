@@ -1,4 +1,4 @@
-//! Which parts of the floor are taken, by the map and by what was seen.
+//! An occupancy grid of the floor, from the map and from perception.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -8,59 +8,59 @@ use crate::scenario::{FloorPlan, Outline, Room};
 
 /// Edge of a cell. Unit: metres.
 pub const CELL_M: f64 = 0.05;
-/// Floor around everything on the map that is part of the grid. Unit: metres.
+/// Width of the floor around the map that belongs to the grid. Unit: metres.
 const AROUND_M: f64 = 2.0;
 /// Longest side of a grid. Unit: cells. Worlds are 24 m wide.
 const MOST_CELLS: usize = 640;
-/// Points in a cell that make one picture take it for taken: fewer are noise.
+/// Number of points in a cell from which one picture counts it as occupied: fewer are noise.
 const HITS: u16 = 3;
-/// What a picture with something in a cell counts for it, and one with nothing but floor counts against it.
+/// Evidence from one picture that shows an object in a cell, and from one that shows only floor.
 const SEEN_TAKEN: i8 = 3;
 const SEEN_FREE: i8 = -1;
-/// More pictures than that make nobody surer.
+/// Largest absolute evidence: further pictures don't add to it.
 const SUREST: i8 = 6;
-/// What is seen so near to what the map has is taken for that. Unit: metres. What a belief is astray by, three times.
+/// Anything seen this close to something on the map counts as that. Unit: metres. Three times the localisation error.
 const MAPPED_M: f64 = 0.12;
 
-/// Square cells of the floor, by rows along x. Frame: world, by the base's belief.
+/// Square cells of the floor, in rows along x. Frame: world, by the base's belief.
 #[derive(Debug, Clone)]
 pub struct Grid {
     low: [f64; 2],
     columns: usize,
     rows: usize,
-    /// Distance of each cell's middle to what the map says is taken; 0 outside of all rooms. Unit: metres.
+    /// Distance from each cell's centre to mapped obstacles; 0 outside of all rooms. Unit: metres.
     mapped_m: Vec<f64>,
-    /// Above 0 where something was seen, below where the floor was.
+    /// Evidence: positive if an obstacle was seen, negative if floor was seen.
     seen: Vec<i8>,
-    /// Height of the highest that was seen of it. Unit: metres.
+    /// Height of the highest point seen in each cell. Unit: metres.
     tops_m: Vec<f64>,
 }
 
-/// What one picture shows of the floor.
+/// Evidence about the floor from one picture.
 #[derive(Debug, Clone, Default)]
 pub struct Evidence {
     counts: std::collections::BTreeMap<usize, Shown>,
 }
 
-/// What one picture shows of one cell.
+/// Evidence about one cell from one picture.
 #[derive(Debug, Clone, Copy, Default)]
 struct Shown {
-    /// Points of things.
+    /// Number of object points.
     things: u16,
-    /// Points of the floor.
+    /// Number of floor points.
     floor: u16,
     /// Height of the highest point. Unit: metres.
     top_m: f64,
 }
 
 impl Evidence {
-    /// Adds a point of the floor.
+    /// Adds a floor point.
     pub fn add_floor(&mut self, cell: usize) {
         let shown = self.counts.entry(cell).or_default();
         shown.floor = shown.floor.saturating_add(1);
     }
 
-    /// Adds a point of a thing, at a height. Unit: metres.
+    /// Adds an object point at a height. Unit: metres.
     pub fn add_thing(&mut self, cell: usize, height_m: f64) {
         let shown = self.counts.entry(cell).or_default();
         shown.things = shown.things.saturating_add(1);
@@ -69,7 +69,7 @@ impl Evidence {
 }
 
 impl Grid {
-    /// The grid of a map that reaches to some places at least.
+    /// The grid of a map, large enough to include `places`.
     pub fn new(plan: &FloorPlan, places: &[[f64; 2]]) -> Self {
         let rooms = plan.rooms.iter().flat_map(|room| [room.low_m, room.high_m]);
         let corners = plan.outlines.iter().flat_map(corners);
@@ -93,17 +93,17 @@ impl Grid {
         grid
     }
 
-    /// How many cells there are along x.
+    /// Number of cells along x.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// How many cells there are.
+    /// Number of cells.
     pub fn n_cells(&self) -> usize {
         self.columns * self.rows
     }
 
-    /// The cell of a point, if it has one.
+    /// The cell that contains a point, or `None` outside of the grid.
     pub fn cell(&self, [x, y]: [f64; 2]) -> Option<usize> {
         let (column, row) = ((x - self.low[0]) / CELL_M, (y - self.low[1]) / CELL_M);
         let inside = column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
@@ -111,13 +111,13 @@ impl Grid {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// The middle of a cell.
+    /// The centre of a cell.
     pub fn middle(&self, cell: usize) -> [f64; 2] {
         let (column, row) = (cell % self.columns, cell / self.columns);
         [self.low[0] + (column as f64 + 0.5) * CELL_M, self.low[1] + (row as f64 + 0.5) * CELL_M]
     }
 
-    /// Takes in what a picture shows. A cell in which it shows the floor and nothing else is free: a ray went there.
+    /// Adds the evidence of a picture. A cell in which it shows only floor is free, because rays reached the floor.
     pub fn learn(&mut self, evidence: &Evidence) {
         for (cell, shown) in &evidence.counts {
             let (Some(seen), Some(top)) = (self.seen.get_mut(*cell), self.tops_m.get_mut(*cell)) else { continue };
@@ -133,19 +133,19 @@ impl Grid {
         }
     }
 
-    /// Forgets what was seen.
+    /// Clears all perceived evidence.
     pub fn forget(&mut self) {
         self.seen.fill(0);
         self.tops_m.fill(0.0);
     }
 
-    /// What was seen on the floor and is not on the map.
+    /// Perceived obstacles that are not on the map.
     pub fn standing(&self) -> Vec<Standing> {
         let taken = (0..self.n_cells()).filter(|cell| self.seen[*cell] > 0 && self.mapped_m[*cell] > MAPPED_M);
         taken.map(|cell| Standing { at_m: self.middle(cell), top_m: self.tops_m[cell] }).collect()
     }
 
-    /// Takes in what was seen on an earlier drive.
+    /// Adds the obstacles seen on an earlier drive.
     pub fn recall(&mut self, standing: &[Standing]) {
         for Standing { at_m, top_m } in standing {
             if let Some(cell) = self.cell(*at_m) {
@@ -155,12 +155,12 @@ impl Grid {
         }
     }
 
-    /// Distances of the cells' middles to what is taken by the map. Unit: metres.
+    /// Distances from the cells' centres to mapped obstacles. Unit: metres.
     pub fn mapped_m(&self) -> &[f64] {
         &self.mapped_m
     }
 
-    /// Distances of the cells' middles to what was seen. Unit: metres.
+    /// Distances from the cells' centres to perceived obstacles. Unit: metres.
     ///
     /// Source: the exact distance transform of Felzenszwalb and Huttenlocher (2012), along columns and then along rows.
     pub fn seen_m(&self) -> Vec<f64> {
@@ -178,12 +178,12 @@ impl Grid {
         for row in squares.chunks_mut(self.columns) {
             row.copy_from_slice(&parabolas(row));
         }
-        // To the side of the taken cell, not to its middle.
+        // To the side of the occupied cell, not to its centre.
         squares.into_iter().map(|square| (square.sqrt() - 0.5).max(0.0) * CELL_M).collect()
     }
 }
 
-/// Lowest of the parabolas that stand over each place, at each place.
+/// The lower envelope at each place of the parabolas rooted at all places.
 fn parabolas(line: &[f64]) -> Vec<f64> {
     let mut standing: Vec<(usize, f64)> = Vec::with_capacity(line.len());
     for (place, height) in line.iter().enumerate() {
@@ -221,7 +221,7 @@ fn corners(outline: &Outline) -> [[f64; 2]; 4] {
     })
 }
 
-/// Distance of a point to everything on the map; 0 outside of all rooms, where there are rooms. Unit: metres.
+/// Distance from a point to everything on the map; 0 outside of all rooms, if there are rooms. Unit: metres.
 fn mapped(plan: &FloorPlan, outlines: &[(Isometry3<f64>, [f64; 2])], [x, y]: [f64; 2]) -> f64 {
     let in_room =
         |room: &Room| (room.low_m[0]..=room.high_m[0]).contains(&x) && (room.low_m[1]..=room.high_m[1]).contains(&y);

@@ -1,6 +1,8 @@
-//! Driving to a place: an occupancy grid from the robot's map and its depth camera, a way over it, and the way driven.
+//! Driving to a goal: an occupancy grid from the robot's map and depth camera, a path over it, and the controller that
+//! follows it.
 //!
-//! Never: knows where obstacles are other than by its own pictures, or where the base is other than by its own belief.
+//! Never: knows obstacles other than from the map and its own pictures, or the base's pose other than from its own
+//! belief.
 
 mod follow;
 mod grid;

@@ -1,4 +1,4 @@
-//! The cheapest way over a grid.
+//! Cheapest path over a grid.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -6,9 +6,9 @@ use std::collections::BinaryHeap;
 use crate::actions::navigate::grid::CELL_M;
 use crate::actions::navigate::terrain::Terrain;
 
-/// Costs are whole numbers of this, so that sums don't depend on their order. Unit: metres.
+/// Costs are integer multiples of this, so that sums don't depend on their order. Unit: metres.
 const GRAIN_M: f64 = 1e-5;
-/// A step to each neighbour: columns, rows, and its length in cells.
+/// Steps to the neighbours: columns, rows, and length in cells.
 const STEPS: [(isize, isize, f64); 8] = [
     (1, 0, 1.0),
     (0, 1, 1.0),
@@ -20,9 +20,10 @@ const STEPS: [(isize, isize, f64); 8] = [
     (1, -1, std::f64::consts::SQRT_2),
 ];
 
-/// The cells of the cheapest way, both ends included; nothing where there is none. Of equally cheap ways always the same.
+/// The cells of the cheapest path, both ends included. Returns `None` if there is no path. Ties are broken
+/// deterministically.
 ///
-/// Source: A* with the octile distance, which never is more than what is left.
+/// Source: A* with the octile distance, an admissible heuristic.
 pub fn cheapest(terrain: &Terrain<'_>, from: usize, to: usize) -> Option<Vec<usize>> {
     let grid = terrain.grid();
     terrain.factor(from)?;
@@ -60,7 +61,7 @@ fn grains(metres: f64) -> u64 {
     grains
 }
 
-/// What is left at least.
+/// Lower bound of the remaining cost.
 fn left(terrain: &Terrain<'_>, cell: usize, to: usize) -> u64 {
     let columns = terrain.grid().columns();
     let (dx, dy) = ((cell % columns).abs_diff(to % columns), (cell / columns).abs_diff(to / columns));

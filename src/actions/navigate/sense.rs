@@ -1,4 +1,4 @@
-//! Pictures as evidence of what stands on the floor.
+//! Turns pictures into evidence about obstacles on the floor.
 
 use nalgebra::Point3;
 
@@ -7,28 +7,29 @@ use crate::actions::operator::Operator;
 use crate::actions::route::length;
 use crate::world::OwnBody;
 
-/// What is lower is floor. Unit: metres. Range noise at 3 m, seen at a slant, four times. Lower things are run over.
+/// Points below this are floor. Unit: metres. Four times the range noise at 3 m, seen at a slant. The robot drives over
+/// lower objects.
 const FLOOR_M: f64 = 0.05;
-/// Room above the robot. Unit: metres.
+/// Clearance above the robot. Unit: metres.
 const HEAD_ROOM_M: f64 = 0.05;
-/// What is farther is looked at again when it is nearer. Unit: metres.
+/// Points farther away are ignored until they are nearer. Unit: metres.
 const FAR_M: f64 = 3.5;
-/// What is nearer to the robot's own shapes is itself. Unit: metres. Calibration and noise.
+/// Points closer to the robot's own shapes belong to the robot. Unit: metres. Allows for calibration error and noise.
 const OWN_M: f64 = 0.03;
-/// Of the pixels of a picture every so many in a row and in a column count: cells are larger than their gaps.
+/// Only every n-th pixel of every n-th row is used: cells are larger than the gaps.
 const STRIDE: usize = 2;
 
-/// Size of the robot as it is at the moment.
+/// The robot's current size.
 #[derive(Debug, Clone, Copy)]
 pub struct Size {
-    /// Of the circle around the base's middle that holds everything. Unit: metres.
+    /// Radius of the circle around the base's centre that contains the whole robot. Unit: metres.
     pub radius_m: f64,
     /// Unit: metres.
     pub height_m: f64,
 }
 
 impl Size {
-    /// The size of the robot as it was last told to be, with what it holds.
+    /// The size of the robot in its last commanded posture, including the held object.
     pub fn of(robot: &Operator<'_>) -> Self {
         let kinematics = robot.kinematics();
         let links = kinematics.links(robot.commanded());
@@ -49,7 +50,7 @@ impl Size {
     }
 }
 
-/// Takes a picture and notes what it shows of the floor.
+/// Takes a picture and adds its evidence about the floor.
 pub fn look(robot: &mut Operator<'_>, size: Size, grid: &mut Grid) {
     let positions = robot.observe().positions;
     let camera = robot.kinematics().camera(&positions);
@@ -62,7 +63,8 @@ pub fn look(robot: &mut Operator<'_>, size: Size, grid: &mut Grid) {
             let Some(seen) = image.point(column, row) else { continue };
             let point: Point3<f64> = camera * seen;
             let away = length(point.x - base.x, point.y - base.y);
-            // What is within its own circle it would stand in already: that is what it carries.
+            // Points within the robot's own circle belong to its load: any obstacle there would already be in
+            // collision.
             if away > FAR_M || away < size.radius_m || point.z > size.height_m + HEAD_ROOM_M {
                 continue;
             }

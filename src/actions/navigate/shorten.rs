@@ -1,13 +1,13 @@
-//! A way over cells as few straight legs.
+//! Shortens a path over cells to a few straight legs.
 
 use crate::actions::navigate::search::cheapest;
 use crate::actions::navigate::terrain::Terrain;
 
-/// How much dearer a straight leg may be than the cells that it replaces: those only go eight ways.
+/// Factor by which a straight leg may cost more than the cells it replaces, which only go in eight directions.
 const TOLERATED: f64 = 1.001;
 
-/// The way from one place to another as the ends of its straight legs, the first place left out; nothing where there is
-/// none.
+/// The path between two places as the ends of its straight legs, without the first place. Returns `None` if there is no
+/// path.
 pub fn way(terrain: &Terrain<'_>, from: [f64; 2], to: [f64; 2]) -> Option<Vec<[f64; 2]>> {
     let grid = terrain.grid();
     let cells = cheapest(terrain, grid.cell(from)?, grid.cell(to)?)?;
@@ -23,7 +23,7 @@ pub fn way(terrain: &Terrain<'_>, from: [f64; 2], to: [f64; 2]) -> Option<Vec<[f
     Some(shortened(terrain, &points))
 }
 
-/// From each point the longest straight leg that costs no more than the way.
+/// From each point, the longest straight leg that costs no more than the path.
 fn shortened(terrain: &Terrain<'_>, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut sums = vec![0.0];
     for pair in points.windows(2) {
@@ -51,7 +51,7 @@ mod tests {
     use crate::base::Pose;
     use crate::scenario::{FloorPlan, Outline, Room};
 
-    /// A room with a wall at its upper end, and one across it that leaves a door of 90 cm there.
+    /// A room divided by a wall that leaves a door of 90 cm at the upper end.
     fn two_rooms() -> Grid {
         let across = Outline { pose: Pose::upright([0.0, -0.45, 0.0], 0.0), size_m: [0.1, 3.1] };
         let upper = Outline { pose: Pose::upright([0.0, 2.05, 0.0], 0.0), size_m: [4.0, 0.1] };
@@ -74,7 +74,7 @@ mod tests {
         assert_eq!(straight, [[-1.1, 1.0]]);
         let around = way(&terrain, from, [1.0, -0.5]).expect("there is a door");
         assert_eq!(around.last(), Some(&[1.0, -0.5]));
-        // Over the door's middle it would be 5.1 m; with room at corners it is more.
+        // Through the middle of the door it would be 5.1 m; clearance at corners makes it longer.
         assert!((5.1..5.8).contains(&total(from, &around)), "{around:?}");
         let crossed = around.iter().filter(|at| at[0].abs() < 0.3).all(|at| (1.3..1.8).contains(&at[1]));
         assert!(crossed && around.len() <= 12, "{around:?}");

@@ -1,4 +1,4 @@
-//! The skill: a way by the map, driven while looking ahead, and another way where that one is not free.
+//! The drive skill: plans a path by the map, looks ahead while driving, and replans if the path is blocked.
 
 use nalgebra::Point3;
 
@@ -12,44 +12,44 @@ use crate::actions::perceive::towards;
 use crate::actions::route::length;
 use crate::actions::{ActionCall, ActionReport};
 
-/// Designators of the place to go to, the first that there is.
+/// Designators of the goal; the first one present is used.
 const PLACES: [&str; 2] = ["objectLocation", "objectSurface"];
-/// Room beside the robot on its way. Unit: metres. The map, the pictures and its belief are off by as much.
+/// Clearance beside the robot on its path. Unit: metres. The combined error of the map, the pictures and localisation.
 const MARGIN_M: f64 = 0.04;
-/// Share of the joints' velocity limits that is used: room for the controller to catch up.
+/// Share of the joints' velocity limits that is used, so that the controller can catch up.
 const SPEED_SHARE: f64 = 0.9;
 /// Unit: m/s². At full speed the robot stops within 10 cm.
 const ACCELERATION: f64 = 0.3;
 /// Unit: rad/s².
 const TURN_ACCELERATION: f64 = 1.5;
-/// Time between two pictures while driving. Unit: seconds. The robot goes a quarter of a metre.
+/// Time between two pictures while driving. Unit: seconds. The robot covers a quarter of a metre.
 const LOOK_SECS: f64 = 1.0;
-/// Time between two thoughts about where to look. Unit: seconds.
+/// Time between two updates of the gaze. Unit: seconds.
 const GAZE_SECS: f64 = 0.25;
-/// How far ahead on its way the robot looks at the floor. Unit: metres.
+/// Distance ahead on the path at which the robot looks at the floor. Unit: metres.
 const GAZE_M: f64 = 1.4;
-/// Where it looks when it stands and does not know on: to both sides and ahead. Unit: radians.
+/// Directions in which a robot without a path looks around: to both sides and ahead. Unit: radians.
 const LOOK_AROUND_RAD: [f64; 3] = [-0.9, 0.9, 0.0];
 /// Time for the head to get there and come to rest. Unit: seconds.
 const REST_SECS: f64 = 1.2;
-/// Other ways that are tried before the robot gives up.
+/// Number of paths tried before the robot gives up.
 const MOST_WAYS: usize = 12;
-/// A base that is so far from where it is driven to is held up by something. Unit: metres.
+/// A base this far from its commanded position is blocked. Unit: metres.
 const HELD_UP_M: f64 = 0.15;
-/// The end is reached within this. Units: metres, radians.
+/// Tolerances within which the goal is reached. Units: metres, radians.
 const REACHED: [f64; 2] = [0.03, 0.03];
-/// Distances from a goal that is taken at which another place is looked for, the nearest first, and in how many directions.
-/// Unit of the distances: metres. From farther away no table is within sight.
+/// Distances from an occupied goal at which substitutes are tried, the nearest first, and the number of directions.
+/// Unit of the distances: metres. From farther away, a table would be out of sight.
 const ASIDE_M: [f64; 4] = [0.3, 0.45, 0.6, 0.8];
 const N_ASIDE: u32 = 16;
-/// How many times as long as the straight line the way to such a place may be.
+/// Longest path to a substitute goal, relative to the straight line.
 const DETOUR: f64 = 1.3;
-/// How far ahead of a goal is what a robot faces there. Unit: metres. The middle of a table.
+/// Distance ahead of the goal that the robot faces there. Unit: metres. The middle of a table.
 const FACED_M: f64 = 1.0;
 /// Time for the base to come to rest. Unit: seconds.
 const ARRIVE_SECS: f64 = 0.5;
 
-/// Drives to the designated place and reports whether it believes to be there.
+/// Drives to the designated place and reports whether the robot believes it is there.
 ///
 /// # Errors
 /// [`Interrupt`] if simulation broke or time ran out.
@@ -59,7 +59,7 @@ pub fn move_to(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionRepo
     let Some(goal) = named.iter().find_map(|name| robot.floor_plan().place(name)) else {
         return Ok(failed(format!("{first} is not on the map")));
     };
-    let Some(base) = robot.layout().base else { return Ok(failed("the robot has no base that drives")) };
+    let Some(base) = robot.layout().base else { return Ok(failed("the robot has no mobile base")) };
     let mut drive = Drive::new(robot, base, goal);
     match drive.go()? {
         Some(reason) => {
@@ -70,18 +70,18 @@ pub fn move_to(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionRepo
     }
 }
 
-/// Drives to a place (x, y, heading), looking ahead. Gives the reason why it did not get there, if it did not.
+/// Drives to a pose (x, y, heading), looking ahead. Returns the reason if it did not get there.
 ///
 /// # Errors
 /// [`Interrupt`] if simulation broke or time ran out.
 pub fn drive_to(goal: [f64; 3], robot: &mut Operator<'_>) -> Result<Option<String>, Interrupt> {
     match robot.layout().base {
         Some(base) => Drive::new(robot, base, goal).go(),
-        None => Ok(Some("the robot has no base that drives".to_owned())),
+        None => Ok(Some("the robot has no mobile base".to_owned())),
     }
 }
 
-/// A drive to a place. Everything is by the base's belief of where it is.
+/// A drive to a goal. All poses are by the base's belief.
 struct Drive<'r, 'o> {
     robot: &'r mut Operator<'o>,
     base: [usize; 3],
@@ -108,7 +108,7 @@ impl<'r, 'o> Drive<'r, 'o> {
         Self { robot, base, goal, size, limits, grid, follower: Follower::new(at, Vec::new(), at[2]) }
     }
 
-    /// Drives there, and keeps what it saw on the floor. Gives the reason why it did not get there, if it did not.
+    /// Drives to the goal and keeps the obstacles seen on the floor. Returns the reason if it did not get there.
     fn go(&mut self) -> Result<Option<String>, Interrupt> {
         let reason = self.go_on();
         self.robot.remember_floor(self.grid.standing());
@@ -131,14 +131,14 @@ impl<'r, 'o> Drive<'r, 'o> {
             match self.follow()? {
                 Leg::Arrived => return Ok(None),
                 Leg::Blocked => {}
-                Leg::HeldUp => return Ok(Some("something holds the robot up that it does not see".to_owned())),
+                Leg::HeldUp => return Ok(Some("the robot is blocked by something it does not see".to_owned())),
             }
         }
-        Ok(Some("no way stayed free".to_owned()))
+        Ok(Some("no path stayed free".to_owned()))
     }
 
-    /// Drives to the nearest free place to a goal that it can't get to, and faces what it would have faced there: what comes next
-    /// may still be done from here. Wherever that leads, the goal was not reached.
+    /// Drives to the nearest free place near an unreachable goal and faces the same point, because the next action may
+    /// still be possible from there. The goal still counts as not reached.
     fn go_near(&mut self) -> Result<(), Interrupt> {
         let [x, y, heading] = self.goal;
         let faced = [x + FACED_M * libm::cos(heading), y + FACED_M * libm::sin(heading)];
@@ -162,7 +162,7 @@ impl<'r, 'o> Drive<'r, 'o> {
         Ok(())
     }
 
-    /// Whether the way leads about where it should, and not around a table to its far side.
+    /// Whether the path is nearly straight, and does not lead around a table to its far side.
     fn is_direct(&self) -> bool {
         let ends: Vec<[f64; 2]> = self.follower.left().collect();
         let way: f64 = ends.windows(2).map(|pair| length(pair[1][0] - pair[0][0], pair[1][1] - pair[0][1])).sum();
@@ -170,7 +170,7 @@ impl<'r, 'o> Drive<'r, 'o> {
         way <= length(self.goal[0] - x, self.goal[1] - y) * DETOUR + CELL_M
     }
 
-    /// Takes the best way from here, if there is one.
+    /// Starts on the best path from here. Returns `false` if there is none.
     fn set_out(&mut self) -> bool {
         let at = self.follower.at();
         let (from, to) = ([at[0], at[1]], [self.goal[0], self.goal[1]]);
@@ -186,10 +186,10 @@ impl<'r, 'o> Drive<'r, 'o> {
     fn why_not(&self) -> String {
         let goal = self.grid.cell([self.goal[0], self.goal[1]]);
         let taken = goal.is_none_or(|cell| self.grid.seen_m()[cell] < self.size.radius_m + MARGIN_M);
-        if taken { "the goal is occupied".to_owned() } else { "there is no free way".to_owned() }
+        if taken { "the goal is occupied".to_owned() } else { "there is no free path".to_owned() }
     }
 
-    /// Follows the way, looking ahead, to its end or to where it is not free any more.
+    /// Follows the path, looking ahead, until it ends or is blocked.
     fn follow(&mut self) -> Result<Leg, Interrupt> {
         let tick = self.robot.tick_secs();
         let (mut since_look, mut since_gaze) = (0.0, GAZE_SECS);
@@ -215,11 +215,11 @@ impl<'r, 'o> Drive<'r, 'o> {
         Ok(if blocked { Leg::Blocked } else { Leg::Arrived })
     }
 
-    /// Whether what is left of the way is free as far as is known.
+    /// Whether the rest of the path is free, as far as known.
     fn is_free(&self) -> bool {
         let left: Vec<[f64; 2]> = self.follower.left().collect();
         let from = left.first().copied().unwrap_or_default();
-        // What the way was planned with must not fail by the size of a cell.
+        // Checked without the planning margin, so that a planned path does not fail by the size of a cell.
         let terrain = Terrain::new(&self.grid, self.size.radius_m, from);
         left.windows(2).all(|pair| terrain.straight(pair[0], pair[1]).is_some())
     }
@@ -229,7 +229,7 @@ impl<'r, 'o> Drive<'r, 'o> {
         let [x, y] = self.follower.ahead(GAZE_M);
         let [at_x, at_y, heading] = self.follower.at();
         let way = length(x - at_x, y - at_y);
-        // Near the end, as far ahead as it faces.
+        // Near the end, looks straight ahead at the same distance.
         let point = if way < GAZE_M / 2.0 {
             Point3::new(at_x + GAZE_M * libm::cos(heading), at_y + GAZE_M * libm::sin(heading), 0.0)
         } else {
@@ -245,7 +245,7 @@ impl<'r, 'o> Drive<'r, 'o> {
         self.robot.aim(&head, &positions);
     }
 
-    /// Forgets what it saw, which may have been noise, and looks again.
+    /// Clears the perceived evidence, which may have been noise, and looks again.
     fn look_around(&mut self) -> Result<(), Interrupt> {
         self.robot.begin("look around");
         self.grid.forget();
@@ -279,7 +279,7 @@ impl<'r, 'o> Drive<'r, 'o> {
     }
 }
 
-/// How a way ended.
+/// How following a path ended.
 enum Leg {
     Arrived,
     Blocked,

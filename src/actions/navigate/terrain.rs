@@ -1,30 +1,30 @@
-//! What it costs a base of some radius to be somewhere.
+//! The cost of a position for a base of a given radius.
 
 use crate::actions::navigate::grid::{CELL_M, Grid};
 use crate::actions::route::length;
 
-/// Room beside the base that is as good as any more. Unit: metres.
+/// Clearance beside the base beyond which more brings no benefit. Unit: metres.
 const AMPLE_M: f64 = 0.35;
-/// How many times as long a way may be that has this room, instead of one that just fits.
+/// Factor by which a path with ample clearance may be longer than one that just fits.
 const DEAR: f64 = 3.0;
-/// A base that stands nearer to something than it may goes away from it, within this distance. Unit: metres.
+/// Within this distance, a base that is too close to an obstacle may move away from it. Unit: metres.
 const ESCAPE_M: f64 = 0.6;
 
-/// A grid as a base sees it that wants to drive.
+/// A grid with the costs for a base that drives on it.
 #[derive(Debug, Clone)]
 pub struct Terrain<'a> {
     grid: &'a Grid,
-    /// Distance of each cell to what is taken. Unit: metres.
+    /// Distance from each cell to the nearest obstacle. Unit: metres.
     clear_m: Vec<f64>,
-    /// Distance that the middle of the base has to keep. Unit: metres.
+    /// Distance that the base's centre has to keep. Unit: metres.
     keep_m: f64,
-    /// Where the base stands, and how near to something that is.
+    /// Position of the base, and its clearance there.
     from: [f64; 2],
     from_clear_m: f64,
 }
 
 impl<'a> Terrain<'a> {
-    /// The grid for a base that has to keep a distance and stands somewhere.
+    /// The terrain for a base at `from` that has to keep a distance.
     pub fn new(grid: &'a Grid, keep_m: f64, from: [f64; 2]) -> Self {
         let clear_m: Vec<f64> = grid.seen_m().iter().zip(grid.mapped_m()).map(|(a, b)| a.min(*b)).collect();
         let from_clear_m = grid.cell(from).map_or(0.0, |cell| clear_m[cell]);
@@ -36,7 +36,8 @@ impl<'a> Terrain<'a> {
         self.grid
     }
 
-    /// How many times its length a way costs at a cell: 1 where there is ample room; nothing where the base can't be.
+    /// Cost of a path at a cell, relative to its length: 1 with ample clearance. Returns `None` if the base can't be
+    /// there.
     pub fn factor(&self, cell: usize) -> Option<f64> {
         let clear = *self.clear_m.get(cell)?;
         let room = clear - self.keep_m;
@@ -49,7 +50,7 @@ impl<'a> Terrain<'a> {
         Some(1.0 + (DEAR - 1.0) * lack * lack)
     }
 
-    /// What a straight way costs. Unit: metres; nothing where it is not free.
+    /// Cost of a straight path. Unit: metres. Returns `None` if it is not free.
     pub fn straight(&self, from: [f64; 2], to: [f64; 2]) -> Option<f64> {
         let way = length(to[0] - from[0], to[1] - from[1]);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few metres of centimetres")]

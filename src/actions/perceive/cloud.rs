@@ -1,16 +1,17 @@
-//! Pictures as points in the world.
+//! Converts depth pictures to points in the world.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::world::DepthImage;
 
-/// What every pixel sees that sees anything. Frame: that of `camera`, the pose of the camera.
+/// The points seen by all pixels with a depth. `camera` is the pose of the camera; the points are in its parent frame.
 pub fn points(image: &DepthImage, camera: &Isometry3<f64>) -> Vec<Point3<f64>> {
     let pixels = (0..image.height).flat_map(|row| (0..image.width).map(move |column| (column, row)));
     pixels.filter_map(|(column, row)| image.point(column, row)).map(|point| camera * point).collect()
 }
 
-/// One point for each cube of a grid that holds any: their mean, in the order of the cubes. Unit of the edge: metres.
+/// Downsamples points to one per occupied cube of a grid: their mean, in the order of the cubes. Unit of the edge:
+/// metres.
 pub fn thinned(points: &[Point3<f64>], edge: f64) -> Vec<Point3<f64>> {
     let mut by_cube: Vec<([i64; 3], usize)> =
         points.iter().enumerate().map(|(idx, point)| (cube_of(point, edge), idx)).collect();
@@ -24,7 +25,7 @@ pub fn thinned(points: &[Point3<f64>], edge: f64) -> Vec<Point3<f64>> {
         .collect()
 }
 
-/// Which cube of a grid a point is in.
+/// The grid cube that contains a point.
 pub fn cube_of(point: &Point3<f64>, edge: f64) -> [i64; 3] {
     [point.x, point.y, point.z].map(|along| {
         #[expect(clippy::cast_possible_truncation, reason = "a few metres of millimetres")]

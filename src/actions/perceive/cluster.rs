@@ -1,4 +1,4 @@
-//! Points that belong together because they are near each other.
+//! Groups points by proximity.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use crate::actions::perceive::cloud::cube_of;
 
-/// Groups of points in which each has another at most `reach` away; by index, in the order of their first points.
+/// Groups in which each point has another at most `reach` away; by index, in the order of their first points.
 pub fn clusters(points: &[Point3<f64>], reach: f64) -> Vec<Vec<usize>> {
     let mut grid: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
     for (idx, point) in points.iter().enumerate() {
@@ -45,7 +45,7 @@ fn around(grid: &BTreeMap<[i64; 3], Vec<usize>>, [x, y, z]: [i64; 3]) -> impl It
 mod tests {
     use super::*;
 
-    /// Points on a line, so far apart.
+    /// Points on a line at a fixed spacing.
     fn line(from: f64, to: f64, step: f64, height: f64) -> Vec<Point3<f64>> {
         let count = ((to - from) / step).round() as usize;
         (0..=count).map(|idx| Point3::new(from + step * idx as f64, 0.0, height)).collect()

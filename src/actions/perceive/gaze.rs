@@ -1,27 +1,27 @@
-//! How the head has to stand to look at a point.
+//! Computes the head's joint positions for looking at a point.
 
 use nalgebra::{Matrix2, Point3, Vector2};
 
 use crate::world::{Kinematics, Layout};
 
-/// Change of a joint by which its effect on the gaze is measured. Unit: radians.
+/// Joint displacement used to measure its effect on the gaze. Unit: radians.
 const PROBE_RAD: f64 = 1e-4;
-/// Damping of the least squares: where a joint does not turn the gaze, it stays.
+/// Damping of the least squares: joints that do not turn the gaze stay in place.
 const DAMPING: f64 = 1e-6;
 const N_ROUNDS: usize = 12;
-/// A point that is so near to the middle of the picture is looked at. Unit: radians.
+/// A point this close to the image centre counts as looked at. Unit: radians.
 const SEEN_RAD: f64 = 0.05;
-/// Largest change of a joint in a round. Unit: radians.
+/// Largest change of a joint per round. Unit: radians.
 const LARGEST_RAD: f64 = 0.5;
 
-/// The posture with the head turned so that a point is in the middle of the picture, or as near to it as the head's joints
-/// allow. Without such joints, the posture as it is. Frame: world, by the base's belief.
+/// The posture with the head turned so that a point is at the centre of the picture, or as close to it as the head's
+/// joints allow. Without head joints, the posture is returned unchanged. Frame: world, by the base's belief.
 pub fn towards(kinematics: &Kinematics, layout: &Layout, positions: &[f64], point: &Point3<f64>) -> Vec<f64> {
     let turned = self::turned(kinematics, layout, positions.to_vec(), point);
     if off(kinematics, &turned, point).norm() < SEEN_RAD {
         return turned;
     }
-    // The short way round has come to the end of a joint: the long way may not.
+    // If the short way round hits a joint limit, the long way may not.
     let mut ahead = positions.to_vec();
     for joint in &layout.head {
         let limits = &kinematics.joints()[*joint];
@@ -32,7 +32,7 @@ pub fn towards(kinematics: &Kinematics, layout: &Layout, positions: &[f64], poin
     if miss(&other) < miss(&turned) { other } else { turned }
 }
 
-/// What turning the head towards a point from some posture comes to.
+/// The result of turning the head towards a point from a given posture.
 fn turned(kinematics: &Kinematics, layout: &Layout, mut positions: Vec<f64>, point: &Point3<f64>) -> Vec<f64> {
     for _ in 0..N_ROUNDS {
         let miss = off(kinematics, &positions, point);
@@ -75,7 +75,8 @@ mod tests {
     use crate::scenario::RobotStart;
     use crate::world::geometry;
 
-    /// A head that had turned far to the right could not look ahead any more: the short way there goes over the end of its neck.
+    /// Regression: a head turned far to the right could not look ahead again, because the short way crosses a joint
+    /// limit of the neck.
     #[test]
     fn the_head_finds_a_point_before_it_wherever_it_looked() {
         let path = Path::new("models/robots/mobile_manipulator.toml");

@@ -1,4 +1,4 @@
-//! Points to a surface and the things on it.
+//! From points to a surface and the objects on it.
 
 use std::collections::BTreeSet;
 
@@ -13,31 +13,32 @@ use crate::actions::{PerceivedPlane, PerceivedThing};
 use crate::base::Pose;
 use crate::scenario::KnownKind;
 
-/// Edge of the cubes of which one point each is kept. Unit: metres. About what pixels lie apart a metre away.
+/// Edge of the grid cubes used for downsampling. Unit: metres. About the pixel spacing at a distance of one metre.
 pub const GRID_M: f64 = 0.005;
-/// Tables are neither on the floor nor above the robot's head; what it knows of its own tilt is better than 5 degrees.
-/// Points of a plane are off by three times the range noise that depth cameras have at 1.5 m.
+/// Tables are neither on the floor nor above the robot's head, and the robot knows its own tilt to better than 5
+/// degrees. The inlier distance is three times the range noise of depth cameras at 1.5 m.
 const PRIOR: Prior = Prior { heights_m: (0.2, 1.3), tilt_rad: 0.09, off_m: 0.01 };
-/// Any number: the guesses need not differ from run to run.
+/// Arbitrary: the guesses need not differ from run to run.
 const SEED: u64 = 1;
-/// A surface is one piece: gaps in it that are wider part two. Unit: metres. The shadow of a bottle is as wide.
+/// Wider gaps separate surfaces. Unit: metres. The shadow of a bottle is about this wide.
 const SURFACE_GAP_M: f64 = 0.1;
-/// Grid for that. Unit: metres.
+/// Grid for finding those gaps. Unit: metres.
 const SURFACE_GRID_M: f64 = 0.02;
-/// A smaller surface is none. Unit: metres.
+/// Shortest side of a surface. Unit: metres.
 const LEAST_SIDE_M: f64 = 0.15;
-/// What rises less above the surface is taken for the surface. Unit: metres. Range noise seen at a slant, four times.
+/// Points lower than this above the surface belong to the surface. Unit: metres. Four times the range noise at a slant.
 const RISE_M: f64 = 0.008;
-/// Nothing on a surface is higher. Unit: metres.
+/// Largest height of an object on a surface. Unit: metres.
 const HIGHEST_M: f64 = 0.6;
-/// How far things stick out over the edge. Unit: metres.
+/// How far objects may overhang the edge. Unit: metres.
 const OVER_EDGE_M: f64 = 0.02;
-/// Points farther apart are of different things. Unit: metres. At a slant, pixels lie so far apart on top of a thing.
+/// Points farther apart belong to different objects. Unit: metres. At a slant, pixels on top of an object are this far
+/// apart.
 const APART_M: f64 = 0.02;
-/// What shows fewer points is noise. Unit: points of the grid; a fork shows fifty.
+/// Clusters with fewer points are noise. Unit: points of the grid; a fork shows fifty.
 const LEAST_POINTS: usize = 15;
 
-/// A surface: its plane and its outline on the level.
+/// A surface: its plane and its horizontal outline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
     plane: Plane,
@@ -53,7 +54,7 @@ impl Surface {
         let coarse = thinned(&inliers, SURFACE_GRID_M);
         let piece = clusters(&coarse, SURFACE_GAP_M).into_iter().max_by_key(Vec::len)?;
         let cubes: BTreeSet<[i64; 3]> = piece.into_iter().map(|idx| cube_of(&coarse[idx], SURFACE_GRID_M)).collect();
-        // The coarse points end up to half a step before the edge: the fine ones in their cubes say where it is.
+        // Coarse points end up to half a step before the edge; the fine points in their cubes locate the edge.
         let of_piece = inliers.iter().filter(|point| cubes.contains(&cube_of(point, SURFACE_GRID_M)));
         let outline: Vec<Point2<f64>> = of_piece.map(Point3::xy).collect();
         let outline = smallest_around(&outline)?;
@@ -66,13 +67,13 @@ impl Surface {
         self.outline.corners().map(|corner| self.lifted(&corner))
     }
 
-    /// The point of the plane above or below a level one.
+    /// The point of the plane above or below a horizontal position.
     fn lifted(&self, level: &Point2<f64>) -> Point3<f64> {
         let low = Point3::new(level.x, level.y, 0.0);
         Point3::new(level.x, level.y, -self.plane.above(&low) / self.plane.normal.z)
     }
 
-    /// The same as it is reported.
+    /// The surface as it is reported.
     pub fn perceived(&self) -> PerceivedPlane {
         let up = self.plane.normal.into_inner();
         let along = Vector3::new(libm::cos(self.outline.yaw), libm::sin(self.outline.yaw), 0.0);
@@ -84,7 +85,7 @@ impl Surface {
         PerceivedPlane { pose, size_m: self.outline.size_m }
     }
 
-    /// What stands on it, seen from `eye`.
+    /// The objects on the surface, seen from `eye`.
     pub fn things(&self, points: &[Point3<f64>], eye: &Point3<f64>, kinds: &[KnownKind]) -> Vec<PerceivedThing> {
         let standing: Vec<Point3<f64>> = points.iter().filter(|point| self.carries(point)).copied().collect();
         let clusters = clusters(&standing, APART_M).into_iter().filter(|cluster| cluster.len() >= LEAST_POINTS);
@@ -96,14 +97,14 @@ impl Surface {
             .collect()
     }
 
-    /// Whether a point is of something on the surface.
+    /// Whether a point belongs to an object on the surface.
     fn carries(&self, point: &Point3<f64>) -> bool {
         let local = self.outline.local(&point.xy());
         let inside = local.iter().zip(self.outline.size_m).all(|(off, side)| off.abs() <= side / 2.0 + OVER_EDGE_M);
         inside && (RISE_M..=HIGHEST_M).contains(&self.plane.above(point))
     }
 
-    /// The thing that shows these points.
+    /// The object that these points belong to.
     fn thing(&self, points: &[Point3<f64>], eye: &Point3<f64>, kinds: &[KnownKind]) -> Option<PerceivedThing> {
         let level: Vec<Point2<f64>> = points.iter().map(Point3::xy).collect();
         let mut outline = smallest_around(&level)?;
@@ -128,8 +129,8 @@ impl Surface {
     }
 }
 
-/// The outline with its sides as long as they are known to be. What is missing is behind what is seen: the middle goes
-/// away from the eye by half of what is missing along that direction.
+/// The outline extended to the known side lengths. The missing part is behind the visible part, so the centre moves
+/// away from the eye by half of the missing length in that direction.
 fn completed(outline: &Rectangle, known: [f64; 2], eye: &Point2<f64>) -> Rectangle {
     let away = Vector2::from(outline.local(eye)).try_normalize(1e-6).map_or(Vector2::zeros(), |towards| -towards);
     let mut out = *outline;
@@ -155,7 +156,7 @@ mod tests {
         vec![kind("box", [0.1, 0.06, 0.15]), kind("can", [0.066, 0.066, 0.115])]
     }
 
-    /// Points on the sides and the top of a box that stands at z = 0.7, 3 mm apart; only those that a cut keeps.
+    /// Points at a spacing of 3 mm on the sides and the top of a box at z = 0.7; only those accepted by `cut`.
     fn block(centre: [f64; 2], yaw: f64, size: [f64; 3], cut: impl Fn(&Point3<f64>) -> bool) -> Vec<Point3<f64>> {
         let pose = Pose::upright([centre[0], centre[1], 0.7], yaw).to_isometry();
         let steps = |extent: f64| (0..=100).map(move |idx| extent * (f64::from(idx) / 100.0 - 0.5));
@@ -172,7 +173,7 @@ mod tests {
         points.into_iter().map(|point| pose * point).filter(cut).collect()
     }
 
-    /// Points of a table top of 0.8 × 0.6 m at z = 0.7, turned by 0.2, 4 mm apart.
+    /// Points at a spacing of 4 mm on a 0.8 × 0.6 m table top at z = 0.7, with a yaw of 0.2 rad.
     fn table() -> Vec<Point3<f64>> {
         let pose = Pose::upright([0.1, 0.0, 0.7], 0.2).to_isometry();
         let xs = (0..=200).map(|idx| 0.8 * (f64::from(idx) / 200.0 - 0.5));

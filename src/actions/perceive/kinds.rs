@@ -1,28 +1,29 @@
-//! What a thing may be, by its size.
+//! Recognises objects by their size.
 
 use crate::scenario::KnownKind;
 
-/// How much larger than it is a side may seem. Unit: metres. Noise at the outline, and the grid of points.
+/// How much larger than its true length a side may appear. Unit: metres. Noise at the outline, and the grid of points.
 const WIDER_M: f64 = 0.008;
-/// How much smaller: a part of the side is hidden by others, or by the thing itself.
+/// How much smaller it may appear: part of the side may be hidden by other objects or by the object itself.
 const NARROWER_M: f64 = 0.02;
-/// How much a height may seem off. Unit: metres. The top of a thing is seldom hidden.
+/// How far off a height may appear. Unit: metres. The top of an object is seldom hidden.
 const HIGHER_M: f64 = 0.008;
-/// Sum of squares of the above beyond which a thing is of no known kind: once each, or one of them nearly twice.
+/// Sum of squares beyond which an object is of no known kind: all three at their limit, or one at nearly twice its
+/// limit.
 const MOST: f64 = 3.0;
 
-/// A kind that fits a size.
+/// A kind that matches a size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit<'a> {
-    /// Which kind.
+    /// The kind.
     pub kind: &'a KnownKind,
-    /// Whether its x side lies along the thing's second side.
+    /// Whether its x side lies along the object's second side.
     pub crosswise: bool,
-    /// How badly it fits: 0 is perfect. No unit.
+    /// Mismatch: 0 is perfect. No unit.
     pub miss: f64,
 }
 
-/// The kind that fits best, if any does. Unit: metres. The first two sides are level and in no order.
+/// The best match, if any. Unit: metres. The first two sides are horizontal and in any order.
 pub fn recognise(size_m: [f64; 3], kinds: &[KnownKind]) -> Option<Fit<'_>> {
     let fits = kinds.iter().flat_map(|kind| {
         [false, true].map(|crosswise| {
@@ -35,7 +36,7 @@ pub fn recognise(size_m: [f64; 3], kinds: &[KnownKind]) -> Option<Fit<'_>> {
     fits.filter(|fit| fit.miss <= MOST).min_by(|a, b| a.miss.total_cmp(&b.miss))
 }
 
-/// How much a seen side misses a known one, in units of what is to be expected.
+/// Mismatch of a perceived side, in units of its expected error.
 fn side(seen: f64, known: f64) -> f64 {
     let off = seen - known;
     if off > 0.0 { off / WIDER_M } else { off / NARROWER_M }

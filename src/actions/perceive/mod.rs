@@ -1,11 +1,11 @@
 //! From depth pictures to a level surface and the things on it.
 //!
-//! Each step is a function over points: [`cloud`] places pixels in the world, [`plane`] finds the surface, [`rectangle`] its
-//! outline, [`cluster`] what stands out of it, [`kinds`] what that may be, [`interpret`] puts them together. [`gaze`] says
-//! how the head has to stand, and only [`sight`] moves it: for [`skill`], which looks for any surface, and for [`survey`], which
-//! looks again at one that is known.
+//! Each step is a function over points: [`cloud`] places pixels in the world, [`plane`] finds the surface,
+//! [`rectangle`] its outline, [`cluster`] separates the objects on it, [`kinds`] recognises them, and [`interpret`]
+//! combines these steps. [`gaze`] computes head postures, and only [`sight`] moves the head: for [`skill`], which looks
+//! for any surface, and for [`survey`], which looks again at a known one.
 //!
-//! Never: sees anything but pictures and joint positions, or knows what is in the scene.
+//! Never: uses anything but pictures and joint positions, or knows what is in the scene.
 
 mod cloud;
 mod cluster;

@@ -1,36 +1,37 @@
-//! The largest level plane among points: a guess that most agree with, then a fit to those.
+//! Finds the largest level plane among points: the guess with the most inliers, then a fit to those inliers.
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::base::Stream;
 
-/// What is known of the plane beforehand.
+/// Prior knowledge about the plane.
 #[derive(Debug, Clone)]
 pub struct Prior {
-    /// Height of its points: the floor is none, nor is what stands in a shelf overhead. Unit: metres.
+    /// Height range of its points, which excludes the floor and overhead shelves. Unit: metres.
     pub heights_m: (f64, f64),
     /// Largest angle from the level. Unit: radians.
     pub tilt_rad: f64,
-    /// Largest distance of a point that belongs to it. Unit: metres.
+    /// Largest distance of an inlier. Unit: metres.
     pub off_m: f64,
 }
 
 /// A plane with an upper side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plane {
-    /// A point of it: the middle of those that it was fitted to.
+    /// A point of the plane: the mean of the points it was fitted to.
     pub point: Point3<f64>,
-    /// Direction of its upper side.
+    /// Normal of its upper side.
     pub normal: Unit<Vector3<f64>>,
 }
 
-/// Guesses. Where a third of the points are of the plane, one guess in 27 is right: all are wrong once in 10¹⁶ times.
+/// Number of guesses. If a third of the points are inliers, one guess in 27 is right, and all are wrong once in 10¹⁶
+/// times.
 const N_GUESSES: u64 = 1000;
-/// Points that a guess is judged by.
+/// Number of points used to score a guess.
 const N_JUDGES: usize = 500;
-/// Fewer points are no plane.
+/// Fewest points that make a plane.
 const LEAST_POINTS: usize = 100;
-/// Rounds of fitting to the points that are near the last fit. The result does not change any more after two.
+/// Rounds of refitting to the points near the last fit. The result no longer changes after two.
 const N_FITS: usize = 3;
 
 impl Plane {
@@ -44,15 +45,15 @@ impl Plane {
         libm::acos(self.normal.z.clamp(-1.0, 1.0))
     }
 
-    /// The plane through three points; nothing where they are in line.
+    /// The plane through three points. Returns `None` if they are collinear.
     fn through(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> Option<Self> {
         let normal = (b - a).cross(&(c - a));
         let upwards = if normal.z < 0.0 { -normal } else { normal };
         Unit::try_new(upwards, 1e-6).map(|normal| Self { point: *a, normal })
     }
 
-    /// The plane from which the squared vertical distances of some points are the least. (For a plane that is nearly level
-    /// that is as good as those along its normal.)
+    /// The plane with the least sum of squared vertical distances. (For a nearly level plane this is as good as
+    /// distances along the normal.)
     fn fitted(points: &[Point3<f64>]) -> Option<Self> {
         let middle = Point3::from(points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / points.len() as f64);
         let [mut xx, mut xy, mut yy, mut xz, mut yz] = [0.0; 5];
@@ -68,7 +69,7 @@ impl Plane {
     }
 }
 
-/// The plane that the most points agree with, and the indexes of these. The same seed makes the same guesses.
+/// The plane with the most inliers, and their indices. The same seed makes the same guesses.
 pub fn find(points: &[Point3<f64>], prior: &Prior, seed: u64) -> Option<(Plane, Vec<usize>)> {
     let (low, high) = prior.heights_m;
     let within: Vec<usize> = (0..points.len()).filter(|idx| (low..=high).contains(&points[*idx].z)).collect();
@@ -114,7 +115,7 @@ mod tests {
 
     const PRIOR: Prior = Prior { heights_m: (0.2, 1.3), tilt_rad: 0.15, off_m: 0.01 };
 
-    /// Points on z = 0.7 + 0.05 x − 0.02 y over a square metre, off by noise of 2 mm, and as many anywhere above.
+    /// Points on z = 0.7 + 0.05 x − 0.02 y over a square metre with 2 mm of noise, and as many anywhere above.
     fn scattered(seed: u64) -> (Vec<Point3<f64>>, Plane) {
         let stream = Stream::new(seed);
         let mut points = Vec::new();

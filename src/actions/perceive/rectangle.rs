@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Vector2};
 
-/// A rectangle, turned in its plane.
+/// A rotated rectangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rectangle {
     /// Its middle.
@@ -14,19 +14,20 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
-    /// A point as seen from the middle along both sides.
+    /// A point in the rectangle's frame.
     pub fn local(&self, point: &Point2<f64>) -> Vector2<f64> {
         turned(point - self.centre, -self.yaw)
     }
 
-    /// The four corners, around.
+    /// The four corners, in order around the rectangle.
     pub fn corners(&self) -> [Point2<f64>; 4] {
         let [x, y] = self.size_m.map(|side| side / 2.0);
         [(x, y), (-x, y), (-x, -y), (x, -y)].map(|(x, y)| self.centre + turned(Vector2::new(x, y), self.yaw))
     }
 }
 
-/// The rectangle of the smallest area: one of its sides lies along a side of the points' hull. Nothing without points.
+/// The rectangle of the smallest area: one of its sides lies along a side of the convex hull. Returns `None` without
+/// points.
 pub fn smallest_around(points: &[Point2<f64>]) -> Option<Rectangle> {
     let hull = hull(points);
     let ends = hull.iter().zip(hull.iter().cycle().skip(1));
@@ -45,7 +46,7 @@ fn around(points: &[Point2<f64>], yaw: f64) -> Rectangle {
     Rectangle { centre: Point2::from(turned((low + high) / 2.0, yaw)), yaw, size_m: (high - low).into() }
 }
 
-/// The same direction but for quarter turns, in [−π/4, π/4).
+/// The heading modulo a quarter turn, in [−π/4, π/4).
 pub fn quarter(heading: f64) -> f64 {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
     let turned = heading + FRAC_PI_4;

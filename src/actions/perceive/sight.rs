@@ -1,4 +1,4 @@
-//! What the head sees in several pictures, together.
+//! Combines several pictures taken by the head camera.
 
 use nalgebra::{Isometry3, Point3};
 
@@ -10,22 +10,22 @@ use crate::world::{DepthImage, OwnBody};
 
 /// Time for the head to come to rest. Unit: seconds.
 const REST_SECS: f64 = 0.3;
-/// What is nearer to the robot's own shapes is itself. Unit: metres. Calibration and noise.
+/// Points closer to the robot's own shapes belong to the robot. Unit: metres. Allows for calibration error and noise.
 const OWN_M: f64 = 0.02;
-/// Corners that are nearer to each other are the same. Unit: metres.
+/// Corners closer than this are the same. Unit: metres.
 const SAME_M: f64 = 0.03;
-/// Part of the picture at its border in which a corner does not count as seen: what is beyond may belong to it.
+/// Share of the picture at its border in which a corner does not count as seen: the surface may continue beyond.
 const BORDER_SHARE: f64 = 0.05;
 
-/// All that was seen so far.
+/// Everything seen so far.
 #[derive(Default)]
 pub(super) struct Sight {
-    /// What there is besides the robot. Frame: world, by the base's belief.
+    /// Points that do not belong to the robot. Frame: world, by the base's belief.
     pub(super) points: Vec<Point3<f64>>,
     views: Vec<View>,
 }
 
-/// One picture and where it was taken.
+/// One picture and the pose of the camera.
 struct View {
     image: DepthImage,
     camera: Isometry3<f64>,
@@ -43,14 +43,14 @@ impl Sight {
         let image = robot.look();
         let seen = thinned(&points(&image, &camera), GRID_M);
         self.points.extend(seen.into_iter().filter(|point| !own.is_near(point, OWN_M)));
-        // Points of several pictures together are as many as those of one.
+        // Thin again: several pictures together keep the density of one.
         self.points = thinned(&self.points, GRID_M);
         self.views.push(View { image, camera });
         Ok(())
     }
 
-    /// Looks at the corners of a surface that no picture shows yet, until all are seen or the head does not reach, and gives
-    /// the surface as it is then. `find` finds it among points.
+    /// Looks at the corners of a surface that are in no picture yet, until all are seen or the head can't reach, and
+    /// returns the updated surface. `find` finds the surface among points.
     pub(super) fn take_in(
         &mut self,
         mut surface: Surface,
@@ -61,32 +61,33 @@ impl Sight {
         let mut last: Option<Point3<f64>> = None;
         while self.views.len() < most_views {
             let Some(corner) = self.unseen(&surface) else { break };
-            // Looking at it has not brought it into the picture: the head does not reach.
+            // Still not in the picture after looking at it: the head can't reach.
             if last.is_some_and(|last| (last - corner).norm() < SAME_M) {
                 break;
             }
             last = Some(corner);
             robot.begin("look at a corner");
             self.add_look_at(&corner, robot)?;
-            // More points only make more of it; were there none any more, what was found before would stand.
+            // More points should only improve the surface. If it is no longer found, keep the previous one.
             surface = find(&self.points).unwrap_or(surface);
         }
         Ok(surface)
     }
 
-    /// A corner of the surface that no picture shows well inside of its borders.
+    /// A corner of the surface that is not well inside the borders of any picture.
     pub(super) fn unseen(&self, surface: &Surface) -> Option<Point3<f64>> {
         surface.corners().into_iter().find(|corner| !self.views.iter().any(|view| view.shows(corner)))
     }
 
-    /// Where the last picture was taken from. (The head turns about its neck: others were taken a few centimetres away.)
+    /// Position of the camera at the last picture. (The head turns about its neck, so other pictures were taken within
+    /// a few centimetres.)
     pub(super) fn eye(&self) -> Point3<f64> {
         self.views.last().map_or(Point3::origin(), |view| Point3::from(view.camera.translation.vector))
     }
 }
 
 impl View {
-    /// Whether a point is in the picture and not at its border. It may be hidden.
+    /// Whether a point is in the picture and away from its border. It may be occluded.
     fn shows(&self, point: &Point3<f64>) -> bool {
         let extent = [self.image.width, self.image.height].map(|count| count as f64);
         let inside = |(at, extent): (f64, f64)| (BORDER_SHARE..=1.0 - BORDER_SHARE).contains(&(at / extent));

@@ -1,4 +1,5 @@
-//! The skill: look where the surface should be, or ahead, until there is one, look where it runs out of the picture, say what stands on it.
+//! The perception skill: looks where the surface is expected, or ahead, until a surface is found; looks at its unseen
+//! corners; reports the objects on it.
 
 use std::collections::BTreeMap;
 
@@ -13,26 +14,27 @@ use crate::actions::{ActionCall, ActionReport, Perceived};
 use crate::base::names;
 use crate::world::Sighting;
 
-/// Where a surface is looked for: distance in front of the base, and height. Unit: metres. A table, a low table, a far one.
+/// Where to look for a surface: distance in front of the base, and height. Unit: metres. A table, a low table, a far
+/// one.
 const AHEAD_M: [[f64; 2]; 3] = [[1.0, 0.7], [0.8, 0.35], [1.8, 0.8]];
-/// Designator of the surface that is meant.
+/// Designator of the surface.
 const SURFACE: &str = "objectSurface";
-/// A surface that is farther away is not looked for by the floor plan. Unit: metres.
+/// The floor plan is ignored for surfaces farther away than this. Unit: metres.
 const FAR_M: f64 = 2.5;
-/// A surface that seems larger or smaller than that by more is cut off, or several things. Unit: metres. What outlines are off by,
-/// twice.
+/// A surface whose sides differ from the expected ones by more is cut off, or several surfaces. Unit: metres. Twice the
+/// error of an outline.
 const SIZE_OFF_M: f64 = 0.05;
-/// Pictures that are taken at most.
+/// Largest number of pictures.
 const MOST_VIEWS: usize = 7;
 
-/// Looks for a surface and for what stands on it, and keeps that for later actions.
+/// Looks for a surface and the objects on it, and keeps them for later actions.
 ///
 /// # Errors
 /// [`Interrupt`] if simulation broke or time ran out.
 pub fn perceive_plane(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
     let mut sight = Sight::default();
     let expected = expected(call, robot);
-    // What is where a surface is expected; where there is nothing, the largest of all.
+    // The surface at the expected place; otherwise the largest of all.
     let find = |points: &[Point3<f64>]| {
         let there = expected.as_ref().and_then(|expected| Surface::find(&near(points, expected)));
         there.or_else(|| Surface::find(points))
@@ -66,14 +68,14 @@ pub fn perceive_plane(call: &ActionCall, robot: &mut Operator<'_>) -> Result<Act
     })
 }
 
-/// Whether a surface is as large as it is expected to be, however it is turned.
+/// Whether a surface has the expected size, in either orientation.
 fn is_of_size(surface: &Surface, expected: &Sighting) -> bool {
     let sorted = |[a, b]: [f64; 2]| [a.min(b), a.max(b)];
     let [seen, known] = [surface.outline.size_m, [expected.size_m[0], expected.size_m[1]]].map(sorted);
     seen.iter().zip(known).all(|(seen, known)| (seen - known).abs() <= SIZE_OFF_M)
 }
 
-/// The designated surface by the floor plan, where it is within sight. What is there is for the camera to say.
+/// The designated surface according to the floor plan, if it is within sight. The camera decides what is really there.
 fn expected(call: &ActionCall, robot: &Operator<'_>) -> Option<Sighting> {
     let id = call.value(SURFACE)?;
     let base = robot.base().translation.vector;
@@ -81,12 +83,12 @@ fn expected(call: &ActionCall, robot: &Operator<'_>) -> Option<Sighting> {
     robot.known_furniture().into_iter().find(|piece| piece.id == id).filter(is_near)
 }
 
-/// The middle of a piece of furniture's top.
+/// Centre of the top of a piece of furniture.
 fn middle(piece: &Sighting) -> Point3<f64> {
     piece.pose.to_isometry() * Point3::new(0.0, 0.0, piece.size_m[2])
 }
 
-/// A point so far in front of the base, so high. Frame: world, by the base's belief.
+/// The point at this distance in front of the base and at this height. Frame: world, by the base's belief.
 fn in_front(robot: &Operator<'_>, [distance, height]: [f64; 2]) -> Point3<f64> {
     let mut point = robot.base() * Point3::new(distance, 0.0, 0.0);
     point.z = height;
@@ -106,7 +108,7 @@ fn report(perceived: &Perceived, whole: bool) -> ActionReport {
     let ([_, _, height], [width, depth]) = (plane.pose.position, plane.size_m);
     let found = format!("a surface of {width:.2} × {depth:.2} m, {height:.2} m high, and on it {things}");
     if !whole {
-        return ActionReport { succeeded: false, message: format!("{found}; it goes on beyond what the head can see") };
+        return ActionReport { succeeded: false, message: format!("{found}; it extends beyond the head's view") };
     }
     ActionReport { succeeded: true, message: found }
 }

@@ -1,4 +1,4 @@
-//! A second look at a surface that the robot knows about: where exactly it is, and what stands on it.
+//! A second look at a known surface: its exact pose and the objects on it.
 
 use nalgebra::{Point3, Vector3};
 
@@ -11,25 +11,25 @@ use crate::base::Pose;
 use crate::scenario::KnownKind;
 use crate::world::Sighting;
 
-/// Pictures that are taken at most.
+/// Largest number of pictures.
 const MOST_VIEWS: usize = 5;
-/// How far beyond where it is expected the surface may reach, and how much higher or lower it may be. Unit: metres. What a
-/// map is off by the error of a heading, and a detector by three times its noise.
+/// How far the surface may extend beyond its expected outline, and differ from its expected height. Unit: metres. The
+/// position error that a heading error causes on a map, and three times a detector's noise.
 const OFF_M: f64 = 0.15;
-/// A thing that is seen farther from where it is expected is another one. Unit: metres. What a belief is put right by after a few
-/// metres' drive, twice.
+/// An object seen farther from its expected position is a different one. Unit: metres. Twice the correction of the
+/// belief after a few metres of driving.
 const ASTRAY_M: f64 = 0.25;
 
-/// A surface as it was looked at, and what stands on it.
+/// A surface as perceived, and the objects on it.
 pub struct Survey {
     /// The surface.
     pub plane: PerceivedPlane,
-    /// What stands on it.
+    /// The objects on it.
     pub things: Vec<Sighting>,
 }
 
 impl Survey {
-    /// The same of a piece of furniture that was seen as a whole: its top, and what stands anywhere.
+    /// A survey from a piece of furniture that was seen as a whole: its top, and all known objects.
     pub fn of(furniture: &Sighting, things: Vec<Sighting>) -> Self {
         let [x, y, z] = furniture.pose.position;
         let [width, depth, height] = furniture.size_m;
@@ -38,7 +38,7 @@ impl Survey {
     }
 }
 
-/// Looks at a surface that is expected to be the top of a piece of furniture; nothing if there is none.
+/// Looks at a surface that should be the top of a piece of furniture. Returns `None` if no surface is found.
 ///
 /// # Errors
 /// [`Interrupt`] if the action has to end.
@@ -61,8 +61,8 @@ pub fn survey(expected: &Sighting, robot: &mut Operator<'_>) -> Result<Option<Su
     Ok(Some(Survey { plane: surface.perceived(), things: things.collect() }))
 }
 
-/// Looks once more at a thing on a surface and gives where it is now by the base's belief, which drives have changed; nothing if
-/// no such thing is seen near where it is expected.
+/// Looks once more at an object on a surface and returns its current pose by the base's belief, which drifts while
+/// driving. Returns `None` if no object of this kind is seen near the expected position.
 ///
 /// # Errors
 /// [`Interrupt`] if the action has to end.
@@ -84,7 +84,8 @@ pub fn look_again(
     Ok(nearest.map(|thing| sighting(expected.id.clone(), thing)))
 }
 
-/// Where the top of a piece of furniture is looked for: its middle, then halfway to its corners, where something is in the way.
+/// Points to look at on the top of a piece of furniture: its centre, then halfway to each corner in case something is
+/// in the way.
 fn places(expected: &Sighting) -> impl Iterator<Item = Point3<f64>> {
     let ([width, depth, height], pose) = (expected.size_m, expected.pose.to_isometry());
     let shares = [(0.0, 0.0), (-0.25, 0.25), (-0.25, -0.25), (0.25, 0.25), (0.25, -0.25)];
@@ -112,7 +113,7 @@ mod tests {
     fn what_is_beside_a_table_or_far_below_its_top_is_no_part_of_it() {
         let pose = Pose::upright([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
         let table = Sighting { id: "t".to_owned(), pose, size_m: [1.2, 0.8, 0.74], furniture: true };
-        // Turned a quarter, it is 0.8 m long along x and 1.2 m along y.
+        // Turned by 90 degrees, it is 0.8 m long along x and 1.2 m along y.
         let points = [[1.5, 0.7, 0.7], [1.0, 0.0, 0.88], [1.6, 0.0, 0.74], [1.0, 0.8, 0.74], [1.0, 0.0, 0.5]];
         let kept = near(&points.map(Point3::from), &table);
         assert_eq!(kept, points[..2].iter().copied().map(Point3::from).collect::<Vec<_>>());

@@ -1,4 +1,4 @@
-//! How a thing is carried: the hand near the base, the base around what stands on the floor.
+//! Carrying an object: brings the hand close to the base and drives the base around obstacles.
 
 use nalgebra::Vector3;
 
@@ -8,27 +8,27 @@ use crate::actions::{navigate, plan};
 use crate::base::Pose;
 use crate::world::{SelfContact, Sighting, ik};
 
-/// Distance between postures on a straight way of the hand. Unit: metres.
+/// Distance between postures on a straight path of the hand. Unit: metres.
 const STEP_M: f64 = 0.02;
-/// How far in front of the base's middle the hand is while it carries. Unit: metres. A base is about 0.2 m in radius, and a
-/// hand that holds a bowl reaches 0.1 m back.
+/// Distance of the hand in front of the base's centre while carrying. Unit: metres. A base has a radius of about 0.2 m,
+/// and a hand that holds a bowl reaches 0.1 m back.
 const NEAR_M: f64 = 0.38;
-/// How high the hand is meanwhile, if the arm reaches so low. Unit: metres. The arm and what it holds are then below what the
-/// head looks at, and still above the base.
+/// Height of the hand while carrying, if the arm reaches that low. Unit: metres. The arm and its load are then below
+/// the head's view and still above the base.
 const LOW_M: f64 = 0.45;
-/// How far the hand goes back before it goes down, by the arm and by the base together. Unit: metres. What it holds clears the
-/// edge of the furniture that it was over.
+/// How far the hand moves back, by the arm and the base together, before it moves down. Unit: metres. The load then
+/// clears the edge of the furniture.
 const BACK_M: f64 = 0.2;
-/// How far a thing may lean on its way into the hand's place for driving: what it leans in the hand anyway. Unit: radians.
+/// Largest tilt of an object on the way to the driving posture, equal to its usual tilt in the hand. Unit: radians.
 const LEAN_RAD: f64 = 0.15;
-/// Postures that are checked on the way there.
+/// Number of postures checked per leg.
 const N_CHECKS: u32 = 12;
-/// Distance of the base's middle from the edge of a surface that it looks at. Unit: metres. A head a metre high sees a table's
-/// near edge from there, and what the hand holds in front of the base is clear of it.
+/// Distance between the base's centre and the edge of a surface it looks at. Unit: metres. A head at a height of one
+/// metre sees the near edge of a table from there, and an object in the hand is clear of it.
 const GAP_M: f64 = 0.69;
 
-/// Postures that bring the hand near the base and down, as it is turned, the base a little back if the arm does not go back
-/// far enough by itself; none for a robot without a base to drive.
+/// Postures that bring the hand close to the base and down, keeping its orientation. The base moves back a little if
+/// the arm alone doesn't move back far enough. Empty for a fixed base.
 pub fn fold(robot: &Operator<'_>) -> Vec<Vec<f64>> {
     let Some([x, y, _]) = robot.layout().base else { return Vec::new() };
     let start = robot.commanded().to_vec();
@@ -48,10 +48,10 @@ pub fn fold(robot: &Operator<'_>) -> Vec<Vec<f64>> {
     path
 }
 
-/// Postures that bring the arm from where it is to how it is for driving, so that the base with what it holds is slim; none where
-/// what the hand holds would lean on the way, or the arm would go into itself.
+/// Postures that move the arm to its driving posture, to make the base with its load slim. Empty if the load would tilt
+/// on the way or the arm would collide with itself.
 ///
-/// The arm goes there straight, or with one joint last: an arm whose upper part stands upright turns about it.
+/// The arm moves there directly, or with one joint last: an arm whose upper part is vertical turns about it.
 pub fn tuck(robot: &Operator<'_>, held: &Held) -> Vec<Vec<f64>> {
     let start = robot.commanded();
     let home = with_arm(start, &robot.layout().arm, &robot.profile().home);
@@ -65,7 +65,7 @@ pub fn tuck(robot: &Operator<'_>, held: &Held) -> Vec<Vec<f64>> {
     ways.into_iter().find(|way| stays_upright(robot, held, &itself, way)).unwrap_or_default()
 }
 
-/// The way back from there to how the arm was, with the base where it is now.
+/// The way back from the driving posture to the posture before, with the base at its current pose.
 pub fn untuck(robot: &Operator<'_>, tucked: &[Vec<f64>], before: &[f64]) -> Vec<Vec<f64>> {
     let arm = &robot.layout().arm;
     let values = |posture: &[f64]| arm.iter().map(|joint| posture[*joint]).collect::<Vec<f64>>();
@@ -73,7 +73,7 @@ pub fn untuck(robot: &Operator<'_>, tucked: &[Vec<f64>], before: &[f64]) -> Vec<
     back.map(|posture| with_arm(robot.commanded(), arm, &values(posture))).collect()
 }
 
-/// A posture with the arm's joints elsewhere.
+/// A posture with other positions of the arm's joints.
 fn with_arm(posture: &[f64], arm: &[usize], values: &[f64]) -> Vec<f64> {
     let mut posture = posture.to_vec();
     for (joint, value) in arm.iter().zip(values) {
@@ -82,7 +82,7 @@ fn with_arm(posture: &[f64], arm: &[usize], values: &[f64]) -> Vec<f64> {
     posture
 }
 
-/// Whether what the hand holds stays upright on a way from where the arm is, and the arm off itself.
+/// Whether the load stays upright along a path from the current posture without self-collision of the arm.
 fn stays_upright(robot: &Operator<'_>, held: &Held, itself: &SelfContact, way: &[Vec<f64>]) -> bool {
     let kinematics = robot.kinematics();
     let fits = |posture: &[f64]| {
@@ -98,7 +98,7 @@ fn stays_upright(robot: &Operator<'_>, held: &Held, itself: &SelfContact, way: &
     })
 }
 
-/// Postures on a straight way of the hand, which stays as it is turned, with the base where it is: as far as the arm reaches.
+/// Postures on a straight path of the hand with fixed orientation and a fixed base, as far as the arm reaches.
 pub fn straight(robot: &Operator<'_>, from: &[f64], by: &Vector3<f64>) -> Vec<Vec<f64>> {
     let (kinematics, layout) = (robot.kinematics(), robot.layout());
     let mut mobility = vec![0.0; from.len()];
@@ -121,9 +121,9 @@ pub fn straight(robot: &Operator<'_>, from: &[f64], by: &Vector3<f64>) -> Vec<Ve
     path
 }
 
-/// Drives to in front of a piece of furniture: to its front if there is a way, otherwise to another side. Where the robot looked
-/// around earlier it looks ahead, as on every drive; otherwise it goes by what the abstract detector saw. Gives the reason if it
-/// did not get there; a robot that stands where it stands is there.
+/// Drives in front of a piece of furniture: to its front if there is a path, otherwise to another side. If the robot
+/// perceived its surroundings earlier, it looks ahead as on every drive; otherwise it relies on the abstract detector.
+/// Returns the reason if it did not get there. A robot with a fixed base is always there.
 ///
 /// # Errors
 /// [`Interrupt`] if the action has to end.
@@ -132,7 +132,7 @@ pub fn drive_before(
     others: &[Sighting],
     robot: &mut Operator<'_>,
 ) -> Result<Option<String>, Interrupt> {
-    let mut reason = (robot.layout().base.is_some()).then(|| "no free way was found".to_owned());
+    let mut reason = (robot.layout().base.is_some()).then(|| "no free path was found".to_owned());
     let looks = robot.memory().perceived.is_some();
     for stand in stands(furniture) {
         if reason.is_none() {
@@ -148,7 +148,7 @@ pub fn drive_before(
     Ok(reason)
 }
 
-/// Base poses in front of the four sides of a piece of furniture, facing it: the front, left and right, the back.
+/// Base poses facing each of the four sides of a piece of furniture: front, left and right, back.
 fn stands(furniture: &Sighting) -> [[f64; 3]; 4] {
     let [x, y, _] = furniture.pose.position;
     let [width, depth, _] = furniture.size_m;
@@ -173,7 +173,7 @@ mod tests {
             let gaze = [libm::cos(heading), libm::sin(heading)];
             assert!((gaze[0] * dx + gaze[1] * dy - dx.hypot(dy)).abs() < 1e-9, "it looks past the middle");
         }
-        // The front of furniture is on its negative x side.
+        // The front of furniture is its negative x side.
         assert!((stands(&shelf)[0][1] - (1.0 - 0.2 - GAP_M)).abs() < 1e-9);
     }
 }

@@ -1,9 +1,9 @@
-//! From a thing in the hand to a thing on a surface.
+//! Placing: from an object in the hand to an object on a surface.
 //!
-//! [`carry`] brings the hand close to the base and the base to the surface, [`spot`] chooses where the thing shall stand and
-//! how the hand gets there, [`touch`] feels when it stands, and [`skill`] puts them together.
+//! [`carry`] brings the hand close to the base and the base to the surface, [`spot`] chooses the spot for the object
+//! and the grasp poses above it, [`touch`] detects contact with the surface, and [`skill`] combines them.
 //!
-//! Never: knows where anything is but by sight, by the map and by what the hand feels.
+//! Never: knows positions other than by sight, by the map and by touch.
 
 mod carry;
 mod skill;

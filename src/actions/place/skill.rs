@@ -1,4 +1,4 @@
-//! The place skill: fold, drive, look, lower until it stands, open, withdraw.
+//! The place skill: fold, drive, look, lower until contact, open, withdraw.
 
 use nalgebra::{Point3, Vector3};
 
@@ -13,31 +13,31 @@ use crate::actions::plan::{self, Plan, Wanted};
 use crate::actions::{ActionCall, ActionReport, memory};
 use crate::world::Sighting;
 
-/// Designators of the thing to place and of what it shall stand on.
+/// Designators of the object to place and of the target surface.
 const TARGET: &str = "pickObject";
 const SURFACE: &str = "placeSurface";
-/// Time for looking and for coming to rest. Unit: seconds.
+/// Duration of a look, including the time to come to rest. Unit: seconds.
 const LOOK_SECS: f64 = 0.5;
-/// Shortest time of folding the arm with something in the hand. Unit: seconds.
+/// Shortest duration of folding a loaded arm. Unit: seconds.
 const FOLD_SECS: f64 = 2.0;
-/// Shortest time of bringing the arm into its place for driving, or out of it. Unit: seconds.
+/// Shortest duration of moving the arm into or out of its driving posture. Unit: seconds.
 const TUCK_SECS: f64 = 3.0;
-/// Shortest time of going down to a few centimetres above the surface. Unit: seconds.
+/// Shortest duration of moving down to a few centimetres above the surface. Unit: seconds.
 const DOWN_SECS: f64 = 3.0;
-/// How far below the place where the surface is expected the hand goes on. Unit: metres. What sight is off by, three times.
+/// How far the hand continues below the expected height of the surface. Unit: metres. Three times the error of vision.
 const DEEPER_M: f64 = 0.03;
-/// Shortest time of the last part of the way down, about 2 cm/s. Unit: seconds.
+/// Shortest duration of the last part of the descent, at about 2 cm/s. Unit: seconds.
 const SETTLE_SECS: f64 = 3.0;
-/// Time for fingers to open. Unit: seconds.
+/// Time for the fingers to open. Unit: seconds.
 const OPEN_SECS: f64 = 0.8;
-/// Shortest time of leaving what was set down. Unit: seconds.
+/// Shortest duration of withdrawing from the object. Unit: seconds.
 const LEAVE_SECS: f64 = 2.0;
-/// How far a hand goes back from what it let go, where no base takes it there. Unit: metres.
+/// How far the hand withdraws from the object if the base can't move it away. Unit: metres.
 const LEAVE_M: f64 = 0.12;
 
-/// Why the skill ends before its end.
+/// Early end of the skill.
 enum Halt {
-    /// It has failed; a sentence for the report.
+    /// The skill has failed, with a sentence for the report.
     Failed(String),
     /// The action has to end.
     Interrupted(Interrupt),
@@ -49,7 +49,7 @@ impl From<Interrupt> for Halt {
     }
 }
 
-/// Sets what the hand holds down on the designated surface and reports whether it believes that it stands there.
+/// Sets the held object down on the designated surface and reports whether the robot believes it is there.
 ///
 /// # Errors
 /// [`Interrupt`] if simulation broke or time ran out.
@@ -91,7 +91,7 @@ fn try_to_place(call: &ActionCall, robot: &mut Operator<'_>) -> Result<String, H
     set_down(surface, &held, &plan, &spot, robot)
 }
 
-/// What the robot believes to hold, if its fingers feel anything.
+/// The object the robot believes to hold, if the fingers feel anything.
 fn in_hand(target: &str, robot: &mut Operator<'_>) -> Result<Held, Halt> {
     let nothing = || Halt::Failed(format!("nothing is in the hand: {target} can't be placed"));
     let held = robot.memory().held.clone().ok_or_else(nothing)?;
@@ -103,7 +103,7 @@ fn in_hand(target: &str, robot: &mut Operator<'_>) -> Result<Held, Halt> {
     Ok(held)
 }
 
-/// That nothing slipped on the way.
+/// Fails if the object slipped on the way.
 fn still_in_hand(held: &Held, robot: &mut Operator<'_>) -> Result<(), Halt> {
     if !robot.felt_slip() {
         return Ok(());
@@ -112,8 +112,9 @@ fn still_in_hand(held: &Held, robot: &mut Operator<'_>) -> Result<(), Halt> {
     Err(Halt::Failed(format!("{} slipped out of the hand on the way", held.id)))
 }
 
-/// Where the surface is, roughly, and everything else. Where the robot looked around earlier: furniture by its floor plan, and
-/// things on tables as it perceived them then. Otherwise by the abstract detector, but for what is on a map.
+/// The approximate pose of the surface, and all other objects. If the robot perceived its surroundings earlier, these
+/// are the furniture of its floor plan and the perceived objects. Otherwise mapped furniture comes from the map and
+/// everything else from the abstract detector.
 fn look_out(surface: &str, held: &Held, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), Halt> {
     let mut seen = match robot.memory().perceived.clone() {
         Some(perceived) => {
@@ -131,7 +132,7 @@ fn look_out(surface: &str, held: &Held, robot: &mut Operator<'_>) -> Result<(Sig
     let at = seen.iter().position(|thing| thing.id == surface && thing.furniture);
     let at = at.ok_or_else(|| Halt::Failed(format!("{surface} was not seen")))?;
     let place = seen.remove(at);
-    // Where the thing stood, there may still be a percept of it.
+    // There may still be a percept of the object at its old position.
     let taken = held.foot.translation.vector;
     seen.retain(|thing| {
         thing.furniture || (Vector3::from(thing.pose.position) - taken).norm() > spot::radius(held.size_m)
@@ -139,8 +140,8 @@ fn look_out(surface: &str, held: &Held, robot: &mut Operator<'_>) -> Result<(Sig
     Ok((place, seen))
 }
 
-/// The surface as it is seen from before it: in pictures where the robot looked around earlier, otherwise by the abstract
-/// detector.
+/// The surface seen from in front of it: in pictures if the robot perceived its surroundings earlier, otherwise by the
+/// abstract detector.
 fn look_at(surface: &str, seen: &Sighting, others: &[Sighting], robot: &mut Operator<'_>) -> Result<Survey, Halt> {
     robot.wait(LOOK_SECS)?;
     let missing = || Halt::Failed(format!("{surface} was not found where it should be"));
@@ -152,7 +153,7 @@ fn look_at(surface: &str, seen: &Sighting, others: &[Sighting], robot: &mut Oper
     Ok(Survey::of(&again, things))
 }
 
-/// A free spot, and the way of the hand to it.
+/// A free spot, and the hand's path to it.
 fn choose(
     surface: &str,
     held: &Held,
@@ -167,19 +168,19 @@ fn choose(
     }
     let mut around: Vec<Sighting> = others.iter().chain(&survey.things).cloned().collect();
     around.push(furniture(surface, &survey.plane));
-    // What the drive saw on the floor.
+    // Obstacles that the drive saw on the floor.
     around.extend(memory::obstacles(&robot.memory().floor));
     let ways = spot::ways(held, &spots, robot.profile().max_opening_m);
-    // Where the arm can't unfold straight, it goes around itself: what it holds may lean meanwhile.
+    // An arm that can't unfold straight moves around obstacles; the held object may tilt meanwhile.
     let wanted = Wanted { grasps: &ways, all: &ways, taken: None };
     let plan = plan::plan(robot, wanted, &spot::heightened(&around, held));
     let plan = plan.map_err(|reason| Halt::Failed(format!("{surface}: {reason}")))?;
     let lowest = plan.approach.last().map(|posture| robot.kinematics().grasp(posture).translation.vector.xy().into());
     let spot = lowest.and_then(|at| spot::nearest(&spots, &at));
-    spot.map(|spot| (plan, spot)).ok_or_else(|| Halt::Failed(format!("{surface}: there is no way down to it")))
+    spot.map(|spot| (plan, spot)).ok_or_else(|| Halt::Failed(format!("{surface}: no path down to it was found")))
 }
 
-/// Carries the thing over its spot, lowers it, lets it go and leaves.
+/// Carries the object over its spot, lowers it, releases it and withdraws.
 fn set_down(
     surface: &str,
     held: &Held,
@@ -213,7 +214,7 @@ fn set_down(
     Ok(format!("set {} down on {surface} at x = {:.2}, y = {:.2}", held.id, spot.x, spot.y))
 }
 
-/// Lowers the hand until something else carries what it holds. True if that was felt.
+/// Lowers the hand until something else carries the object. Returns `true` if contact was felt.
 fn lower(plan: &Plan, robot: &mut Operator<'_>) -> Result<bool, Halt> {
     robot.wait(LOOK_SECS)?;
     let Some((lowest, down)) = plan.approach.split_last() else { return Ok(false) };
@@ -226,7 +227,7 @@ fn lower(plan: &Plan, robot: &mut Operator<'_>) -> Result<bool, Halt> {
     Ok(robot.follow_until(&deeper, SETTLE_SECS, |robot| touch.felt(robot))?)
 }
 
-/// Takes the open hand away: level, by the way that it faces, from what it held from the side; otherwise up first.
+/// Withdraws the open hand: horizontally and backwards from an object held from the side, otherwise upwards first.
 fn withdraw(held: &Held, plan: &Plan, robot: &mut Operator<'_>) -> Result<(), Halt> {
     if !spot::is_level(held) {
         robot.follow(&plan.lift, LEAVE_SECS)?;

@@ -1,4 +1,4 @@
-//! Where on a surface a thing can stand, and how the hand that holds it gets there.
+//! Chooses free spots on a surface, and hand poses for setting an object down there.
 
 use nalgebra::{Point2, Point3, Vector3};
 
@@ -9,30 +9,30 @@ use crate::actions::route::length;
 use crate::base::Pose;
 use crate::world::Sighting;
 
-/// Distance between places that are looked at. Unit: metres.
+/// Grid spacing of candidate spots. Unit: metres.
 const STEP_M: f64 = 0.03;
-/// Room that a thing needs to the edge and to others. Unit: metres. What sight is off by, twice.
+/// Clearance that an object needs to the edge and to other objects. Unit: metres. Twice the error of vision.
 const LEAST_ROOM_M: f64 = 0.03;
-/// Room that is as good as any more. Unit: metres. A finger and what sight is off by.
+/// More clearance than this brings no benefit. Unit: metres. A finger and the error of vision.
 const AMPLE_ROOM_M: f64 = 0.08;
-/// How much room a metre less of a way is worth. No unit: both are metres.
+/// Clearance that offsets one metre of distance. No unit: both are metres.
 const DISTANCE_SHARE: f64 = 0.05;
-/// Places that are tried, and how far apart they are. Unit of the distance: metres.
+/// Number of spots tried, and the distance between them. Unit of the distance: metres.
 const N_SPOTS: usize = 6;
 const APART_M: f64 = 0.1;
-/// Directions from which each is tried.
+/// Number of headings tried for each spot.
 const N_HEADINGS: u32 = 24;
-/// What speaks against a spot that is next in order. Unit: that of a plan's cost.
+/// Penalty added for each next spot in order. Unit: that of a plan's cost.
 const SPOT_PENALTY: f64 = 0.03;
-/// How much wider than what they hold fingers open to let it go. Unit: metres.
+/// How much wider than the object the fingers open to release it. Unit: metres.
 pub const RELEASE_M: f64 = 0.04;
-/// How high above its spot a thing is when the hand comes in. Unit: metres.
+/// Height of the object above its spot when the hand arrives. Unit: metres.
 const HIGH_M: f64 = 0.17;
-/// Sides that differ by less are taken for those of a round body. Unit: metres.
+/// Objects whose sides differ by less are treated as round. Unit: metres.
 const ROUND_M: f64 = 0.015;
 
-/// Points of a surface where a thing of a radius can stand clear of the edge and of what is there, the best first. Frame: world,
-/// by the base's belief.
+/// Points of a surface where an object of this radius is clear of the edge and of other objects, the best first. Frame:
+/// world, by the base's belief.
 pub fn spots(plane: &PerceivedPlane, things: &[Sighting], radius: f64, from: &Point3<f64>) -> Vec<Point3<f64>> {
     let world_from_plane = plane.pose.to_isometry();
     let [length_m, width_m] = plane.size_m;
@@ -58,25 +58,26 @@ pub fn spots(plane: &PerceivedPlane, things: &[Sighting], radius: f64, from: &Po
     chosen
 }
 
-/// Offsets from the middle, over a whole side.
+/// Offsets from the centre along a whole side.
 fn steps(extent: f64) -> impl Iterator<Item = f64> {
     #[expect(clippy::cast_possible_truncation, reason = "a surface is a few metres long")]
     let n_steps = (extent / 2.0 / STEP_M).floor().clamp(0.0, 1000.0) as i32;
     (-n_steps..=n_steps).map(|step| f64::from(step) * STEP_M)
 }
 
-/// Level distance from a point to the outline of a thing. Unit: metres.
+/// Horizontal distance from a point to the outline of an object. Unit: metres.
 fn gap(thing: &Sighting, point: &Point3<f64>) -> f64 {
     let [x, y, _] = thing.pose.position;
     length(point.x - x, point.y - y) - radius(thing.size_m)
 }
 
-/// Radius of the upright cylinder around a thing: half of its diagonal, or of its side if it seems to be round.
+/// Radius of the vertical cylinder around an object: half of its diagonal, or of its side if it appears to be round.
 pub fn radius([width, depth, _]: [f64; 3]) -> f64 {
     if (width - depth).abs() < ROUND_M { width.max(depth) / 2.0 } else { length(width, depth) / 2.0 }
 }
 
-/// Every way of a hand to set what it holds down on one of some spots: from above, whatever way it took it.
+/// All hand poses for setting the held object down on one of the spots. The hand comes from above, regardless of how it
+/// grasped the object.
 pub fn ways(held: &Held, spots: &[Point3<f64>], max_opening_m: f64) -> Vec<Grasp> {
     let headings = (0..N_HEADINGS).map(|idx| std::f64::consts::TAU * f64::from(idx) / f64::from(N_HEADINGS));
     let yaw = Pose::from_isometry(&held.foot).yaw();
@@ -89,14 +90,14 @@ pub fn ways(held: &Held, spots: &[Point3<f64>], max_opening_m: f64) -> Vec<Grasp
     spots.iter().enumerate().flat_map(|spot| headings.clone().map(move |heading| way(spot, heading))).collect()
 }
 
-/// Whether the hand holds a thing from the side, so that it has to leave it level.
+/// Whether the hand holds the object from the side and therefore has to withdraw horizontally.
 pub fn is_level(held: &Held) -> bool {
     let forward = (held.foot * held.grasp_from_foot).rotation * Vector3::x();
     forward.z > -0.5
 }
 
-/// Things as high as they are to a hand that comes in high with something hanging below it, and that, where it holds it from
-/// the side, leaves low.
+/// Raises obstacles by the part of the held object that hangs below the hand and, if the hand withdraws horizontally,
+/// by the height at which it comes in.
 pub fn heightened(things: &[Sighting], held: &Held) -> Vec<Sighting> {
     let below = held.grasp_from_foot.translation.vector.z.max(0.0);
     let by = if is_level(held) { below + HIGH_M } else { below };
@@ -107,7 +108,7 @@ pub fn heightened(things: &[Sighting], held: &Held) -> Vec<Sighting> {
     things.iter().map(higher).collect()
 }
 
-/// The spot below a hand that was to go to one of some: the nearest.
+/// The spot nearest to this position of the hand.
 pub fn nearest(spots: &[Point3<f64>], to: &Point2<f64>) -> Option<Point3<f64>> {
     let far = |spot: &Point3<f64>| length(spot.x - to.x, spot.y - to.y);
     spots.iter().min_by(|a, b| far(a).total_cmp(&far(b))).copied()

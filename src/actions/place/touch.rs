@@ -1,16 +1,16 @@
-//! What an arm feels of what its hand holds: its weight, and when something else carries it.
+//! Arm force sensing: the weight of the held object, and contact with a surface that carries it.
 
 use crate::actions::operator::Operator;
 
-/// The arm has to carry so much less before that is a touch. Unit: newtons. Ten times what braking and the joints' own damping
-/// make of it, and less than half of what makes a thing slide between the fingers.
+/// Drop of the carried force that counts as contact. Unit: newtons. Ten times the effect of braking and joint damping,
+/// and less than half of the force that makes an object slide between the fingers.
 const TOUCH_N: f64 = 2.5;
-/// Share of what is felt now in what counts: three control ticks' worth.
+/// Weight of the current reading in the smoothed force: about three control ticks.
 const SHARE: f64 = 0.35;
 
-/// Force with which the hand is held up beyond its own weight. Unit: newtons.
+/// Force that holds up the hand's load beyond the hand's own weight. Unit: newtons.
 ///
-/// Source: the virtual work of the arm's joints for a movement straight up, τ = Jᵀ·F; the best F of all joints together.
+/// Source: virtual work of the arm's joints for an upward movement, τ = Jᵀ·F; the least-squares F over all joints.
 pub fn carried_n(robot: &Operator<'_>) -> f64 {
     let observed = robot.observe();
     let (_, jacobian) = robot.kinematics().grasp_jacobian(&observed.positions);
@@ -24,7 +24,7 @@ pub fn carried_n(robot: &Operator<'_>) -> f64 {
     work / square
 }
 
-/// Feels whether what is held is being set down.
+/// Detects when the held object is being set down.
 #[derive(Debug, Clone)]
 pub struct Touch {
     free_n: f64,
@@ -32,13 +32,13 @@ pub struct Touch {
 }
 
 impl Touch {
-    /// Begins with a thing that hangs free, at rest.
+    /// Starts with an object at rest that touches nothing else.
     pub fn new(robot: &Operator<'_>) -> Self {
         let free_n = carried_n(robot);
         Self { free_n, felt_n: free_n }
     }
 
-    /// One control tick later: whether something else carries the thing by now.
+    /// Updates after a control tick. Returns `true` once something else carries the object.
     pub fn felt(&mut self, robot: &Operator<'_>) -> bool {
         self.felt_n += SHARE * (carried_n(robot) - self.felt_n);
         self.free_n - self.felt_n > TOUCH_N
