@@ -1,4 +1,5 @@
-//! Answers to what a program asks for: pictures, points, and the reference perception's objects. No simulated time passes.
+//! Answers to a program's requests: pictures, points, and the objects of the reference perception. No simulated time
+//! passes.
 
 use serde::Serialize;
 
@@ -34,7 +35,7 @@ enum Content {
     },
 }
 
-/// The answer to a request, and the bytes of the frame that follows it, if one does.
+/// The answer to a request, and the payload of the binary frame that follows it, if any.
 pub fn answer(ask: &Ask, robot: &mut Operator<'_>) -> (Answer, Option<Vec<u8>>) {
     let (content, bytes) = match ask.what {
         What::Depth => depth(robot),
@@ -44,7 +45,7 @@ pub fn answer(ask: &Ask, robot: &mut Operator<'_>) -> (Answer, Option<Vec<u8>>) 
     (Answer { r#type: "answer", content }, bytes)
 }
 
-/// A picture, and where the camera is by the robot's belief.
+/// A picture, and the camera's pose by the robot's belief.
 fn look(robot: &mut Operator<'_>) -> (DepthImage, nalgebra::Isometry3<f64>) {
     let image = robot.look();
     (image, robot.kinematics().camera(&robot.observe().positions))
@@ -71,7 +72,7 @@ fn cloud(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {
     for row in 0..image.height {
         for point in (0..image.width).filter_map(|column| image.point(column, row)) {
             let point = camera * point;
-            #[expect(clippy::cast_possible_truncation, reason = "depths have 32 bits, and more would be made up")]
+            #[expect(clippy::cast_possible_truncation, reason = "depths have 32 bits, more digits would be invented")]
             bytes.extend([point.x, point.y, point.z].into_iter().flat_map(|along| (along as f32).to_le_bytes()));
         }
     }

@@ -1,4 +1,4 @@
-//! Commands: what a program wants of the joints, checked against the robot that it has.
+//! Commands for the robot's joints, checked against the robot's description.
 
 use std::fmt;
 
@@ -51,7 +51,7 @@ struct HeadTarget {
     tilt_rad: Option<f64>,
 }
 
-/// Targets by the names of joints, in the order of the message: a name can come twice, and is found out then.
+/// Targets by joint name, in the order of the message. Duplicate names are kept, so that they can be reported.
 #[derive(Debug, Default)]
 struct Targets(Vec<(String, f64)>);
 
@@ -67,7 +67,7 @@ impl<'de> Visitor<'de> for TargetsVisitor {
     type Value = Targets;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("an object of numbers by the names of joints")
+        f.write_str("an object that maps joint names to numbers")
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Targets, A::Error> {
@@ -80,13 +80,13 @@ impl<'de> Visitor<'de> for TargetsVisitor {
 }
 
 impl WireCommand {
-    /// How many ticks the command lasts, and the controls that it asks for.
+    /// Returns the number of ticks the command lasts, and its controls.
     ///
     /// # Errors
-    /// It names a joint that is not there, that has another key, or twice; or lasts no tick at all.
+    /// An unknown joint, a joint commanded by the wrong key, duplicate targets for a joint, or zero ticks.
     pub fn controls(self, joints: &Joints) -> Result<(u32, Controls), OutsideFault> {
         if self.ticks == 0 {
-            return Err(wrong("its command lasts 0 ticks, so that no time would ever pass".to_owned()));
+            return Err(wrong("its command lasts 0 ticks; `ticks` must be at least 1".to_owned()));
         }
         let mut taken = Taken { joints, seen: Vec::new() };
         let mut controls = Controls {
@@ -116,7 +116,7 @@ impl HeadTarget {
     }
 }
 
-/// Which joints have a target already.
+/// Joints that already have a target.
 struct Taken<'a> {
     joints: &'a Joints,
     seen: Vec<usize>,
@@ -133,7 +133,7 @@ impl Taken<'_> {
             return Err(wrong(format!("the robot has no joint `{name}`: {help}")));
         };
         if *role == Role::Gripper {
-            return Err(wrong(format!("`{name}` is a finger, which goes by `gripper`")));
+            return Err(wrong(format!("`{name}` is a finger joint; command it with `gripper`")));
         }
         self.once(*joint, name)?;
         Ok(*joint)
@@ -147,7 +147,7 @@ impl Taken<'_> {
         Ok(())
     }
 
-    /// A velocity of the whole base goes with no target of one of its joints.
+    /// Checks that a base velocity is not combined with targets for the base's joints.
     fn base(&self) -> Result<(), OutsideFault> {
         if !self.joints.drives {
             return Err(wrong("the robot has no mobile base".to_owned()));

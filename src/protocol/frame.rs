@@ -1,4 +1,5 @@
-//! Frames on a stream: four bytes of length, one of kind, the payload. Waiting ends by the clock, or by what else is watched.
+//! Frames on a stream: four bytes of length, one byte of kind, the payload. Waiting ends by a timeout or by the
+//! caller's watch function.
 
 use std::io::{ErrorKind, Read, Write};
 use std::ops::Range;
@@ -7,16 +8,16 @@ use std::time::Duration;
 
 use crate::actions::OutsideFault;
 
-/// Longest payload that a program gets. Unit: bytes.
+/// Longest payload sent to a program. Unit: bytes.
 pub const TO_PROGRAM_LIMIT: usize = 64 << 20;
-/// Longest payload that a program may send. Unit: bytes.
+/// Longest payload accepted from a program. Unit: bytes.
 pub const FROM_PROGRAM_LIMIT: usize = 1 << 20;
 
-/// Kinds of payloads: JSON in UTF-8, and plain bytes.
+/// Kinds of payloads: UTF-8 JSON, and raw bytes.
 const JSON: u8 = b'J';
 const BYTES: u8 = b'B';
 const HEADER: usize = 5;
-/// Who waits looks around so often.
+/// Polling interval while waiting.
 const POLL: Duration = Duration::from_millis(20);
 
 /// Frames over a stream, one at a time in each direction.
@@ -24,16 +25,16 @@ const POLL: Duration = Duration::from_millis(20);
 pub struct Wire {
     stream: UnixStream,
     clock_secs: fn() -> f64,
-    /// What came in; its first `filled` bytes count.
+    /// Received bytes; only the part of the current frame is valid.
     incoming: Vec<u8>,
     outgoing: Vec<u8>,
 }
 
-/// How long somebody waits.
+/// Time limit of one wait.
 struct Patience {
     until_secs: f64,
     clock_secs: fn() -> f64,
-    /// Time in which nothing came at all, for clocks that stand still. Unit: seconds.
+    /// Accumulated idle time, in case the clock does not advance. Unit: seconds.
     idle_secs: f64,
     limit_secs: f64,
 }
@@ -42,7 +43,7 @@ impl Wire {
     /// Frames over a connected stream.
     ///
     /// # Errors
-    /// The stream can't be set up.
+    /// The stream can't be configured.
     pub fn new(stream: UnixStream, clock_secs: fn() -> f64) -> std::io::Result<Self> {
         stream.set_nonblocking(false)?;
         stream.set_read_timeout(Some(POLL))?;
@@ -50,10 +51,10 @@ impl Wire {
         Ok(Self { stream, clock_secs, incoming: vec![0; 64 << 10], outgoing: Vec::with_capacity(64 << 10) })
     }
 
-    /// Sends one message with the binary frames that it announces.
+    /// Sends one message followed by the binary frames it announces.
     ///
     /// # Errors
-    /// It is not taken within `limit_secs`, or the other side is gone.
+    /// The message is not read within `limit_secs`, or the connection is closed.
     pub fn send(
         &mut self,
         message: &impl serde::Serialize,
@@ -62,7 +63,8 @@ impl Wire {
     ) -> Result<(), OutsideFault> {
         self.outgoing.clear();
         self.outgoing.extend_from_slice(&[0; HEADER]);
-        serde_json::to_writer(&mut self.outgoing, message).map_err(|error| broke(format!("no message: {error}")))?;
+        serde_json::to_writer(&mut self.outgoing, message)
+            .map_err(|error| broke(format!("the message can't be serialised: {error}")))?;
         let length = self.outgoing.len() - HEADER;
         self.outgoing[..HEADER].copy_from_slice(&header(JSON, length)?);
         for binary in binaries {
@@ -75,16 +77,18 @@ impl Wire {
             match self.stream.write(&self.outgoing[sent..]) {
                 Ok(0) => return Err(gone()),
                 Ok(n_bytes) => sent += n_bytes,
-                Err(error) => patience.bear(&error, "take a message")?,
+                Err(error) => patience.bear(&error, "read a message")?,
             }
         }
         Ok(())
     }
 
-    /// The next message, as the place of its bytes: one JSON object. `watch` is asked while nothing comes.
+    /// Receives the next message, a single JSON object, and returns the range of its bytes for [`Self::payload`].
+    /// `watch` is called while nothing arrives.
     ///
     /// # Errors
-    /// Nothing came within `limit_secs`, the other side is gone, or what came is no frame, too long, or more than one.
+    /// Nothing arrives within `limit_secs`, the connection is closed, or the received data is not a valid frame, is too
+    /// long, or contains more than one frame.
     pub fn receive(
         &mut self,
         limit_secs: f64,
@@ -119,7 +123,7 @@ impl Wire {
         Ok(HEADER..needed)
     }
 
-    /// The bytes of the message that came last.
+    /// The bytes of the last message.
     pub fn payload(&self, range: Range<usize>) -> &[u8] {
         &self.incoming[range]
     }
@@ -135,7 +139,7 @@ impl Wire {
 }
 
 impl Patience {
-    /// Goes on where a read or write only took its time.
+    /// Continues after a read or write that would block or was interrupted.
     fn bear(&mut self, error: &std::io::Error, what: &str) -> Result<(), OutsideFault> {
         match error.kind() {
             ErrorKind::Interrupted => Ok(()),
@@ -163,16 +167,16 @@ fn header(kind: u8, length: usize) -> Result<[u8; HEADER], OutsideFault> {
     Ok([a, b, c, d, kind])
 }
 
-/// Length of the payload that a header announces.
+/// The payload length announced by a header.
 fn payload_length(incoming: &[u8]) -> Result<usize, OutsideFault> {
     let [a, b, c, d, kind, ..] = *incoming else { return Ok(0) };
     if kind != JSON {
         let begun = String::from_utf8_lossy(&incoming[..HEADER]).escape_debug().to_string();
-        return Err(broke(format!("it sent `{begun}`, which is no frame of JSON: its fifth byte must be `J`")));
+        return Err(broke(format!("it sent `{begun}`, which is not a JSON frame: its fifth byte must be `J`")));
     }
     let length = u32::from_le_bytes([a, b, c, d]) as usize;
     if length > FROM_PROGRAM_LIMIT {
-        return Err(broke(format!("it sent a message of {length} bytes; the longest may have {FROM_PROGRAM_LIMIT}")));
+        return Err(broke(format!("it sent a message of {length} bytes; the limit is {FROM_PROGRAM_LIMIT}")));
     }
     Ok(length)
 }

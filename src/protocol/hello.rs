@@ -1,4 +1,4 @@
-//! How a program is introduced to its robot: the URDF, and which joints are what.
+//! Introduces a program to its robot: the URDF and the roles of the joints.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::protocol::message::PROTOCOL;
 use crate::world::{Joint, JointKind, World};
 
-/// What can be observed or asked for.
+/// Data that can be observed or requested.
 const SENSORS: [&str; 6] = ["joints", "odometry", "gripper", "depth", "cloud", "objects"];
 
 /// The first message to a program.
@@ -63,7 +63,7 @@ struct Camera<'a> {
     max_range_m: f64,
 }
 
-/// What a joint is to the robot.
+/// The role of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     Base,
@@ -85,14 +85,14 @@ impl Role {
     }
 }
 
-/// The joints of a robot by their names.
+/// The joints of a robot by name.
 #[derive(Debug, Clone, Default)]
 pub struct Joints {
     /// Index and role.
     pub by_name: BTreeMap<String, (usize, Role)>,
-    /// Indices of pan and tilt, as far as there are such joints.
+    /// Indices of the pan and tilt joints that exist.
     pub head: Vec<usize>,
-    /// Whether the base drives.
+    /// Whether the base is mobile.
     pub drives: bool,
 }
 
@@ -158,7 +158,7 @@ fn wire_joint(joint: &Joint, role: Role) -> WireJoint<'_> {
     WireJoint { name, kind, role: role.word(), lower, upper, velocity, effort }
 }
 
-/// JSON has no infinity: the largest number stands for it.
+/// JSON has no infinity; the largest finite number replaces it.
 fn written(value: f64) -> f64 {
     value.clamp(f64::MIN, f64::MAX)
 }

@@ -1,4 +1,4 @@
-//! What goes over the wire, but for commands and observations, which go often and have files of their own.
+//! Messages of the protocol, except commands and observations, which have their own modules.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::actions::OutsideFault;
 use crate::base::Pose;
 use crate::protocol::observation::Observed;
 
-/// Version of the protocol. Another version may understand nothing of this one.
+/// Version of the protocol. Versions are incompatible with each other.
 pub const PROTOCOL: u32 = 1;
 
 /// A pose on the wire.
@@ -19,7 +19,7 @@ pub struct WirePose {
     pub quaternion_xyzw: [f64; 4],
 }
 
-/// Something that is seen, or that truly is. Frame of its pose: world, by the robot's belief unless it is the truth.
+/// An object, perceived or true. Frame of its pose: world, by the robot's belief unless it is ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WireObject {
     pub id: String,
@@ -27,24 +27,24 @@ pub struct WireObject {
     pub category: Option<String>,
     pub pose: WirePose,
     pub size_m: [f64; 3],
-    /// Whether it stands for good.
+    /// Whether it is fixed furniture.
     pub furniture: bool,
 }
 
-/// Everything as it truly is.
+/// Ground truth about all objects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Truth {
     pub objects: Vec<WireObject>,
 }
 
-/// What a program is told with the value of a designator: what kind of thing it stands for.
+/// The kind of object that a designator's value refers to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WireKind {
     pub category: String,
     pub size_m: [f64; 3],
 }
 
-/// Binary frames that follow a message.
+/// Description of a binary frame that follows a message.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Binary {
     pub name: &'static str,
@@ -77,7 +77,7 @@ pub enum ToProgram<'a> {
     Bye,
 }
 
-/// A message from the program: its type first.
+/// The type of a message from the program.
 #[derive(Deserialize)]
 struct Typed<'a> {
     #[serde(borrow, rename = "type")]
@@ -90,18 +90,18 @@ pub fn kind_of(message: &[u8]) -> Result<String, OutsideFault> {
     Ok(typed.kind.into_owned())
 }
 
-/// A message of a known type.
+/// Parses a message of a known type.
 pub fn parse<'a, T: Deserialize<'a>>(kind: &str, message: &'a [u8]) -> Result<T, OutsideFault> {
     serde_json::from_slice(message).map_err(|error| wrong(&format!("a message `{kind}`"), &error, message))
 }
 
-/// Longest part of a wrong message that is quoted. Unit: characters.
+/// Longest quoted part of an invalid message. Unit: characters.
 const QUOTED: usize = 80;
 
 fn wrong(what: &str, error: &serde_json::Error, message: &[u8]) -> OutsideFault {
     let text = String::from_utf8_lossy(&message[..message.len().min(4 * QUOTED)]);
     let quoted: String = text.chars().take(QUOTED).flat_map(char::escape_debug).collect();
-    OutsideFault { late: false, reason: format!("it sent {what} that can't be read: {error}, in `{quoted}`") }
+    OutsideFault { late: false, reason: format!("it sent {what} that can't be parsed: {error}, in `{quoted}`") }
 }
 
 /// The program's introduction.
@@ -116,7 +116,7 @@ pub struct Hello {
     pub actions: Vec<String>,
 }
 
-/// A message that says nothing but its type.
+/// A message without content besides its type.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plain {
@@ -124,7 +124,7 @@ pub struct Plain {
     _kind: serde::de::IgnoredAny,
 }
 
-/// A request for what the robot sees.
+/// A request for perception.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ask {
@@ -135,7 +135,7 @@ pub struct Ask {
     pub of: Option<String>,
 }
 
-/// What can be asked for.
+/// Data that can be requested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum What {
@@ -161,7 +161,7 @@ pub struct End {
     pub held: Option<HeldOnWire>,
 }
 
-/// Something that the program perceived.
+/// An object perceived by the program.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PerceivedOnWire {
@@ -171,7 +171,7 @@ pub struct PerceivedOnWire {
     pub category: Option<String>,
 }
 
-/// The level surface that it perceived.
+/// The level surface perceived by the program.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneOnWire {
@@ -179,7 +179,7 @@ pub struct PlaneOnWire {
     pub size_m: [f64; 2],
 }
 
-/// What it holds.
+/// The object held by the program's robot.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOnWire {
@@ -187,7 +187,7 @@ pub struct HeldOnWire {
     pub size_m: [f64; 3],
 }
 
-/// Quaternions shorter than this point nowhere.
+/// Quaternions shorter than this have no direction.
 const SHORTEST: f64 = 1e-6;
 
 impl WirePose {
@@ -196,11 +196,11 @@ impl WirePose {
         Self { position_m: pose.position, quaternion_xyzw: pose.rotation }
     }
 
-    /// A pose from the wire, its quaternion brought to length 1.
+    /// A pose from the wire, with its quaternion normalised.
     pub fn pose(&self) -> Result<Pose, OutsideFault> {
         let length = self.quaternion_xyzw.iter().map(|part| part * part).sum::<f64>().sqrt();
         if !length.is_finite() || length < SHORTEST {
-            let reason = format!("it sent a pose whose quaternion {:?} is no rotation", self.quaternion_xyzw);
+            let reason = format!("it sent a pose whose quaternion {:?} is not a rotation", self.quaternion_xyzw);
             return Err(OutsideFault { late: false, reason });
         }
         Ok(Pose { position: self.position_m, rotation: self.quaternion_xyzw.map(|part| part / length) })

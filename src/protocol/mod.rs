@@ -1,8 +1,8 @@
-//! A robot's skills in another process: messages over a socket, in lockstep with simulation; the process itself, and what it does
-//! wrong. `clients/PROTOCOL.md` says what goes over the wire.
+//! Robot skills in another process: messages over a socket, in lockstep with the simulation; management of the process,
+//! and handling of its faults. `clients/PROTOCOL.md` specifies the messages.
 //!
-//! Never: lets simulated time pass that nobody asked for, shows a program the truth unless it is privileged, or leaves a process
-//! behind.
+//! Never: advances simulated time unless the program commands it, shows ground truth to an unprivileged program, or
+//! leaves a process behind.
 
 mod answer;
 mod command;

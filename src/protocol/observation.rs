@@ -1,4 +1,4 @@
-//! What the robot measures of itself, for the wire.
+//! The robot's measurements of itself, as sent to programs.
 
 use serde::Serialize;
 
@@ -37,7 +37,7 @@ struct Gripper {
     force_n: f64,
 }
 
-/// An observation as a message of its own.
+/// An observation as a separate message.
 #[derive(Debug, Serialize)]
 pub struct ObservationMessage<'a> {
     #[serde(rename = "type")]
@@ -47,11 +47,11 @@ pub struct ObservationMessage<'a> {
 }
 
 impl<'a> Observed<'a> {
-    /// What the robot measured, with what is true if the program is let in on it.
+    /// The robot's measurements, with ground truth for privileged programs.
     pub fn of(robot: &Operator<'_>, measured: &'a Observation, privileged: bool) -> Self {
         let positions = &measured.positions;
         let (position_m, heading_rad) = match robot.layout().base {
-            // Headings keep counting beyond a full turn.
+            // Headings are not wrapped.
             Some([x, y, heading]) => ([positions[x], positions[y]], positions[heading]),
             None => {
                 let root = crate::base::Pose::from_isometry(&robot.base_of(positions));
@@ -69,7 +69,7 @@ impl<'a> Observed<'a> {
         }
     }
 
-    /// The same as a message.
+    /// Converts the observation to a message.
     pub fn message(self) -> ObservationMessage<'a> {
         ObservationMessage { kind: "observation", observed: self }
     }

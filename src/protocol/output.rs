@@ -1,4 +1,4 @@
-//! What a program prints: the last lines are kept, and all of it is counted.
+//! Captures the output of a program: keeps the last lines and counts all bytes.
 
 use std::collections::VecDeque;
 use std::io::{PipeReader, Read};
@@ -6,14 +6,14 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// So many lines are kept.
+/// Number of lines kept.
 const LINES: usize = 20;
-/// Longest line that is kept as it is. Unit: bytes.
+/// Longest line kept without truncation. Unit: bytes.
 const LONGEST: usize = 400;
-/// What a process that has ended printed last is read within this time.
+/// Time limit for reading the rest of the output after a process has ended.
 const REST: Duration = Duration::from_millis(500);
 
-/// Reads what a program prints while it runs.
+/// Reads the output of a program while it runs.
 #[derive(Debug)]
 pub struct Output {
     tail: Arc<Mutex<Tail>>,
@@ -23,13 +23,13 @@ pub struct Output {
 #[derive(Debug, Default)]
 struct Tail {
     lines: VecDeque<String>,
-    /// The line that has not ended yet.
+    /// The current, unfinished line.
     begun: Vec<u8>,
     n_bytes: u64,
 }
 
 impl Output {
-    /// Reads from a pipe until everybody has closed it.
+    /// Reads from a pipe until all its writers have closed it.
     pub fn read(mut pipe: PipeReader) -> Self {
         let tail = Arc::new(Mutex::new(Tail::default()));
         let (end, ended) = channel();
@@ -39,20 +39,20 @@ impl Output {
             while let Ok(n_bytes @ 1..) = pipe.read(&mut bytes) {
                 filled.lock().unwrap_or_else(PoisonError::into_inner).take(&bytes[..n_bytes]);
             }
-            // Nobody may be waiting for it.
+            // The receiver may be gone.
             let _ = end.send(());
         });
         Self { tail, ended }
     }
 
-    /// How much was printed so far. Unit: bytes.
+    /// Number of bytes printed so far.
     pub fn n_bytes(&self) -> u64 {
         self.tail.lock().unwrap_or_else(PoisonError::into_inner).n_bytes
     }
 
     /// The last lines of a program that has ended.
     pub fn last_lines(&self) -> Vec<String> {
-        // A process that got away may still hold the pipe.
+        // A process that escaped may still hold the pipe.
         let _ = self.ended.recv_timeout(REST);
         let tail = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
         let rest = (!tail.begun.is_empty()).then(|| readable(&tail.begun));
@@ -79,7 +79,7 @@ impl Tail {
     }
 }
 
-/// A line without what would move a terminal's cursor.
+/// A line with control characters replaced, so that it can't move a terminal's cursor.
 fn readable(line: &[u8]) -> String {
     let text = String::from_utf8_lossy(line);
     text.trim_end_matches('\r').chars().map(|c| if c.is_control() && c != '\t' { '\u{fffd}' } else { c }).collect()

@@ -1,4 +1,4 @@
-//! A program's part in one run: its actions, command by command.
+//! A program's part in one run: it performs actions, command by command.
 
 use std::collections::BTreeMap;
 
@@ -12,20 +12,20 @@ use crate::protocol::remember::{Grasped, remember};
 use crate::protocol::session::Session;
 use crate::world::World;
 
-/// Longest message of an action's end that is kept. Unit: characters.
+/// Longest final message of an action that is kept. Unit: characters.
 const LONGEST_MESSAGE: usize = 1000;
 
-/// Longest part of the line that it printed last that is told with a fault. Unit: characters.
+/// Longest part of the last printed line that is quoted in a fault. Unit: characters.
 const LONGEST_LINE: usize = 160;
 
-/// What a program is told of the run.
+/// The data that identifies a run to a program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunName {
     /// The run's id.
     pub run: String,
     /// Position in the campaign, from 0.
     pub index: u64,
-    /// For all randomness of the program's: the same in every repetition of the run.
+    /// Seed for all randomness of the program, the same in every repetition of the run.
     pub seed: u64,
 }
 
@@ -35,22 +35,24 @@ pub struct Performance<'a> {
     lent: Lent<'a>,
     run: RunName,
     clock_secs: fn() -> f64,
-    /// What it printed last, if it was at fault.
+    /// Its last output lines, if it caused a fault.
     output: Option<Vec<String>>,
 }
 
 impl<'a> Performance<'a> {
-    /// A run of one of the campaign's programs. It is started when the run begins, unless it has been before.
+    /// One run with one of the campaign's programs. The program is started at the beginning of the run unless it is
+    /// already running.
     pub fn new(programs: &'a Programs, run: RunName, clock_secs: fn() -> f64) -> Self {
         Self { lent: programs.lend(), run, clock_secs, output: None }
     }
 
-    /// The last lines that the program printed, if it ended the run by a fault of its own.
+    /// The last lines that the program printed, if its own fault ended the run.
     pub fn output(&self) -> Option<&[String]> {
         self.output.as_deref()
     }
 
-    /// The program, started if there is none or if it is still busy with what a crash of simulation ended.
+    /// The program. It is started if it is not running, or if it is still busy with an action that a crash of the
+    /// simulation ended.
     fn started(&mut self, world: &World) -> Result<&mut Session, OutsideFault> {
         let worker = &mut self.lent.worker;
         let programs = self.lent.programs;
@@ -65,7 +67,7 @@ impl<'a> Performance<'a> {
         Ok(worker.session.insert(session))
     }
 
-    /// Ends the program for a fault of its own.
+    /// Ends the program because of a fault of its own.
     fn give_up(&mut self, fault: OutsideFault) -> OutsideFault {
         if let Some(mut session) = self.lent.worker.session.take() {
             let fault = session.refuse(fault);
@@ -80,7 +82,7 @@ impl<'a> Performance<'a> {
         let last = self.output.iter().flatten().rev().find(|line| !line.trim().is_empty());
         let printed = last.map_or_else(String::new, |line| {
             let line: String = line.trim().chars().take(LONGEST_LINE).collect();
-            format!("; it printed last: {line}")
+            format!("; its last output: {line}")
         });
         OutsideFault { reason: format!("the program `{text}`: {}{printed}", fault.reason), ..fault }
     }
@@ -100,7 +102,7 @@ impl Outside for Performance<'_> {
     fn perform(&mut self, call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt> {
         let privileged = self.lent.programs.skill.privileged;
         let Some(session) = &mut self.lent.worker.session else {
-            let reason = format!("no program is there to perform {}", call.action);
+            let reason = format!("no program is running that performs {}", call.action);
             return Err(Interrupt::Outside(OutsideFault { late: false, reason }));
         };
         session.idle = false;
@@ -130,7 +132,7 @@ fn report(end: End) -> ActionReport {
     ActionReport { succeeded: end.succeeded, message }
 }
 
-/// An action under way.
+/// An action in progress.
 struct Performed<'a, 'b> {
     session: &'a mut Session,
     robot: &'a mut Operator<'b>,
@@ -160,7 +162,7 @@ impl Performed<'_, '_> {
         self.session.send(&begin, &[]).map_err(Interrupt::Outside)
     }
 
-    /// Does what the program asks for until it ends the action.
+    /// Executes the program's commands and requests until it ends the action.
     fn follow(&mut self) -> Result<End, Interrupt> {
         loop {
             let message = self.session.receive().map_err(Interrupt::Outside)?;
@@ -177,7 +179,7 @@ impl Performed<'_, '_> {
                 }
                 "end" => return parse("end", message).map_err(Interrupt::Outside),
                 other => {
-                    let reason = format!("it sent `{other}` where `command`, `ask` or `end` was due");
+                    let reason = format!("it sent `{other}` , but `command`, `ask` or `end` was expected");
                     return Err(Interrupt::Outside(OutsideFault { late: false, reason }));
                 }
             }
@@ -194,8 +196,8 @@ impl Performed<'_, '_> {
         self.session.send(&observed.message(), &[]).map_err(Interrupt::Outside)
     }
 
-    /// Tells the program that its action is over. One that does not take that is started anew for the next run, and the action
-    /// has ended for its own reason.
+    /// Notifies the program that its action is over. If the program does not acknowledge, it is restarted for the next
+    /// run; the action still ends for its own reason.
     fn stop(&mut self, interrupt: Interrupt) -> Interrupt {
         let reason = match interrupt {
             Interrupt::Outside(_) => return interrupt,

@@ -1,4 +1,4 @@
-//! The programs of a campaign: one for each run that is being made at the same time.
+//! The programs of a campaign: one for each concurrent run.
 
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::config::Skill;
 use crate::protocol::session::Session;
 
-/// Programs that wait for a run.
+/// The pool of programs.
 #[derive(Debug)]
 pub struct Programs {
     pub(super) skill: Skill,
@@ -21,14 +21,14 @@ struct Workers {
     n_workers: usize,
 }
 
-/// A place for one program, which may have to be started yet.
+/// A slot for one program, which may not be started yet.
 #[derive(Debug, Default)]
 pub(super) struct Worker {
     pub number: usize,
     pub session: Option<Session>,
 }
 
-/// A worker for the time of one run.
+/// A worker reserved for one run; dropping it returns the worker to the pool.
 #[derive(Debug)]
 pub(super) struct Lent<'a> {
     pub programs: &'a Programs,
@@ -36,12 +36,12 @@ pub(super) struct Lent<'a> {
 }
 
 impl Programs {
-    /// No program yet. `tested` are the actions of all tests.
+    /// An empty pool. `tested` are the actions of all tests.
     pub fn new(skill: Skill, tested: BTreeSet<String>) -> Self {
         Self { skill, tested, workers: Mutex::default() }
     }
 
-    /// A worker whose program waits for a run, or is to be started.
+    /// Takes a free worker, or creates one whose program is not started yet.
     pub(super) fn lend(&self) -> Lent<'_> {
         let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);
         let worker = workers.free.pop().unwrap_or_else(|| {

@@ -1,4 +1,4 @@
-//! A program as a process: its socket, its limits, and its end with all that it started.
+//! A program as a process: its socket, its limits, and the termination of it and all its descendants.
 
 use std::fs::{self, DirBuilder};
 use std::io::ErrorKind;
@@ -18,31 +18,32 @@ use crate::config::Skill;
 use crate::protocol::message::PROTOCOL;
 use crate::protocol::output::Output;
 
-/// Who waits for a process looks around so often.
+/// Polling interval while waiting for a process.
 const POLL: Duration = Duration::from_millis(5);
-/// How long a process that is told to end has for it, in steps of [`POLL`]: a second.
+/// Grace period for a process that should exit, in steps of [`POLL`]: one second.
 const GRACE_POLLS: u32 = 200;
-/// A process that starts others while it is ended is ended again so many times.
+/// Number of passes that kill escaped processes, in case they start others meanwhile.
 const SWEEPS: usize = 10;
 
-/// Starts a program within limits on its memory (kilobytes) and computing time (seconds).
+/// Starts a program with limits on its memory (kilobytes) and CPU time (seconds).
 const LIMITED: &str =
     r#"[ -z "$1" ] || ulimit -v "$1" || exit 126; [ -z "$2" ] || ulimit -t "$2" || exit 126; shift 2; exec "$@""#;
-/// Waits until nobody holds its input any more, which also happens when this program is killed, then ends a group of processes.
+/// Waits for the end of its input, which also occurs when actcheck is killed, then kills a process group and removes
+/// the socket's folder.
 const GUARD: &str = r#"read -r _; kill -s KILL -- "-$1" 2>/dev/null; rm -rf -- "$2""#;
 
 /// A running program.
 #[derive(Debug)]
 pub struct Process {
     child: Child,
-    /// Ends the program should this one be ended.
+    /// Kills the program if actcheck itself is killed.
     guard: Child,
-    /// Holds the socket; nobody else may enter.
+    /// Private folder of the socket.
     folder: PathBuf,
     address: String,
     listener: UnixListener,
     pub output: Output,
-    /// Whether it was ended, and its number may be somebody else's.
+    /// Whether the process was ended, so that its id may be reused.
     over: bool,
 }
 
@@ -52,10 +53,10 @@ impl Process {
     /// # Errors
     /// It can't be started.
     pub fn start(skill: &Skill, worker: usize) -> Result<Self, OutsideFault> {
-        let folder = private_folder().map_err(|error| cannot("have a folder for its socket", &error))?;
+        let folder = private_folder().map_err(|error| cannot("the folder of its socket can't be created", &error))?;
         let started = Self::start_in(skill, worker, &folder);
         if started.is_err() {
-            // The fault that is told is the cause.
+            // The first error is the cause; a failed removal is ignored.
             let _ = fs::remove_dir_all(&folder);
         }
         started
@@ -63,10 +64,10 @@ impl Process {
 
     fn start_in(skill: &Skill, worker: usize, folder: &Path) -> Result<Self, OutsideFault> {
         let socket = folder.join("skill.sock");
-        let listener = UnixListener::bind(&socket).map_err(|error| cannot("have its socket", &error))?;
-        listener.set_nonblocking(true).map_err(|error| cannot("have its socket", &error))?;
+        let listener = UnixListener::bind(&socket).map_err(|error| cannot("its socket can't be created", &error))?;
+        listener.set_nonblocking(true).map_err(|error| cannot("its socket can't be configured", &error))?;
         let address = format!("unix:{}", socket.display());
-        let (reader, writer) = std::io::pipe().map_err(|error| cannot("have its output read", &error))?;
+        let (reader, writer) = std::io::pipe().map_err(|error| cannot("its output can't be captured", &error))?;
         let mut command = limited(skill);
         command
             .envs(&skill.env)
@@ -76,10 +77,10 @@ impl Process {
             .current_dir(&skill.dir)
             .process_group(0)
             .stdin(Stdio::null())
-            .stdout(writer.try_clone().map_err(|error| cannot("have its output read", &error))?)
+            .stdout(writer.try_clone().map_err(|error| cannot("its output can't be captured", &error))?)
             .stderr(writer);
-        let mut child = command.spawn().map_err(|error| cannot("be started", &error))?;
-        // The command holds ends of the pipe, too.
+        let mut child = command.spawn().map_err(|error| cannot("it can't be started", &error))?;
+        // The command also holds ends of the pipe.
         drop(command);
         let output = Output::read(reader);
         match guard(&child, folder) {
@@ -87,18 +88,18 @@ impl Process {
                 Ok(Self { child, guard, folder: folder.to_path_buf(), address, listener, output, over: false })
             }
             Err(error) => {
-                // It may have ended by itself.
+                // It may already have exited.
                 let _ = child.kill();
                 let _ = child.wait();
-                Err(cannot("be guarded", &error))
+                Err(cannot("its guard process can't be started", &error))
             }
         }
     }
 
-    /// Its connection, once it has made one.
+    /// Waits for the program to connect.
     ///
     /// # Errors
-    /// It has ended before, or does not come within the time.
+    /// The program exits first, or does not connect in time.
     pub fn accept(&mut self, limit_secs: f64, clock_secs: fn() -> f64) -> Result<UnixStream, OutsideFault> {
         let began = clock_secs();
         let mut waited_secs: f64 = 0.0;
@@ -106,7 +107,7 @@ impl Process {
             match self.listener.accept() {
                 Ok((stream, _)) => return Ok(stream),
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
-                Err(error) => return Err(cannot("connect", &error)),
+                Err(error) => return Err(cannot("its connection can't be accepted", &error)),
             }
             if let Some(how) = self.ended() {
                 return Err(broke(format!("{how} before it connected to the address in ACTCHECK_ADDRESS")));
@@ -120,18 +121,18 @@ impl Process {
         }
     }
 
-    /// How it ended, if it has.
+    /// How the process ended, or `None` if it is running.
     pub fn ended(&mut self) -> Option<String> {
         self.child.try_wait().ok().flatten().map(how)
     }
 
-    /// Waits a moment for an end that may come, and says how it came.
+    /// Waits briefly for a possible exit and returns how the process ended.
     pub fn ends_soon(&mut self) -> Option<String> {
         self.ends_within(GRACE_POLLS / 4)
     }
 
-    /// Waits for an end that is to be expected, as the program has closed its connection, and says how it came. On a machine that
-    /// has much else to do an interpreter takes a while to end.
+    /// Waits for the exit of a program that has closed its connection, and returns how it ended. On a busy machine, an
+    /// interpreter takes a while to exit.
     pub fn ends_after_closing(&mut self) -> Option<String> {
         self.ends_within(3 * GRACE_POLLS)
     }
@@ -146,18 +147,18 @@ impl Process {
         None
     }
 
-    /// Waits for the end of a program that was told to end, a second at most.
+    /// Waits up to a second for a program to exit after it was asked to.
     pub fn let_end(&mut self) {
         self.ends_within(GRACE_POLLS);
     }
 
-    /// Ends it with all that it started. Gives the last lines that it printed.
+    /// Kills the process and all its descendants. Returns the last lines of its output.
     pub fn end(&mut self) -> Vec<String> {
         if std::mem::replace(&mut self.over, true) {
             return Vec::new();
         }
         if let Ok(leader) = i32::try_from(self.child.id()) {
-            // There may be nobody left.
+            // The group may already be empty.
             let _ = killpg(Pid::from_raw(leader), Signal::SIGKILL);
         }
         let _ = self.child.wait();
@@ -175,7 +176,7 @@ impl Drop for Process {
     }
 }
 
-/// The command of a program, through a shell that sets its limits where there are any.
+/// The program's command, started through a shell if it has limits.
 fn limited(skill: &Skill) -> Command {
     if skill.memory_mb.is_none() && skill.cpu_secs.is_none() {
         let mut command = Command::new(&skill.program);
@@ -193,11 +194,11 @@ fn limited(skill: &Skill) -> Command {
 fn guard(child: &Child, folder: &Path) -> std::io::Result<Child> {
     let mut command = Command::new("sh");
     command.args(["-c", GUARD, "sh"]).arg(child.id().to_string()).arg(folder);
-    // A group of its own: it has to outlive an interrupt from the keyboard.
+    // A separate process group, so that it survives Ctrl-C.
     command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()
 }
 
-/// A new folder that is nobody else's.
+/// Creates a new folder that only this user can access.
 fn private_folder() -> std::io::Result<PathBuf> {
     static NUMBER: AtomicU64 = AtomicU64::new(0);
     let base = std::env::temp_dir();
@@ -211,7 +212,7 @@ fn private_folder() -> std::io::Result<PathBuf> {
     }
 }
 
-/// Ends what left its group of processes: on Linux the environment tells whose it is.
+/// Kills processes that left the process group. On Linux they are identified by their environment.
 fn sweep(address: &str) {
     let needle = format!("ACTCHECK_ADDRESS={address}\0");
     for _ in 0..SWEEPS {
@@ -220,14 +221,14 @@ fn sweep(address: &str) {
             return;
         }
         for pid in left {
-            // It may have ended meanwhile.
+            // It may already have exited.
             let _ = kill(Pid::from_raw(pid), Signal::SIGKILL);
         }
         std::thread::sleep(POLL);
     }
 }
 
-/// Processes with these bytes in their environment.
+/// Ids of processes with these bytes in their environment.
 fn holders(needle: &[u8]) -> Vec<i32> {
     let Ok(processes) = fs::read_dir("/proc") else { return Vec::new() };
     let numbers = processes.flatten().filter_map(|entry| entry.file_name().to_str()?.parse().ok());
@@ -243,15 +244,15 @@ fn how(status: ExitStatus) -> String {
     match (status.code(), status.signal()) {
         (Some(code), _) => format!("it exited with code {code}"),
         (None, Some(signal)) => match Signal::try_from(signal) {
-            Ok(known) => format!("it was ended by {known}"),
-            Err(_) => format!("it was ended by signal {signal}"),
+            Ok(known) => format!("it was killed by {known}"),
+            Err(_) => format!("it was killed by signal {signal}"),
         },
         (None, None) => "it ended".to_owned(),
     }
 }
 
 fn cannot(what: &str, error: &std::io::Error) -> OutsideFault {
-    broke(format!("it can't {what}: {}", error.to_string().to_lowercase()))
+    broke(format!("{what}: {}", error.to_string().to_lowercase()))
 }
 
 fn broke(reason: String) -> OutsideFault {

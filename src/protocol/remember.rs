@@ -1,5 +1,5 @@
-//! What a program's action leaves behind for the actions after it: what it perceived and what the hand holds, by its own word or
-//! by what the robot saw and feels, and never by the truth.
+//! Keeps the results of a program's action for later actions: its percepts and the held object. They come from the
+//! program's report or from the robot's own perception and touch, never from ground truth.
 
 use nalgebra::Isometry3;
 
@@ -8,10 +8,10 @@ use crate::base::Pose;
 use crate::protocol::message::{End, WirePose};
 use crate::world::Observation;
 
-/// Designator of the thing that is taken.
+/// Designator of the object to grasp.
 const TARGET: &str = "pickObject";
 
-/// How the hand was when it closed on what it now feels.
+/// State of the hand when it closed on the object that it now feels.
 #[derive(Debug, Clone, Default)]
 pub struct Grasped(Option<Taken>);
 
@@ -19,12 +19,12 @@ pub struct Grasped(Option<Taken>);
 struct Taken {
     grasp: Isometry3<f64>,
     heading: f64,
-    /// How many things had been seen by then: what is seen later is in the hand already.
+    /// Number of percepts at that time; in later percepts the object is already in the hand.
     n_percepts: usize,
 }
 
 impl Grasped {
-    /// To be told of every observation.
+    /// Updates with an observation; must be called for every observation.
     pub fn feel(&mut self, robot: &Operator<'_>, measured: &Observation) {
         if !feels_in(measured, robot.grip_force_n()) {
             self.0 = None;
@@ -41,10 +41,10 @@ impl Taken {
     }
 }
 
-/// Keeps what an action's end says, and what the robot feels.
+/// Stores the content of an action's `end` message and the grip felt by the robot.
 ///
 /// # Errors
-/// A pose of the message is none.
+/// A pose of the message is invalid.
 pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Operator<'_>) -> Result<(), OutsideFault> {
     if end.perceived.is_some() || end.plane.is_some() {
         let perceived = perceived(end)?;
@@ -55,7 +55,7 @@ pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Oper
         robot.hold(None);
         return Ok(());
     };
-    // What was taken by an action before is known from then.
+    // An object grasped by an earlier action is already known.
     if told.is_none() && robot.memory().held.is_some() {
         return Ok(());
     }
@@ -69,10 +69,10 @@ pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Oper
     Ok(())
 }
 
-/// The foot of a thing, and its size.
+/// Pose of an object's foot, and its size.
 type Seen = (Isometry3<f64>, [f64; 3]);
 
-/// Where the robot saw a thing last before the hand closed: in this action, or in an earlier one's pictures.
+/// The last percept of an object before the hand closed: from this action, or from the pictures of an earlier one.
 fn seen_before(id: &str, taken: &Taken, robot: &Operator<'_>) -> Option<Seen> {
     let percept = robot.percepts.iter().take(taken.n_percepts).rev().find(|percept| percept.id == id);
     match percept {
@@ -81,7 +81,7 @@ fn seen_before(id: &str, taken: &Taken, robot: &Operator<'_>) -> Option<Seen> {
     }
 }
 
-/// The thing in the hand as the reference perception sees it now, and the hand as it is now.
+/// The held object as the reference perception sees it now, and the current state of the hand.
 fn seen_now(id: &str, robot: &mut Operator<'_>) -> Option<(Isometry3<f64>, [f64; 3], Taken)> {
     let now = robot.see(id)?;
     Some((now.pose.to_isometry(), now.size_m, Taken::now(robot)))
@@ -96,7 +96,7 @@ fn perceived(end: &End) -> Result<Perceived, OutsideFault> {
     Ok(Perceived { plane: plane.transpose()?, things: things.collect::<Result<_, OutsideFault>>()? })
 }
 
-/// A thing stands upright on its foot: of a pose, its place and heading count.
+/// Reduces a pose to position and yaw: objects are upright on their foot.
 fn upright(pose: &WirePose) -> Result<Isometry3<f64>, OutsideFault> {
     let pose = pose.pose()?;
     Ok(Pose::upright(pose.position, pose.yaw()).to_isometry())

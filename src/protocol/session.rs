@@ -1,4 +1,4 @@
-//! One program from its start to its end: introductions, runs, and what it does wrong.
+//! One program from start to exit: introductions, runs, and its faults.
 
 use std::collections::BTreeSet;
 
@@ -10,9 +10,9 @@ use crate::protocol::message::{Hello, PROTOCOL, Plain, ToProgram, kind_of, parse
 use crate::protocol::process::Process;
 use crate::world::World;
 
-/// Longest name of a program that is kept. Unit: characters.
+/// Longest program name that is kept. Unit: characters.
 const LONGEST_NAME: usize = 80;
-/// What a program may print in one run. Unit: bytes. A line for each control tick of an hour is less.
+/// Limit on a program's output in one run. Unit: bytes. More than a line for each control tick of an hour.
 const PRINTED_LIMIT: u64 = 32 << 20;
 
 /// A program that has introduced itself.
@@ -22,27 +22,27 @@ pub struct Session {
     pub wire: Wire,
     /// The robot's joints, which are the same in all runs.
     pub joints: Joints,
-    /// The actions that it performs.
+    /// The actions that the program performs.
     pub actions: BTreeSet<String>,
-    /// Its name for people.
+    /// Its display name.
     pub name: String,
     timeout_secs: f64,
-    /// What it had printed before the run.
+    /// Number of bytes printed before the run.
     printed_before: u64,
-    /// Whether it waits for a new run or action. A busy one is of no use for another run.
+    /// Whether it is waiting for a new run or action. A busy program can't be used for another run.
     pub idle: bool,
-    /// Whether it has lost the thread, by no fault that ended a run.
+    /// Whether it failed to acknowledge an abort; this does not count as a fault of the run.
     pub lost: bool,
-    /// Whether it was told that it did something wrong, and may end for that by itself.
+    /// Whether it was notified of its fault and may exit by itself.
     refused: bool,
 }
 
 impl Session {
-    /// Starts the program of a worker and lets it introduce itself. `tested` are the actions of all tests.
+    /// Starts the program of a worker and exchanges introductions. `tested` are the actions of all tests.
     ///
     /// # Errors
-    /// It can't be started, is too late, speaks another version or wrongly, or performs nothing that is tested; with what it
-    /// printed last.
+    /// The program can't be started, is late, uses another protocol version, violates the protocol, or performs none of
+    /// the tested actions. The error includes its last output lines.
     pub fn start(
         (skill, worker): (&Skill, usize),
         tested: &BTreeSet<String>,
@@ -89,14 +89,14 @@ impl Session {
         let hello: Hello = parse("hello", message)?;
         if hello.protocol != PROTOCOL {
             let told = hello.protocol;
-            return Err(broke(format!("it speaks version {told} of the protocol, and this is version {PROTOCOL}")));
+            return Err(broke(format!("it uses protocol version {told}, but version {PROTOCOL} is required")));
         }
         self.actions = hello.actions.into_iter().collect();
         if self.actions.is_disjoint(tested) {
             let list = |names: &BTreeSet<String>| names.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
             let named = if self.actions.is_empty() { "none".to_owned() } else { list(&self.actions) };
             return Err(broke(format!(
-                "it performs none of the tests' actions: it named {named}, the tests have {}",
+                "it performs none of the tests' actions: it offers {named}, the tests use {}",
                 list(tested)
             )));
         }
@@ -104,10 +104,10 @@ impl Session {
         Ok(())
     }
 
-    /// A new run begins.
+    /// Begins a new run.
     ///
     /// # Errors
-    /// What it does wrong.
+    /// A fault of the program.
     pub fn reset(&mut self, reset: &ToProgram<'_>) -> Result<(), OutsideFault> {
         self.printed_before = self.process.output.n_bytes();
         self.send(reset, &[])?;
@@ -116,10 +116,10 @@ impl Session {
         parse("ready", message).map(|Plain { .. }| ())
     }
 
-    /// The action is over before the program says so. What it still has to say to that is waited for.
+    /// Notifies the program that its action is over, and waits for the acknowledgement.
     ///
     /// # Errors
-    /// What it does wrong.
+    /// A fault of the program.
     pub fn abort(&mut self, reason: &str) -> Result<(), OutsideFault> {
         self.send(&ToProgram::Abort { reason }, &[])?;
         let message = self.receive()?;
@@ -130,16 +130,16 @@ impl Session {
     /// Sends a message.
     ///
     /// # Errors
-    /// It is not taken.
+    /// The message can't be delivered.
     pub fn send(&mut self, message: &impl serde::Serialize, binaries: &[&[u8]]) -> Result<(), OutsideFault> {
         let limit_secs = self.timeout_secs;
         self.wire.send(message, binaries, limit_secs).map_err(|fault| self.cause(fault))
     }
 
-    /// The program's next message.
+    /// Receives the program's next message.
     ///
     /// # Errors
-    /// It is late, has ended, prints without end, or sends what is no message.
+    /// The program is late, has exited, exceeds the output limit, or sends an invalid message.
     pub fn receive(&mut self) -> Result<&[u8], OutsideFault> {
         let limit_secs = self.timeout_secs;
         let (process, before) = (&mut self.process, self.printed_before);
@@ -153,29 +153,29 @@ impl Session {
         }
     }
 
-    /// A closed connection is often the end of the process: that says more.
+    /// Replaces a closed connection by the exit of the process if it exits, which is more informative.
     fn cause(&mut self, fault: OutsideFault) -> OutsideFault {
         cause_of(&mut self.process, fault)
     }
 
-    /// Tells the program what it did wrong, as far as it listens. Gives the fault back.
+    /// Notifies the program of its fault if it still reads, and returns the fault.
     pub fn refuse(&mut self, fault: OutsideFault) -> OutsideFault {
-        // The run is over for this fault; that the program does not hear of it changes nothing.
+        // The run is over because of this fault; a failure to deliver the notification changes nothing.
         let told = self.wire.send(&ToProgram::Error { reason: &fault.reason }, &[], REFUSAL_SECS);
         self.refused = told.is_ok() && !fault.late;
         fault
     }
 
-    /// Ends the program. Gives the last lines that it printed.
+    /// Ends the program. Returns the last lines of its output.
     pub fn end(mut self) -> Vec<String> {
-        // One that is told why it ends may print something that tells more.
+        // A notified program may print a more informative message before it exits.
         if self.refused {
             self.process.ends_soon();
         }
         self.process.end()
     }
 
-    /// Lets the program end by itself, if it does so soon.
+    /// Asks the program to exit, waits briefly, and ends it.
     pub fn bye(mut self) {
         if self.idle && self.wire.send(&ToProgram::Bye, &[], REFUSAL_SECS).is_ok() {
             self.process.let_end();
@@ -184,7 +184,7 @@ impl Session {
     }
 }
 
-/// Time in which a program that did something wrong can take the word of it. Unit: seconds.
+/// Time limit for delivering a fault notification. Unit: seconds.
 const REFUSAL_SECS: f64 = 0.2;
 
 fn cause_of(process: &mut Process, fault: OutsideFault) -> OutsideFault {
@@ -198,7 +198,7 @@ fn expect(kind: &str, expected: &str) -> Result<(), OutsideFault> {
     if kind == expected {
         return Ok(());
     }
-    Err(broke(format!("it sent `{kind}` where `{expected}` was due")))
+    Err(broke(format!("it sent `{kind}`, but `{expected}` was expected")))
 }
 
 fn broke(reason: String) -> OutsideFault {
