@@ -1,8 +1,8 @@
 //! actcheck: QuickCheck for robot actions.
 //!
-//! Generates randomised tabletop scenes, lets a robot act in them in physics simulation, writes the world before, during
-//! and after each action as RDF facts, judges the actions by rules that people edit without recompiling, and keeps
-//! every run.
+//! Generates randomised tabletop scenes, lets a robot act in them in physics simulation, records the world before, during
+//! and after each action as RDF facts, judges the actions by rules that can be edited without recompiling, and stores every
+//! run.
 //!
 //! # One straight line
 //!
@@ -12,31 +12,31 @@
 //!                                            + SPARQL
 //! ```
 //!
-//! Each stage is a function from the products of earlier stages to its own; nothing flows back. [`campaign`] conducts,
-//! [`cli`] is the rim where arguments, clock, signals and streams are.
+//! Each stage is a function from the products of earlier stages to its own product; nothing flows back. [`campaign`] runs
+//! the stages; [`cli`] handles arguments, the clock, signals and streams.
 //!
-//! | module | what it does | its library |
+//! | module | purpose | libraries |
 //! | --- | --- | --- |
 //! | [`base`] | sources and diagnostics, terms, poses, recorded choices, shipped files | |
-//! | [`search`] | where in a cube to look next, learnt from margins; failure rates whatever was looked at | statrs |
-//! | [`config`] | TOML text to a `Campaign` in which nothing is left to check; models, ours and other people's | toml, roxmltree, mesh-loader, shlex |
+//! | [`search`] | adaptive sampling of the unit cube, guided by margins; failure rates by importance weighting | statrs |
+//! | [`config`] | TOML text to a fully checked `Campaign`; models in our own and in third-party formats | toml, roxmltree, mesh-loader, shlex |
 //! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxigraph (parsers) |
-//! | [`scenario`] | recorded choices to one concrete `Scene`; what "simpler" means | parry3d (overlaps) |
-//! | [`world`] | a `Scene` to a stepping simulation; the only place that knows the engine | rapier3d, parry3d, urdf-rs |
-//! | [`actions`] | the robot's actions over commands and observations; the `Trace` | |
-//! | [`protocol`] | actions performed by a program of somebody's, in lockstep over a socket | nix |
+//! | [`scenario`] | recorded choices to one concrete `Scene`; the order of simplicity for shrinking | parry3d (overlaps) |
+//! | [`world`] | a `Scene` to a stepping simulation; the only module that uses the physics engine | rapier3d, parry3d, urdf-rs |
+//! | [`actions`] | the robot's actions through commands and observations; the `Trace` | |
+//! | [`protocol`] | actions performed by an external program, in lockstep over a socket | nix |
 //! | [`facts`] | a `Trace` to RDF facts, interned once | |
-//! | [`rules`] | rule text to what it finds in the facts; SPARQL properties | datafrog, oxigraph (evaluator) |
+//! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxigraph (evaluator) |
 //! | [`verdict`] | findings to outcomes with witness and margin; the scores | |
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store) |
-//! | [`campaign`] | the conductor; the only module that calls many stages | rayon |
-//! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, campaigns side by side, when it fails | polars, statrs |
-//! | [`report`] | verdicts and tables as text, JSON and pages, in the formats of other people's tools; runs as pictures and in 3D | rerun (feature `rerun`) |
-//! | [`serve`] | a history over HTTP: SPARQL endpoint, a page to ask from, the report | oxhttp |
+//! | [`campaign`] | runs the stages of a campaign; the only module that calls many stages | rayon |
+//! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, comparison of campaigns, failure conditions | polars, statrs |
+//! | [`report`] | verdicts and tables as text, JSON and HTML, and in the formats of other tools; runs as pictures and in 3D | rerun (feature `rerun`) |
+//! | [`serve`] | a history over HTTP: SPARQL endpoint, query page, report | oxhttp |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap, clap_complete, clap_mangen |
 //!
-//! A module imports only from modules above it in this table ([`campaign`] and [`cli`] from all), and a library of the field is used
-//! only where the table names it: `tests/floors.rs` holds both.
+//! A module imports only from modules above it in this table ([`campaign`] and [`cli`] from all), and uses a listed
+//! library only if the table names it there. `tests/floors.rs` enforces both.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::unwrap_used)]

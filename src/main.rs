@@ -1,4 +1,4 @@
-//! The `actcheck` command: parses its arguments, does what they ask, and exits.
+//! The `actcheck` command-line program.
 
 use std::process::ExitCode;
 

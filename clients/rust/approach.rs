@@ -1,5 +1,5 @@
-//! A skill in Rust: drives up to the thing that it is to pick, and gives up there. It needs a socket and JSON, and nothing of
-//! actcheck's.
+//! A skill in Rust: drives up to the object to pick and gives up there. It needs only a socket and JSON, not the
+//! actcheck crate.
 //!
 //!     cargo build --release --example approach
 //!     actcheck run my.toml         # with test_launcher = "target/release/examples/approach"
@@ -9,11 +9,11 @@ mod link;
 
 use serde_json::{Value, json};
 
-/// Stops so far from the thing. Unit: metres.
+/// Distance from the object at which the base stops. Unit: metres.
 const BEFORE_M: f64 = 0.7;
-/// Drives so fast at most. Unit: m/s.
+/// Highest speed. Unit: m/s.
 const FASTEST: f64 = 0.3;
-/// Turns so fast for each radian that it looks aside. Unit: 1/s.
+/// Turning speed per radian of heading error. Unit: 1/s.
 const TURNING: f64 = 1.5;
 
 fn main() -> std::io::Result<()> {
@@ -38,7 +38,7 @@ fn main() -> std::io::Result<()> {
         let still = json!({ "type": "command", "ticks": 30, "base_velocity": [0.0, 0.0, 0.0] });
         let Some(_) = link.ask(&still)? else { return Ok(None) };
         Ok(Some(
-            json!({ "type": "end", "succeeded": false, "message": format!("stands before {wanted}, and has no idea how to take it") }),
+            json!({ "type": "end", "succeeded": false, "message": format!("reached {wanted}, but has no grasp skill") }),
         ))
     })
 }
@@ -47,7 +47,7 @@ fn number<const N: usize>(list: &Value) -> [f64; N] {
     std::array::from_fn(|idx| list[idx].as_f64().unwrap_or_default())
 }
 
-/// An angle in (−π, π].
+/// Wraps an angle to (−π, π].
 fn turn(angle: f64) -> f64 {
     angle.sin().atan2(angle.cos())
 }

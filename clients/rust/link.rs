@@ -1,4 +1,4 @@
-//! The skill protocol in Rust: a socket, frames of JSON, and the loop that every program has. See `clients/PROTOCOL.md`.
+//! The skill protocol in Rust: a socket, JSON frames, and the main loop of a program. See `clients/PROTOCOL.md`.
 
 use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::os::unix::net::UnixStream;
@@ -10,21 +10,21 @@ pub struct Link {
     stream: UnixStream,
     incoming: Vec<u8>,
     outgoing: Vec<u8>,
-    /// What the simulator said of itself and of the robot.
+    /// The simulator's `hello` message, with the description of the robot.
     pub hello: Value,
-    /// For all that is left to chance in this run.
+    /// Seed for all randomness in this run.
     pub seed: u64,
 }
 
-/// Introduces the program and performs actions until the simulator says good-bye. `perform` gives the action's end, or nothing
-/// if it was aborted.
+/// Introduces the program and performs actions until the simulator sends `bye`. `perform` returns the action's `end`
+/// message, or `None` if the action was aborted.
 ///
 /// # Errors
-/// There is no simulator, or it speaks wrongly.
+/// The simulator can't be reached, or violates the protocol.
 pub fn serve(actions: &[&str], mut perform: impl FnMut(&mut Link, &Value) -> Result<Option<Value>>) -> Result<()> {
     let address =
-        std::env::var("ACTCHECK_ADDRESS").map_err(|_| odd("ACTCHECK_ADDRESS is not set: actcheck starts this"))?;
-    let path = address.strip_prefix("unix:").ok_or_else(|| odd("the address is no Unix socket"))?;
+        std::env::var("ACTCHECK_ADDRESS").map_err(|_| odd("ACTCHECK_ADDRESS is not set: start this with actcheck"))?;
+    let path = address.strip_prefix("unix:").ok_or_else(|| odd("the address is not a Unix socket"))?;
     let stream = UnixStream::connect(path)?;
     let mut link = Link { stream, incoming: Vec::new(), outgoing: Vec::new(), hello: Value::Null, seed: 0 };
     link.hello = link.receive()?;
@@ -47,10 +47,10 @@ pub fn serve(actions: &[&str], mut perform: impl FnMut(&mut Link, &Value) -> Res
 }
 
 impl Link {
-    /// Sends a message and reads the answer; nothing if the action was aborted instead.
+    /// Sends a message and reads the answer. Returns `None` if the action was aborted instead.
     ///
     /// # Errors
-    /// The simulator is gone.
+    /// The connection is closed.
     pub fn ask(&mut self, message: &Value) -> Result<Option<Value>> {
         self.send(message)?;
         let answer = self.receive()?;
@@ -71,7 +71,7 @@ impl Link {
         self.stream.read_exact(&mut header)?;
         let [a, b, c, d, kind] = header;
         if kind != b'J' {
-            return Err(odd("no picture was asked for"));
+            return Err(odd("received a binary frame without a request for one"));
         }
         self.incoming.resize(u32::from_le_bytes([a, b, c, d]) as usize, 0);
         self.stream.read_exact(&mut self.incoming)?;

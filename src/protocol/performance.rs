@@ -179,7 +179,7 @@ impl Performed<'_, '_> {
                 }
                 "end" => return parse("end", message).map_err(Interrupt::Outside),
                 other => {
-                    let reason = format!("it sent `{other}` , but `command`, `ask` or `end` was expected");
+                    let reason = format!("it sent `{other}`, but `command`, `ask` or `end` was expected");
                     return Err(Interrupt::Outside(OutsideFault { late: false, reason }));
                 }
             }

@@ -1,7 +1,7 @@
-"""A pick in a hurry, to be compared with `pick.py`: nothing in it fails on purpose, it is only careless.
+"""A careless pick, for comparison with `pick.py`: no step fails on purpose.
 
-It goes straight at the thing and unfolds its arm on the way, looks at nothing that stands around, does not slow down before it
-touches, does not wait until the fingers have stalled, lifts as fast as the arm can, and takes its success for granted.
+It drives straight at the object and unfolds its arm on the way, ignores all obstacles, does not slow down before contact,
+does not wait until the fingers have stalled, lifts as fast as the arm can, and reports success without checking.
 """
 
 import math

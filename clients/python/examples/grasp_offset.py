@@ -1,6 +1,6 @@
-"""A small network that says how far a thing is from where it seems to be, by what the depth camera shows around there.
+"""A small network that predicts the error of an object's perceived position from the depth camera's view of it.
 
-The view's frame: x from the camera to where the thing seems to be, level; y to the left of it; z up.
+The frame of the view: x points horizontally from the camera to the perceived position; y left; z up.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: What the network sees. Shape: 8. Unit: metres.
+#: Inputs of the network. Shape: 8. Unit: metres.
 FEATURES = ("ahead", "left", "depth", "width", "height", "seen_width", "seen_depth", "seen_height")
 
 
 def features(seen: Thing, shown: Thing) -> Array:
-    """What is known of a thing: the box of what the camera shows against what the reference perception says."""
+    """Input features: the box of the camera's points relative to the object of the reference perception."""
     ahead, left, _ = shown.pose.rotation.T @ (shown.pose.position - seen.pose.position)
     return np.array([ahead, left, *shown.size_m, *seen.size_m])
 
 
 @dataclass(frozen=True)
 class Network:
-    """One hidden layer beside a linear way through."""
+    """One hidden layer in parallel with a linear skip connection."""
 
     mean: Array
     scale: Array
@@ -39,24 +39,24 @@ class Network:
 
     @classmethod
     def load(cls, file: Path) -> Network:
-        """From a file that `save` wrote."""
+        """Loads a file written by `save`."""
         stored = json.loads(file.read_text())
         return cls(**{name: np.array(stored[name], dtype=np.float64) for name in cls.__dataclass_fields__})
 
     def save(self, file: Path, note: str) -> None:
-        """Writes it, with how it came about."""
+        """Writes the weights, with a note about their training."""
         weights = {name: np.round(getattr(self, name), 6).tolist() for name in self.__dataclass_fields__}
         file.write_text(json.dumps({"note": note, "features": FEATURES} | weights, indent=None) + "\n")
 
     def __call__(self, inputs: Array) -> Array:
-        """How far ahead and to the left it is. Shape: … × 8 to … × 2. Unit: metres."""
+        """Predicts the object's offset ahead and to the left. Shape: … × 8 to … × 2. Unit: metres."""
         scaled = (inputs - self.mean) / self.scale
         result: Array = np.tanh(scaled @ self.hidden + self.hidden_bias) @ self.out + scaled @ self.straight + self.bias
         return result
 
 
 def corrected(seen: Thing, shown: Thing, network: Network) -> Thing:
-    """The thing where the network says that it is."""
+    """The object at the position that the network predicts."""
     ahead, left = network(features(seen, shown))
     way = shown.pose.rotation @ np.array([ahead, left, 0.0])
     return Thing(seen.id, Pose(seen.pose.position + way, seen.pose.rotation), seen.size_m, seen.category)

@@ -1,8 +1,9 @@
-"""The pick of `pick.py`, with a learned idea of where the thing is: `train_grasp_offset.py` learned it from runs of this program.
+"""The pick of `pick.py` with a learned correction of the object's position. `train_grasp_offset.py` learned it from runs of this
+program.
 
-Before it drives it looks at the thing with its depth camera. A network says from the box of what is seen there how far the thing is
-from where the reference perception has it. With `--untrained` it looks and does not listen: so the first runs were made. Either way
-it reports the box as what it perceived, by which the runs can be learned from.
+Before it drives, it looks at the object with its depth camera. From the bounding box of the points seen there, a network predicts
+the error of the reference perception. With `--untrained` it looks but ignores the network; this produced the training runs. Either
+way it reports the box as its percept, so that networks can be trained on the runs.
 """
 
 import math
@@ -15,16 +16,16 @@ from grasp_offset import Network, corrected
 from pick import take
 
 WEIGHTS = Path(__file__).with_name("grasp_offset.json")
-#: What is looked at around a thing. Unit: metres. Four standard deviations of where things seem to be, or a glass's width.
+#: Radius of the region around an object. Unit: metres. Four standard deviations of the perceived position, or a glass's width.
 AROUND_M = 0.1
-#: Fewer points say nothing.
+#: Fewest points for a usable box.
 FEWEST_POINTS = 30
 
 network = None if "--untrained" in sys.argv else Network.load(WEIGHTS)
 
 
 def look_at(robot: Robot, thing: Thing) -> Thing | None:
-    """The box of the points that the camera shows around a thing, turned as it looks; nothing if there are too few."""
+    """The box of the camera's points around an object, aligned with the view; `None` if there are too few points."""
     assert robot.description.camera is not None, "the robot has no camera"
     place = thing.pose.position + np.array([0.0, 0.0, float(thing.size_m[2]) / 2])
     x, y, heading = robot.observe().base
@@ -36,7 +37,7 @@ def look_at(robot: Robot, thing: Thing) -> Thing | None:
     view = Pose.upright(place, bearing)
     points = (robot.cloud().astype(np.float64) - place) @ view.rotation
     near = np.hypot(points[:, 0], points[:, 1]) < AROUND_M
-    # Above the table and what lies flat on it, and not far above the thing.
+    # Above the table and flat objects on it, and not far above the object.
     points = points[near & (np.abs(points[:, 2]) < 0.35 * float(thing.size_m[2]))]
     if len(points) < FEWEST_POINTS:
         return None

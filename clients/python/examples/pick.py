@@ -1,4 +1,4 @@
-"""A scripted pick: from the side or from above, from where furniture and other things leave room."""
+"""A scripted pick: from the side or from above, where furniture and other objects leave room."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -8,7 +8,7 @@ from actcheck import Failed, Pose, Report, Robot, Thing, Unreachable, serve, ski
 
 
 def ways(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[float, float, Pose]]:
-    """Hands at its side, or above what is low: what speaks against each, how far back furniture is clear, and its pose."""
+    """Hand poses beside the object, or above it if it is low: the cost, the distance back to clear furniture, and the pose."""
     height, place, (x, y, _) = float(thing.size_m[2]), thing.pose.position, robot.observe().base
     up, down = (min(max(height / 2, 0.055), 0.11), 0.0) if height >= 0.1 else (max(height - 0.03, 0.0275), math.pi / 2)
     blocks, things = [one for one in others if one.furniture], [one for one in others if not one.furniture]
@@ -17,7 +17,7 @@ def ways(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[
         back = -np.array([math.cos(heading), math.sin(heading), 0.0])
         along = place + back * np.arange(0.0, 2.0, 0.03)[:, None]
         out = next(n for n in range(4, len(along)) if n > 40 or all(one.beside(along[n]) > 0.1 for one in blocks))
-        drive = np.linspace([x, y, 0.0], along[out + 22], 20)  # the base stands some 66 cm behind the hand
+        drive = np.linspace([x, y, 0.0], along[out + 22], 20)  # the base is about 66 cm behind the hand
         room = min((one.beside(at) for at in along[:out] for one in things), default=1.0)
         if all(one.beside(at) > 0.25 for at in drive for one in blocks):
             against = 0.012 * out + 0.3 * abs(turn) + 20.0 * max(0.0, 0.1 - room)
@@ -25,7 +25,7 @@ def ways(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[
 
 
 def take(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Report:
-    """Drives there, closes the hand on the thing, lifts it and takes it away."""
+    """Drives to the object, closes the hand on it, lifts it and backs away."""
     x, y, heading = robot.description.base_joints
     for _, back, hand in sorted(ways(robot, thing, others), key=lambda way: way[0]):
         level = hand.rotation[2, 0] > -0.5
@@ -36,7 +36,7 @@ def take(robot: Robot, thing: Thing, others: Sequence[Thing]) -> Report:
         if all(one.beside(np.array([at[x], at[y], 0.0])) > 0.2 for one in others if one.furniture):
             break
     else:
-        raise Failed("no free way to it was found")
+        raise Failed("no free path to it was found")
     away = {x: at[x] - back * math.cos(at[heading]), y: at[y] - back * math.sin(at[heading])}
     robot.drive(away[x], away[y], at[heading])
     robot.gripper(robot.description.max_opening_m, wait=False)

@@ -1,4 +1,4 @@
-r"""Learns the weights of `learned_pick.py` from an exported dataset of its runs, offline: in seconds, without a simulation.
+r"""Trains the network of `learned_pick.py` on an exported dataset of its runs: offline, in seconds, without a simulation.
 
     sed 's|^test_launcher.*|test_launcher = "../clients/python/examples/learned_pick.py --untrained"|' \
         configs/pick.toml > configs/collect.toml
@@ -6,7 +6,7 @@ r"""Learns the weights of `learned_pick.py` from an exported dataset of its runs
     actcheck export --history collected --dataset runs
     python clients/python/examples/train_grasp_offset.py runs
 
-Needs polars (`pip install polars`), which reads the dataset's tables.
+Needs polars (`pip install polars`) to read the dataset's tables.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from grasp_offset import Array, Network, features
 
 HIDDEN = 12
 STEPS = 4000
-#: Of the squared weights, against learning runs by heart.
+#: Weight decay, against overfitting.
 DECAY = 2e-3
 
 
 def examples(folder: Path) -> tuple[Array, Array]:
-    """From each run what was known, and how far ahead and to the left the thing was from where it seemed to be."""
-    import polars as pl  # here, so that what learns can be used without it
+    """For each run, the features and the object's true offset ahead and to the left of its perceived position."""
+    import polars as pl  # imported here, so that training can be used without it
 
     actions = pl.read_parquet(folder / "actions.parquet").filter(pl.col("action").str.ends_with("Pick"))
     percepts = pl.read_parquet(folder / "percepts.parquet")
@@ -49,25 +49,25 @@ def examples(folder: Path) -> tuple[Array, Array]:
         inputs.append(features(thing, box))
         offsets.append((box.pose.rotation.T @ (place - thing.pose.position))[:2])
     if not inputs:
-        raise SystemExit("the dataset has no runs of learned_pick.py that saw what they were to pick")
+        raise SystemExit("the dataset has no runs of learned_pick.py that saw the object to pick")
     return np.array(inputs), np.array(offsets)
 
 
 def thing_of(row: dict[str, float]) -> Thing:
-    """A percept."""
+    """Converts a percept row."""
     pose = {"position_m": [row[k] for k in ("x_m", "y_m", "z_m")], "quaternion_xyzw": [row[k] for k in ("qx", "qy", "qz", "qw")]}
     return Thing("", Pose.from_wire(pose), np.array([row[k] for k in ("width_m", "depth_m", "height_m")]))
 
 
 def believed(base: dict[str, float], place: Array) -> Array:
-    """A true place where the robot believes it to be: off by as much as it is wrong about where it stands itself."""
+    """A true position in the robot's believed world frame, shifted by its localisation error."""
     true = Pose.upright((base["true_base_x_m"], base["true_base_y_m"], 0.0), base["true_base_heading_rad"])
     belief = Pose.upright((base["base_x_m"], base["base_y_m"], 0.0), base["base_heading_rad"])
     return (belief * true.inverse() * Pose.upright(place)).position
 
 
 def learn(inputs: Array, offsets: Array, seed: int) -> Network:
-    """Least squares by Adam over all examples at once; the same for the same examples and seed."""
+    """Least squares with Adam on all examples at once; deterministic for the same examples and seed."""
     generator = np.random.default_rng(seed)
     mean, scale = inputs.mean(axis=0), inputs.std(axis=0) + 1e-4
     weights = [
@@ -96,9 +96,9 @@ def learn(inputs: Array, offsets: Array, seed: int) -> Network:
 
 
 def main() -> None:
-    """Learns from four fifths of the runs, says how well the others are foretold, then learns from all and writes the weights."""
+    """Trains on four fifths of the runs, evaluates on the rest, then trains on all runs and writes the weights."""
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("dataset", type=Path, help="the folder that `actcheck export --dataset` wrote")
+    arguments.add_argument("dataset", type=Path, help="folder written by `actcheck export --dataset`")
     arguments.add_argument("--output", type=Path, default=Path(__file__).with_name("grasp_offset.json"))
     arguments.add_argument("--seed", type=int, default=1)
     given = arguments.parse_args()
@@ -106,11 +106,11 @@ def main() -> None:
     held = np.arange(len(inputs)) % 5 == 4
     before = np.linalg.norm(offsets[held], axis=1)
     after = np.linalg.norm(learn(inputs[~held], offsets[~held], given.seed)(inputs[held]) - offsets[held], axis=1)
-    told = f"{len(inputs)} runs; on {held.sum()} held back the median error is {1e3 * np.median(after):.1f} mm"
+    told = f"{len(inputs)} runs; on {held.sum()} held-out runs the median error is {1e3 * np.median(after):.1f} mm"
     told += f" instead of {1e3 * np.median(before):.1f} mm"
     print(told)
     learn(inputs, offsets, given.seed).save(given.output, told)
-    print(f"{given.output} holds the weights ({given.output.stat().st_size} bytes)")
+    print(f"wrote the weights to {given.output} ({given.output.stat().st_size} bytes)")
 
 
 if __name__ == "__main__":

@@ -1,1 +1,1 @@
-"""Tests of the client against a simulation that is not there: `python -m unittest` in the folder `clients/python`."""
+"""Tests of the client against a fake simulation: `python -m unittest` in the folder `clients/python`."""

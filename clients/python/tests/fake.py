@@ -1,4 +1,6 @@
-"""The simulation's side of the protocol, without physics: joints are where they are told, a second of theirs is a tick's work."""
+"""The simulation's side of the protocol, without physics: joints reach their targets at once, and simulated time costs no
+computation.
+"""
 
 from __future__ import annotations
 
@@ -68,17 +70,17 @@ def hello(**changes: Any) -> Message:
 
 
 class Simulation:
-    """One end of a socket pair; `script` plays the simulation in a thread of its own."""
+    """One end of a socket pair; `script` plays the simulation in a separate thread."""
 
     def __init__(self, script: Script) -> None:
         self._socket, client = socket.socketpair()
         self.wire = Wire(client)
-        #: All that the client sent, in order.
+        #: All messages from the client, in order.
         self.received: list[Message] = []
         self.fault: BaseException | None = None
         self.positions = {joint.name: 0.0 for joint in JOINTS} | dict(zip(ARM, HOME))
         self.opening_m, self.wanted_m, self.force_n = 0.0, 0.0, 0.0
-        #: What stands between the fingers. Unit: metres; nothing if there is nothing.
+        #: Width of the object between the fingers, or `None`. Unit: metres.
         self.between_m: float | None = None
         self.time_s = 0.0
         self._thread = threading.Thread(target=self._play, args=(script,), daemon=True)
@@ -93,7 +95,7 @@ class Simulation:
             self._socket.close()
 
     def join(self) -> None:
-        """Waits for the script's end, and raises what it raised."""
+        """Waits for the script's end and re-raises its exception."""
         self._thread.join(20.0)
         assert not self._thread.is_alive(), "the script did not end"
         self.wire.close()
@@ -114,7 +116,7 @@ class Simulation:
         assert header[4:] == b"J"
         message: Message = json.loads(self._exactly(length))
         self.received.append(message)
-        assert kind in (None, message["type"]), f"{message} came instead of {kind}"
+        assert kind in (None, message["type"]), f"received {message}, expected {kind}"
         return message
 
     def _exactly(self, count: int) -> bytes:
@@ -122,12 +124,12 @@ class Simulation:
         while len(data) < count:
             chunk = self._socket.recv(count - len(data))
             if not chunk:
-                raise EOFError("the client hung up")
+                raise EOFError("the client closed the connection")
             data += chunk
         return data
 
     def greet(self) -> Message:
-        """Says hello, and gives back what the client said."""
+        """Sends hello and returns the client's hello."""
         self.send(hello())
         return self.receive("hello")
 
@@ -157,7 +159,7 @@ class Simulation:
         self.send(message | {"observation": self.observation()})
 
     def take(self, command: Message) -> None:
-        """Moves everything as far as a command's ticks let it."""
+        """Moves the joints and the gripper by the ticks of a command."""
         self.positions |= command.get("positions", {})
         if "gripper" in command:
             self.wanted_m = command["gripper"]["opening_m"]
@@ -169,7 +171,7 @@ class Simulation:
         self.time_s += command["ticks"] * TICK_S
 
     def act(self) -> Message:
-        """Carries commands out until the client ends the action; gives back how it did."""
+        """Executes commands until the client ends the action; returns its `end` message."""
         while True:
             message = self.receive()
             if message["type"] == "end":
@@ -181,7 +183,7 @@ class Simulation:
             self.send(self.observation())
 
     def answer(self, ask: Message) -> None:
-        """Answers as every sensor would."""
+        """Answers a sensor request."""
         upright = {"position_m": [1.0, 0.0, 0.5], "quaternion_xyzw": [0.0, 0.0, 0.0, 1.0]}
         answer: Message = {"type": "answer", "what": ask["what"]}
         if ask["what"] == "objects":
@@ -210,7 +212,7 @@ def one_action(simulation: Simulation) -> None:
 
 
 def robot_of(simulation: Simulation) -> tuple[Session, Robot]:
-    """The client's side of `one_action`, as far as the robot."""
+    """The client's side of `one_action`, up to the robot."""
     session = Session(simulation.wire, "test", ["Pick"])
     call = session.next_call()
     assert call is not None

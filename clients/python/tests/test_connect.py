@@ -1,4 +1,4 @@
-"""One run from a notebook, with a stand-in for the program that starts simulations."""
+"""One run from a notebook, with a stand-in for actcheck."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from actcheck import Closed, Connection, Robot, connect
 from actcheck.connect import with_launcher
 
-#: Starts its launcher as actcheck does, and plays one action with it.
+#: Starts its launcher as actcheck does and performs one action with it.
 PROGRAM = """
     import os, shlex, socket, subprocess, sys, tempfile, tomllib
     sys.path[:0] = {path!r}

@@ -1,4 +1,4 @@
-"""The environment's interface."""
+"""The interface of `ActionEnv`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Environment(unittest.TestCase):
         _, reward, terminated, truncated, _ = env.step(action)
         self.assertAlmostEqual(reward, -0.1)
         self.assertFalse(terminated or truncated)
-        # The lift goes up at its largest speed for a tenth of a second.
+        # The lift goes up at its velocity limit for a tenth of a second.
         self.assertAlmostEqual(env.robot.joints()["arm_lift_joint"], 0.02)
         self.assertEqual(simulation.wanted_m, 0.135)
         with self.assertRaisesRegex(ValueError, "9 finite numbers"):

@@ -1,4 +1,4 @@
-"""What the learned example has learned, and that it can be learned again."""
+"""The learned example: its network's predictions, and that training can be reproduced."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class GraspOffset(unittest.TestCase):
             nudged = usual.copy()
             nudged[axis] += 0.01
             moved = network(nudged) - network(usual)
-            # A thing that is shown a centimetre further on is most of a centimetre further on, and no further aside.
+            # If the camera shows the object a centimetre further ahead, the prediction moves most of a centimetre ahead, not aside.
             self.assertTrue(0.005 < moved[axis] < 0.015, moved)
             self.assertLess(abs(moved[1 - axis]), 0.005)
 
@@ -38,7 +38,7 @@ class GraspOffset(unittest.TestCase):
         nothing = np.zeros((len(FEATURES), 2))
         ahead = Network(np.zeros(8), np.ones(8), nothing, np.zeros(2), np.zeros((2, 2)), nothing, np.array([0.03, 0.01]))
         np.testing.assert_allclose(features(seen, shown)[:2], [0.0, 0.0], atol=1e-12)
-        # Ahead is along the world's y, left along its −x.
+        # Ahead is the world's y, left its −x.
         np.testing.assert_allclose(corrected(seen, shown, ahead).pose.position, [0.99, 2.03, 0.7], atol=1e-12)
 
     def test_what_is_there_to_be_learned_is_learned_and_always_the_same(self) -> None:

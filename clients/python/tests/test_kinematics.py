@@ -1,4 +1,4 @@
-"""Poses, forward and inverse kinematics, courses: against each other and against what is known."""
+"""Poses, forward and inverse kinematics, trajectories: against each other and against known values."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Chains(unittest.TestCase):
             Chain(read_urdf(URDF), "tentacle")
 
     def test_a_level_posture_is_where_the_urdf_says(self) -> None:
-        # Upper arm and hand in one level line: shoulder at 0.141, 0.078, 0.34 + lift, then 0.345 + 0.1405 + 0.08 ahead.
+        # Upper arm and hand in one horizontal line: shoulder at 0.141, 0.078, 0.34 + lift, then 0.345 + 0.1405 + 0.08 ahead.
         pose = self.chain.pose(dict(zip(ARM, (0.3, -math.pi / 2, 0.0, 0.0, 0.0))))
         np.testing.assert_allclose(pose.rotation[:, 0], [1.0, 0.0, 0.0], atol=1e-9)
         np.testing.assert_allclose(pose.position, [0.141 + 0.345 + 0.1405 + 0.08, 0.078, 0.34 + 0.3 - 0.005 - 0.012], atol=1e-9)
@@ -94,7 +94,7 @@ class Chains(unittest.TestCase):
     def test_held_joints_stay_and_what_is_out_of_reach_is_told(self) -> None:
         seed = dict(zip(BASE + ARM, [0.0, 0.0, 0.0, *HOME]))
         far = Pose.pointing((9.0, 0.0, 0.6), 0.0)
-        with self.assertRaisesRegex(Unreachable, r"\(9.00, 0.00, 0.60\): .* cm are missing"):
+        with self.assertRaisesRegex(Unreachable, r"\(9.00, 0.00, 0.60\): .* cm off"):
             self.chain.solve(far, [seed], frozenset(BASE))
         found = self.chain.solve(far, [seed | dict(zip(ARM, LEVEL))])
         self.assertGreater(found["base_x_joint"], 8.0)

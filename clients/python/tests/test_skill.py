@@ -1,4 +1,4 @@
-"""Skills and what they do with the robot."""
+"""Skills and their commands to the robot."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Serving(unittest.TestCase):
         skills.update(self.kept)
 
     def ends(self, function: Callable[..., Any], script: Script = one_action) -> list[Message]:
-        """What came to the simulation when a skill was served."""
+        """The final messages that the simulation received from a served skill."""
         skill_for("Pick")(function)
         simulation = Simulation(script)
         self.errors = io.StringIO()
@@ -129,7 +129,7 @@ class Serving(unittest.TestCase):
             simulation.greet()
             simulation.send({"type": "error", "reason": "unknown key"})
 
-        for script, words in ((other_version, "version 7"), (refusal, "unknown key"), (lambda simulation: None, "hung up")):
+        for script, words in ((other_version, "version 7"), (refusal, "unknown key"), (lambda simulation: None, "closed")):
             with self.assertRaisesRegex(SystemExit, words):
                 self.ends(lambda robot: None, script)
 
@@ -139,7 +139,7 @@ class Serving(unittest.TestCase):
             simulation.send(simulation.observation())
 
         session = Session(Simulation(script).wire, "test", [])
-        with self.assertRaisesRegex(ProtocolFault, "`observation` came where reset or begin or bye was due"):
+        with self.assertRaisesRegex(ProtocolFault, "received `observation`, expected reset or begin or bye"):
             session.next_call()
 
 

@@ -1,4 +1,4 @@
-"""Test your own robot skill with actcheck: a skill is a function, a program that actcheck starts serves it.
+"""Test your own robot skill with actcheck: a skill is a function, served by a program that actcheck starts.
 
 ```python
 import actcheck

@@ -1,4 +1,4 @@
-"""One run from a notebook or a shell: the simulation is started from here, and errors are raised where they are written."""
+"""One run from a notebook or a shell: starts the simulation and raises the skill's exceptions in the caller."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from actcheck.session import Session
 from actcheck.skill import Skill, report_of, wanted
 from actcheck.wire import Wire
 
-#: How long one may think between two commands. Unit: seconds of the clock on the wall.
+#: Longest time between two commands. Unit: seconds of wall-clock time.
 PATIENCE_S = 3600
-#: How long the program may take to start. Unit: seconds.
+#: Time limit for actcheck to start. Unit: seconds.
 STARTUP_S = 60.0
 
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a run."""
+    """The result of a run."""
 
     #: 0 if everything passed, 1 if a property failed, 2 if it could not run.
     exit_code: int
-    #: What actcheck printed.
+    #: Output of actcheck.
     text: str
 
     @property
     def passed(self) -> bool:
-        """Whether every property did."""
+        """Whether every property passed."""
         return self.exit_code == 0
 
     def __repr__(self) -> str:
@@ -48,7 +48,7 @@ class Result:
 
 
 class Connection:
-    """A campaign of one run whose actions are performed from here."""
+    """A campaign of one run whose actions are performed in this process."""
 
     def __init__(
         self, config: str | Path, actions: Sequence[str], arguments: Sequence[str] = (), actcheck: str = "actcheck"
@@ -56,7 +56,7 @@ class Connection:
         self._folder = tempfile.TemporaryDirectory(prefix="actcheck-")
         path = Path(self._folder.name) / "notebook.sock"
         relay = shlex.join([sys.executable, "-m", "actcheck.relay", str(path)])
-        # Beside the configuration, to which its paths are relative.
+        # In the same folder as the configuration, because its paths are relative to it.
         self._config = Path(config).with_name(f".{Path(config).stem}-{Path(self._folder.name).name}.toml")
         self._config.write_text(with_launcher(Path(config).read_text(), relay))
         command = [actcheck, "run", str(self._config), "--runs", "1", "--jobs", "1", *arguments]
@@ -88,24 +88,24 @@ class Connection:
         return self._session
 
     def begin(self) -> Robot:
-        """Waits for the next action and hands out the robot. Raises `Closed` when there are no more."""
+        """Waits for the next action and returns the robot. Raises `Closed` when there are no more actions."""
         if self._robot is not None:
-            raise RuntimeError(f"{self._robot.call.action} is not over: call `end` first")
+            raise RuntimeError(f"{self._robot.call.action} is still in progress: call `end` first")
         call = self.session.next_call()
         if call is None:
-            raise Closed("the run is over: `result` says what came of it")
+            raise Closed("the run is over: call `result` for its outcome")
         self._robot = Robot(self.session, call)
         return self._robot
 
     def end(self, succeeded: bool = True, message: str = "") -> None:
         """Ends the action with its own report."""
         if self._robot is None:
-            raise RuntimeError("no action is going on: call `begin` first")
+            raise RuntimeError("no action is in progress: call `begin` first")
         self._robot = None
         self.session.end(Report(succeeded, message))
 
     def perform(self, function: Skill) -> Report:
-        """Performs the next action by a skill. Unlike in a campaign, what it raises is raised here, with where it was written."""
+        """Performs the next action with a skill. Unlike in a campaign, its exceptions are raised here, with their traceback."""
         robot = self.begin()
         report = Report(False, "the skill raised an exception")
         try:
@@ -127,11 +127,11 @@ class Connection:
         return ActionEnv(action, ticks=ticks, session=self.session)
 
     def result(self) -> Result:
-        """Waits for the end of the run, and says what came of it."""
+        """Waits for the end of the run and returns its result."""
         if self._robot is not None:
-            self.end(False, "it was not ended")
+            self.end(False, "the skill did not end the action")
         while self.session.next_call() is not None:
-            self.session.end(Report(False, "nobody performed it"))
+            self.session.end(Report(False, "the action was not performed"))
         self._hang_up()
         code = 2 if self._process is None else self._process.wait()
         result = Result(code, self._said())
@@ -139,7 +139,7 @@ class Connection:
         return result
 
     def close(self) -> None:
-        """Ends whatever is left of it."""
+        """Ends the run and removes its temporary files."""
         self._hang_up()
         if self._process is not None and self._process.poll() is None:
             self._process.terminate()
@@ -162,7 +162,7 @@ class Connection:
         self.close()
 
     def _answered(self, door: socket.socket) -> socket.socket:
-        """The relay's connection, or what actcheck said instead of starting it."""
+        """Waits for the relay's connection. Raises `Closed` with actcheck's output if it does not start the relay."""
         door.settimeout(0.1)
         until = time.monotonic() + STARTUP_S
         while time.monotonic() < until:
@@ -171,7 +171,7 @@ class Connection:
             except TimeoutError:
                 if self._process is not None and self._process.poll() is not None:
                     break
-        raise Closed(f"the run did not begin:\n{self._said()}")
+        raise Closed(f"the run did not start:\n{self._said()}")
 
     def _said(self) -> str:
         self._output.seek(0)
@@ -179,7 +179,7 @@ class Connection:
 
 
 def with_launcher(config: str, launcher: str) -> str:
-    """A configuration's text with another `test_launcher`, that has all the time it wants."""
+    """Replaces the `test_launcher` of a configuration's text and raises its time limit."""
     line = f"test_launcher = {json.dumps(launcher)}"
     config, found = re.subn(r"(?m)^test_launcher\s*=.*$", lambda _: line, config)
     if not found:
@@ -198,9 +198,9 @@ def connect(
     history: str | Path | None = None,
     actcheck: str = "actcheck",
 ) -> Connection:
-    """Starts one run of a configuration whose `actions` are performed from here, by `begin` and `end` or by `perform`.
+    """Starts one run of a configuration whose `actions` are performed here, with `begin` and `end` or with `perform`.
 
-    `actcheck` is the program, `history` where the run is kept instead of beside the configuration.
+    `actcheck` is the program to start; `history` overrides the folder where the run is stored.
     """
     arguments = [] if seed is None else ["--seed", str(seed)]
     arguments += [] if history is None else ["--history", str(history)]

@@ -1,4 +1,4 @@
-"""An action as an environment with `reset` and `step`, as learning libraries want it (the interface of gymnasium)."""
+"""An action as a reinforcement-learning environment with `reset` and `step` (the interface of gymnasium)."""
 
 from __future__ import annotations
 
@@ -19,53 +19,53 @@ from actcheck.wire import Wire
 
 Info = dict[str, Any]
 
-BETWEEN = "no episode is going on: call `reset` first"
+BETWEEN = "no episode is in progress: call `reset` first"
 
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A range of vectors: what gymnasium calls `Box`."""
+    """A range of vectors, like gymnasium's `Box`."""
 
     low: Vector
     high: Vector
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of each vector in it."""
+        """Shape of each vector."""
         return self.low.shape
 
     @property
     def dtype(self) -> np.dtype[np.float64]:
-        """Of its numbers."""
+        """Type of the vectors' elements."""
         return self.low.dtype
 
     def contains(self, value: NDArray[Any]) -> bool:
-        """Whether a vector is in it."""
+        """Whether a vector is in the range."""
         return value.shape == self.shape and bool(np.all((self.low <= value) & (value <= self.high)))
 
     def sample(self, generator: np.random.Generator) -> Vector:
-        """A vector in it, where it has ends."""
+        """A uniformly distributed vector. The range must be bounded."""
         return generator.uniform(self.low, self.high)
 
 
 def measured(robot: Robot) -> Vector:
-    """Positions and velocities of all joints, then the gap between the fingers and what they press with."""
+    """Positions and velocities of all joints, then the gap between the fingers and their force."""
     seen = robot.observe()
     return np.concatenate([seen.positions, seen.velocities, [seen.opening_m, seen.force_n]])
 
 
 def nothing(_robot: Robot) -> float:
-    """The reward of who has none: what counts as success is the simulation's secret."""
+    """The default reward, always 0: success is judged by the simulation."""
     return 0.0
 
 
 class ActionEnv:
-    """One action, again and again: each episode is the action in another scene of the campaign.
+    """One action, repeated: each episode performs it in another scene of the campaign.
 
-    A step's vector has, each from −1 to 1: the speed of each joint of the arm as a share of its largest; where the robot drives,
-    its speed forwards, to the left and turning, likewise; the gap between the fingers, from closed to wide open.
+    The components of a step's vector range from −1 to 1: the velocity of each arm joint as a share of its limit; for a mobile
+    base, likewise its velocity forwards, left and turning; the gap between the fingers, from closed to wide open.
 
-    `observe` makes an observation of the robot, `reward` judges it, `ticks` is how many control ticks a step takes.
+    `observe` computes an observation from the robot, `reward` a reward; `ticks` is the number of control ticks per step.
     """
 
     def __init__(
@@ -89,12 +89,12 @@ class ActionEnv:
         length = len(self._arm) + len(self._drive) + 1
         self.action_space = Box(-np.ones(length), np.ones(length))
         wide = np.full(2 * len(robot.joints) + 2, np.inf)
-        #: Of the default observation; there is none for one's own.
+        #: Space of the default observation; `None` with a custom `observe`.
         self.observation_space = Box(-wide, wide) if observe is measured else None
 
     @property
     def robot(self) -> Robot:
-        """The robot of the episode, for whatever else is to be known or done. Raises `RuntimeError` between episodes."""
+        """The robot of the episode, for direct access. Raises `RuntimeError` between episodes."""
         if self._robot is None:
             raise RuntimeError(BETWEEN)
         return self._robot
@@ -102,10 +102,10 @@ class ActionEnv:
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
         """Waits for the next scene. Raises `Closed` when the campaign has no more.
 
-        Scenes come from the campaign's seed: `seed` and `options` are accepted as other environments do, and must be nothing.
+        Scenes come from the campaign's seed: `seed` and `options` exist for compatibility with gymnasium and must be `None`.
         """
         if seed is not None or options:
-            raise ValueError("scenes come from the campaign: set `seed` in its configuration")
+            raise ValueError("`reset` takes no seed or options: set `seed` in the campaign's configuration")
         if self._robot is not None:
             self.end(False, "the next episode was begun")
         call = self._session.next_call()
@@ -116,11 +116,11 @@ class ActionEnv:
         return self._last, {"action": call.action, "parameters": dict(call.parameters), "run": call.run, "seed": call.seed}
 
     def step(self, action: NDArray[Any]) -> tuple[Vector, float, bool, bool, Info]:
-        """Acts for a while: observation, reward, whether it ended of itself (never), whether actcheck ended it, and why."""
+        """Performs one step. Returns observation, reward, terminated (always false), truncated (by actcheck), and info."""
         robot = self.robot
         shares = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
         if shares.shape != self.action_space.shape or not np.isfinite(shares).all():
-            raise ValueError(f"an action is {self.action_space.shape[0]} finite numbers")
+            raise ValueError(f"an action must have {self.action_space.shape[0]} finite numbers")
         seconds = self._ticks * robot.tick_s
         positions = {
             name: min(max(robot.commanded[name] + float(share) * speed * seconds, lower), upper)
@@ -137,12 +137,12 @@ class ActionEnv:
         return self._last, float(self._reward(robot)), False, False, {}
 
     def end(self, succeeded: bool, message: str = "") -> None:
-        """Ends the episode with the action's own report, by which and by the rules it is judged."""
+        """Ends the episode with the action's own report. The report and the rules decide the verdict."""
         if self._robot is None:
             raise RuntimeError(BETWEEN)
         self._robot = None
         self._session.end(Report(succeeded, message))
 
     def close(self) -> None:
-        """Hangs up."""
+        """Closes the connection."""
         self._session.close()

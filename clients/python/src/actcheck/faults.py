@@ -1,10 +1,10 @@
-"""What can go wrong, told apart by whose fault it is."""
+"""Exceptions, distinguished by cause: the skill, the simulation or the protocol."""
 
 from __future__ import annotations
 
 
 class Failed(Exception):
-    """The robot could not do what it was asked to: raise it in a skill to report failure in your own words."""
+    """The robot could not perform the action. Raise it in a skill to report a failure in your own words."""
 
 
 class Unreachable(Failed):
@@ -12,9 +12,9 @@ class Unreachable(Failed):
 
 
 class Aborted(BaseException):
-    """actcheck ended the action: its time is up, simulation is at fault, or the campaign was stopped.
+    """actcheck ended the action: its budget is exhausted, the simulation failed, or the campaign was stopped.
 
-    No `Exception`, so that a skill's own `except Exception` does not swallow it; `serve` and `ActionEnv` deal with it.
+    Not an `Exception`, so that a skill's own `except Exception` does not catch it; `serve` and `ActionEnv` handle it.
     """
 
     def __init__(self, reason: str) -> None:
@@ -23,8 +23,8 @@ class Aborted(BaseException):
 
 
 class ProtocolFault(Exception):
-    """The other side sent what the protocol does not allow, or said that this side did."""
+    """Either side violated the protocol: actcheck sent an invalid message, or rejected one of this program's."""
 
 
 class Closed(ProtocolFault):
-    """The other side is gone."""
+    """actcheck closed the connection, or can't be reached."""

@@ -1,4 +1,4 @@
-"""Where links are for given joint positions, and joint positions that bring a link to a pose. Numpy only."""
+"""Forward and inverse kinematics of a URDF's links. Numpy only."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import numpy as np
 from actcheck.faults import Unreachable
 from actcheck.pose import Matrix, Pose, Vector
 
-#: Errors that count as reached. Units: metres, radians.
+#: Tolerances within which a pose is reached. Units: metres, radians.
 REACHED_M = 5e-4
 REACHED_RAD = 2e-3
 #: Keeps steps small near singular postures.
 DAMPING = 0.03
-#: Iterations from one start.
+#: Largest number of iterations from one seed.
 MOST_ITERATIONS = 80
 #: Largest change of a joint in one iteration. Units: metres or radians.
 LARGEST_STEP = 0.3
-#: What is close enough to a limit to be at it. Units: metres or radians.
+#: A joint this close to a limit is at the limit. Units: metres or radians.
 AT_LIMIT = 1e-6
 
 
@@ -34,24 +34,24 @@ class UrdfJoint:
     kind: str
     parent: str
     child: str
-    #: The joint's frame in its parent link's. Shape: 4 × 4.
+    #: Pose of the joint's frame in its parent link. Shape: 4 × 4.
     origin: Matrix
     #: Unit vector in the joint's frame.
     axis: Vector
     #: Units: metres or radians.
     lower: float
     upper: float
-    #: The joint that it follows, with factor and offset.
+    #: The joint it mimics, with factor and offset.
     mimic: tuple[str, float, float] | None
 
 
 def read_urdf(text: str) -> list[UrdfJoint]:
-    """All joints of a URDF."""
+    """Parses all joints of a URDF."""
     return [_joint(element) for element in xml.fromstring(text).findall("joint")]
 
 
 def on_base(joints: list[UrdfJoint], names: Sequence[str]) -> list[UrdfJoint]:
-    """The joints of a robot on a base that drives: where the URDF lacks those of the base (x, y, heading) they come before it."""
+    """The joints of a robot with a mobile base. Joints of the base (x, y, heading) that the URDF lacks are put below its root."""
     known, children = {joint.name for joint in joints}, {joint.child for joint in joints}
     if len(names) != 3 or names[0] in known:
         return joints
@@ -104,7 +104,7 @@ def _origin(element: xml.Element | None) -> Matrix:
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Matrix:
-    """Turns about fixed axes x, then y, then z, as a URDF has them. Unit: radians. Shape: 3 × 3."""
+    """Rotation about the fixed axes x, then y, then z, as in a URDF. Unit: radians. Shape: 3 × 3."""
     x, y, z = np.eye(3)
     return turn(z, yaw) @ turn(y, pitch) @ turn(x, roll)
 
@@ -122,7 +122,7 @@ def turn(axis: Vector, angle: float) -> Matrix:
 
 
 def turn_between(start: Matrix, end: Matrix) -> Vector:
-    """The turn from one rotation to another, as an axis times an angle in radians. Frame: the one that both are in."""
+    """The rotation from one orientation to another, as axis times angle in radians. Frame: the common frame of both."""
     x, y, z, w = Pose(np.zeros(3), end @ start.T).quaternion()
     sine = math.sqrt(x * x + y * y + z * z)
     share = 2.0 * math.atan2(sine, w) / sine if sine > 1e-12 else 2.0
@@ -143,9 +143,9 @@ class Chain:
         self._way = way[::-1]
         #: Pose of the root link. Shape: 4 × 4.
         self.root = np.eye(4) if root is None else root.matrix()
-        #: How what is brought to places stands in the link. Shape: 4 × 4.
+        #: Pose of the tool in the link. Shape: 4 × 4.
         self.tip = np.eye(4) if tip is None else tip.matrix()
-        #: Those that move, from the root outwards; followers stand for the joint that they follow.
+        #: Movable joints from the root outwards; a mimic joint is replaced by the joint it mimics.
         self.names = list(dict.fromkeys(_leader(joint) for joint in self._way if joint.kind != "fixed"))
         limits = {joint.name: (joint.lower, joint.upper) for joint in joints}
         self.lower = np.array([limits[name][0] for name in self.names])
@@ -156,7 +156,7 @@ class Chain:
         return -1 if joint.kind == "fixed" else self.names.index(_leader(joint))
 
     def jacobian(self, positions: Vector) -> tuple[Matrix, Matrix]:
-        """Pose of the link, and how it moves with each joint: linear above angular. Shapes: 4 × 4, 6 × joints."""
+        """Pose of the tool, and its Jacobian: linear above angular. Shapes: 4 × 4, 6 × joints."""
         pose = self.root
         seen: list[tuple[int, bool, float, Vector, Vector]] = []
         for joint, number, factor, offset in self._steps:
@@ -181,14 +181,14 @@ class Chain:
         return pose, jacobian
 
     def pose(self, positions: Mapping[str, float]) -> Pose:
-        """Pose of the link for joint positions; joints that are not named are at zero."""
+        """Pose of the tool for joint positions; joints that are not named are at zero."""
         matrix, _ = self.jacobian(np.array([positions.get(name, 0.0) for name in self.names]))
         return Pose.from_matrix(matrix)
 
     def solve(self, target: Pose, seeds: Sequence[Mapping[str, float]], held: frozenset[str] = frozenset()) -> dict[str, float]:
-        """Positions that bring the link to a pose, from the first seed from which there is a way; some joints are held.
+        """Positions that bring the tool to a pose, from the first seed that converges; `held` joints do not move.
 
-        Damped least squares; a joint that meets its limit is held there and the rest is solved again. Raises `Unreachable`.
+        Damped least squares; a joint that reaches its limit is fixed there and the rest is solved again. Raises `Unreachable`.
         """
         free = np.array([0.0 if name in held else 1.0 for name in self.names])
         nearest = math.inf
@@ -199,7 +199,7 @@ class Chain:
                 return dict(zip(self.names, found.tolist()))
             nearest = min(nearest, miss)
         place = ", ".join(f"{value:.2f}" for value in target.position)
-        raise Unreachable(f"the hand can't be brought to ({place}): {nearest * 100:.1f} cm are missing")
+        raise Unreachable(f"the hand can't reach ({place}): the closest solution is {nearest * 100:.1f} cm off")
 
     def _descend(self, target: Pose, positions: Vector, free: Vector) -> tuple[Vector | None, float]:
         error = np.zeros(6)

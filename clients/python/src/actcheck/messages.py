@@ -1,4 +1,4 @@
-"""What the messages of the protocol say, as typed records. SI units, radians; poses in the world as the robot believes it."""
+"""The messages of the protocol as typed records. SI units, radians; poses in the world as the robot believes it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from actcheck.pose import Pose, Vector
 from actcheck.wire import Message
 
-#: The version of the protocol that this package speaks.
+#: Protocol version of this package.
 PROTOCOL = 1
 
 
@@ -46,38 +46,38 @@ class Camera:
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """The robot, as the hello has it."""
+    """The robot, as described in the hello message."""
 
     name: str
     urdf: str
-    #: In the order of all arrays.
+    #: All arrays are in this order.
     joints: tuple[Joint, ...]
-    #: x, y and heading; empty where the robot stands for good.
+    #: x, y and heading; empty if the base is fixed.
     base_joints: tuple[str, ...]
     arm_joints: tuple[str, ...]
     gripper_joints: tuple[str, ...]
     head_joints: tuple[str, ...]
-    #: The link that is brought to things.
+    #: The end effector's link, between the fingertips.
     tool_link: str
-    #: How the tool is turned in it (roll, pitch, yaw; radians): its x points where the fingers point, its y across them.
+    #: Rotation of the tool in that link (roll, pitch, yaw; radians): x points along the fingers, y across them.
     tool_turned_rad: tuple[float, float, float]
-    #: How high the root of a robot that does not drive stands. Unit: metres.
+    #: Height of the root of a robot with a fixed base. Unit: metres.
     mount_height_m: float
     max_opening_m: float
     grip_force_n: float
-    #: Arm positions for driving.
+    #: Arm posture for driving.
     home: tuple[float, ...]
-    #: Arm positions to look for others from.
+    #: Arm postures to start inverse kinematics from.
     postures: tuple[tuple[float, ...], ...]
     camera: Camera | None
-    #: Time between two commands. Unit: seconds.
+    #: Control period. Unit: seconds.
     control_period_s: float
-    #: Whether messages carry the truth.
+    #: Whether messages include ground truth.
     privileged: bool
 
     @classmethod
     def from_wire(cls, hello: Message) -> RobotDescription:
-        """From the simulation's hello."""
+        """Converts the simulation's hello message."""
         robot = hello["robot"]
         camera = robot.get("camera")
         names = ("base_joints", "arm_joints", "gripper_joints", "head_joints")
@@ -104,29 +104,29 @@ class RobotDescription:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What the robot measures of itself."""
+    """The robot's measurements of itself."""
 
     #: Since the action began. Unit: seconds.
     time_s: float
-    #: Of all joints, in the order of the robot's description; the base's by its own belief.
+    #: Of all joints, in the order of the robot's description; the base joints by the robot's belief.
     positions: Vector
     velocities: Vector
-    #: What each motor gives beyond what holds the robot's own weight. Units: newtons or newton metres.
+    #: Motor efforts without gravity compensation of the robot's own weight. Units: newtons or newton metres.
     efforts: Vector
     #: x, y and heading of the base by odometry. Units: metres, radians.
     base: tuple[float, float, float]
     #: Gap between the fingers. Unit: metres.
     opening_m: float
-    #: What the fingers press with. Unit: newtons.
+    #: Force of the weaker finger. Unit: newtons.
     force_n: float
-    #: Simulated time that the action may still take. Unit: seconds.
+    #: Simulated time left in the action's budget. Unit: seconds.
     budget_left_s: float
-    #: True poses and sizes of all objects, only where the campaign is privileged.
+    #: True poses and sizes of all objects; empty unless the program is privileged.
     truth: tuple[Thing, ...] = ()
 
     @classmethod
     def from_wire(cls, sent: Message) -> Observation:
-        """From an observation."""
+        """Converts an observation message."""
         joints, base, gripper = sent["joints"], sent["base"], sent["gripper"]
         x, y = base["position_m"]
         return cls(
@@ -144,21 +144,21 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Thing:
-    """An object as it is perceived: an upright box."""
+    """An object as perceived: an upright box."""
 
     id: str
-    #: Of the middle of its foot.
+    #: Pose of the centre of its foot.
     pose: Pose
-    #: Along the axes of that pose. Unit: metres.
+    #: Dimensions along the axes of that pose. Unit: metres.
     size_m: Vector
-    #: Class in the ontology, where it is told.
+    #: Class in the ontology, if known.
     category: str | None = None
-    #: Whether it stands for good.
+    #: Whether it is fixed furniture.
     furniture: bool = False
 
     @classmethod
     def from_wire(cls, sent: Message) -> Thing:
-        """From an answer's object."""
+        """Converts an object of an answer message."""
         return cls(
             id=sent["id"],
             pose=Pose.from_wire(sent["pose"]),
@@ -168,18 +168,18 @@ class Thing:
         )
 
     def beside(self, place: Vector) -> float:
-        """How far a place is beside it, seen from above; negative within it. Unit: metres."""
+        """Horizontal distance from its outline to a place; negative inside. Unit: metres."""
         x, y, _ = self.pose.rotation.T @ (place - self.pose.position)
         return float(max(abs(x) - self.size_m[0] / 2, abs(y) - self.size_m[1] / 2))
 
     def to_wire(self) -> Message:
-        """As the end of an action tells what was perceived."""
+        """Converts to a percept of an `end` message."""
         sent: Message = {"pose": self.pose.to_wire(), "size_m": [float(side) for side in self.size_m]}
         return sent if self.category is None else sent | {"category": self.category}
 
 
 def things_from_wire(sent: Sequence[Message]) -> tuple[Thing, ...]:
-    """All objects of an answer."""
+    """Converts all objects of an answer message."""
     return tuple(Thing.from_wire(one) for one in sent)
 
 
@@ -187,7 +187,7 @@ def things_from_wire(sent: Sequence[Message]) -> tuple[Thing, ...]:
 class DepthImage:
     """A picture of the depth camera."""
 
-    #: Along the optical axis; what the protocol says stands for nothing seen. Shape: height × width. Unit: metres.
+    #: Distance along the optical axis; 0 where nothing was measured. Shape: height × width. Unit: metres.
     depth: NDArray[np.float32]
     #: x looks forward, z is up in the picture. Frame: world, by the robot's belief.
     camera_pose: Pose
@@ -196,15 +196,15 @@ class DepthImage:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What an action says of itself when it ends."""
+    """An action's own report at its end."""
 
     succeeded: bool
     message: str = ""
-    #: What it perceived, for actions that are judged by it.
+    #: The perceived objects, for actions that are judged by them.
     perceived: Sequence[Thing] = ()
 
     def to_wire(self) -> Message:
-        """As the message that ends an action."""
+        """Converts to an `end` message."""
         sent: Message = {"type": "end", "succeeded": self.succeeded, "message": self.message}
         if self.perceived:
             sent["perceived"] = [thing.to_wire() for thing in self.perceived]
@@ -213,19 +213,19 @@ class Report:
 
 @dataclass(frozen=True, eq=False)
 class Call:
-    """An action that is to be performed."""
+    """An action to perform."""
 
-    #: Such as `Pick`.
+    #: Name of the action, such as `Pick`.
     action: str
-    #: Values by designator: one as it is, several as a list.
+    #: Values by designator: a single value, or a list of several.
     parameters: Mapping[str, Any]
-    #: What kind of thing a value stands for (`category`, `size_m`), by value.
+    #: Kind of object (`category`, `size_m`) by designator value.
     kinds: Mapping[str, Any]
-    #: Simulated time that it may take. Unit: seconds.
+    #: Budget of simulated time. Unit: seconds.
     budget_s: float
-    #: What the robot measures at the beginning.
+    #: The observation at the start of the action.
     observation: Observation
     #: Id of the run.
     run: str = ""
-    #: The same for the same campaign seed and run.
+    #: Seed of the run, the same for the same campaign seed and run.
     seed: int = 0

@@ -1,4 +1,4 @@
-"""Courses of joints over time: at rest at both ends, no faster than the joints allow."""
+"""Joint trajectories: at rest at both ends and within the joints' velocity limits."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 
 from actcheck.pose import Matrix, Vector
 
-#: Share of a joint's largest speed that is used: room for the controller to catch up.
+#: Share of a joint's velocity limit that is used, so that the controller can catch up.
 SPEED_SHARE = 0.9
-#: Peak over mean speed of a course that starts and ends at rest (of 3s² − 2s³).
+#: Peak over mean speed of a trajectory that starts and ends at rest (of 3s² − 2s³).
 PEAK_OVER_MEAN = 1.5
 
 
 def course(waypoints: Sequence[Vector], speeds: Vector, period_s: float, least_s: float = 0.0) -> Matrix:
-    """Positions at each tick along straight legs between waypoints, the first of which is where it starts.
+    """Positions at each tick along straight legs between waypoints, the first of which is the start.
 
-    Shape: ticks × joints. `speeds` are the largest ones of the joints; `least_s` is the shortest time it may take.
+    Shape: ticks × joints. `speeds` are the joints' velocity limits; `least_s` is the shortest duration.
     """
     points = np.array(waypoints)
     legs = (np.abs(np.diff(points, axis=0)) / np.maximum(speeds, 1e-3)).max(axis=1, initial=0.0)
@@ -29,5 +29,5 @@ def course(waypoints: Sequence[Vector], speeds: Vector, period_s: float, least_s
         return points[:0]
     share = np.arange(1, ticks + 1) / ticks
     at = ends[-1] * share * share * (3.0 - 2.0 * share)
-    # Legs of no length would make the ends repeat, of which interpolation takes the last: a step, as it should be.
+    # Legs of length zero repeat an end time; interpolation then takes the last value, which is correct.
     return np.column_stack([np.interp(at, ends, column) for column in points.T])

@@ -1,4 +1,4 @@
-"""Positions with directions."""
+"""Poses: positions with orientations."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Where something is and how it is turned. Frame: world, as the robot believes it, unless said otherwise."""
+    """A position and an orientation. Frame: world, as the robot believes it, unless stated otherwise."""
 
     #: Shape: 3. Unit: metres.
     position: Vector
-    #: Columns are its own x, y and z. Shape: 3 × 3.
+    #: Rotation matrix; its columns are the pose's x, y and z axes. Shape: 3 × 3.
     rotation: Matrix
 
     @classmethod
     def upright(cls, position: ArrayLike, yaw: float = 0.0) -> Pose:
-        """At a position, turned about the vertical by an angle in radians."""
+        """A pose at a position with a yaw in radians."""
         sin, cos = math.sin(yaw), math.cos(yaw)
         rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         return cls(np.asarray(position, dtype=np.float64), rotation)
 
     @classmethod
     def pointing(cls, position: ArrayLike, heading: float, down: float = 0.0) -> Pose:
-        """Its x points along a heading and down by an angle, its y is level and to the left. Units: radians.
+        """A pose whose x axis has a heading and a downward angle; its y axis is horizontal, to the left. Units: radians.
 
-        That is a hand whose fingers point along x and lie beside each other along y; `down=math.pi / 2` points straight down.
+        Suits a hand whose fingers point along x and are side by side along y; `down=math.pi / 2` points straight down.
         """
         sin, cos = math.sin(heading), math.cos(heading)
         forward = np.array([cos * math.cos(down), sin * math.cos(down), -math.sin(down)])
@@ -42,7 +42,7 @@ class Pose:
 
     @classmethod
     def from_wire(cls, sent: dict[str, Any]) -> Pose:
-        """From the protocol's position and quaternion."""
+        """Converts the protocol's position and quaternion."""
         x, y, z, w = (float(value) for value in sent["quaternion_xyzw"])
         rotation = np.array([
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -53,22 +53,22 @@ class Pose:
 
     @classmethod
     def from_matrix(cls, matrix: Matrix) -> Pose:
-        """From a homogeneous matrix. Shape: 4 × 4."""
+        """Converts a homogeneous matrix. Shape: 4 × 4."""
         return cls(matrix[:3, 3].copy(), matrix[:3, :3].copy())
 
     def matrix(self) -> Matrix:
-        """As a homogeneous matrix. Shape: 4 × 4."""
+        """Converts to a homogeneous matrix. Shape: 4 × 4."""
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.rotation, self.position
         return matrix
 
     def to_wire(self) -> dict[str, Any]:
-        """As the protocol has it."""
+        """Converts to the protocol's position and quaternion."""
         return {"position_m": self.position.tolist(), "quaternion_xyzw": list(self.quaternion())}
 
     def quaternion(self) -> tuple[float, float, float, float]:
-        """The rotation as x, y, z, w; w is not negative."""
-        # The largest component is found from the diagonal, the others from it: stable whatever the angle.
+        """The rotation as a quaternion x, y, z, w with w ≥ 0."""
+        # Compute the largest component from the diagonal and the others from it: numerically stable for every angle.
         r = self.rotation
         trace = [r[0, 0] - r[1, 1] - r[2, 2], r[1, 1] - r[0, 0] - r[2, 2], r[2, 2] - r[0, 0] - r[1, 1], np.trace(r)]
         largest = int(np.argmax(trace))
@@ -87,30 +87,30 @@ class Pose:
 
     @property
     def yaw(self) -> float:
-        """Angle about the vertical. Unit: radians."""
+        """Heading of its x axis, seen from above. Unit: radians."""
         return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
     @property
     def across(self) -> float:
-        """Which way its y points, seen from above. Unit: radians."""
+        """Heading of its y axis, seen from above. Unit: radians."""
         return math.atan2(self.rotation[1, 1], self.rotation[0, 1])
 
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
-        """The same elsewhere, by a way along the world's axes. Unit: metres."""
+        """The pose translated along the world's axes. Unit: metres."""
         return Pose(self.position + np.array([x, y, z]), self.rotation)
 
     def ahead(self, metres: float) -> Pose:
-        """The same elsewhere, by a way along its own x."""
+        """The pose translated along its own x axis."""
         return Pose(self.position + self.rotation[:, 0] * metres, self.rotation)
 
     def __mul__(self, inner: Pose) -> Pose:
         return Pose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
     def inverse(self) -> Pose:
-        """The pose that undoes it."""
+        """The inverse pose."""
         return Pose(-self.rotation.T @ self.position, self.rotation.T)
 
 
 def wrapped(angle: float) -> float:
-    """The same direction as an angle from −π to π. Unit: radians."""
+    """Wraps an angle to [−π, π]. Unit: radians."""
     return math.remainder(angle, math.tau)

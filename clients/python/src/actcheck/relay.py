@@ -1,4 +1,4 @@
-"""Stands in for a notebook as the program that actcheck starts: hands the simulation's address on, and waits until it is done."""
+"""The program that actcheck starts in place of a notebook: passes the simulation's address on and waits until the run ends."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 
 def main(path: str) -> None:
-    """Tells whoever listens at a path where the simulation is to be found; ends when they hang up."""
+    """Sends the simulation's address to the socket at `path`; returns when the other side closes the connection."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as notebook:
         notebook.connect(path)
         notebook.sendall((os.environ.get("ACTCHECK_ADDRESS", "") + "\n").encode())

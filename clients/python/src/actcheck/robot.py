@@ -1,4 +1,4 @@
-"""The robot in the hands of a skill."""
+"""The robot as a skill sees it."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from actcheck.pose import Pose, Vector, wrapped
 from actcheck.session import Session
 from actcheck.wire import Message
 
-#: Joint positions by name, or those of the arm in order.
+#: Joint positions by name, or the arm's positions in order.
 Joints = Mapping[str, float] | Sequence[float] | Vector
 
-#: Fingers that close slower than this have stalled. Unit: m/s.
+#: Fingers that close more slowly than this have stalled. Unit: m/s.
 STALLED = 0.003
-#: Ticks for which they have to. A moment's rest at the turn is none.
+#: Number of ticks after which slow fingers count as stalled; a short rest when they reverse does not count.
 STALLED_TICKS = 10
-#: Share of the grip force that stalled fingers have to feel.
+#: Share of the grip force that stalled fingers must exert.
 FELT_SHARE = 0.7
-#: Longest time that fingers get. Unit: seconds.
+#: Longest time for the fingers to move. Unit: seconds.
 LONGEST_GRIP_S = 2.5
 
 
 class Ended(BaseException):
-    """A skill ended its action by `Robot.end`. No `Exception`, so that no skill swallows it."""
+    """A skill ended its action with `Robot.end`. Not an `Exception`, so that a skill's own handlers don't catch it."""
 
     def __init__(self, report: Report) -> None:
         super().__init__(report.message)
@@ -39,7 +39,7 @@ class Ended(BaseException):
 
 
 class Robot:
-    """Commands and measurements for the time of one action. Time passes only in commands."""
+    """Commands and measurements for the duration of one action. Time passes only in commands."""
 
     def __init__(self, session: Session, call: Call, urdf: list[UrdfJoint] | None = None) -> None:
         self._session = session
@@ -49,18 +49,18 @@ class Robot:
         self._chains: dict[str, Chain] = {}
         self._numbers = {joint.name: number for number, joint in enumerate(self.description.joints)}
         self._observation = call.observation
-        #: Where each joint was last told to go, by name.
+        #: The last commanded position of each joint, by name.
         self.commanded: dict[str, float] = dict(zip(self._numbers, call.observation.positions.tolist()))
 
-    # What is known without asking.
+    # Data available without a request.
 
     @property
     def tick_s(self) -> float:
-        """Time between two commands. Unit: seconds."""
+        """Control period. Unit: seconds."""
         return self.description.control_period_s
 
     def observe(self) -> Observation:
-        """What was measured last; no time passes."""
+        """The last observation; no time passes."""
         return self._observation
 
     def joints(self) -> dict[str, float]:
@@ -68,15 +68,15 @@ class Robot:
         return dict(zip(self._numbers, self._observation.positions.tolist()))
 
     def fk(self, joints: Joints | None = None, link: str | None = None) -> Pose:
-        """Pose of the tool, or of another link, for joint positions: the measured ones but for those that are given."""
+        """Pose of the tool or of another link; joints that are not given are at their measured positions."""
         positions = self.joints() if joints is None else self.joints() | self._named(joints)
         return self._chain(link or self.description.tool_link).pose(positions)
 
     def ik(self, pose: Pose, *, near: Joints | None = None, base: bool = True, link: str | None = None) -> dict[str, float]:
-        """Positions of arm and, unless `base` is false, base that bring the tool to a pose. Raises `Unreachable`.
+        """Positions of the arm and, unless `base` is false, of the base that bring the tool to a pose. Raises `Unreachable`.
 
-        Looked for from `near` if it is given, otherwise from the postures of the robot's profile, then from where it is. Where
-        that does not say where the base is, the base is put so that the hand is over the place.
+        The search starts from `near` if it is given, otherwise from the postures of the robot's profile, then from the current
+        posture. If the start does not include a base pose, the base is placed so that the hand is over the target.
         """
         chain = self._chain(link or self.description.tool_link)
         movable = set(self.description.arm_joints) | (set(self.description.base_joints) if base else set())
@@ -103,7 +103,7 @@ class Robot:
         head: tuple[float, float] | None = None,
         ticks: int = 1,
     ) -> Observation:
-        """One command, and what is measured after its ticks. What is not named goes on as it was told.
+        """Sends one command and returns the observation after its ticks. Anything not named keeps its previous target.
 
         `positions`, `velocities` and `efforts` by joint; `base_velocity` forwards, to the left (m/s) and turning (rad/s), in
         the base's frame; `gripper` as the gap between the fingers (metres), or as gap and force (newtons); `head` as pan and
@@ -127,7 +127,7 @@ class Robot:
         return self._command(message)
 
     def wait(self, seconds: float) -> Observation:
-        """Lets time pass."""
+        """Waits for a simulated time."""
         ticks = math.ceil(seconds / self.tick_s - 1e-9)
         return self._command({"type": "command", "ticks": ticks}) if ticks > 0 else self._observation
 
@@ -137,9 +137,9 @@ class Robot:
         seconds: float = 0.0,
         until: Callable[[Observation], bool] | None = None,
     ) -> Observation:
-        """Moves along joint positions, at rest at both ends, no faster than the joints allow and no shorter than `seconds`.
+        """Moves through joint positions, at rest at both ends, within the joints' velocity limits and in at least `seconds`.
 
-        Joints that a waypoint does not name go on to where they were told. It stops early as soon as `until` says so.
+        Joints that a waypoint does not name keep their targets. The motion stops early when `until` returns true.
         """
         way = [self._checked(self._named(waypoint), "position") for waypoint in waypoints]
         names = list(dict.fromkeys(name for waypoint in way for name in waypoint))
@@ -161,7 +161,7 @@ class Robot:
         return self.follow([target], seconds)
 
     def move_straight(self, *poses: Pose, seconds: float = 0.0, step_m: float = 0.03, base: bool = False) -> Observation:
-        """Brings the tool to poses along straight lines, from where it was told to be. Raises `Unreachable`."""
+        """Moves the tool to poses along straight lines from its commanded pose. Raises `Unreachable`."""
         joints, start, way = dict(self.commanded), self.fk(self.commanded), []
         for pose in poses:
             pieces = max(1, math.ceil(float(np.linalg.norm(pose.position - start.position)) / step_m))
@@ -174,17 +174,17 @@ class Robot:
         return self.follow([{name: at[name] for name in movable} for at in way], seconds)
 
     def drive(self, x: float, y: float, heading: float, seconds: float = 0.0) -> Observation:
-        """Drives straight to a place, turning on the way. Frame: world, by its own belief."""
+        """Drives straight to a pose, turning on the way. Frame: world, by the robot's belief."""
         names = self.description.base_joints
         turned = self.commanded[names[2]] + wrapped(heading - self.commanded[names[2]])
         return self.follow([dict(zip(names, (x, y, turned)))], seconds)
 
     def base_velocity(self, forward: float, left: float = 0.0, turn: float = 0.0, *, ticks: int = 1) -> Observation:
-        """Drives at a speed for some ticks. Units: m/s, rad/s. Frame: the base's."""
+        """Drives at a velocity for some ticks. Units: m/s, rad/s. Frame: the base's."""
         return self.step(base_velocity=(forward, left, turn), ticks=ticks)
 
     def gripper(self, opening_m: float, force_n: float | None = None, wait: bool = True) -> Observation:
-        """Moves the fingers to a gap, and waits until they are there or have stalled on something, unless `wait` is false."""
+        """Moves the fingers to a gap and, unless `wait` is false, waits until they arrive or stall on something."""
         force = self.description.grip_force_n if force_n is None else force_n
         self.step(gripper=(opening_m, force))
         still, before = 0, math.inf
@@ -198,7 +198,7 @@ class Robot:
         return self._observation
 
     def feels(self, share: float = FELT_SHARE) -> bool:
-        """Whether the fingers press on something with that share of the grip force."""
+        """Whether the fingers press on something with at least this share of the grip force."""
         return self._observation.force_n > share * self.description.grip_force_n
 
     # Sensors. No time passes.
@@ -214,11 +214,11 @@ class Robot:
         return cloud
 
     def objects(self, of: str | None = None) -> tuple[Thing, ...]:
-        """What the reference perception sees: everything, or the one thing of an id; with its errors."""
+        """Objects from the reference perception, with its errors: all, or only the one with this id."""
         return things_from_wire(self._session.ask("objects", of)["objects"])
 
     def look_for(self, of: str) -> tuple[Thing, list[Thing]]:
-        """One thing that the reference perception sees, and everything else. Raises `Failed` where it does not see that."""
+        """One object from the reference perception, and all others. Raises `Failed` if it is not seen."""
         seen = {thing.id: thing for thing in self.objects()}
         if of not in seen:
             raise Failed(f"{of} was not seen")
@@ -227,7 +227,7 @@ class Robot:
     # The end.
 
     def end(self, succeeded: bool, message: str = "", perceived: Sequence[Thing] = ()) -> NoReturn:
-        """Ends the action with its own report, from wherever it is called; `return` does it too."""
+        """Ends the action with its own report, from any call depth. Returning from the skill does the same."""
         raise Ended(Report(succeeded, message, perceived))
 
     def _command(self, message: Message) -> Observation:
@@ -246,10 +246,10 @@ class Robot:
         return self._chains[link]
 
     def _standing_over(self, seed: dict[str, float], chain: Chain, pose: Pose) -> dict[str, float]:
-        """The posture with the base turned so that the hand heads as the pose does, and put so that it is there."""
+        """The posture with the base turned to the heading of the pose and placed so that the hand is at the pose."""
         x, y, heading = self.description.base_joints
         hand = chain.pose(seed)
-        # By what is across the fingers: that is level also where they point down.
+        # Compare the axis across the fingers, which is horizontal even if they point down.
         if math.hypot(*pose.rotation[:2, 1]) > 0.1 and math.hypot(*hand.rotation[:2, 1]) > 0.1:
             seed = seed | {heading: seed[heading] + wrapped(pose.across - hand.across)}
         miss = pose.position - chain.pose(seed).position
@@ -270,5 +270,5 @@ class Robot:
                 raise ValueError(f"the robot has no joint {name!r}; it has {', '.join(self._numbers)}")
             checked[name] = number = float(value)
             if not math.isfinite(number):
-                raise ValueError(f"the {what} of {name} is {number}")
+                raise ValueError(f"the {what} of {name} is {number}, but must be finite")
         return checked

@@ -1,4 +1,4 @@
-"""The course of a connection: hello, then resets and actions until bye."""
+"""The message sequence of a connection: hello, then resets and actions until bye."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from actcheck.wire import Message, Wire
 
 
 class Session:
-    """A connection to one simulation, after both sides said hello."""
+    """A connection to one simulation after the exchange of hello messages."""
 
     def __init__(self, wire: Wire, name: str, actions: list[str]) -> None:
         self._wire = wire
         hello = self._receive("hello")
         if hello.get("protocol") != PROTOCOL:
             wire.close()
-            raise ProtocolFault(f"actcheck speaks version {hello.get('protocol')} of the protocol, this package {PROTOCOL}")
+            raise ProtocolFault(f"actcheck uses protocol version {hello.get('protocol')}, this package version {PROTOCOL}")
         self.description = RobotDescription.from_wire(hello)
         self._run, self._seed = "", 0
         self._aborted: Aborted | None = None
@@ -33,7 +33,7 @@ class Session:
         self._wire.close()
 
     def next_call(self) -> Call | None:
-        """Waits for the next action; nothing when there are no more."""
+        """Waits for the next action; returns `None` when there are no more."""
         while True:
             message = self._receive("reset", "begin", "bye")
             if message["type"] == "bye":
@@ -56,13 +56,13 @@ class Session:
             )
 
     def command(self, message: Message) -> Observation:
-        """Sends a command and waits until its ticks are over. Raises `Aborted`."""
+        """Sends a command and waits for the observation after its ticks. Raises `Aborted`."""
         self._go_on()
         self._wire.send(message)
         return Observation.from_wire(self._receive("observation"))
 
     def ask(self, what: str, of: str | None = None) -> Message:
-        """Asks a sensor; no simulated time passes. Raises `Aborted`."""
+        """Requests sensor data; no simulated time passes. Raises `Aborted`."""
         self._go_on()
         self._wire.send({"type": "ask", "what": what} if of is None else {"type": "ask", "what": what, "of": of})
         return self._receive("answer")
@@ -72,11 +72,11 @@ class Session:
         self._wire.send(report.to_wire())
 
     def close(self) -> None:
-        """Hangs up."""
+        """Closes the connection."""
         self._wire.close()
 
     def _go_on(self) -> None:
-        """A skill that goes on after its action was ended is told so again, and nothing is sent."""
+        """Raises `Aborted` again, without sending anything, if a skill continues after its action was aborted."""
         if self._aborted is not None:
             raise Aborted(self._aborted.reason)
 
@@ -93,9 +93,9 @@ class Session:
             raise ProtocolFault(f"actcheck refused a message: {message.get('reason', 'no reason was given')}")
         if kind == "bye":
             raise Closed("actcheck ended the connection")
-        raise ProtocolFault(f"a message `{kind}` came where {' or '.join(due)} was due")
+        raise ProtocolFault(f"received `{kind}`, expected {' or '.join(due)}")
 
 
 def _single(value: Any) -> Any:
-    """The value of a designator: the only one as it is."""
+    """The value of a designator: a single value is unwrapped from its list."""
     return value[0] if isinstance(value, list) and len(value) == 1 else value

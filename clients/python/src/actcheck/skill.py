@@ -16,20 +16,20 @@ from actcheck.robot import Ended, Robot
 from actcheck.session import Session
 from actcheck.wire import Wire
 
-#: A skill takes the robot and, by name, the action's designators that it wants.
+#: A skill takes the robot and, as keyword arguments, any of the action's designators.
 Skill = Callable[..., "Report | bool | None"]
 _Skill = TypeVar("_Skill", bound=Skill)
 _PACKAGE = str(Path(__file__).parent)
 
-#: The skills of this program by the action that they perform.
+#: The skills of this program by action.
 skills: dict[str, Skill] = {}
 
 
 def skill(action: str) -> Callable[[_Skill], _Skill]:
-    """Makes a function the skill for an action: `@skill("Pick")`.
+    """Registers a function as the skill for an action: `@skill("Pick")`.
 
-    It is called with the robot and, by name, those designators of the action that it has parameters for. It returns a
-    `Report`, true or nothing for success, false for failure; `Failed` and any other exception are a failure too.
+    It is called with the robot and, as keyword arguments, the designators of the action that it has parameters for. It
+    returns a `Report`, `True` or `None` for success, `False` for failure; any exception, such as `Failed`, is a failure too.
     """
 
     def register(function: _Skill) -> _Skill:
@@ -40,9 +40,9 @@ def skill(action: str) -> Callable[[_Skill], _Skill]:
 
 
 def serve(name: str | None = None, wire: Wire | None = None) -> None:
-    """Performs actions until the campaign is over. The last line of a program that has skills.
+    """Performs actions until the campaign is over. Call it at the end of a program that defines skills.
 
-    Actions for which the program has no skill are performed by actcheck's own.
+    Actions without a skill in this program are performed by actcheck's reference skills.
     """
     name = name or Path(sys.argv[0]).stem or "python"
     try:
@@ -59,7 +59,7 @@ def serve(name: str | None = None, wire: Wire | None = None) -> None:
 
 
 def perform(function: Skill, robot: Robot) -> Report:
-    """Performs one action and says how it ended; only what is the connection's fault is raised."""
+    """Performs one action and returns its report. Raises only faults of the connection."""
     try:
         return report_of(function(robot, **wanted(function, robot.call)))
     except Ended as ended:
@@ -69,13 +69,13 @@ def perform(function: Skill, robot: Robot) -> Report:
     except (Aborted, ProtocolFault):
         raise
     except Exception as fault:
-        # Told where it was written, for people who read the run's record; the whole story goes to the error stream.
+        # The report names the line, for readers of the run's record; the full traceback goes to stderr.
         traceback.print_exception(fault)
         return Report(False, told(fault))
 
 
 def wanted(function: Skill, call: Call) -> dict[str, Any]:
-    """Those of an action's designators that a function has parameters for, or all if it takes any."""
+    """The action's designators that a function has parameters for, or all if it accepts `**kwargs`."""
     taken = inspect.signature(function).parameters
     if any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in taken.values()):
         return dict(call.parameters)
@@ -83,7 +83,7 @@ def wanted(function: Skill, call: Call) -> dict[str, Any]:
 
 
 def report_of(returned: Report | bool | None) -> Report:
-    """What a skill's return value says."""
+    """Converts a skill's return value to a report."""
     if isinstance(returned, Report):
         return returned
     if returned is None or returned is True:
@@ -94,7 +94,7 @@ def report_of(returned: Report | bool | None) -> Report:
 
 
 def told(fault: BaseException) -> str:
-    """An exception in one line: what it says, and the innermost place outside this package."""
+    """An exception in one line: its message, and the innermost line of code outside this package."""
     words = f"{type(fault).__name__}: {fault}"
     frames = traceback.extract_tb(fault.__traceback__)
     own = [frame for frame in frames if not frame.filename.startswith(_PACKAGE) and "/site-packages/" not in frame.filename]
