@@ -21,7 +21,7 @@ pub enum Cut {
 }
 
 /// Reason reported for a run that was cut off.
-pub(super) const REASON: &str = "the run took longer on the clock than `[budget] run_secs` allows";
+pub(super) const REASON: &str = "the run exceeded its wall-clock limit, `[budget] run_secs`";
 
 impl Cut {
     /// Whether the run ends at this simulated time.

@@ -91,11 +91,11 @@ mod tests {
         for effort in [7.0, 1.0, 1.0, 7.0, 6.0] {
             shaken.look(&felt(0.078, effort));
         }
-        assert!(!shaken.slipped(), "a moment's shaking is no slip");
+        assert!(!shaken.slipped(), "brief shaking does not count as a slip");
         let mut closing = held.clone();
         closing.look(&felt(0.065, 7.0));
         closing.look(&felt(0.08, 7.0));
-        assert!(closing.slipped(), "what was lost once stays lost");
+        assert!(closing.slipped(), "a lost hold is not regained");
         let mut weak = held;
         for _ in 0..WEAK_TICKS {
             assert!(!weak.slipped());

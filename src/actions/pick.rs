@@ -74,7 +74,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
 /// detector.
 fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), String> {
     if let Some(perceived) = &robot.memory().perceived {
-        let kind = robot.kind_of(target).ok_or_else(|| format!("{target} is of no known kind"))?;
+        let kind = robot.kind_of(target).ok_or_else(|| format!("{target} has no known kind"))?;
         let (seen, mut others) = memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
         others.extend(memory::elsewhere(robot.known_furniture(), perceived));
         others.extend(memory::obstacles(&robot.memory().floor));

@@ -13,9 +13,9 @@ const LEAST: Room = Room { furniture_m: 0.01, things_m: 0.01 };
 
 fn arm() -> (Kinematics, Layout, Vec<f64>) {
     let path = Path::new("models/robots/fixed_arm.toml");
-    let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is right");
+    let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is valid");
     let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
-    geometry(&start).expect("the shipped robot is right")
+    geometry(&start).expect("the shipped robot is valid")
 }
 
 fn seen(position: [f64; 3], size_m: [f64; 3], furniture: bool) -> Sighting {
@@ -42,8 +42,8 @@ fn an_arm_goes_around_a_wall_that_it_would_otherwise_go_through() {
     let mut lengths = Vec::new();
     for start in [0.1, 0.3, 0.5, 0.7, 0.9] {
         let find = || way(&space, &from, &to, LEAST, &mut Samples::new(start, 2000));
-        let found = find().expect("there is a way above the wall");
-        assert_eq!(Some(&found), find().as_ref(), "the same samples give the same way");
+        let found = find().expect("there is a path above the wall");
+        assert_eq!(Some(&found), find().as_ref(), "the same samples give the same path");
         assert_eq!(found.last(), Some(&to));
         let legs: Vec<(&Vec<f64>, &Vec<f64>)> = std::iter::once(&from).chain(&found).zip(&found).collect();
         assert!(legs.iter().all(|(a, b)| space.is_way_free(a, b, LEAST)));

@@ -175,7 +175,7 @@ mod tests {
         while !follower.has_arrived() {
             follower.advance(&LIMITS, TICK, false);
             poses.push(follower.at());
-            assert!(poses.len() < 60 * 120, "it does not arrive: {follower:?}");
+            assert!(poses.len() < 60 * 120, "the base does not arrive: {follower:?}");
         }
         poses
     }
@@ -210,7 +210,7 @@ mod tests {
         while !follower.is_still() {
             follower.advance(&LIMITS, TICK, true);
             n_ticks += 1;
-            assert!(n_ticks < 60, "it does not stop");
+            assert!(n_ticks < 60, "the base does not stop");
         }
         let braked = LIMITS.speed * LIMITS.speed / (2.0 * LIMITS.acceleration);
         assert!((follower.at()[0] - from - braked).abs() < 0.01);

@@ -80,9 +80,9 @@ mod tests {
     #[test]
     fn the_head_finds_a_point_before_it_wherever_it_looked() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is right");
+        let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is valid");
         let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
-        let (kinematics, layout, mut posture) = geometry(&start).expect("the shipped robot is right");
+        let (kinematics, layout, mut posture) = geometry(&start).expect("the shipped robot is valid");
         for pan in [-3.8, -3.0, -1.0, 0.0, 1.7] {
             posture[layout.head[0]] = pan;
             for point in [[1.0, 0.0, 0.7], [0.8, 0.6, 0.4], [0.3, -1.0, 0.0]].map(Point3::from) {

@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn three_exact_points_give_the_exact_plane() {
         let points = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.1], [0.0, 1.0, 0.8], [1.0, 1.0, 0.9]].map(Point3::from);
-        let plane = Plane::fitted(&points).expect("they are not in line");
+        let plane = Plane::fitted(&points).expect("the points are not collinear");
         assert!(points.iter().all(|point| plane.above(point).abs() < 1e-12));
         assert!((plane.tilt() - libm::atan(0.05f64.sqrt())).abs() < 1e-12);
         assert_eq!(Plane::fitted(&points[..2]), None);

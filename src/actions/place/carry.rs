@@ -171,7 +171,7 @@ mod tests {
             let (dx, dy) = (2.0 - x, 1.0 - y);
             assert!((dx.hypot(dy) - across / 2.0 - GAP_M).abs() < 1e-9);
             let gaze = [libm::cos(heading), libm::sin(heading)];
-            assert!((gaze[0] * dx + gaze[1] * dy - dx.hypot(dy)).abs() < 1e-9, "it looks past the middle");
+            assert!((gaze[0] * dx + gaze[1] * dy - dx.hypot(dy)).abs() < 1e-9, "the base must face the middle");
         }
         // The front of furniture is its negative x side.
         assert!((stands(&shelf)[0][1] - (1.0 - 0.2 - GAP_M)).abs() < 1e-9);

@@ -155,7 +155,7 @@ mod tests {
         for way in found {
             let pose = Pose::from_isometry(&way.pose);
             assert!((pose.position[2] - 0.47).abs() < 1e-9 && pose.tilt() < 1e-6, "{pose:?}");
-            assert!(libm::cos(pose.yaw() - way.heading) > 1.0 - 1e-9, "the hand heads where the base does");
+            assert!(libm::cos(pose.yaw() - way.heading) > 1.0 - 1e-9, "hand and base must have the same heading");
             assert!((way.opening_m - 0.12).abs() < 1e-9);
         }
     }
