@@ -70,7 +70,8 @@ impl ParameterCoverage {
     }
 }
 
-/// A choice with its bin. struct Binned {
+/// A choice with its bin.
+struct Binned {
     /// Its object, if it belongs to one of several.
     owner: Option<String>,
     name: String,
