@@ -259,8 +259,8 @@ mod tests {
         assert_eq!(told.len(), 3);
     }
 
-    /// Kutner, Nachtsheim, Neter and Li, "Applied Linear Statistical Models", table 25.1: ratings by five officers of four
-    /// candidates each; the mean squares are 394.925 and 73.2833, and the officers' variance 80.41.
+    /// Kutner, Nachtsheim, Neter and Li, "Applied Linear Statistical Models", table 25.1: ratings by five officers of
+    /// four candidates each; the mean squares are 394.925 and 73.2833, and the officers' variance 80.41.
     #[test]
     fn published_components_come_out() {
         let ratings = [

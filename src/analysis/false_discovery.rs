@@ -6,8 +6,8 @@
 /// `tried` is the total number of tests. Tests that are not given count as if their p-values were 1, so that the
 /// adjusted p-values are upper bounds. A `tried` below the number of given p-values is raised to it.
 ///
-/// Source: Y. Benjamini and Y. Hochberg, "Controlling the false discovery rate", Journal of the Royal Statistical Society B 57 (1995)
-/// 289–300.
+/// Source: Y. Benjamini and Y. Hochberg, "Controlling the false discovery rate", Journal of the Royal Statistical
+/// Society B 57 (1995) 289–300.
 pub fn benjamini_hochberg(probabilities: &[f64], tried: u64) -> Vec<f64> {
     let tried = tried.max(probabilities.len() as u64) as f64;
     let mut order: Vec<usize> = (0..probabilities.len()).collect();

@@ -96,8 +96,8 @@ impl PairedTable {
     /// Performs McNemar's exact test: if neither side is better, either direction of a discordant scene has probability
     /// ½.
     ///
-    /// Source: Q. McNemar, Psychometrika 12 (1947) 153–157; its exact form and the mid-p value as in Fagerland, Lydersen and
-    /// Laake, BMC Medical Research Methodology 13 (2013) 91.
+    /// Source: Q. McNemar, Psychometrika 12 (1947) 153–157; its exact form and the mid-p value as in Fagerland,
+    /// Lydersen and Laake, BMC Medical Research Methodology 13 (2013) 91.
     pub fn test(self) -> PairedTest {
         let differing = self.only_first + self.only_second;
         let Ok(coins) = Binomial::new(0.5, differing) else {

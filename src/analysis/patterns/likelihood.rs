@@ -20,7 +20,8 @@ pub(super) fn parts(count: Count) -> (usize, usize) {
 /// pattern's size, whereas weighted relative accuracy, which is reported too, hardly penalises runs in a pattern that
 /// fail like all others. Unit: nats.
 ///
-/// Source: M. Kulldorff, "A spatial scan statistic", Communications in Statistics – Theory and Methods 26 (1997) 1481–1496.
+/// Source: M. Kulldorff, "A spatial scan statistic", Communications in Statistics – Theory and Methods 26 (1997)
+/// 1481–1496.
 pub(super) struct Likelihood {
     runs: usize,
     failed: usize,
