@@ -21,7 +21,7 @@ const LEVEL: f64 = 1e-3;
 const NOISE: &str = "sense.";
 /// A pair of parameters is called neglected if less than this share of the expected cells was hit,
 const PAIR_SHARE: f64 = 0.75;
-/// … and the difference is at least this many standard deviations.
+/// … and the shortfall exceeds this many standard deviations.
 const PAIR_SIGMAS: f64 = 5.0;
 
 /// Counts the choices of a campaign's runs.

@@ -116,7 +116,7 @@ impl PairedTable {
     }
 }
 
-/// Finds by bisection the point between `from` and `to` at which a condition stops to hold.
+/// Finds by bisection the point between `from` and `to` at which a condition stops holding.
 fn crossing(from: f64, to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut holding, mut failing) = (from, to);
     // 60 halvings of an interval of at most 2 leave less than the last bit.

@@ -173,7 +173,7 @@ impl Choices {
     /// Makes a choice that is never random: an index below `of`, taken from the record, or 0 if the record lacks it.
     /// Only a nonzero value is recorded.
     ///
-    /// This lets a record leave out parts of a configuration.
+    /// This lets a record ask for less than its configuration does.
     pub fn exception(&mut self, name: &str, of: usize) -> usize {
         let asked = match &mut self.origin {
             Origin::Recorded { values, .. } => values.get_mut(name).and_then(VecDeque::pop_front).unwrap_or(0.0),
@@ -191,7 +191,7 @@ impl Choices {
         &self.made
     }
 
-    /// Returns the choices made, by value.
+    /// Consumes the source and returns the choices made.
     pub fn into_made(self) -> Vec<Choice> {
         self.made
     }

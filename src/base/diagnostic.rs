@@ -17,7 +17,7 @@ pub enum Severity {
 ///
 /// Messages are lower-case sentences without a full stop. Codes are stable: a letter for the
 /// stage (`C` config, `O` ontology, `S` scenario, `W` world and models, `R` rules, `H` history,
-/// `X` command line) and three digits.
+/// `A` analysis, `X` command line) and three digits.
 #[derive(Debug, Clone)]
 pub struct Diagnostic {
     /// Stable code, such as `C003`.

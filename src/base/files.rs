@@ -42,7 +42,7 @@ impl Files {
     pub fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, String> {
         match self {
             Self::Shipped => {
-                let file = carried(&slashed(&normalised(path))).ok_or("there is no such built-in file")?;
+                let file = carried(&slashed(&normalised(path))).ok_or("no built-in file has this path")?;
                 Ok(file.data.into_owned())
             }
             Self::Disk => std::fs::read(path).map_err(|error| describe(&error)),

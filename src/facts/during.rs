@@ -12,7 +12,8 @@ use crate::facts::writer::Writer;
 /// contact above some force, and the largest force. The trace keeps all episodes.
 const EPISODES_OF_A_PAIR: usize = 3;
 
-/// Writes the report, contacts, extremes and percepts of one action, and the results of its image processing.
+/// Writes the report, contacts, extremes and percepts of one action, and the plane and objects that the action itself
+/// perceived.
 pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
     let subject = writer.w("action");
     if let Some(report) = &action.report {

@@ -35,7 +35,7 @@ pub(super) fn escaped(name: &str) -> String {
 
 /// Returns the number with the fewest digits that rounds to the same f32. Physics has f32 precision, and 0.3 stays 0.3.
 ///
-/// Both zeros become `0.0`, so that they are one term. NaN stays NaN.
+/// Both zeros become `0.0`, so that they are one term. NaN and infinities are unchanged.
 pub(super) fn shortest(value: f64) -> f64 {
     #[expect(clippy::cast_possible_truncation, reason = "rounding to the precision of physics is intended")]
     let single = value as f32;

@@ -4,7 +4,7 @@ use super::archive::Archive;
 use super::proposal::{Component, Marginal, Proposal};
 use super::space::{Dimension, Space, bucket};
 
-/// Arms of a continuous axis.
+/// Number of arms of a continuous axis.
 const SLICES: usize = 5;
 
 /// Gives each arm a share that decreases with the number of standard errors of its mean above the best arm's. So arms

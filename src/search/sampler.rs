@@ -318,7 +318,7 @@ mod tests {
             let (mut rates, mut held, mut weights) = (0.0, 0, 0.0);
             for seed in 0..SEEDS {
                 let (search, asked) = searched(strategy, seed, 25);
-                let estimate = search.estimates()[0].expect("points were told");
+                let estimate = search.estimates()[0].expect("the points have results");
                 rates += estimate.rate / SEEDS as f64;
                 held += u64::from((estimate.low..=estimate.high).contains(&VOLUME));
                 weights += asked.iter().map(|ask| ask.weight).sum::<f64>() / asked.len() as f64 / SEEDS as f64;
@@ -420,7 +420,7 @@ mod tests {
             }
             found += failed[0];
             for (property, estimate) in search.estimates().into_iter().enumerate() {
-                let estimate = estimate.expect("points were told");
+                let estimate = estimate.expect("the points have results");
                 rates[property] += estimate.rate / SEEDS as f64;
                 held[property] += u64::from((estimate.low..=estimate.high).contains(&truth[property]));
             }
@@ -450,12 +450,12 @@ mod tests {
                         let stand_in =
                             std::iter::repeat_with(|| [fill::unit(&mut generator), fill::unit(&mut generator)])
                                 .find(|point| possible(point))
-                                .expect("there is no end");
+                                .expect("the iterator is infinite");
                         search.tell_stand_in(&[told(margin(&stand_in))]);
                     }
                 }
             }
-            let estimate = search.estimates()[0].expect("points were told");
+            let estimate = search.estimates()[0].expect("the points have results");
             rates += estimate.rate / SEEDS as f64;
             held += u64::from((estimate.low..=estimate.high).contains(&0.2));
         }

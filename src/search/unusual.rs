@@ -18,12 +18,12 @@ const FIRST_TURN: usize = 2;
 /// Ratio of the lengths of successive turns.
 const LONGER: usize = 3;
 
-/// Returns the kinds of unusual points of a space. In the first, the action's own quantities have large perception
-/// errors; in the second, there are many objects, close to each other, with large perception errors. All other axes
-/// stay uniform.
+/// Returns the kinds of unusual points of a space. In the first, perception errors of the target and the base are
+/// large; in the second, there are many other objects, close to the target, with large perception errors. All other
+/// axes stay uniform.
 ///
-/// Each point has one kind, because the kinds mask each other: a misplaced gripper among many objects always fails in
-/// the same way.
+/// Each point has one kind, because the kinds mask each other: a misplaced gripper in a crowd always fails in the same
+/// way.
 ///
 /// Based on scaled-sigma sampling (Sun, Li and others, 2015), which finds rare failures of circuits by enlarging the
 /// noise. Here the distance is uniform from [`FAR`] to four standard deviations.

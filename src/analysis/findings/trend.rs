@@ -7,7 +7,7 @@ use crate::analysis::{Interval, OutcomeTable, TwoByTwo, wilson};
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrendPoint {
-    /// Id of the campaign.
+    /// ID of the campaign.
     pub campaign: String,
     /// Start of its first run in the table (RFC 3339).
     pub started: String,

@@ -55,7 +55,8 @@ pub struct Pattern {
     pub elsewhere: Option<Interval>,
     /// Failure rate within the pattern divided by the overall failure rate.
     pub lift: f64,
-    /// Weighted relative accuracy: the pattern's share of all runs times its failure rate minus the overall rate.
+    /// Weighted relative accuracy: the pattern's share of all runs times the difference between its failure rate and
+    /// the overall rate.
     pub wracc: f64,
     /// One-sided p-value of Fisher's exact test among the training runs.
     pub p: f64,
