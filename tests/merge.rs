@@ -138,7 +138,7 @@ fn what_is_no_part_is_refused() {
     for wrong in ["0/4", "5/4", "4", "1/0", "-1/2", "a/b"] {
         let output = actcheck(project.path(), &["run", "configs/pick.toml", &format!("--shard={wrong}")]);
         assert_eq!(output.status.code(), Some(2), "{wrong}");
-        assert!(stderr(&output).contains("a part such as 1/4 is needed"), "{}", stderr(&output));
+        assert!(stderr(&output).contains("expected a shard such as 1/4"), "{}", stderr(&output));
     }
     assert!(!project.path().join("configs/.actcheck").exists());
 }

@@ -1,4 +1,5 @@
-//! Two campaigns on the same scenes: what holds more or less often, and in which scenes it went another way.
+//! Compares two campaigns on the same scenes: which properties hold more or less often, and in which scenes outcomes
+//! differ.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,12 +7,12 @@ use crate::analysis::{Difference, PairedTable, PairedTest, holm};
 use crate::history::{OutcomeRow, RunRow, RunStatus, SceneDigest};
 use crate::verdict::{Counts, Outcome};
 
-/// What is compared: whole runs, or one property of one action.
+/// The subject of a comparison: whole runs, or one property of one action.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Compared {
-    /// A run passes when some property passed in it and none failed.
+    /// Whole runs. A run passes if at least one property passed and none failed.
     WholeRun,
-    /// Every execution of the action in the run.
+    /// A property over all executions of the action in a run.
     Property {
         /// IRI of the action.
         action: String,
@@ -20,14 +21,14 @@ pub enum Compared {
     },
 }
 
-/// One run of a campaign, as far as it is compared.
+/// A run of a campaign, with the data needed for a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComparedRun {
-    /// Its id.
+    /// ID of the run.
     pub run: String,
-    /// Number of its scene in the campaign, and of the run among those of the scene, both from 0.
+    /// Number of the scene in the campaign, and of the run among the scene's runs, both from 0.
     pub place: (u64, u64),
-    /// Its scene.
+    /// Digest of the scene.
     pub scene: SceneDigest,
     outcomes: BTreeMap<Compared, Outcome>,
 }
@@ -35,44 +36,44 @@ pub struct ComparedRun {
 /// One line of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComparedLine {
-    /// What is compared.
+    /// The subject of the comparison.
     pub of: Compared,
-    /// The scenes in which both sides passed or failed.
+    /// Counts of the scenes that are decided on both sides.
     pub table: PairedTable,
-    /// The difference of the rates; nothing where no scene was decided on both sides.
+    /// The difference of the rates. `None` if no scene was decided on both sides.
     pub difference: Option<Difference>,
-    /// What chance alone would do.
+    /// Tests against the hypothesis of no difference.
     pub test: PairedTest,
-    /// Two-sided probability, corrected for the number of lines.
+    /// Two-sided p-value, adjusted for the number of lines.
     pub two_sided_adjusted: f64,
-    /// One-sided probability that the second is worse, corrected for the number of lines.
+    /// One-sided p-value of "the second is worse", adjusted for the number of lines.
     pub second_worse_adjusted: f64,
-    /// Runs that passed in the first and failed in the second: ids of both.
+    /// Runs that passed in the first campaign and failed in the second: IDs of both.
     pub worse: Vec<(String, String)>,
-    /// Runs that failed in the first and passed in the second: ids of both.
+    /// Runs that failed in the first campaign and passed in the second: IDs of both.
     pub better: Vec<(String, String)>,
-    /// Outcomes of the scenes that were not decided on both sides: of the first, and of the second.
+    /// Outcomes of the scenes that were not decided on both sides, in the first and in the second campaign.
     pub left_out: [Counts; 2],
 }
 
-/// Two campaigns, compared.
+/// The comparison of two campaigns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// Scenes that both have.
+    /// Number of scenes in both campaigns.
     pub pairs: u64,
-    /// Of those, the ones whose objects have other masses, frictions or restitutions.
+    /// Number of these scenes in which masses, frictions or restitutions differ.
     pub other_physics: u64,
-    /// Runs whose place the other side lacks, of the first and of the second.
+    /// Runs of the first and of the second campaign without a counterpart.
     pub alone: [Vec<String>; 2],
-    /// Runs with the same place and another scene.
+    /// Runs with the same place but different scenes.
     pub other_scene: Vec<(String, String)>,
-    /// What only one side judged, of the first and of the second.
+    /// Subjects judged only in the first and only in the second campaign.
     pub judged_alone: [Vec<Compared>; 2],
     /// Whole runs first, then by action and property.
     pub lines: Vec<ComparedLine>,
 }
 
-/// The runs of a campaign for a comparison, by place. What is unknown of a run leaves it out.
+/// Returns the runs of a campaign for a comparison, sorted by place. Runs without a known scene are left out.
 pub fn compared_runs(
     runs: &[RunRow],
     scenes: &BTreeMap<String, SceneDigest>,
@@ -89,7 +90,7 @@ pub fn compared_runs(
     for row in runs {
         let Some(scene) = scenes.get(&row.run) else { continue };
         let mut outcomes = of_run.remove(row.run.as_str()).unwrap_or_default();
-        // A run that broke says nothing of the robot, whatever came before.
+        // A broken run is no evidence about the robot, regardless of earlier outcomes.
         let whole = match row.status {
             RunStatus::Broken => Outcome::Broken,
             RunStatus::Completed | RunStatus::Timeout => {
@@ -104,17 +105,17 @@ pub fn compared_runs(
     found
 }
 
-/// Several outcomes as one: failed where one failed; decided only where none was left open.
+/// Combines two outcomes: failed if one failed, else broken, timeout or untested if one is, else passed if one passed.
 fn together(one: Outcome, other: Outcome) -> Outcome {
     const STRONGEST_FIRST: [Outcome; 6] =
         [Outcome::Failed, Outcome::Broken, Outcome::Timeout, Outcome::Untested, Outcome::Passed, Outcome::Inapplicable];
     STRONGEST_FIRST.into_iter().find(|outcome| [one, other].contains(outcome)).unwrap_or(one)
 }
 
-/// Compares two campaigns run by run: those with the same place in it and the same scene.
+/// Compares two campaigns by pairs of runs with the same place and the same scene.
 ///
-/// Where scenes are run more than once, a scene passes when all of its runs do: runs of one scene are too alike to count each. Only as
-/// many of them as both sides have are looked at.
+/// If scenes are repeated, a scene passes if all its runs pass: runs of one scene are too alike to be counted
+/// separately. Only repetitions that both sides have are compared.
 pub fn compare(first: &[ComparedRun], second: &[ComparedRun]) -> Comparison {
     let by_place = |runs: &'_ [ComparedRun]| runs.iter().enumerate().map(|(at, run)| (run.place, at)).collect();
     let (firsts, seconds): (BTreeMap<_, usize>, BTreeMap<_, usize>) = (by_place(first), by_place(second));
@@ -141,15 +142,15 @@ pub fn compare(first: &[ComparedRun], second: &[ComparedRun]) -> Comparison {
     }
 }
 
-/// One scene in both campaigns.
+/// A scene in both campaigns.
 struct ScenePair {
-    /// The first run of the scene in each.
+    /// IDs of the scene's first run in each campaign.
     runs: (String, String),
     outcomes: [BTreeMap<Compared, Outcome>; 2],
     other_physics: bool,
 }
 
-/// The runs of each scene together. Shape of the argument: sorted by place.
+/// Merges the runs of each scene. The argument must be sorted by place.
 fn scene_pairs(same: &[[&ComparedRun; 2]]) -> Vec<ScenePair> {
     let mut pairs: Vec<(u64, ScenePair)> = Vec::new();
     for [first, second] in same {
@@ -215,7 +216,7 @@ fn line(pairs: &[ScenePair], of: &Compared) -> ComparedLine {
     }
 }
 
-/// Whether it passed, where that says something of the robot.
+/// Returns whether the property passed, or `None` if the outcome is no evidence about the robot.
 fn decided(outcome: Outcome) -> Option<bool> {
     match outcome {
         Outcome::Passed => Some(true),
@@ -225,8 +226,8 @@ fn decided(outcome: Outcome) -> Option<bool> {
 }
 
 impl Comparison {
-    /// The lines in which the second is worse: one-sided, exact, and corrected so that the chance of any false one is at most
-    /// `level`.
+    /// Returns the lines in which the second campaign is significantly worse: one-sided, exact, and adjusted so that
+    /// the probability of any false finding is at most `level`.
     pub fn worse_at(&self, level: f64) -> Vec<&ComparedLine> {
         self.lines.iter().filter(|line| line.second_worse_adjusted <= level).collect()
     }

@@ -1,80 +1,81 @@
-//! How alike the runs of one scene are: what of a property's outcome the scene decides, and what the noise.
+//! Consistency of repeated runs of a scene: how much of a property's variance comes from the scene and how much from
+//! noise.
 
 use std::collections::BTreeMap;
 
 use crate::analysis::{Interval, wilson_share};
 
-/// One decided run of a scene.
+/// A decided run of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repeated {
     /// Number of the scene.
     pub scene: u64,
     /// Whether it passed.
     pub passed: bool,
-    /// How far from flipping, where that is known.
+    /// Distance of the outcome from flipping, if known.
     pub margin: Option<f64>,
 }
 
-/// What several runs of each of several scenes say of one property.
+/// Consistency of one property over repeated runs of several scenes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Consistency {
-    /// Scenes with at least two decided runs that all passed.
+    /// Number of scenes with at least two decided runs, all passed.
     pub always_passed: u64,
-    /// Scenes with at least two decided runs that all failed.
+    /// Number of scenes with at least two decided runs, all failed.
     pub always_failed: u64,
-    /// The others with at least two decided runs, by number.
+    /// The other scenes with at least two decided runs, sorted by number.
     pub flaky: Vec<Flaky>,
     /// pass^k for k from 1 to the most decided runs of a scene.
     pub pass_powers: Vec<PassPower>,
-    /// Of passing, 1 for passed and 0 for failed.
+    /// Variance of the outcome: 1 for passed, 0 for failed.
     pub outcome: Option<Variance>,
-    /// Of the margin, where all decided runs have one. Unit: the margin's, squared.
+    /// Variance of the margin, if all decided runs have one. Unit: the margin's, squared.
     pub margin: Option<Variance>,
-    /// Share of passed runs. Its interval knows that runs of one scene are alike.
+    /// Share of passed runs. The interval accounts for the correlation of runs of the same scene.
     pub rate: Option<Interval>,
 }
 
-/// A scene that sometimes passes.
+/// A scene with its number of passed runs. In [`Consistency::flaky`], a scene with different outcomes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Flaky {
-    /// Its number.
+    /// Number of the scene.
     pub scene: u64,
-    /// So many of its runs passed.
+    /// Number of passed runs.
     pub passed: u64,
-    /// Of so many.
+    /// Number of decided runs.
     pub of: u64,
 }
 
 /// The probability that `k` independent runs of a scene all pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PassPower {
-    /// How many runs.
+    /// Number of runs.
     pub k: u64,
-    /// Scenes with at least so many decided runs: those that it is the mean of.
+    /// Number of scenes with at least `k` decided runs, over which the mean is taken.
     pub scenes: u64,
-    /// The mean with an interval; that is a wide one, because a number in [0, 1] spreads at most as much as one that is 0
-    /// or 1 as often.
+    /// The mean with an interval. The interval is conservative, because the variance of a number in [0, 1] is at most
+    /// that of a binary one with the same mean.
     pub probability: Interval,
 }
 
-/// Where the spread of a number comes from. Unit: the number's, squared.
+/// Variance components of a number. Unit: the number's, squared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variance {
-    /// Of runs about the mean of their scene.
+    /// Variance of runs about the mean of their scene.
     pub noise: f64,
-    /// Of the scenes' means themselves. The estimate is unbiased, so it may be negative where there is little of it.
+    /// Variance of the scenes' means. The estimate is unbiased, so it may be negative if the variance is small.
     pub scene: f64,
 }
 
 impl Variance {
-    /// Share of the noise in both together, in [0, 1]; nothing where there is no spread.
+    /// Returns the share of the noise in the total variance, in [0, 1], or `None` if the variance is 0.
     pub fn noise_share(&self) -> Option<f64> {
         let both = self.noise + self.scene.max(0.0);
         (both > 0.0).then(|| self.noise / both)
     }
 }
 
-/// What decided runs say about how alike the runs of a scene are.
+/// Computes the consistency of a property from its decided runs.
 pub fn consistency(runs: &[Repeated]) -> Consistency {
     let mut scenes: BTreeMap<u64, Vec<&Repeated>> = BTreeMap::new();
     for run in runs {
@@ -104,12 +105,13 @@ fn count(scene: u64, runs: &[&Repeated]) -> Flaky {
     Flaky { scene, passed: runs.iter().filter(|run| run.passed).count() as u64, of: runs.len() as u64 }
 }
 
-/// The mean over scenes of C(passed, k) / C(runs, k), which is unbiased whatever each scene's own probability is.
+/// Returns the mean over scenes of C(passed, k) / C(runs, k), an unbiased estimate for any distribution of the scenes'
+/// probabilities.
 fn pass_power(counts: &[Flaky], k: u64) -> Option<PassPower> {
     let enough: Vec<f64> = counts
         .iter()
         .filter(|scene| scene.of >= k)
-        // The first of k draws without replacement passes, then the second of what is left, and so on.
+        // Probability that k draws without replacement all pass.
         .map(|scene| {
             (0..k).map(|drawn| scene.passed.saturating_sub(drawn) as f64 / (scene.of - drawn) as f64).product()
         })
@@ -119,10 +121,11 @@ fn pass_power(counts: &[Flaky], k: u64) -> Option<PassPower> {
     Some(PassPower { k, scenes: enough.len() as u64, probability })
 }
 
-/// Components of the variance between and within groups; nothing without two groups and one group of two.
+/// Computes the variance components between and within groups. Returns `None` with fewer than two groups or if every
+/// group has one value.
 ///
 /// Source: the one-way model with random effects, by the method of moments of the analysis of variance (Searle, 1971,
-/// for groups of unequal size): both are unbiased.
+/// for groups of unequal size): both estimates are unbiased.
 fn variance(groups: &[Vec<f64>]) -> Option<Variance> {
     let spread = |values: &Vec<f64>| {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -135,7 +138,7 @@ fn variance(groups: &[Vec<f64>]) -> Option<Variance> {
     components(&groups.iter().map(spread).collect::<Vec<Spread>>())
 }
 
-/// The same of what is true or false, from how often it is true, of how many, in each group.
+/// Computes the variance components of a binary value from its number of ones and the size of each group.
 fn outcome_variance(groups: &[[u64; 2]]) -> Option<Variance> {
     let spread = |[is, of]: &[u64; 2]| {
         let (size, mean) = (*of as f64, *is as f64 / *of as f64);
@@ -144,7 +147,7 @@ fn outcome_variance(groups: &[[u64; 2]]) -> Option<Variance> {
     components(&groups.iter().map(spread).collect::<Vec<Spread>>())
 }
 
-/// How many values a group has, their mean, and the sum of their squared distances from it.
+/// Size of a group, its mean, and the sum of squared deviations from the mean.
 struct Spread {
     size: f64,
     mean: f64,
@@ -168,30 +171,31 @@ fn components(groups: &[Spread]) -> Option<Variance> {
     Some(Variance { noise, scene: (between / (count - 1.0) - noise) / size })
 }
 
-/// The share of runs of which something is true, from how many of how many runs of each scene: Wilson's interval with as many runs
-/// as are worth their number, as those of one scene are alike. Where every scene was run once, it is Wilson's own.
+/// Computes the share of positive runs from the positive runs and all runs of each scene, with Wilson's interval for
+/// the effective sample size, since runs of one scene are correlated. If every scene was run once, this is Wilson's
+/// interval.
 ///
 /// Source: the design effect of Kish (1965), 1 + (m - 1) ρ, with ρ from the components of the variance.
 fn share_of_scenes(scenes: &[[u64; 2]]) -> Option<Interval> {
     let sum = |number: fn(&[u64; 2]) -> u64| scenes.iter().map(number).sum::<u64>() as f64;
     let (is, runs, squares) = (sum(|[is, _]| *is), sum(|[_, of]| *of), sum(|[_, of]| of * of));
-    // Where all runs went alike nothing tells noise from scenes: then each scene counts once.
+    // If all outcomes are equal, noise and scenes can't be separated: count each scene once.
     let alike = outcome_variance(scenes).and_then(|variance| variance.noise_share()).map_or(1.0, |noise| 1.0 - noise);
     let worth = runs / (1.0 + (squares / runs - 1.0) * alike);
     wilson_share(is / runs, worth)
 }
 
-/// Which of some runs are of the same scene.
+/// Groups runs by scene.
 #[derive(Debug, Clone, Default)]
 pub struct SceneRuns {
-    /// For each run the place of its scene.
+    /// Index of the scene of each run.
     scene_of: Vec<usize>,
-    /// How many runs each scene has.
+    /// Number of runs of each scene.
     sizes: Vec<u64>,
 }
 
 impl SceneRuns {
-    /// Of runs by what tells their scenes apart.
+    /// Groups runs by the keys of their scenes.
     pub fn new<K: Ord>(scenes: impl IntoIterator<Item = K>) -> Self {
         let mut places = BTreeMap::new();
         let mut found = Self::default();
@@ -207,7 +211,8 @@ impl SceneRuns {
         found
     }
 
-    /// The share of some of the runs, by their places among all, with an interval that knows which are of one scene.
+    /// Returns the share of some of the runs, given by their indices, with an interval that accounts for runs of the
+    /// same scene.
     pub fn share(&self, runs: impl IntoIterator<Item = usize>) -> Option<Interval> {
         let mut scenes: Vec<[u64; 2]> = self.sizes.iter().map(|size| [0, *size]).collect();
         runs.into_iter().for_each(|run| scenes[self.scene_of[run]][0] += 1);
@@ -239,7 +244,7 @@ mod tests {
         assert_eq!(consistency(&[]), Consistency::default());
     }
 
-    /// Of three runs two passed: of the three pairs one passed whole. So by hand for all scenes.
+    /// If two of three runs passed, one of the three pairs passed entirely. Computed by hand for all scenes.
     #[test]
     fn pass_powers_are_shares_of_all_choices_of_runs() {
         let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1, 1]]));
@@ -254,8 +259,8 @@ mod tests {
         assert_eq!(told.len(), 3);
     }
 
-    /// Kutner, Nachtsheim, Neter and Li, "Applied Linear Statistical Models", table 25.1: ratings by five officers of four
-    /// candidates each; the mean squares are 394.925 and 73.2833, and the officers' variance 80.41.
+    /// Kutner, Nachtsheim, Neter and Li, "Applied Linear Statistical Models", table 25.1: ratings by five officers of
+    /// four candidates each; the mean squares are 394.925 and 73.2833, and the officers' variance 80.41.
     #[test]
     fn published_components_come_out() {
         let ratings = [
@@ -272,14 +277,14 @@ mod tests {
         assert_eq!(variance(&[vec![1.0], vec![2.0]]), None);
     }
 
-    /// Scenes pass with probability 0.2 or 0.8, equally often: the variance of scenes is 0.09, that of noise 0.16, and two
-    /// runs both pass with probability 0.34. Estimates of unequal numbers of runs are right in the mean.
+    /// Scenes pass with probability 0.2 or 0.8, equally often: the variance of scenes is 0.09, that of noise 0.16, and
+    /// two runs both pass with probability 0.34. Estimates from unequal numbers of runs are unbiased.
     #[test]
     fn estimates_are_unbiased_for_a_known_mixture() {
         const CAMPAIGNS: usize = 4000;
         let mut state = 1_u64;
         let mut uniform = || {
-            // Knuth's linear congruential generator: any will do here.
+            // Knuth's linear congruential generator; any generator would do.
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
@@ -306,7 +311,7 @@ mod tests {
         assert!((noise - 0.16).abs() < 0.002, "{noise}");
         assert!((scene - 0.09).abs() < 0.003, "{scene}");
         assert!((both - 0.34).abs() < 0.005, "{both}");
-        // The plain interval, which takes all runs for independent, holds in 84 %.
+        // The plain interval, which treats all runs as independent, has a coverage of 84 %.
         assert!(held * 100 >= CAMPAIGNS * 93, "{held}");
     }
 
@@ -321,7 +326,7 @@ mod tests {
     fn margins_count_where_every_run_has_one() {
         let run = |scene, margin| Repeated { scene, passed: true, margin };
         let mut told = vec![run(0, Some(1.0)), run(0, Some(3.0)), run(1, Some(5.0)), run(1, Some(7.0))];
-        // Within: 2 each. Between the means 2 and 6: 2 · (4 + 4) / 1 = 16, less 2, by 2.
+        // Within: 2 each. Between the means 2 and 6: 2 · (4 + 4) / 1 = 16; minus 2, divided by 2.
         assert_eq!(consistency(&told).margin, Some(Variance { noise: 2.0, scene: 7.0 }));
         told.push(run(1, None));
         assert_eq!(consistency(&told).margin, None);

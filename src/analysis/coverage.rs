@@ -1,7 +1,7 @@
-//! How much of the space of scenes a campaign has tried, against what so many random draws would.
+//! Coverage of the scene space by a campaign, compared with the same number of random draws.
 //!
-//! Every decision falls into a bin; all bins of a parameter are equally probable. Parameters that differ only in which of
-//! the objects they belong to are one: `other.3.x` and `other.5.x` are `other.*.x`.
+//! Every choice falls into a bin; all bins of a parameter are equally probable. Parameters that differ only in their
+//! object are pooled: `other.3.x` and `other.5.x` are `other.*.x`.
 
 use std::collections::BTreeMap;
 
@@ -9,68 +9,70 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::base::{Choice, ChoiceKind};
 
-/// Bins of a parameter that is a number. Fifths show a gap in the middle and at both ends, and fill in a hundred draws.
+/// Number of bins of a numeric parameter. Fifths show gaps in the middle and at both ends, and a hundred draws fill
+/// them.
 const BINS: usize = 5;
-/// A decision between more things than this is a number: no campaign tries them all.
+/// A choice with more options than this is treated as a number, because no campaign tries them all.
 const MOST_BINS: usize = 1000;
-/// Probability that any bin of a whole campaign without a fault is called neglected.
+/// Probability that any bin of an unbiased campaign is called neglected.
 const LEVEL: f64 = 1e-3;
-/// Decisions whose name begins so belong to what robot and senses get wrong, each in its own right: no pairs of them.
+/// Name prefix of noise choices. They are independent errors of the robot and its sensors, so that their pairs are not
+/// counted.
 const NOISE: &str = "sense.";
-/// Pairs of bins are called neglected where fewer than this share of those that were to be expected were tried.
+/// A pair of parameters is called neglected if less than this share of the expected cells was hit,
 const PAIR_SHARE: f64 = 0.75;
-/// … and that by so many standard deviations.
+/// … and the shortfall exceeds this many standard deviations.
 const PAIR_SIGMAS: f64 = 5.0;
 
-/// Counts what a campaign's runs decided.
+/// Counts the choices of a campaign's runs.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Coverage {
     parameters: BTreeMap<(String, usize), Vec<u64>>,
     pairs: BTreeMap<[(String, usize); 2], Vec<u64>>,
 }
 
-/// What was tried of one parameter.
+/// Coverage of one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterCoverage {
-    /// Its name, `*` for the number or id of an object.
+    /// Name, with `*` for the number or ID of an object.
     pub name: String,
-    /// How often it was decided.
+    /// Number of choices.
     pub draws: u64,
-    /// Decisions in each bin. Shape: one for each of the things chosen from, or for each fifth of the distribution.
+    /// Choices in each bin. Shape: one entry for each option, or for each fifth of the distribution.
     pub counts: Vec<u64>,
-    /// Bins that so many random draws would hit in the mean.
+    /// Expected number of bins hit by the same number of random draws.
     pub expected_hits: f64,
-    /// A bin that was tried less than half as often as its share, beyond chance.
+    /// The first bin hit significantly less than half as often as expected.
     pub neglected: Option<usize>,
 }
 
-/// What was tried of two parameters together.
+/// Coverage of a pair of parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairCoverage {
-    /// Their names.
+    /// Names of the parameters.
     pub names: [String; 2],
-    /// How often both were decided.
+    /// Number of choices of both.
     pub draws: u64,
-    /// Pairs of bins.
+    /// Number of pairs of bins.
     pub cells: usize,
-    /// Those that were tried.
+    /// Number of pairs hit.
     pub hits: usize,
-    /// Those that so many random draws would hit in the mean.
+    /// Expected number of pairs hit by the same number of random draws.
     pub expected_hits: f64,
-    /// Whether much less was tried, beyond chance.
+    /// Whether significantly fewer pairs were hit.
     pub neglected: bool,
 }
 
 impl ParameterCoverage {
-    /// Bins that were tried.
+    /// Number of bins hit.
     pub fn hits(&self) -> usize {
         self.counts.iter().filter(|count| **count > 0).count()
     }
 }
 
-/// A decision in its bin.
+/// A choice with its bin.
 struct Binned {
-    /// The object that it belongs to, where it belongs to one of several.
+    /// Its object, if it belongs to one of several.
     owner: Option<String>,
     name: String,
     bins: usize,
@@ -78,7 +80,7 @@ struct Binned {
 }
 
 impl Coverage {
-    /// Counts the decisions of one run. Of decisions that were made again the last one counts: it stands in the scene.
+    /// Counts the choices of one run. Of repeated choices only the last one counts, because the scene uses it.
     pub fn add(&mut self, choices: &[Choice]) {
         let mut last: BTreeMap<&str, &Choice> = BTreeMap::new();
         for choice in choices {
@@ -96,7 +98,7 @@ impl Coverage {
         }
     }
 
-    /// Two decisions about the whole scene, or about the same object.
+    /// Counts a pair of choices if both are about the whole scene or about the same object.
     fn add_pair(&mut self, first: &Binned, second: &Binned) {
         let noise = first.name.starts_with(NOISE) || second.name.starts_with(NOISE);
         if noise || first.owner != second.owner {
@@ -107,7 +109,7 @@ impl Coverage {
         counts[first.bin * second.bins + second.bin] += 1;
     }
 
-    /// Every parameter that could be decided one way or another, by name.
+    /// Returns the coverage of every parameter that can vary, sorted by name.
     pub fn parameters(&self) -> Vec<ParameterCoverage> {
         let bins: usize = self.parameters.values().map(Vec::len).sum();
         self.parameters
@@ -125,7 +127,7 @@ impl Coverage {
             .collect()
     }
 
-    /// Every pair of parameters of the scene, or of one object, by name.
+    /// Returns the coverage of every pair of parameters of the scene or of one object, sorted by name.
     pub fn pairs(&self) -> Vec<PairCoverage> {
         self.pairs
             .iter()
@@ -148,23 +150,24 @@ impl Coverage {
     }
 }
 
-/// Whether a bin's true share is less than half of an even one: so few draws would come of half a share once in a
-/// thousand campaigns, whichever of all the `bins` it were.
+/// Whether a bin's true probability is significantly less than half of a uniform one: at half of it, any of the `bins`
+/// would have so few draws in less than one of a thousand campaigns.
 fn is_neglected(count: u64, draws: u64, of: usize, bins: usize) -> bool {
     let half = 0.5 / of as f64;
     Binomial::new(half, draws).is_ok_and(|chance| chance.cdf(count) < LEVEL / bins.max(1) as f64)
 }
 
-/// How many of `cells` equally probable cells so many draws hit: mean, and a bound of the variance.
+/// Returns the mean number of `cells` equally probable cells that `draws` draws hit, and an upper bound of its
+/// variance.
 ///
-/// The cells exclude each other, so the variance of the sum is at most the sum of the variances.
+/// The hits are negatively correlated, so the variance of the sum is at most the sum of the variances.
 fn occupied(cells: usize, draws: u64) -> (f64, f64) {
     let cells = cells as f64;
     let empty = libm::pow(1.0 - 1.0 / cells, draws as f64);
     (cells * (1.0 - empty), cells * empty * (1.0 - empty))
 }
 
-/// A decision in its bin; nothing where there was nothing to decide.
+/// Returns a choice with its bin, or `None` if it had only one option.
 fn binned(choice: &Choice) -> Option<Binned> {
     let share = |share: f64| (BINS, ((share * BINS as f64).max(0.0) as usize).min(BINS - 1));
     let (bins, bin) = match choice.kind {
@@ -180,11 +183,11 @@ fn binned(choice: &Choice) -> Option<Binned> {
     Some(Binned { owner, name, bins, bin })
 }
 
-/// The object in a name, where it is one of several, and the name with `*` in its place.
+/// Returns the object in a name, if it is one of several, and the name with `*` in its place.
 fn pooled(name: &str) -> (Option<String>, String) {
     let parts: Vec<&str> = name.split('.').collect();
     match parts.as_slice() {
-        // Where the base believes that it stands belongs to no object.
+        // The localisation error of the base belongs to no object.
         [_, "localisation", ..] => (None, name.to_owned()),
         [head, owner, rest @ ..] if !rest.is_empty() && (is_number(owner) || name.starts_with(NOISE)) => {
             (Some(format!("{head}.{owner}")), format!("{head}.*.{}", rest.join(".")))
@@ -202,7 +205,8 @@ mod tests {
     use super::*;
     use crate::base::Choices;
 
-    /// Decisions of a scene with two objects; `lean` says how often the colour is drawn again when it is the last one.
+    /// Choices of a scene with two objects. `lean` is the number of times that the colour is redrawn if it is the last
+    /// one.
     fn scene(index: u64, lean: u32) -> Vec<Choice> {
         let mut choices = Choices::random(5, index);
         for name in ["other.1", "other.2"] {
@@ -219,7 +223,7 @@ mod tests {
         choices.into_made()
     }
 
-    /// Which of four billion noises a picture has is no table of four billion counts: once, it was one of 34 gigabytes.
+    /// An index of one of four billion noise images must not allocate four billion counters (34 GB).
     #[test]
     fn one_of_very_many_things_is_a_number() {
         let mut choices = Choices::random(5, 0);

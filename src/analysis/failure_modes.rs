@@ -1,4 +1,4 @@
-//! Runs that fail alike: the same set of failed properties.
+//! Failure modes: runs with the same set of failed properties.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,21 +6,21 @@ use crate::analysis::{Interval, SceneRuns};
 use crate::history::OutcomeRow;
 use crate::verdict::Outcome;
 
-/// A set of failed properties and the runs that have just it.
+/// A set of failed properties, and the runs with exactly this set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FailureMode {
-    /// IRIs of the properties, sorted. Empty: the runs in which none failed.
+    /// IRIs of the properties, sorted. Empty for the runs in which none failed.
     pub failed: Vec<String>,
-    /// Ids of the runs, in the order given.
+    /// IDs of the runs, in the order given.
     pub runs: Vec<String>,
     /// Share among the runs that tested anything. Its interval accounts for runs of the same scene.
     pub share: Interval,
 }
 
-/// Failure modes, the most frequent first, then by their properties.
+/// Returns the failure modes, most frequent first, then sorted by their properties.
 ///
-/// A run in which no property passed or failed tested nothing, and is left out. `scenes` maps the id of a run to its scene, where
-/// scenes are run more than once.
+/// Runs in which no property passed or failed tested nothing and are left out. `scenes` maps the IDs of runs to their
+/// scenes, if scenes are repeated.
 pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>) -> Vec<FailureMode> {
     let tested = signatures(rows);
     // A run without a known scene counts as a scene of its own.
@@ -39,16 +39,16 @@ pub fn failure_modes(rows: &[OutcomeRow], scenes: &BTreeMap<String, u64>) -> Vec
             })
         })
         .collect();
-    // The sort is stable: modes of one size stay sorted by their properties.
+    // The sort is stable: modes of equal size stay sorted by their properties.
     found.sort_by_key(|mode| std::cmp::Reverse(mode.runs.len()));
     found
 }
 
-/// The runs that tested something, in the order given, each with the properties that failed in it.
+/// Returns the runs with decided properties, in the order given, each with its failed properties.
 fn signatures(rows: &[OutcomeRow]) -> Vec<(&str, BTreeSet<&str>)> {
     let mut runs: Vec<(&str, BTreeSet<&str>)> = Vec::new();
     for row in rows.iter().filter(|row| matches!(row.outcome, Outcome::Passed | Outcome::Failed)) {
-        // The rows of a run follow each other.
+        // The rows of a run are contiguous.
         if runs.last().is_none_or(|(run, _)| *run != row.run) {
             runs.push((&row.run, BTreeSet::new()));
         }
@@ -102,7 +102,7 @@ mod tests {
             .collect();
         assert_eq!(plain, [(vec!["a", "b"], vec!["k-1", "k-3"]), (vec![], vec!["k-2"]), (vec!["a"], vec!["k-5"])]);
         assert_eq!(modes[0].share, wilson(2, 4).expect("four runs"));
-        // As one scene they are worth fewer runs than they are: the share stays, and its interval is wider.
+        // Runs of one scene have a smaller effective sample size: the share stays, and its interval is wider.
         let scenes = [("k-1", 1), ("k-3", 1), ("k-2", 2), ("k-5", 2)].map(|(run, scene)| (run.to_owned(), scene));
         let alike = failure_modes(&rows, &scenes.into());
         let (alone, alike) = (modes[0].share, alike[0].share);

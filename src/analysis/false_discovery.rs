@@ -1,13 +1,13 @@
-//! Many tests at once, when some false findings among many true ones are bearable.
+//! The Benjamini–Hochberg correction for multiple tests, which controls the false discovery rate.
 
-/// Benjamini and Hochberg's adjusted probabilities, in the order given: if each of those at or below a level is called a finding, the
-/// share of false ones among the findings is at most the level on average.
+/// Returns the Benjamini–Hochberg adjusted p-values, in the order given. If those at or below a level are called
+/// findings, the expected share of false findings is at most the level.
 ///
-/// `tried`: how many tests there were in all. Those that are not given count as if nothing at all spoke for them, so that the
-/// adjusted probabilities are upper bounds; fewer than given count as given.
+/// `tried` is the total number of tests. Tests that are not given count as if their p-values were 1, so that the
+/// adjusted p-values are upper bounds. A `tried` below the number of given p-values is raised to it.
 ///
-/// Source: Y. Benjamini and Y. Hochberg, "Controlling the false discovery rate", Journal of the Royal Statistical Society B 57 (1995)
-/// 289–300.
+/// Source: Y. Benjamini and Y. Hochberg, "Controlling the false discovery rate", Journal of the Royal Statistical
+/// Society B 57 (1995) 289–300.
 pub fn benjamini_hochberg(probabilities: &[f64], tried: u64) -> Vec<f64> {
     let tried = tried.max(probabilities.len() as u64) as f64;
     let mut order: Vec<usize> = (0..probabilities.len()).collect();
@@ -15,7 +15,7 @@ pub fn benjamini_hochberg(probabilities: &[f64], tried: u64) -> Vec<f64> {
     let mut adjusted = vec![1.0; probabilities.len()];
     let mut smallest = 1.0f64;
     for (rank, place) in order.into_iter().enumerate().rev() {
-        // None may be less sure than one with a larger probability.
+        // Adjusted p-values must not decrease.
         smallest = smallest.min(probabilities[place] * tried / (rank + 1) as f64);
         adjusted[place] = smallest;
     }

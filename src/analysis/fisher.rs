@@ -1,9 +1,9 @@
-//! Fisher's exact test for a table of two by two counts.
+//! Fisher's exact test for 2 × 2 tables.
 
-/// Weights of two tables that differ less than this are the same one: rounding must not part tables that are alike by symmetry.
+/// Relative tolerance of table weights: rounding must not separate tables that are equal by symmetry.
 const ALIKE: f64 = 1e-9;
 
-/// How often something failed within a group and outside it.
+/// Failures and passes within a group and outside it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TwoByTwo {
     /// Failed within.
@@ -16,20 +16,19 @@ pub struct TwoByTwo {
     pub passed_out: u64,
 }
 
-/// What Fisher's exact test says of a table: probabilities of what was seen, or what is more extreme, if it fails as often within as
-/// outside.
+/// Results of Fisher's exact test: p-values under the hypothesis that the failure rates within and outside are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FisherTest {
-    /// At least so many failures within.
+    /// P-value of at least as many failures within.
     pub greater: f64,
-    /// At most so many failures within.
+    /// P-value of at most as many failures within.
     pub less: f64,
-    /// A table that is at most as probable as this one.
+    /// P-value of tables that are at most as probable as this one.
     pub two_sided: f64,
 }
 
 impl TwoByTwo {
-    /// Counts one more.
+    /// Counts one run.
     pub fn add(&mut self, within: bool, failed: bool) {
         *match (within, failed) {
             (true, true) => &mut self.failed_in,
@@ -39,18 +38,19 @@ impl TwoByTwo {
         } += 1;
     }
 
-    /// The exact test.
+    /// Performs the exact test.
     ///
-    /// Source: R. A. Fisher, "The logic of inductive inference", Journal of the Royal Statistical Society 98 (1935) 39–82. The
-    /// probabilities are summed from the most probable table outwards, each as a multiple of its neighbour, so that small ones
-    /// keep all their digits (one minus a sum of large ones would lose them); below 1e-300 they are 0.
+    /// Source: R. A. Fisher, "The logic of inductive inference", Journal of the Royal Statistical Society 98 (1935)
+    /// 39–82. The probabilities are summed from the most probable table outwards, each as a multiple of its neighbour,
+    /// so that small ones keep all their digits (one minus a sum of large ones would lose them). Values below 1e-300
+    /// become 0.
     pub fn fisher(&self) -> FisherTest {
         let within = self.failed_in + self.passed_in;
         let failed = self.failed_in + self.failed_out;
         let all = within + self.failed_out + self.passed_out;
         let (least, most) = ((within + failed).saturating_sub(all), within.min(failed));
         let mode = most_probable(within, failed, all).clamp(least, most);
-        // How much more probable one failure more within is.
+        // Ratio of the probability with one more failure within to the current one.
         let step = |inside: u64| {
             let [inside, within, failed, all] = [inside, within, failed, all].map(|count| count as f64);
             (within - inside) * (failed - inside) / ((inside + 1.0) * (all - within - failed + inside + 1.0))
@@ -78,13 +78,13 @@ impl TwoByTwo {
     }
 }
 
-/// The number of failures within that is most probable.
+/// Returns the most probable number of failures within.
 fn most_probable(within: u64, failed: u64, all: u64) -> u64 {
     let product = (u128::from(within) + 1) * (u128::from(failed) + 1);
     u64::try_from(product / (u128::from(all) + 2)).unwrap_or(u64::MAX)
 }
 
-/// Weights beside the mode, which has 1, outwards until they vanish.
+/// Returns the weights on one side of the mode, relative to the mode, until they underflow.
 fn outwards(ratios: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut weights = Vec::new();
     let mut weight = 1.0;

@@ -1,4 +1,4 @@
-//! Whether a campaign was a fair and sound test: what was discarded, tried twice, never tried, slow, or badly simulated.
+//! Health checks of a campaign: discarded scenes, duplicate runs, coverage gaps, slow runs and simulation artefacts.
 
 use std::collections::BTreeMap;
 
@@ -7,25 +7,25 @@ use crate::base::Digest;
 use crate::history::{OutcomeRow, RunVitals};
 use crate::verdict::Outcome;
 
-/// Scenes may be discarded in this share: up to a tenth is what a crowded table does, more skews what is tested.
+/// Maximum share of discarded scenes. A crowded table causes up to a tenth; a larger share biases the tested scenes.
 const MOST_DISCARDS: f64 = 0.1;
-/// A property is nearly always inapplicable from this share on.
+/// A property counts as nearly always inapplicable from this share on.
 const MOST_INAPPLICABLE: f64 = 0.9;
-/// Fewer judgements than this are no ground for "nearly always".
+/// Minimum number of judgements for "nearly always".
 const LEAST_JUDGED: u64 = 10;
-/// A run is out of the ordinary when it takes so many times the median: scenes of one campaign differ by a factor of 4.
+/// A run is an outlier if it takes this many times the median. Scenes of one campaign differ by a factor of 4,
 const SLOW_FACTOR: f64 = 10.0;
-/// … and so much longer. Unit: seconds. A busy machine delays a run by less.
+/// … and this much longer than the median. Unit: seconds. A busy machine delays a run by less.
 const SLOW_SECS: f64 = 10.0;
-/// Fewer runs than this have no ordinary time.
+/// Minimum number of runs for the detection of slow runs.
 const LEAST_TIMED: usize = 5;
-/// Things that push each other may go so deep into each other. Unit: metres. A grasp at 240 steps a second goes in by less
-/// than one millimetre; the walls of cups are 4 mm thick, and at 2 cm things are through each other.
+/// Maximum penetration depth of colliding objects. Unit: metres. A grasp at 240 steps a second penetrates by less than
+/// one millimetre; the walls of cups are 4 mm thick, and at 2 cm objects have passed through each other.
 const DEEPEST_M: f64 = 0.02;
-/// Energy that may come from nowhere. Unit: joules. It throws a full glass (0.3 kg) at more than 1 m/s.
+/// Maximum unphysical energy gain. Unit: joules. This is enough to throw a full glass (0.3 kg) at more than 1 m/s.
 const MOST_ENERGY_J: f64 = 0.2;
 
-/// Gathers what a campaign's runs show.
+/// Collects the vital data of a campaign's runs.
 #[derive(Debug, Clone, Default)]
 pub struct HealthMeter {
     coverage: Coverage,
@@ -33,7 +33,7 @@ pub struct HealthMeter {
     runs: u64,
     discards: u64,
     first_discard: Option<(u64, String)>,
-    /// Digest of all decisions and the first run that made them.
+    /// Digest of all choices, with the first run that made them.
     seen: BTreeMap<String, String>,
     duplicates: Vec<(String, String)>,
     wall: Vec<(f64, String)>,
@@ -41,16 +41,16 @@ pub struct HealthMeter {
     energy: Option<(f64, String)>,
 }
 
-/// How healthy a campaign is.
+/// Health of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Health {
-    /// Runs that are kept.
+    /// Number of runs kept.
     pub runs: u64,
-    /// Scenes that were discarded.
+    /// Number of discarded scenes.
     pub discards: u64,
-    /// What was tried of each parameter.
+    /// Coverage of each parameter.
     pub parameters: Vec<ParameterCoverage>,
-    /// What was tried of parameters two by two.
+    /// Coverage of pairs of parameters.
     pub pairs: Vec<PairCoverage>,
     /// Median of the runs' wall time. Unit: seconds.
     pub median_secs: Option<f64>,
@@ -58,35 +58,36 @@ pub struct Health {
     pub slowest: Option<(f64, String)>,
     /// The deepest penetration and its run. Unit: metres.
     pub deepest: Option<(f64, String)>,
-    /// The most energy that came from nowhere and its run. Unit: joules.
+    /// The largest unphysical energy gain and its run. Unit: joules.
     pub energy: Option<(f64, String)>,
-    /// What is wrong.
+    /// The problems found.
     pub ailments: Vec<Ailment>,
 }
 
-/// Something that makes a campaign say less than it seems to.
+/// A problem that weakens the conclusions of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ailment {
-    /// So many of the drawn scenes were discarded; the first one for this run (from 1), for this reason.
+    /// Too many scenes were discarded: number of discarded scenes, number of drawn scenes, run of the first discard
+    /// (from 1) and its reason.
     Discards(u64, u64, u64, String),
-    /// The property (IRI) was inapplicable in so many of so many judgements.
+    /// The property (IRI) was nearly always inapplicable: number of inapplicable judgements, number of judgements.
     Inapplicable(String, u64, u64),
-    /// A value or range of a parameter was hardly tried.
+    /// A value or range of a parameter was rarely tried.
     Neglected(ParameterCoverage),
-    /// Pairs of values of two parameters were hardly tried.
+    /// Pairs of values of two parameters were rarely tried.
     PairNeglected(PairCoverage),
-    /// So many runs repeat another one in every decision, such as this one that one.
+    /// Runs that repeat another run in every choice: their number, and an example with the run that it repeats.
     Duplicates(u64, String, String),
-    /// The run took so much longer than the median. Unit: seconds.
+    /// A slow run: its ID, its wall time and the median wall time. Unit: seconds.
     Slow(String, f64, f64),
-    /// In this run things went so deep into each other. Unit: metres.
+    /// Deep penetration in this run. Unit: metres.
     Penetration(String, f64),
-    /// In this run so much energy came from nowhere. Unit: joules.
+    /// Unphysical energy gain in this run. Unit: joules.
     Energy(String, f64),
 }
 
 impl HealthMeter {
-    /// Counts one run.
+    /// Adds one run.
     pub fn add(&mut self, run: &RunVitals) {
         self.runs += 1;
         self.discards += run.discards.len() as u64;
@@ -94,7 +95,7 @@ impl HealthMeter {
             self.first_discard = Some((run.index + 1, reason.clone()));
         }
         self.steered |= run.steered;
-        // A scene that is run again on purpose was tried once.
+        // Repetitions of a scene count once.
         if run.repetition == 0 {
             self.coverage.add(&run.choices);
         }
@@ -109,7 +110,7 @@ impl HealthMeter {
         larger(&mut self.energy, run.energy_gain_j, &run.run);
     }
 
-    /// What all of it comes to, with the outcomes of the same runs.
+    /// Returns the health of the added runs, given their outcomes.
     pub fn finish(mut self, outcomes: &[OutcomeRow]) -> Health {
         self.wall.sort_by(|a, b| a.0.total_cmp(&b.0));
         let median_secs = self.wall.get(self.wall.len() / 2).map(|(secs, _)| *secs);
@@ -146,7 +147,7 @@ impl HealthMeter {
         }
     }
 
-    /// Parameters that were hardly tried; a search means to lean.
+    /// Rarely tried parameters. A guided search is biased on purpose, so that it is exempt.
     fn neglected(&self, health: &Health) -> Vec<Ailment> {
         if self.steered {
             return Vec::new();
@@ -163,7 +164,7 @@ impl HealthMeter {
     }
 }
 
-/// Digest over a run's decisions.
+/// Computes the digest of a run's choices.
 fn digest(run: &RunVitals) -> String {
     let mut digest = Digest::new();
     for choice in &run.choices {
@@ -182,7 +183,7 @@ fn larger(largest: &mut Option<(f64, String)>, value: Option<f64>, run: &str) {
     }
 }
 
-/// Properties that were nearly always inapplicable, by IRI.
+/// Finds the properties that were nearly always inapplicable, sorted by IRI.
 fn inapplicable(outcomes: &[OutcomeRow]) -> Vec<Ailment> {
     let mut counts: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
     for row in outcomes {
@@ -250,7 +251,7 @@ mod tests {
     #[test]
     fn a_sound_campaign_has_no_ailment() {
         assert_eq!(ailments(|_| ()), []);
-        // Histories of older programs say nothing of simulation.
+        // Histories of older versions have no simulation data.
         assert_eq!(ailments(|run| (run.deepest_penetration_m, run.energy_gain_j) = (None, None)), []);
     }
 

@@ -1,9 +1,10 @@
-//! Several tests at once: probabilities that stay what they say when the smallest one is picked out.
+//! Holm's correction for multiple tests, which controls the family-wise error rate.
 
-/// Holm's adjusted probabilities, in the order given: if each of those at or below a level is called a finding, the chance of any false
-/// one among them is at most the level, however the tests depend on each other.
+/// Returns Holm's adjusted p-values, in the order given. If those at or below a level are called findings, the
+/// probability of any false finding is at most the level, regardless of dependences between the tests.
 ///
-/// Source: S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 6 (1979) 65–70.
+/// Source: S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 6
+/// (1979) 65–70.
 pub fn holm(probabilities: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..probabilities.len()).collect();
     order.sort_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]));
@@ -11,7 +12,7 @@ pub fn holm(probabilities: &[f64]) -> Vec<f64> {
     let mut largest = 0.0f64;
     for (rank, place) in order.into_iter().enumerate() {
         let left = (probabilities.len() - rank) as f64;
-        // None may be surer than one with a smaller probability.
+        // Adjusted p-values must not decrease.
         largest = largest.max(probabilities[place] * left).min(1.0);
         adjusted[place] = largest;
     }
@@ -22,7 +23,7 @@ pub fn holm(probabilities: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Worked by hand: 4 × 0.005, 3 × 0.01, 2 × 0.03, and 0.04, which may not be surer than 0.03.
+    /// Computed by hand: 4 × 0.005, 3 × 0.01, 2 × 0.03, and 0.04, which must not be adjusted below 0.03's value.
     #[test]
     fn the_smallest_is_multiplied_most() {
         let adjusted = holm(&[0.01, 0.04, 0.03, 0.005]);

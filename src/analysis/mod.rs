@@ -1,6 +1,6 @@
-//! History to tables and patterns: rates with intervals, the ways in which runs fail, and campaigns side by side.
+//! Analyses a history: tables, rates with confidence intervals, failure modes, patterns, and comparisons of campaigns.
 //!
-//! Never: judges, changes what a history keeps (tables lie beside it), or hands out a type of the table library.
+//! Never: judges, changes a history (its tables are stored beside it), or exposes a type of the table library.
 
 mod compare;
 mod consistency;
@@ -43,5 +43,5 @@ pub use tables::{
     export_parquet,
 };
 
-// Rates of outcomes and their intervals are part of a verdict; readers of tables meet them here.
+// Re-exported for readers of tables.
 pub use crate::verdict::{Interval, wilson, wilson_share};

@@ -1,25 +1,26 @@
-//! Which properties notice which faults: paired outcomes of the same scenes without and with each fault.
+//! Mutation testing of properties: which properties detect which faults, from paired outcomes of the same scenes
+//! without and with each fault.
 
 use std::collections::BTreeMap;
 
 use crate::analysis::PairedTable;
 use crate::verdict::Outcome;
 
-/// Level of the test by which a property notices a fault: of all pairs of a property and a fault that has nothing to do
-/// with it, at most one in a hundred is taken for noticing.
+/// Significance level at which a property notices a fault: of all pairs of a property and an unrelated fault, at most
+/// one in a hundred counts as noticed.
 pub const LEVEL: f64 = 0.01;
-/// Scenes that can show anything: with fewer that passed without the fault not even failing in all of them with it would
-/// be beyond chance (½⁷ < 0.01 < ½⁶).
+/// Minimum number of scenes that passed without the fault. With fewer, even failures in all of them would not be
+/// significant (½⁷ < 0.01 < ½⁶).
 const LEAST_SCENES: u64 = 7;
 
-/// One scene with one fault, or with none.
+/// A scene with one fault, or without a fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OracleTrial {
-    /// Which scene.
+    /// Index of the scene.
     pub index: u64,
-    /// Name of the fault; none: the scene as it is.
+    /// Name of the fault. `None` for the scene without a fault.
     pub fault: Option<String>,
-    /// Whether the fault came about.
+    /// Whether the fault occurred.
     pub came_about: bool,
     /// Outcome of each property, by IRI.
     pub outcomes: BTreeMap<String, Outcome>,
@@ -28,78 +29,78 @@ pub struct OracleTrial {
 /// Whether a property notices a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Notice {
-    /// It fails with the fault where it passed without, beyond chance.
+    /// It fails significantly more often with the fault than without it.
     Noticed,
-    /// It does not.
+    /// It does not fail significantly more often.
     Unnoticed,
-    /// Too few scenes to tell: the fault came about too seldom, or the property hardly ever passes without it.
+    /// Too few scenes: the fault occurred too rarely, or the property rarely passes without it.
     TooFew,
 }
 
-/// One property with one fault, over the scenes in which the fault came about.
+/// One property with one fault, over the scenes in which the fault occurred.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OracleCell {
     /// IRI of the property.
     pub property: String,
-    /// Scenes in which it passed with the fault.
+    /// Scenes in which the property passed with the fault.
     pub passed: u64,
-    /// Scenes in which it failed with the fault.
+    /// Scenes in which the property failed with the fault.
     pub failed: u64,
-    /// Scenes in which it did neither.
+    /// Scenes in which the property neither passed nor failed with the fault.
     pub other: u64,
     /// Scenes in which it passed without the fault and failed with it.
     pub newly_failed: u64,
     /// Scenes in which it failed without the fault and passed with it.
     pub newly_passed: u64,
-    /// Probability of so many new failures among what changed if the fault were nothing to the property (McNemar's exact
-    /// test, one-sided).
+    /// One-sided p-value of McNemar's exact test: the probability of so many new failures among the changed outcomes if
+    /// the fault had no effect on the property.
     pub p: f64,
-    /// What follows.
+    /// The conclusion.
     pub notice: Notice,
 }
 
-/// One fault.
+/// One fault with all properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OracleRow {
-    /// Its name.
+    /// Name of the fault.
     pub fault: String,
-    /// Scenes in which it came about and that were judged with it.
+    /// Scenes in which the fault occurred and that were judged with it.
     pub came_about: u64,
-    /// Scenes in which it was put in.
+    /// Scenes in which the fault was injected.
     pub scenes: u64,
-    /// Scenes in which it came about and no property failed: with this fault, the action passes.
+    /// Scenes in which the fault occurred and no property failed: the action passes despite the fault.
     pub passed_anyway: u64,
-    /// One for each property.
+    /// One cell for each property.
     pub cells: Vec<OracleCell>,
 }
 
-/// All faults and properties.
+/// The matrix of faults and properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OracleMatrix {
     /// Scenes that were judged without a fault.
     pub scenes: u64,
-    /// IRI of each property with how often it passed and failed without a fault.
+    /// IRI of each property, with its numbers of passed and failed scenes without a fault.
     pub properties: Vec<(String, u64, u64)>,
     /// One row for each fault.
     pub rows: Vec<OracleRow>,
 }
 
-/// Something that the tests of the oracles leave open.
+/// A gap in the fault detection of the properties.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum OracleGap {
     /// No property notices the fault.
     FaultUnnoticed(String),
     /// The property notices no fault.
     PropertyNoticesNothing(String),
-    /// The fault came about in so many scenes: too few to tell whether any property notices it.
+    /// The fault occurred in this many scenes, too few to decide whether any property notices it.
     FaultTooRare(String, u64),
-    /// The property passed in so many scenes without a fault: too few to tell whether it notices any.
+    /// The property passed in this many scenes without a fault, too few to decide whether it notices any.
     PropertyTooRare(String, u64),
-    /// The robot does nothing, and in so many scenes no property fails.
+    /// No property fails in this many scenes although the robot does nothing.
     NothingPasses(String, u64),
 }
 
-/// The matrix of the faults × the properties, both in the order given.
+/// Computes the matrix of faults × properties, both in the given order.
 pub fn oracle_matrix(faults: &[&str], properties: &[String], trials: &[OracleTrial]) -> OracleMatrix {
     let judged = |trial: &&OracleTrial| !trial.outcomes.is_empty();
     let sound: BTreeMap<u64, &OracleTrial> =
@@ -133,7 +134,7 @@ pub fn oracle_matrix(faults: &[&str], properties: &[String], trials: &[OracleTri
     }
 }
 
-/// One property over scenes without and with a fault.
+/// Compares a property over the same scenes without and with a fault.
 fn cell(property: &str, pairs: &[(&OracleTrial, &OracleTrial)]) -> OracleCell {
     let mut table = PairedTable::default();
     let (mut passed, mut failed) = (0, 0);
@@ -170,7 +171,8 @@ fn cell(property: &str, pairs: &[(&OracleTrial, &OracleTrial)]) -> OracleCell {
 }
 
 impl OracleMatrix {
-    /// What the tests leave open. `idle` is the name of the fault that does nothing at all, with which no action may pass.
+    /// Returns the gaps in fault detection. `idle` is the name of the fault with which the robot does nothing, so that
+    /// no action may pass.
     pub fn gaps(&self, idle: &str) -> Vec<OracleGap> {
         let mut gaps = Vec::new();
         for row in &self.rows {
@@ -200,7 +202,7 @@ impl OracleMatrix {
 mod tests {
     use super::*;
 
-    /// Scenes whose properties pass without a fault; with it, those named fail where the fault came about.
+    /// Scenes whose properties pass without the fault. With it, the named properties fail if the fault occurred.
     fn trials(fault: &str, scenes: u64, came_about: u64, fails: &[&str]) -> Vec<OracleTrial> {
         let outcomes = |failed: &[&str]| {
             ["a", "b"]

@@ -1,12 +1,12 @@
-//! Two rates over the same scenes: how far apart they are, how sure that is, and what chance alone would do.
+//! Compares two rates over the same scenes: difference, confidence interval and exact tests.
 
 use serde::Serialize;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// Quantile of the normal distribution that leaves 2.5 % above: intervals are of 95 %.
+/// The 97.5 % quantile of the normal distribution, for 95 % intervals.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// The scenes that two campaigns share, by what came of them in each.
+/// Counts of the scenes that two campaigns share, by their outcomes in each.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct PairedTable {
     /// Passed in both.
@@ -19,10 +19,10 @@ pub struct PairedTable {
     pub neither: u64,
 }
 
-/// The second rate less the first, with its 95 % confidence interval. All three lie in [-1, 1].
+/// The second rate minus the first, with its 95 % confidence interval. All three lie in [-1, 1].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Difference {
-    /// Positive: the second is better.
+    /// Positive if the second is better.
     pub value: f64,
     /// Lower end.
     pub low: f64,
@@ -30,14 +30,14 @@ pub struct Difference {
     pub high: f64,
 }
 
-/// Probabilities of so unequal a table, if which side fails where only one does were the toss of a coin.
+/// P-values under the hypothesis that in discordant scenes either side fails with probability ½.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PairedTest {
     /// McNemar's exact test, two-sided.
     pub two_sided: f64,
-    /// The same with half the weight for the table itself: less cautious, nearer to the level.
+    /// Mid-p value: the observed table has half its weight. Less conservative, closer to the nominal level.
     pub mid_p: f64,
-    /// One-sided: the second is worse.
+    /// One-sided p-value of "the second is worse".
     pub second_worse: f64,
 }
 
@@ -52,50 +52,52 @@ impl PairedTable {
         } += 1;
     }
 
-    /// All scenes.
+    /// Returns the number of scenes.
     pub fn pairs(self) -> u64 {
         self.both + self.only_first + self.only_second + self.neither
     }
 
-    /// How many passed in the first, and in the second.
+    /// Returns the number of scenes passed in the first and in the second.
     pub fn passed(self) -> [u64; 2] {
         [self.both + self.only_first, self.both + self.only_second]
     }
 
-    /// The difference of the rates; nothing where there is no scene.
+    /// Computes the difference of the rates, or returns `None` without scenes.
     ///
-    /// The interval is Tango's score interval, which keeps its coverage for few scenes and for tables with zeros. Source: T. Tango,
-    /// "Equivalence test and confidence interval for the difference in proportions for the paired-sample design", Statistics in
-    /// Medicine 17 (1998) 891–908.
+    /// The interval is Tango's score interval, which keeps its coverage for few scenes and for tables with zeros.
+    /// Source: T. Tango, "Equivalence test and confidence interval for the difference in proportions for the
+    /// paired-sample design", Statistics in Medicine 17 (1998) 891–908.
     pub fn difference(self) -> Option<Difference> {
         if self.pairs() == 0 {
             return None;
         }
         let value = (self.only_second as f64 - self.only_first as f64) / self.pairs() as f64;
-        // The score falls as the supposed difference grows, and is 0 at the one observed.
+        // The score decreases with the hypothetical difference, and is 0 at the observed one.
         let low = if value == -1.0 { -1.0 } else { crossing(-1.0, value, |supposed| self.score(supposed) > Z) };
         let high = if value == 1.0 { 1.0 } else { crossing(value, 1.0, |supposed| self.score(supposed) > -Z) };
         Some(Difference { value, low, high })
     }
 
-    /// How many standard errors the observed difference lies above a supposed one, which lies within (-1, 1).
+    /// Returns the distance of the observed difference above a hypothetical one in (-1, 1), in standard errors.
     fn score(self, supposed: f64) -> f64 {
         let (n, up, down) = (self.pairs() as f64, self.only_second as f64, self.only_first as f64);
-        // The likeliest share of scenes that only the first passes, given the supposed difference: a root of ax² + bx + c.
+        // Maximum likelihood estimate of the share of scenes that only the first passes, given the hypothetical
+        // difference: a root of ax² + bx + c.
         let a = 2.0 * n;
         let b = -up - down + (2.0 * n - up + down) * supposed;
         let c = -down * supposed * (1.0 - supposed);
         let share = (libm::sqrt((b * b - 4.0 * a * c).max(0.0)) - b) / (2.0 * a);
         let variance = n * (2.0 * share + supposed * (1.0 - supposed));
         let distance = up - down - n * supposed;
-        // Without a spread any distance is too far.
+        // Without variance, any difference is infinitely significant.
         if distance == 0.0 { 0.0 } else { distance / libm::sqrt(variance.max(f64::MIN_POSITIVE)) }
     }
 
-    /// McNemar's test, exact: which of the scenes that differ went which way is a toss of a coin where neither side is better.
+    /// Performs McNemar's exact test: if neither side is better, either direction of a discordant scene has probability
+    /// ½.
     ///
-    /// Source: Q. McNemar, Psychometrika 12 (1947) 153–157; its exact form and the mid-p value as in Fagerland, Lydersen and
-    /// Laake, BMC Medical Research Methodology 13 (2013) 91.
+    /// Source: Q. McNemar, Psychometrika 12 (1947) 153–157; its exact form and the mid-p value as in Fagerland,
+    /// Lydersen and Laake, BMC Medical Research Methodology 13 (2013) 91.
     pub fn test(self) -> PairedTest {
         let differing = self.only_first + self.only_second;
         let Ok(coins) = Binomial::new(0.5, differing) else {
@@ -105,7 +107,7 @@ impl PairedTable {
         let below = |count: u64| count.checked_sub(1).map_or(0.0, at_most);
         let fewer = self.only_first.min(self.only_second);
         let here = at_most(fewer) - below(fewer);
-        // At least `only_first` of the coins: by symmetry as probable as at most `only_second`.
+        // "At least `only_first` discordant scenes" is by symmetry as probable as "at most `only_second`".
         PairedTest {
             two_sided: (2.0 * at_most(fewer)).min(1.0),
             mid_p: (2.0 * at_most(fewer) - here).min(1.0),
@@ -114,10 +116,10 @@ impl PairedTable {
     }
 }
 
-/// Where a condition that holds at `from` stops to hold on the way to `to`.
+/// Finds by bisection the point between `from` and `to` at which a condition stops holding.
 fn crossing(from: f64, to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut holding, mut failing) = (from, to);
-    // 60 halvings of at most 2 leave less than the last bit.
+    // 60 halvings of an interval of at most 2 leave less than the last bit.
     for _ in 0..60 {
         let middle = 0.5 * (holding + failing);
         if holds(middle) { holding = middle } else { failing = middle }
@@ -134,8 +136,9 @@ mod tests {
     }
 
     /// The examples of Fagerland, Lydersen and Laake, "Recommended tests and confidence intervals for paired binomial
-    /// proportions", Statistics in Medicine 33 (2014) 2850–2875: airway hyper-responsiveness (Bentur et al. 2009) and complete
-    /// response (Cavo et al. 2012). Their difference is the first rate less the second, ours the second less the first.
+    /// proportions", Statistics in Medicine 33 (2014) 2850–2875: airway hyper-responsiveness (Bentur et al. 2009) and
+    /// complete response (Cavo et al. 2012). Their difference is the first rate minus the second, ours the second minus
+    /// the first.
     #[test]
     fn published_examples_come_out() {
         for (table, low, high, exact, mid_p) in
@@ -150,7 +153,7 @@ mod tests {
         }
     }
 
-    /// Against sums of binomial coefficients in whole numbers.
+    /// Compares with sums of integer binomial coefficients.
     #[test]
     fn the_exact_test_is_exact() {
         for differing in 0..=40u64 {

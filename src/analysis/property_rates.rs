@@ -1,4 +1,4 @@
-//! How often each property holds.
+//! Pass rates of properties.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ pub struct PropertyRate {
     pub property: String,
     /// Counts in the order of [`Outcome::ALL`].
     pub counts: [u64; 6],
-    /// Share of passed among passed and failed; nothing where neither occurred.
+    /// Share of passed among passed and failed. `None` if neither occurred.
     pub passed: Option<Interval>,
 }
 
-/// Counts and rates of every property, by action, then property.
+/// Returns the counts and rates of every property, sorted by action, then property.
 pub fn property_rates(rows: &[OutcomeRow]) -> Vec<PropertyRate> {
     let mut counts: BTreeMap<(&str, &str), [u64; 6]> = BTreeMap::new();
     for row in rows {

@@ -1,10 +1,11 @@
-//! How sure a mean of scores is.
+//! Confidence interval of a mean score.
 
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use crate::analysis::Interval;
 
-/// The mean of scores with Student's 95 % interval, cut at 0 and 1; nothing for fewer than two scores.
+/// Returns the mean of the finite scores with Student's 95 % interval, clamped to [0, 1], or `None` for fewer than two
+/// scores.
 pub fn score_interval(scores: impl IntoIterator<Item = f64>) -> Option<Interval> {
     let scores: Vec<f64> = scores.into_iter().filter(|score| score.is_finite()).collect();
     let count = scores.len() as f64;
@@ -19,7 +20,7 @@ pub fn score_interval(scores: impl IntoIterator<Item = f64>) -> Option<Interval>
 mod tests {
     use super::*;
 
-    /// As `scipy.stats.t.interval` gives it.
+    /// Reference values from `scipy.stats.t.interval`.
     #[test]
     fn four_scores_have_the_interval_of_the_tables() {
         let found = score_interval([0.1, 0.2, 0.3, 0.4, f64::NAN]).expect("there are four");

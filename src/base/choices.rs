@@ -1,4 +1,4 @@
-//! Randomness as a recorded list of named choices: a run is a function of it.
+//! Randomness as a recorded list of named choices. A run is a function of this list.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -6,49 +6,49 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-/// Noise beyond so many standard deviations (one value in 16,000) is brought back to them.
+/// Noise is clamped to this many standard deviations (affects one value in 16,000).
 const FARTHEST: f64 = 4.0;
 
-/// What was chosen from.
+/// The distribution of a choice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ChoiceKind {
-    /// One of `of` things, counted from 0. The value is a whole number; nominal is 0.
+    /// An index from 0 to `of` - 1. The nominal value is 0.
     Index {
-        /// How many there were.
+        /// Number of options.
         of: usize,
     },
-    /// Uniform between two bounds, both included.
+    /// Uniform between two inclusive bounds.
     Real {
         /// Smallest value.
         low: f64,
         /// Largest value.
         high: f64,
-        /// The value that stands for "nothing special".
+        /// Default value.
         nominal: f64,
     },
-    /// Normally distributed about 0; nominal is 0.
+    /// Normal with mean 0. The nominal value is 0.
     Normal {
         /// Standard deviation.
         sigma: f64,
     },
 }
 
-/// One recorded decision.
+/// A recorded choice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Choice {
-    /// Path-like name, such as `target.yaw`. Names may repeat: then the order counts.
+    /// Path-like name, such as `target.yaw`. Names may repeat; repeated choices are matched in order.
     pub name: String,
-    /// What was chosen from.
+    /// The distribution.
     pub kind: ChoiceKind,
-    /// What was chosen, in the unit of whoever asked.
+    /// The chosen value, in the caller's unit.
     pub value: f64,
 }
 
-/// Where decisions come from, and the record of those made.
+/// The source of choices, and the record of those made.
 #[derive(Debug, Clone)]
 pub struct Choices {
     origin: Origin,
-    /// What noise is drawn from, once it begins; without one, everything is drawn from the same.
+    /// Generator that takes over at [`Choices::begin_noise`]. If `None`, the scene's generator continues.
     noise: Option<Box<ChaCha8Rng>>,
     made: Vec<Choice>,
 }
@@ -56,19 +56,19 @@ pub struct Choices {
 #[derive(Debug, Clone)]
 enum Origin {
     Random(Box<ChaCha8Rng>),
-    /// Values by name, in order; for a name that is not there (any more), what `rest` says.
+    /// Values by name, in order. `rest` decides the choices that the record lacks.
     Recorded {
         values: BTreeMap<String, VecDeque<f64>>,
         rest: Rest,
     },
-    /// Quantiles by name, each for the first decision of that name; everything else is drawn.
+    /// Quantiles by name, each for the first choice of that name. All other choices are drawn.
     Steered {
         quantiles: BTreeMap<String, f64>,
         generator: Box<ChaCha8Rng>,
     },
 }
 
-/// What becomes of a decision that a record lacks.
+/// How to make a choice that the record lacks.
 #[derive(Debug, Clone)]
 enum Rest {
     Nominal,
@@ -76,7 +76,7 @@ enum Rest {
 }
 
 impl ChoiceKind {
-    /// The value that stands for "nothing special".
+    /// Returns the default value.
     pub fn nominal(&self) -> f64 {
         match self {
             Self::Index { .. } | Self::Normal { .. } => 0.0,
@@ -86,30 +86,30 @@ impl ChoiceKind {
 }
 
 impl Choices {
-    /// Fresh decisions: the same seed and index give the same ones, on every machine.
+    /// Draws every choice. The same seed and index give the same choices on every machine.
     pub fn random(seed: u64, index: u64) -> Self {
         Self::of(Origin::Random(generator(seed, index)))
     }
 
-    /// The decisions of a record, by name. What the record lacks gets its nominal value.
+    /// Replays a record by name. Choices that the record lacks get their nominal value.
     pub fn recorded(record: &[Choice]) -> Self {
         Self::of(Origin::Recorded { values: by_name(record), rest: Rest::Nominal })
     }
 
-    /// Decisions by name, in order where a name repeats. What is not there gets its nominal value.
+    /// Replays values by name, in order if a name repeats. Missing choices get their nominal value.
     pub fn named(values: &BTreeMap<String, Vec<f64>>) -> Self {
         let values = values.iter().map(|(name, values)| (name.clone(), values.iter().copied().collect())).collect();
         Self { origin: Origin::Recorded { values, rest: Rest::Nominal }, noise: None, made: Vec::new() }
     }
 
-    /// The decisions of a record, by name; what it lacks is drawn, as [`Choices::random`] does.
+    /// Replays a record by name. Choices that it lacks are drawn as by [`Choices::random`].
     pub fn partly_recorded(record: &[Choice], seed: u64, index: u64) -> Self {
         let rest = Rest::Random(generator(seed, index));
         Self::of(Origin::Recorded { values: by_name(record), rest })
     }
 
-    /// Fresh decisions, but for the names of `quantiles`: the first decision of such a name is the value below which
-    /// this share of its distribution lies. Shape: each from 0 to 1; uniform ones give the nominal distribution.
+    /// Draws every choice, except that the first choice of each name in `quantiles` is that quantile of its
+    /// distribution. Quantiles range from 0 to 1; uniform quantiles give the nominal distribution.
     pub fn steered(quantiles: &BTreeMap<String, f64>, seed: u64, index: u64) -> Self {
         Self::of(Origin::Steered { quantiles: quantiles.clone(), generator: generator(seed, index) })
     }
@@ -118,13 +118,13 @@ impl Choices {
         Self { origin, noise: None, made: Vec::new() }
     }
 
-    /// Lets what is drawn after [`Choices::begin_noise`] come from a stream of its own, so that the same scene can be
-    /// run with different noise.
+    /// Draws the choices after [`Choices::begin_noise`] from a separate stream, so that the same scene can be run with
+    /// different noise.
     pub fn with_noise(self, seed: u64, index: u64) -> Self {
         Self { noise: Some(generator(seed, index)), ..self }
     }
 
-    /// From here on decisions are noise: the scene is complete.
+    /// Marks the scene as complete. All further choices are noise.
     pub fn begin_noise(&mut self) {
         let Some(noise) = self.noise.take() else { return };
         match &mut self.origin {
@@ -135,11 +135,11 @@ impl Choices {
         }
     }
 
-    /// One of `of` things, counted from 0. `of` must not be 0.
+    /// Chooses an index from 0 to `of` - 1. `of` must not be 0.
     pub fn index(&mut self, name: &str, of: usize) -> usize {
-        debug_assert!(of > 0, "a choice needs something to choose from");
+        debug_assert!(of > 0, "the number of options must not be 0");
         let last = of.saturating_sub(1);
-        // 53 random bits over a handful of things: the bias is under 1e-13.
+        // 53 random bits over a handful of options: the bias is under 1e-13.
         let at = |share: f64| ((share * of as f64) as usize).min(last) as f64;
         let value = self.decide(name, 0.0, at, |generator| at(unit(generator)));
         let value = (value.max(0.0) as usize).min(last);
@@ -147,7 +147,7 @@ impl Choices {
         value
     }
 
-    /// A number between two bounds, both included; `nominal` is clamped to them.
+    /// Chooses a number between two inclusive bounds. `nominal` is clamped to them.
     pub fn real(&mut self, name: &str, low: f64, high: f64, nominal: f64) -> f64 {
         let nominal = nominal.clamp(low, high);
         let at = |share: f64| low + (high - low) * share;
@@ -156,11 +156,12 @@ impl Choices {
         value
     }
 
-    /// Normally distributed noise about 0 with the given standard deviation, at most 4 of them away.
+    /// Chooses normally distributed noise with mean 0 and the given standard deviation, clamped to 4 standard
+    /// deviations.
     pub fn normal(&mut self, name: &str, sigma: f64) -> f64 {
         let at = |share: f64| normal_quantile(share) * sigma;
         let value = self.decide(name, 0.0, at, |generator| {
-            // Box–Muller, from libm so that every machine gets the same bits.
+            // Box–Muller with libm, so that every machine gets the same bits.
             let radius = libm::sqrt(-2.0 * libm::log(1.0 - unit(generator)));
             let angle = std::f64::consts::TAU * unit(generator);
             (radius * libm::cos(angle)).clamp(-FARTHEST, FARTHEST) * sigma
@@ -169,9 +170,10 @@ impl Choices {
         value
     }
 
-    /// A decision that chance never makes: one of `of` things, 0 unless a record says otherwise, and recorded only then.
+    /// Makes a choice that is never random: an index below `of`, taken from the record, or 0 if the record lacks it.
+    /// Only a nonzero value is recorded.
     ///
-    /// It lets a record ask for less than its configuration does.
+    /// This lets a record ask for less than its configuration does.
     pub fn exception(&mut self, name: &str, of: usize) -> usize {
         let asked = match &mut self.origin {
             Origin::Recorded { values, .. } => values.get_mut(name).and_then(VecDeque::pop_front).unwrap_or(0.0),
@@ -184,17 +186,17 @@ impl Choices {
         value
     }
 
-    /// What has been decided so far, in order.
+    /// The choices made so far, in order.
     pub fn made(&self) -> &[Choice] {
         &self.made
     }
 
-    /// The record, for keeping.
+    /// Consumes the source and returns the choices made.
     pub fn into_made(self) -> Vec<Choice> {
         self.made
     }
 
-    /// A decision: recorded, at a given quantile (by `at`), or drawn.
+    /// Makes a choice: from the record, at a given quantile (by `at`), or drawn.
     fn decide(
         &mut self,
         name: &str,
@@ -235,11 +237,11 @@ fn by_name(record: &[Choice]) -> BTreeMap<String, VecDeque<f64>> {
     by_name
 }
 
-/// The standard normal value below which a share of the distribution lies, at most [`FARTHEST`] away from 0.
+/// Quantile function of the standard normal distribution, clamped to ±[`FARTHEST`].
 fn normal_quantile(share: f64) -> f64 {
     let below = |value: f64| 0.5 * libm::erfc(-value / std::f64::consts::SQRT_2);
     let (mut low, mut high) = (-FARTHEST, FARTHEST);
-    // Bisection: 60 halvings of 8 leave less than the last bit.
+    // Bisection: 60 halvings of an interval of width 8 leave less than the last bit.
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if below(middle) < share { low = middle } else { high = middle }
@@ -247,7 +249,7 @@ fn normal_quantile(share: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// A number in [0, 1) from 53 random bits.
+/// Draws a number in [0, 1) from 53 random bits.
 fn unit(generator: &mut ChaCha8Rng) -> f64 {
     (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
@@ -319,7 +321,7 @@ mod tests {
         let again = drawn(Choices::random(7, 3).with_noise(7, 101));
         assert_eq!(again.0, first.0);
         assert_ne!(again.1, first.1);
-        // Noise depends on its own stream alone.
+        // Noise depends only on its own stream.
         assert_eq!(drawn(Choices::random(7, 4).with_noise(7, 100)).1, first.1);
         assert_eq!(drawn(Choices::random(7, 3)).0, first.0);
     }

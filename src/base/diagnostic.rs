@@ -1,41 +1,41 @@
-//! Faults that a user can cause: a code, the place, and the way out.
+//! Diagnostics of the user's input: a code, a message, the place, and a help text.
 
 use std::fmt;
 
 use crate::base::{Source, Span};
 
-/// How bad a diagnostic is.
+/// Severity of a diagnostic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// The work goes on.
+    /// The command continues.
     Warning,
-    /// The input is refused.
+    /// The input is rejected.
     Error,
 }
 
-/// One fault: what is wrong, where, and what to do about it.
+/// A diagnostic: the problem, its place and the remedy.
 ///
 /// Messages are lower-case sentences without a full stop. Codes are stable: a letter for the
 /// stage (`C` config, `O` ontology, `S` scenario, `W` world and models, `R` rules, `H` history,
-/// `X` command line) and three digits.
+/// `A` analysis, `X` command line) and three digits.
 #[derive(Debug, Clone)]
 pub struct Diagnostic {
     /// Stable code, such as `C003`.
     pub code: &'static str,
-    /// Whether the input is refused.
+    /// Whether the input is rejected.
     pub severity: Severity,
-    /// What is wrong.
+    /// The problem.
     pub message: String,
-    /// The text that is wrong, where there is one.
+    /// The text with the problem, if any.
     pub source: Option<Source>,
     /// The place in `source`.
     pub span: Option<Span>,
-    /// What to do.
+    /// The remedy.
     pub help: Option<String>,
 }
 
 impl Diagnostic {
-    /// An error without a place.
+    /// Creates an error without a place.
     pub fn error(code: &'static str, message: impl Into<String>) -> Self {
         Self {
             code,
@@ -47,12 +47,12 @@ impl Diagnostic {
         }
     }
 
-    /// A warning without a place.
+    /// Creates a warning without a place.
     pub fn warning(code: &'static str, message: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, ..Self::error(code, message) }
     }
 
-    /// The same fault, at a place in a text.
+    /// Adds a place in a text.
     #[must_use]
     pub fn at(mut self, source: &Source, span: Span) -> Self {
         self.source = Some(source.clone());
@@ -60,21 +60,21 @@ impl Diagnostic {
         self
     }
 
-    /// The same fault, in a file of which no place is known.
+    /// Adds a file, if the place in it is unknown.
     #[must_use]
     pub fn in_source(mut self, source: &Source) -> Self {
         self.source = Some(source.clone());
         self
     }
 
-    /// The same fault, with the way out.
+    /// Adds a help text.
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// `file:line:column`, or the file alone, or nothing.
+    /// Returns `file:line:column`, or only the file if the span is unknown, or `None` without a file.
     pub fn place(&self) -> Option<String> {
         let source = self.source.as_ref()?;
         Some(match &self.span {
@@ -95,7 +95,7 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// A message may quote a name of megabytes: nobody reads beyond its beginning.
+/// Truncates a message, because it may quote a name of several megabytes.
 fn readable(mut message: String) -> String {
     if let Some((end, _)) = message.char_indices().nth(LONGEST_MESSAGE) {
         message.truncate(end);
@@ -104,9 +104,9 @@ fn readable(mut message: String) -> String {
     message
 }
 
-/// Unit: characters. A contradiction's proof or a cycle of rules takes a few thousand.
+/// Longest message. Unit: characters. A contradiction's proof or a cycle of rules takes a few thousand.
 const LONGEST_MESSAGE: usize = 20_000;
-/// So much of a text is shown on each side of a place, and of the place itself. Unit: bytes.
+/// Longest part of a text shown before a span, in it, and after it. Unit: bytes.
 const MOST_SHOWN: usize = 300;
 
 impl miette::Diagnostic for Diagnostic {
@@ -126,7 +126,7 @@ impl miette::Diagnostic for Diagnostic {
     }
 
     fn source_code(&self) -> Option<&dyn miette::SourceCode> {
-        // Without a span there is nothing to point at; the file is then named in the message.
+        // Without a span there is nothing to underline; the message names the file instead.
         self.span.as_ref()?;
         self.source.as_ref().map(|source| source as &dyn miette::SourceCode)
     }
@@ -149,7 +149,7 @@ impl miette::SourceCode for Source {
         let whole = contents.span().offset()..contents.span().offset() + contents.data().len();
         let (mut shown, mut line, mut column) = (whole.clone(), contents.line(), contents.column());
         if whole.len() > 3 * MOST_SHOWN {
-            // A line of megabytes would take minutes to draw: only what is around the place is shown.
+            // A line of several megabytes takes minutes to draw: show only the surroundings of the span.
             shown.start = self.boundary(span.offset().saturating_sub(MOST_SHOWN)).max(whole.start);
             shown.end = self.boundary(span.offset() + span.len() + MOST_SHOWN).min(whole.end);
             let cut = &self.text[whole.start..shown.start];
@@ -167,49 +167,49 @@ impl miette::SourceCode for Source {
     }
 }
 
-/// All faults of one or more inputs, in the order in which they were found.
+/// The diagnostics of one or more inputs, in the order in which they were found.
 #[derive(Debug, Clone, Default)]
 pub struct Diagnostics {
     found: Vec<Diagnostic>,
 }
 
 impl Diagnostics {
-    /// No faults yet.
+    /// Creates an empty collection.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds one fault.
+    /// Adds a diagnostic.
     pub fn push(&mut self, diagnostic: Diagnostic) {
         self.found.push(diagnostic);
     }
 
-    /// Adds all faults of another collection.
+    /// Adds all diagnostics of another collection.
     pub fn extend(&mut self, other: Diagnostics) {
         self.found.extend(other.found);
     }
 
-    /// Whether anything is refused.
+    /// Whether any diagnostic is an error.
     pub fn has_errors(&self) -> bool {
         self.found.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// Whether nothing was found at all.
+    /// Whether the collection is empty.
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
 
-    /// How many were found.
+    /// Number of diagnostics.
     pub fn len(&self) -> usize {
         self.found.len()
     }
 
-    /// The faults in order.
+    /// Iterates over the diagnostics in order.
     pub fn iter(&self) -> std::slice::Iter<'_, Diagnostic> {
         self.found.iter()
     }
 
-    /// `value` where nothing was refused, otherwise the faults. Warnings are dropped with `Ok`.
+    /// Returns `Ok(value)` if there are no errors, otherwise `Err` with all diagnostics. `Ok` drops warnings.
     pub fn or<T>(self, value: T) -> Result<T, Diagnostics> {
         if self.has_errors() { Err(self) } else { Ok(value) }
     }

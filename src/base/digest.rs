@@ -1,11 +1,12 @@
-//! Content hashes: what came from where, and whether two traces are the same.
+//! Content hashes, for provenance and for the comparison of traces.
 
 use sha2::{Digest as _, Sha256};
 
-/// Digest of the sources that this program was built from, what it depends on included.
+/// Digest of the sources that this program was built from, including its dependencies.
 pub const PROGRAM_DIGEST: &str = env!("ACTCHECK_SOURCES_DIGEST");
 
-/// A running SHA-256 over parts that can't run into each other (each is preceded by its length).
+/// An incremental SHA-256 over parts. Each part is preceded by its length, so that different splits give different
+/// digests.
 #[derive(Debug, Clone, Default)]
 pub struct Digest(Sha256);
 
@@ -21,7 +22,7 @@ impl Digest {
         self.0.update(part);
     }
 
-    /// Adds numbers by their bits, so that only the same bits give the same digest.
+    /// Adds numbers by their bits: only identical bits give the same digest.
     pub fn update_bits(&mut self, values: &[f32]) {
         self.0.update((values.len() as u64).to_le_bytes());
         for value in values {
@@ -29,13 +30,13 @@ impl Digest {
         }
     }
 
-    /// The first 128 bits in hexadecimal: enough to tell things apart, short enough to read.
+    /// Returns the first 128 bits in hexadecimal.
     pub fn finish(self) -> String {
         self.0.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
     }
 }
 
-/// Digest of one text.
+/// Returns the digest of one text.
 pub fn digest_of(text: &str) -> String {
     let mut digest = Digest::new();
     digest.update(text.as_bytes());

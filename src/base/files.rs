@@ -1,10 +1,11 @@
-//! Files of a project: a folder on disk, or the copy of this repository's that the binary carries.
+//! Files of a project: on disk, or embedded in the binary.
 
 use std::path::{Component, Path, PathBuf};
 
 use crate::base::Source;
 
-/// One carried folder each: taking the whole checkout and leaving out the rest would walk through a target folder.
+/// One struct for each embedded folder: embedding the whole checkout with exclusions would walk through the target
+/// folder.
 #[derive(rust_embed::RustEmbed)]
 #[folder = "ontology/"]
 #[prefix = "ontology/"]
@@ -24,10 +25,10 @@ fn carried(key: &str) -> Option<rust_embed::EmbeddedFile> {
     Ontology::get(key).or_else(|| Rules::get(key)).or_else(|| Models::get(key))
 }
 
-/// A place that files are read from, by path.
+/// A source of files, by path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Files {
-    /// What the binary carries: `ontology/`, `rules/` and `models/` as they were when it was built.
+    /// The files embedded in the binary: `ontology/`, `rules/` and `models/` at build time.
     Shipped,
     /// The file system; paths are as the user gave them.
     Disk,
@@ -37,21 +38,21 @@ impl Files {
     /// Reads a file's bytes.
     ///
     /// # Errors
-    /// As [`Files::read`], but for what is no text.
+    /// As [`Files::read`], except that the file need not be UTF-8.
     pub fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, String> {
         match self {
             Self::Shipped => {
-                let file = carried(&slashed(&normalised(path))).ok_or("the program carries no such file")?;
+                let file = carried(&slashed(&normalised(path))).ok_or("no built-in file has this path")?;
                 Ok(file.data.into_owned())
             }
             Self::Disk => std::fs::read(path).map_err(|error| describe(&error)),
         }
     }
 
-    /// Reads a text. The source's name is the path, with `built-in:` before it where it was carried.
+    /// Reads a text. The source's name is the path, prefixed with `built-in:` for embedded files.
     ///
     /// # Errors
-    /// A lower-case sentence that says why it can't be read (it does not repeat the path).
+    /// Returns the reason as a lower-case sentence without the path.
     pub fn read(&self, path: &Path) -> Result<Source, String> {
         let name = match self {
             Self::Shipped => format!("built-in:{}", slashed(&normalised(path))),
@@ -61,7 +62,7 @@ impl Files {
         Ok(Source::new(name, text))
     }
 
-    /// Paths of the files directly in a folder, sorted; none where there is no such folder.
+    /// Returns the paths of the files directly in a folder, sorted; empty if the folder does not exist.
     pub fn list(&self, folder: &Path) -> Vec<PathBuf> {
         let mut paths: Vec<PathBuf> = match self {
             Self::Shipped => {
@@ -85,7 +86,7 @@ impl Files {
         paths
     }
 
-    /// Paths of all shipped files in a folder and the folders in it, sorted.
+    /// Returns the paths of all shipped files in a folder and its subfolders, sorted.
     pub fn all_shipped(folder: &Path) -> Vec<PathBuf> {
         let files = Ontology::iter().chain(Rules::iter()).chain(Models::iter());
         let mut paths: Vec<PathBuf> =
@@ -94,7 +95,7 @@ impl Files {
         paths
     }
 
-    /// Paths of the folders directly in a folder, sorted; none where there is no such folder.
+    /// Returns the paths of the direct subfolders of a folder, sorted; empty if the folder does not exist.
     pub fn folders(&self, folder: &Path) -> Vec<PathBuf> {
         let mut paths: Vec<PathBuf> = match self {
             Self::Shipped => {
@@ -121,7 +122,7 @@ impl Files {
     }
 }
 
-/// A path with `.` and `..` taken out, where that is possible without looking at the disk.
+/// Removes `.` and `..` from a path as far as possible without reading the disk.
 fn normalised(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {

@@ -1,9 +1,9 @@
-//! Poses as plain data, and the few conversions that more than one stage needs.
+//! Poses as plain data, and the conversions that more than one stage needs.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Position and orientation of a body. Frame: world unless the name that holds it says otherwise.
+/// Position and orientation of a body. Frame: world, unless the field's name states another.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Unit: metres. Shape: x, y, z; z is up.
@@ -13,28 +13,28 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The origin, not turned.
+    /// The origin without rotation.
     pub const IDENTITY: Self = Self { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] };
 
-    /// An upright pose. Units: metres, radians about the vertical.
+    /// Returns an upright pose. Units: metres, radians about the vertical.
     pub fn upright(position: [f64; 3], yaw: f64) -> Self {
         let (sin, cos) = (libm::sin(yaw / 2.0), libm::cos(yaw / 2.0));
         Self { position, rotation: [0.0, 0.0, sin, cos] }
     }
 
-    /// Heading: angle of the pose's x axis about the vertical. Unit: radians in (−π, π].
+    /// Returns the heading: the angle of the pose's x axis about the vertical. Unit: radians in (−π, π].
     pub fn yaw(&self) -> f64 {
         let [x, y, z, w] = self.rotation;
         libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     }
 
-    /// Angle between the pose's z axis and the vertical. Unit: radians in [0, π].
+    /// Returns the angle between the pose's z axis and the vertical. Unit: radians in [0, π].
     pub fn tilt(&self) -> f64 {
         let [x, y, _, _] = self.rotation;
         libm::acos((1.0 - 2.0 * (x * x + y * y)).clamp(-1.0, 1.0))
     }
 
-    /// The same pose as nalgebra's transform.
+    /// Converts the pose to a nalgebra transform.
     pub fn to_isometry(&self) -> Isometry3<f64> {
         let [x, y, z, w] = self.rotation;
         Isometry3::from_parts(
@@ -43,7 +43,7 @@ impl Pose {
         )
     }
 
-    /// The pose of a nalgebra transform.
+    /// Converts a nalgebra transform to a pose.
     pub fn from_isometry(isometry: &Isometry3<f64>) -> Self {
         let q = isometry.rotation.quaternion();
         Self { position: isometry.translation.vector.into(), rotation: [q.i, q.j, q.k, q.w] }

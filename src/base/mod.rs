@@ -1,6 +1,6 @@
-//! What every stage speaks: sources and diagnostics, terms, poses, recorded choices, random streams, shipped files.
+//! Types shared by all stages: sources and diagnostics, terms, poses, recorded choices, random streams, shipped files.
 //!
-//! Never: reads a configuration, knows an action, a rule or a robot, or prints.
+//! Never: reads a configuration, depends on actions, rules or robots, or prints.
 
 mod choices;
 mod diagnostic;

@@ -1,4 +1,4 @@
-//! Namespaces and the terms of them that the program itself speaks of.
+//! Namespaces, and functions that build and shorten IRIs.
 
 /// The paper's namespace: actions, properties, designators.
 pub const ACT: &str = "http://actions#";
@@ -23,7 +23,7 @@ pub const EARL: &str = "http://www.w3.org/ns/earl#";
 /// Provenance.
 pub const PROV: &str = "http://www.w3.org/ns/prov#";
 
-/// Prefixes that every shipped query and message may use, longest namespace first where one begins another.
+/// Prefixes that shipped queries and messages may use. A namespace precedes its own prefixes.
 pub const PREFIXES: [(&str, &str); 11] = [
     ("act", ACT),
     ("w", W),
@@ -38,27 +38,27 @@ pub const PREFIXES: [(&str, &str); 11] = [
     ("prov", PROV),
 ];
 
-/// `act:` term of a local name.
+/// Returns the `act:` IRI of a local name.
 pub fn act(local: &str) -> String {
     format!("{ACT}{local}")
 }
 
-/// `w:` term of a local name.
+/// Returns the `w:` IRI of a local name.
 pub fn w(local: &str) -> String {
     format!("{W}{local}")
 }
 
-/// IRI of an object of a scene.
+/// Returns the IRI of an object of a scene.
 pub fn obj(id: &str) -> String {
     format!("{OBJ}{id}")
 }
 
-/// The part of an IRI behind its last `#` or `/`: what people call it.
+/// Returns the local name of an IRI: the part after its last `#` or `/`.
 pub fn local(iri: &str) -> &str {
     iri.rsplit(['#', '/']).next().unwrap_or(iri)
 }
 
-/// An IRI with its namespace shortened to a known prefix, or in angle brackets.
+/// Shortens an IRI to a known prefix, or returns it in angle brackets.
 pub fn shorten(iri: &str) -> String {
     for (prefix, namespace) in PREFIXES {
         if let Some(rest) = iri.strip_prefix(namespace)

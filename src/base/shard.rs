@@ -1,11 +1,11 @@
-//! One of several equal parts of a campaign.
+//! Shards: the equal parts into which a campaign can be split.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// A part of a campaign: every `of`-th run, beginning with the `number`-th.
+/// A shard of a campaign: every `of`-th run, starting with the `number`-th.
 ///
-/// The parts of a campaign have all its runs, each once, whoever makes them and wherever.
+/// Each run of a campaign belongs to exactly one of its shards, on every machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Shard {
     of: u64,
@@ -13,27 +13,27 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Part `number` (from 1) of `of`; nothing where there is no such part.
+    /// Creates shard `number` (from 1) of `of`. Returns `None` unless 1 ≤ `number` ≤ `of`.
     pub fn new(number: u64, of: u64) -> Option<Self> {
         (1 <= number && number <= of).then_some(Self { of, number })
     }
 
-    /// Position among the parts, from 1.
+    /// Position among the shards, from 1.
     pub fn number(self) -> u64 {
         self.number
     }
 
-    /// How many parts there are.
+    /// Number of shards.
     pub fn of(self) -> u64 {
         self.of
     }
 
-    /// Whether the run with this index (from 0) belongs to it.
+    /// Whether the run with this index (from 0) belongs to this shard.
     pub fn has(self, index: u64) -> bool {
         index % self.of == self.number - 1
     }
 
-    /// How many of the first `runs` runs belong to it.
+    /// Number of the first `runs` runs that belong to this shard.
     pub fn share(self, runs: u64) -> u64 {
         runs / self.of + u64::from(runs % self.of >= self.number)
     }
@@ -45,16 +45,16 @@ impl fmt::Display for Shard {
     }
 }
 
-/// What is no part.
+/// The error of parsing an invalid shard.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("a part such as 1/4 is needed: its number, from 1, and how many parts there are")]
+#[error("expected a shard such as 1/4: its number, from 1, and the number of shards")]
 pub struct NoShard;
 
 impl FromStr for Shard {
     type Err = NoShard;
 
     fn from_str(text: &str) -> Result<Self, NoShard> {
-        // Digits alone: the library would read a sign too.
+        // Accept only digits: `u64::from_str` also accepts a `+` sign.
         let number = |text: &str| match text.bytes().all(|byte| byte.is_ascii_digit()) {
             true => text.parse::<u64>().map_err(|_| NoShard),
             false => Err(NoShard),

@@ -1,12 +1,12 @@
-//! Texts that people write, and places in them.
+//! Source texts, and places in them.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Place in a source text. Unit: bytes from the start, end exclusive.
+/// Range of a source text. Unit: bytes from the start, end exclusive.
 pub type Span = Range<usize>;
 
-/// A text with the name under which people know it (usually the path as the user gave it).
+/// A text with its name (usually the path as the user gave it).
 ///
 /// Cheap to clone: both parts are shared.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,12 +18,12 @@ pub struct Source {
 }
 
 impl Source {
-    /// A source from its name and its text.
+    /// Creates a source from its name and text.
     pub fn new(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Self {
         Self { name: name.into(), text: text.into() }
     }
 
-    /// Line and column of a byte offset. Unit: both count from 1; a column counts characters.
+    /// Returns the line and column of a byte offset. Both count from 1; columns count characters.
     pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
         let before = &self.text[..self.boundary(offset)];
         let line = before.matches('\n').count() + 1;
@@ -31,7 +31,7 @@ impl Source {
         (line, before[start_of_line..].chars().count() + 1)
     }
 
-    /// The last place up to a byte offset where a character begins.
+    /// Returns the start of the character at or before a byte offset.
     pub(super) fn boundary(&self, offset: usize) -> usize {
         let mut end = offset.min(self.text.len());
         while !self.text.is_char_boundary(end) {

@@ -1,34 +1,34 @@
-//! Random numbers by their place: a function of a seed and a number, so that it does not matter who asks first.
+//! Counter-based random numbers: each value is a function of a seed and an index, independent of the order of calls.
 
-/// A sequence of random numbers that can be read anywhere. It has no state.
+/// A stateless sequence of random numbers with random access.
 ///
 /// Source: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stream(u64);
 
-/// 2⁶⁴ over the golden ratio, odd: steps of it meet every number once.
+/// 2⁶⁴ divided by the golden ratio, made odd: steps of this size visit every 64-bit number once.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
-/// Standard deviation of the sum of four uniform numbers, √(4/12), makes this factor.
+/// Inverse of √(4/12), the standard deviation of the sum of four uniform numbers.
 const TO_UNIT_DEVIATION: f64 = 1.732_050_807_568_877_2;
 
 impl Stream {
-    /// The sequence of a seed.
+    /// Creates the sequence of a seed.
     pub fn new(seed: u64) -> Self {
         Self(mixed(seed.wrapping_add(STEP)))
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(self, number: u64) -> u64 {
         mixed(self.0.wrapping_add(number.wrapping_mul(STEP)))
     }
 
-    /// A number in [0, 1).
+    /// Returns a number in [0, 1).
     pub fn unit(self, number: u64) -> f64 {
         (self.bits(number) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Bell-shaped about 0 with standard deviation 1, never farther than 3.47: the sum of four uniform numbers. It takes
-    /// no logarithm or root, so that a picture of noise takes a millisecond.
+    /// Returns approximately normal noise with mean 0 and standard deviation 1, within ±3.47: the scaled sum of four
+    /// uniform numbers. This needs no logarithm or root, so that noise for a whole image takes a millisecond.
     pub fn bell(self, number: u64) -> f64 {
         let bits = self.bits(number);
         let sum = (0..4).map(|part| (bits >> (16 * part)) & 0xffff).sum::<u64>();

@@ -1,6 +1,6 @@
 //! "Did you mean": the known name nearest to a mistyped one.
 
-/// The candidate nearest to `name`, if one is near enough to be a likely typing error.
+/// Returns the candidate most similar to `name`, or `None` if none is similar enough for a likely typing error.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
@@ -16,7 +16,7 @@ fn similarity(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(&a, &b).max(strsim::normalized_damerau_levenshtein(&a, &b))
 }
 
-/// Help text: the nearest known name, or the known names.
+/// Returns a help text: the nearest known name, or a list of the known names.
 pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
     match nearest(name, candidates.clone()) {
         Some(found) => format!("did you mean `{found}`?"),
@@ -25,7 +25,7 @@ pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str
             known.sort_unstable();
             known.dedup();
             if known.is_empty() {
-                return "there are none to choose from".to_owned();
+                return "no names are known here".to_owned();
             }
             format!("known names: {}", known.join(", "))
         }

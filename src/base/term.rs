@@ -1,4 +1,4 @@
-//! RDF terms with the meaning of their values kept, and their interning.
+//! RDF terms with typed values, and their interning.
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -8,23 +8,22 @@ use std::sync::Arc;
 
 use crate::base::names;
 
-/// One RDF term. Two terms are equal when they are the same term, not when their values are equal:
-/// `1`, `1.0` and `"1"` are three terms.
+/// An RDF term. Equality compares terms, not values: `1`, `1.0` and `"1"` are three different terms.
 #[derive(Debug, Clone)]
 pub enum Term {
-    /// An IRI, absolute. (A bare name of a rule program is a relative one, kept as written.)
+    /// An absolute IRI. (A bare name of a rule program is a relative IRI, kept as written.)
     Iri(Arc<str>),
-    /// A blank node by its label.
+    /// A blank node, by its label.
     Blank(Arc<str>),
     /// `xsd:string`.
     String(Arc<str>),
     /// `rdf:langString`: text and language tag.
     LangString(Arc<str>, Arc<str>),
-    /// `xsd:integer` that fits 64 bits.
+    /// An `xsd:integer` that fits 64 bits.
     Integer(i64),
-    /// `xsd:decimal`, as its canonical text, because binary fractions can't hold it.
+    /// An `xsd:decimal` as its canonical text, because binary floating point can't represent it exactly.
     Decimal(Arc<str>),
-    /// `xsd:double`. Every NaN is one term; `0.0` and `-0.0` are two.
+    /// An `xsd:double`. All NaNs are one term; `0.0` and `-0.0` are two.
     Double(f64),
     /// `xsd:boolean`.
     Boolean(bool),
@@ -33,17 +32,17 @@ pub enum Term {
 }
 
 impl Term {
-    /// An IRI term.
+    /// Creates an IRI term.
     pub fn iri(iri: impl AsRef<str>) -> Self {
         Self::Iri(Arc::from(iri.as_ref()))
     }
 
-    /// A plain string literal.
+    /// Creates a plain string literal.
     pub fn string(text: impl AsRef<str>) -> Self {
         Self::String(Arc::from(text.as_ref()))
     }
 
-    /// The numeric value of an integer, decimal or double; nothing for other terms.
+    /// Returns the numeric value of an integer, decimal or double, and `None` for other terms.
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Integer(value) => Some(*value as f64),
@@ -53,7 +52,7 @@ impl Term {
         }
     }
 
-    /// The text of an IRI.
+    /// Returns the text of an IRI, and `None` for other terms.
     pub fn as_iri(&self) -> Option<&str> {
         match self {
             Self::Iri(iri) => Some(iri),
@@ -76,7 +75,7 @@ impl Term {
     }
 }
 
-/// Bits of a double in an order that agrees with its value; every NaN alike.
+/// Maps a double to bits that sort by value. All NaNs map to the same bits.
 fn double_key(value: f64) -> u64 {
     let bits = if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() };
     if bits >> 63 == 1 { !bits } else { bits | (1 << 63) }
@@ -109,7 +108,7 @@ impl Hash for Term {
 }
 
 impl fmt::Display for Term {
-    /// Turtle's spelling, with known prefixes.
+    /// Writes the term in Turtle syntax, with known prefixes.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Iri(iri) => f.write_str(&names::shorten(iri)),
@@ -125,10 +124,10 @@ impl fmt::Display for Term {
     }
 }
 
-/// Number of an interned term. Only meaningful together with the [`Terms`] that gave it.
+/// ID of an interned term. Only valid for the [`Terms`] that created it.
 pub type TermId = u32;
 
-/// Terms by number, each once.
+/// An interner of terms.
 #[derive(Debug, Clone, Default)]
 pub struct Terms {
     by_id: Vec<Term>,
@@ -136,12 +135,12 @@ pub struct Terms {
 }
 
 impl Terms {
-    /// No terms.
+    /// Creates an empty interner.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The number of a term, given to it now if it had none.
+    /// Returns the ID of a term, interning the term if it is new.
     pub fn intern(&mut self, term: Term) -> TermId {
         if let Some(id) = self.ids.get(&term) {
             return *id;
@@ -152,22 +151,22 @@ impl Terms {
         id
     }
 
-    /// The number of a term that was interned before.
+    /// Returns the ID of a term, or `None` if it is not interned.
     pub fn id(&self, term: &Term) -> Option<TermId> {
         self.ids.get(term).copied()
     }
 
-    /// The term of a number that [`Terms::intern`] gave.
+    /// Returns the term of an ID. Panics if the ID is out of range.
     pub fn term(&self, id: TermId) -> &Term {
         &self.by_id[id as usize]
     }
 
-    /// How many terms there are.
+    /// Number of interned terms.
     pub fn len(&self) -> usize {
         self.by_id.len()
     }
 
-    /// Whether there are none.
+    /// Whether the interner is empty.
     pub fn is_empty(&self) -> bool {
         self.by_id.is_empty()
     }

@@ -1,13 +1,13 @@
-//! Files that are there whole or not at all.
+//! Atomic writing of files.
 
 use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::Path;
 
-/// Writes a file so that it is there whole or not at all, also after a power cut. Until then its name ends in `.tmp`.
+/// Writes a file atomically, also across a power cut. The file has the suffix `.tmp` until it is complete.
 ///
 /// # Errors
-/// It can't be written; what was there before is there still.
+/// Returns an error if the file can't be written. An existing file is then unchanged.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".tmp");
@@ -17,7 +17,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
         file.sync_all()
     });
     if let Err(error) = written.and_then(|()| fs::rename(&temporary, path)) {
-        // Half a file is of no use; where it can't be removed either, its name says what it is.
+        // A partial file is useless. If its removal fails too, its suffix marks it as temporary.
         let _ = fs::remove_file(&temporary);
         return Err(error);
     }

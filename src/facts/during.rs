@@ -1,4 +1,4 @@
-//! What happened during one action, as facts.
+//! Facts about the events during one action.
 
 use std::collections::BTreeMap;
 
@@ -6,13 +6,14 @@ use crate::actions::{ActionTrace, ContactEpisode, Extremes, Perceived, Percept};
 use crate::base::names;
 use crate::facts::writer::Writer;
 
-/// Contact episodes of one pair that are kept in facts: the strongest ones.
+/// Number of contact episodes that become facts for each pair: the strongest ones.
 ///
-/// A body that chatters on a surface makes and breaks contact many times a second. The pair, the first contact of some
-/// force and the largest force are what rules ask for; all episodes stay in the trace.
+/// A body that chatters on a surface makes and breaks contact many times a second. Rules use the pair, the first
+/// contact above some force, and the largest force. The trace keeps all episodes.
 const EPISODES_OF_A_PAIR: usize = 3;
 
-/// Writes the report, contacts, extremes and percepts of one action, and what it made of its pictures.
+/// Writes the report, contacts, extremes and percepts of one action, and the plane and objects that the action itself
+/// perceived.
 pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
     let subject = writer.w("action");
     if let Some(report) = &action.report {
@@ -34,14 +35,14 @@ pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
     }
 }
 
-/// Writes how far the base got, for the bounds of rooms.
+/// Writes the bounding box of the base's path, for rules about rooms.
 pub(super) fn write_base([low, high]: &[[f64; 2]; 2], writer: &mut Writer) {
     let subject = writer.w("robot");
     writer.numbers(subject, ["baseMinX", "baseMinY"], *low);
     writer.numbers(subject, ["baseMaxX", "baseMaxY"], *high);
 }
 
-/// The strongest episodes of each pair, in the order of their start (then of their pair).
+/// Returns the strongest episodes of each pair, sorted by start, then by pair.
 fn kept(contacts: &[ContactEpisode]) -> Vec<&ContactEpisode> {
     let mut by_pair: BTreeMap<&[String; 2], Vec<&ContactEpisode>> = BTreeMap::new();
     for contact in contacts {

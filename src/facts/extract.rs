@@ -1,4 +1,4 @@
-//! A whole trace as facts.
+//! Extracts the facts of a whole trace.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,10 +7,11 @@ use crate::base::{Term, TermId, names};
 use crate::facts::writer::Writer;
 use crate::facts::{RunFacts, during, places, robot_course, snapshot};
 
-/// The facts of a run: one list for each snapshot, and one list of what happened and one of designators for each action.
+/// Extracts the facts of a run: one list for each snapshot, and for each action one list of events and one of
+/// designators.
 ///
-/// The same trace gives the same facts with the same numbers. An action that was never reached has no facts of its own;
-/// its designators are there. Every number is the shortest decimal of its f32.
+/// The same trace gives the same facts with the same term IDs. An action that was never reached has designators but no
+/// events. Every number is the shortest decimal of its f32.
 pub fn extract(trace: &Trace) -> RunFacts {
     let mut writer = Writer::default();
     let mut facts = RunFacts::default();
@@ -37,8 +38,8 @@ pub fn extract(trace: &Trace) -> RunFacts {
     facts
 }
 
-/// Designators by their IRIs: the value is an object where the scene has one of that name, a location where the map has one,
-/// otherwise a text.
+/// Returns designators, as IRIs, with their values. A value is an object if the scene has one of that name, else a
+/// location if the map has one, else a string.
 fn parameters(
     values: &BTreeMap<String, Vec<String>>,
     bodies: &BTreeSet<&str>,

@@ -1,6 +1,6 @@
 //! Turns a trace into RDF facts: raw quantities with their units, interned once.
 //!
-//! Never: steps the simulation, holds a threshold, knows a rule, or decides a verdict.
+//! Never: steps the simulation, holds a threshold, depends on a rule, or decides a verdict.
 
 mod during;
 mod extract;

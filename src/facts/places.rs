@@ -1,4 +1,4 @@
-//! The map of a world as facts: its locations, rooms and surfaces, which hold at every moment.
+//! Facts about a world's map: its locations, rooms and surfaces. They hold in every snapshot.
 
 use crate::actions::SceneMap;
 use crate::base::names;

@@ -1,20 +1,20 @@
-//! What the robot went through during one action, as facts.
+//! Facts about the robot's joints, self-contacts and held objects during one action.
 
 use crate::actions::RobotCourse;
 use crate::base::names;
 use crate::facts::writer::Writer;
 
-/// A joint that has used less than this share of its speed has not moved: nothing is said of how fast.
+/// A joint that used less than this share of its maximum speed counts as unmoved: its speed is not written.
 const STANDS_STILL: f64 = 0.01;
 
-/// Writes joints at their limits, links in each other and what was held; and that all this was measured, for rules that
-/// must not take its absence for a pass.
+/// Writes how close joints came to their limits, self-contacts and held objects. Marks the robot as measured, so that
+/// rules don't take missing facts for a pass.
 pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
     let action = writer.w("action");
     writer.boolean(action, "robotMeasured", true);
     for joint in &course.joints {
         let subject = writer.named("joint", &joint.name);
-        // A joint that turns without end is infinitely far from its limits.
+        // A continuous joint is infinitely far from its limits.
         if joint.max_excess.is_finite() {
             writer.number(subject, "maxExcess", joint.max_excess);
         }

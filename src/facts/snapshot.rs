@@ -1,4 +1,4 @@
-//! One moment as facts.
+//! Facts about one snapshot.
 
 use crate::actions::{BodyState, JointState, RobotState, Snapshot};
 use crate::base::{Pose, TermId, names};
@@ -7,7 +7,7 @@ use crate::facts::writer::Writer;
 const POSITION: [&str; 3] = ["x", "y", "z"];
 const ROTATION: [&str; 4] = ["qx", "qy", "qz", "qw"];
 
-/// Writes everything that is true at one moment.
+/// Writes the state of all bodies and of the robot.
 pub(super) fn write(snapshot: &Snapshot, writer: &mut Writer) {
     for body in &snapshot.bodies {
         write_body(body, writer);
@@ -15,7 +15,7 @@ pub(super) fn write(snapshot: &Snapshot, writer: &mut Writer) {
     write_robot(&snapshot.robot, writer);
 }
 
-/// A body. What sleeps or is fixed does not move, so its velocities (all zero) are left out.
+/// Writes a body. Sleeping and fixed bodies don't move, so their velocities (all zero) are omitted.
 fn write_body(body: &BodyState, writer: &mut Writer) {
     let subject = writer.thing(&body.id);
     writer.class(subject, &body.category);

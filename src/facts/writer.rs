@@ -1,13 +1,14 @@
-//! Terms and triples of one run while they are being written.
+//! Writer of a run's terms and triples.
 
 use std::fmt::Write as _;
 
 use crate::base::{Term, TermId, Terms, names};
 use crate::facts::Triple;
 
-/// IRI of a thing that simulation names: `w:robot`, `w:floor`, `w:link/NAME` for `robot/NAME`, and `obj:ID` for the rest.
+/// Returns the IRI of an object with this ID in the simulation: `w:robot`, `w:floor`, `w:link/NAME` for `robot/NAME`,
+/// and `obj:ID` for the rest.
 ///
-/// Characters that an IRI can't hold are percent-encoded.
+/// Characters not allowed in an IRI are percent-encoded.
 pub fn thing_iri(id: &str) -> String {
     match id {
         "robot" | "floor" => names::w(id),
@@ -18,7 +19,7 @@ pub fn thing_iri(id: &str) -> String {
     }
 }
 
-/// A name as part of an IRI: letters, digits and `_-.~` as they are, every other byte percent-encoded.
+/// Escapes a name for an IRI: percent-encodes every byte except ASCII letters, digits and `_-.~`.
 pub(super) fn escaped(name: &str) -> String {
     let mut out = String::with_capacity(name.len());
     for byte in name.bytes() {
@@ -32,11 +33,11 @@ pub(super) fn escaped(name: &str) -> String {
     out
 }
 
-/// The number with the fewest digits that is the same f32: physics knows no more, and 0.3 stays 0.3.
+/// Returns the number with the fewest digits that rounds to the same f32. Physics has f32 precision, and 0.3 stays 0.3.
 ///
-/// Both zeros become `0.0`, so that they are one term. What is no number stays so.
+/// Both zeros become `0.0`, so that they are one term. NaN and infinities are unchanged.
 pub(super) fn shortest(value: f64) -> f64 {
-    #[expect(clippy::cast_possible_truncation, reason = "rounding to what physics knows is what this is for")]
+    #[expect(clippy::cast_possible_truncation, reason = "rounding to the precision of physics is intended")]
     let single = value as f32;
     if single == 0.0 {
         return 0.0;
@@ -48,7 +49,7 @@ pub(super) fn shortest(value: f64) -> f64 {
     }
 }
 
-/// Text of a number, without an allocation: facts hold hundreds of them.
+/// Text of a number, without an allocation: a run has hundreds of numbers.
 #[derive(Default)]
 struct ShortText {
     bytes: [u8; 32],
@@ -70,7 +71,7 @@ impl std::fmt::Write for ShortText {
     }
 }
 
-/// Interns terms and gathers the triples of one state or action.
+/// Interns terms and collects the triples of one state or action.
 #[derive(Default)]
 pub(super) struct Writer {
     /// Terms of the whole run.
@@ -80,7 +81,7 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// What was gathered, sorted and each once; the next list begins empty.
+    /// Returns the collected triples, sorted and deduplicated, and starts an empty list.
     pub(super) fn take(&mut self) -> Vec<Triple> {
         let mut triples = std::mem::take(&mut self.triples);
         triples.sort_unstable();
@@ -88,12 +89,12 @@ impl Writer {
         triples
     }
 
-    /// A thing that simulation names.
+    /// Interns the IRI of an object in the simulation.
     pub(super) fn thing(&mut self, id: &str) -> TermId {
         self.terms.intern(Term::iri(thing_iri(id)))
     }
 
-    /// A term of the world vocabulary.
+    /// Interns a term of the world vocabulary.
     pub(super) fn w(&mut self, local: &str) -> TermId {
         self.iri.clear();
         self.iri.push_str(names::W);
@@ -101,49 +102,49 @@ impl Writer {
         self.terms.intern(Term::iri(&self.iri))
     }
 
-    /// A term of the world vocabulary below a heading, such as `w:joint/NAME`.
+    /// Interns a term of the world vocabulary with a heading, such as `w:joint/NAME`.
     pub(super) fn named(&mut self, heading: &str, name: &str) -> TermId {
         self.w(&format!("{heading}/{}", escaped(name)))
     }
 
-    /// States that a property of the world vocabulary has a value.
+    /// Adds a triple with a property of the world vocabulary.
     pub(super) fn state(&mut self, subject: TermId, property: &str, value: TermId) {
         let property = self.w(property);
         self.triples.push([subject, property, value]);
     }
 
-    /// States a number.
+    /// Adds a number.
     pub(super) fn number(&mut self, subject: TermId, property: &str, value: f64) {
         let value = self.terms.intern(Term::Double(shortest(value)));
         self.state(subject, property, value);
     }
 
-    /// States several numbers, one for each property.
+    /// Adds several numbers, one for each property.
     pub(super) fn numbers<const N: usize>(&mut self, subject: TermId, properties: [&str; N], values: [f64; N]) {
         for (property, value) in properties.into_iter().zip(values) {
             self.number(subject, property, value);
         }
     }
 
-    /// States a truth value.
+    /// Adds a Boolean.
     pub(super) fn boolean(&mut self, subject: TermId, property: &str, value: bool) {
         let value = self.terms.intern(Term::Boolean(value));
         self.state(subject, property, value);
     }
 
-    /// States a text.
+    /// Adds a string.
     pub(super) fn text(&mut self, subject: TermId, property: &str, value: &str) {
         let value = self.terms.intern(Term::string(value));
         self.state(subject, property, value);
     }
 
-    /// States a relation to something that has an IRI of its own.
+    /// Adds a relation to an IRI.
     pub(super) fn iri(&mut self, subject: TermId, property: &str, iri: &str) {
         let value = self.terms.intern(Term::iri(iri));
         self.state(subject, property, value);
     }
 
-    /// States a relation to each of some things.
+    /// Adds a relation to each of several objects.
     pub(super) fn things(&mut self, subject: TermId, property: &str, ids: &[String]) {
         for id in ids {
             let thing = self.thing(id);
@@ -151,7 +152,7 @@ impl Writer {
         }
     }
 
-    /// States the class of something.
+    /// Adds the class of the subject.
     pub(super) fn class(&mut self, subject: TermId, class: &str) {
         let property = self.terms.intern(Term::iri(format!("{}type", names::RDF)));
         let class = self.terms.intern(Term::iri(class));

@@ -1,27 +1,28 @@
-//! What is known so far: the points and what each property said of them.
+//! The archive of a search: evaluated points with the results of each property.
 
 use super::space::Space;
 
-/// What one property said of one point.
+/// The result of one property at one point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Told {
-    /// Whether it failed.
+    /// Whether the property failed.
     pub failed: bool,
-    /// How far it was from failing (or, negative, from passing), where it says; any unit.
+    /// Distance from failing (or, if negative, from passing), in any unit. `None` if unknown.
     pub margin: Option<f64>,
 }
 
-/// A point that was tried.
+/// An evaluated point.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tried {
     pub point: Vec<f64>,
     pub told: Vec<Told>,
-    /// For the property that a guided point was made for.
+    /// The property for which a guided strategy chose the point.
     pub focus: Option<usize>,
 }
 
 impl Tried {
-    /// The margin of a property, made to agree with whether it failed; nothing where it is not known.
+    /// Returns the margin of a property, clamped to agree with its outcome, or `None` if the margin is unknown or not
+    /// finite.
     pub fn margin(&self, property: usize) -> Option<f64> {
         let told = self.told.get(property)?;
         match told.margin.filter(|margin| margin.is_finite()) {
@@ -36,7 +37,7 @@ impl Tried {
     }
 }
 
-/// A ball that has been looked into enough.
+/// A ball that has been searched enough.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Closed {
     pub property: usize,
@@ -44,7 +45,7 @@ pub(crate) struct Closed {
     pub radius: f64,
 }
 
-/// All that was tried, in order, and where not to look again.
+/// All evaluated points, in order, and the regions not to search again.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Archive {
     pub tried: Vec<Tried>,
@@ -52,18 +53,18 @@ pub(crate) struct Archive {
 }
 
 impl Archive {
-    /// Properties that were ever told of.
+    /// Number of properties with results.
     pub fn properties(&self) -> usize {
         self.tried.iter().map(|tried| tried.told.len()).max().unwrap_or(0)
     }
 
-    /// Whether the margins of a property differ at all, so that there is something to learn from.
+    /// Whether the margins of a property differ, so that a strategy can learn from them.
     pub fn says_something(&self, property: usize) -> bool {
         let mut margins = self.tried.iter().filter_map(|tried| tried.margin(property));
         margins.next().is_some_and(|first| margins.any(|margin| margin != first))
     }
 
-    /// The points of a property with their margins, lowest first, but those in closed balls.
+    /// Returns the points of a property with their margins, lowest first, without those in closed balls.
     pub fn open(&self, space: &Space, property: usize) -> Vec<(&[f64], f64)> {
         let closed: Vec<&Closed> = self.closed.iter().filter(|closed| closed.property == property).collect();
         let mut found: Vec<(&[f64], f64)> = self

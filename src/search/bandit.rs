@@ -1,14 +1,14 @@
-//! Each axis as a row of arms.
+//! The bandit strategy: each axis is divided into arms.
 
 use super::archive::Archive;
 use super::proposal::{Component, Marginal, Proposal};
 use super::space::{Dimension, Space, bucket};
 
-/// Arms of a continuous axis.
+/// Number of arms of a continuous axis.
 const SLICES: usize = 5;
 
-/// Arms are played by how many standard errors their mean is above the best one's, so that a difference that may be
-/// chance is tried on, and one that is not is used.
+/// Gives each arm a share that decreases with the number of standard errors of its mean above the best arm's. So arms
+/// whose difference may be chance are explored, and clearly better ones are exploited.
 pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Proposal {
     let open = archive.open(space, property);
     if open.is_empty() {
@@ -25,12 +25,12 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
     Proposal(vec![Component(axes.collect())])
 }
 
-/// The shares of the arms of one axis.
+/// Computes the shares of the arms of one axis.
 fn play(open: &[(&[f64], f64)], axis: usize, arms: usize) -> Marginal {
     let mut sums = vec![0.0; arms];
     let mut counts = vec![0.0; arms];
     for (rank, (point, _)) in open.iter().enumerate() {
-        // Ranks instead of margins: their spread is known, and no unit of a margin matters.
+        // Use ranks instead of margins: their spread is known, and they don't depend on the margin's unit.
         let arm = bucket(point[axis], arms);
         sums[arm] += (rank as f64 + 0.5) / open.len() as f64;
         counts[arm] += 1.0;
@@ -39,7 +39,7 @@ fn play(open: &[(&[f64], f64)], axis: usize, arms: usize) -> Marginal {
         .iter()
         .zip(&counts)
         .map(|(sum, count)| {
-            // One imagined point of middle rank: an arm that was never played is neither good nor bad.
+            // Add one virtual point of middle rank, so that an arm without points is neither good nor bad.
             let mean = (sum + 0.5) / (count + 1.0);
             mean / (RANK_DEVIATION / libm::sqrt(count + 1.0))
         })

@@ -1,4 +1,4 @@
-//! A model of the margin, and the edge between what passes and what fails.
+//! The boundary strategy: a model of the margin, and the boundary between pass and fail.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,22 +6,22 @@ use super::archive::Archive;
 use super::proposal::{Component, Marginal, Proposal};
 use super::space::{Dimension, Space, bucket};
 
-/// Spread about the place where the model is least, in shares of an axis.
+/// Standard deviation about the model's minimum, as a share of an axis.
 const MODEL_SIGMA: f64 = 0.12;
 
-/// Spread about a point that is nearly on the edge.
+/// Standard deviation about a point near the boundary, as a share of an axis.
 const EDGE_SIGMA: f64 = 0.07;
 
-/// Points of the edge that are followed at a time.
+/// Number of boundary points followed at a time.
 const EDGE_POINTS: usize = 4;
 
-/// Under this share of the variance explained a model is taken for none, and the points stay plain random.
+/// Minimum share of explained variance. A worse model is discarded, and points stay plain random.
 const LEAST_EXPLAINED: f64 = 0.15;
 
-/// Ridge: how strongly coefficients are drawn to 0, in points.
+/// Ridge penalty, as an equivalent number of points.
 const RIDGE: f64 = 0.5;
 
-/// Where the model is least, and, once something failed, the points whose margin is nearest to 0 as well.
+/// Proposes points near the model's minimum and, after the first failure, near the points with margins closest to 0.
 pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Proposal {
     let mut components = Vec::new();
     let open = archive.open(space, property);
@@ -36,7 +36,7 @@ pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Prop
     Proposal(components)
 }
 
-/// A cloud about a point; a category is kept in most draws.
+/// Returns normal distributions about a point. Most draws keep the point's category.
 fn about(space: &Space, point: &[f64], sigma: f64) -> Component {
     let axes = space.dimensions().iter().zip(point).map(|(dimension, value)| match dimension.categories() {
         _ if !dimension.is_learnt() => Marginal::uniform(),
@@ -50,20 +50,21 @@ fn about(space: &Space, point: &[f64], sigma: f64) -> Component {
     Component(axes.collect())
 }
 
-/// The margin as a sum of a parabola for each continuous axis and a number for each category.
+/// A model of the margin: the sum of a parabola for each continuous axis and a constant for each category.
 struct Model {
     coefficients: DVector<f64>,
 }
 
 impl Model {
-    /// Ridge regression on all open points, low margins counting most; nothing where it explains too little.
+    /// Fits a weighted ridge regression to all open points, in which low margins weigh most. Returns `None` if there
+    /// are too few points or the model explains too little.
     fn fit(space: &Space, open: &[(&[f64], f64)]) -> Option<Self> {
         let width = 1 + space.dimensions().iter().map(|dimension| terms(*dimension)).sum::<usize>();
         if open.len() < width {
             return None;
         }
         let rows: Vec<DVector<f64>> = open.iter().map(|(point, _)| features(space, point)).collect();
-        // Rank falls off linearly: the lowest margin counts fully, the highest hardly.
+        // The weight decreases linearly with the rank, from 1 for the lowest margin to nearly 0 for the highest.
         let weight = |rank: usize| 1.0 - rank as f64 / open.len() as f64;
         let total: f64 = (0..open.len()).map(weight).sum();
         let mean = open.iter().enumerate().map(|(rank, (_, margin))| weight(rank) * margin).sum::<f64>() / total;
@@ -82,12 +83,12 @@ impl Model {
             missed += weight(rank) * residual * residual;
             spread += weight(rank) * away * away;
         }
-        // Each coefficient explains some chance too: adjusted as in Theil's R² of 1961.
+        // Each coefficient also explains some noise: use Theil's adjusted R² (1961).
         let freedom = (open.len() as f64 - 1.0) / (open.len() as f64 - width as f64).max(1.0);
         (spread > 0.0 && 1.0 - freedom * missed / spread > LEAST_EXPLAINED).then_some(Self { coefficients })
     }
 
-    /// A cloud about the least value, which is the least of each axis.
+    /// Returns normal distributions about the model's minimum, which is separable by axis.
     fn least(&self, space: &Space) -> Component {
         let mut at = 1;
         let mut point = Vec::with_capacity(space.dimensions().len());
@@ -123,7 +124,7 @@ fn features(space: &Space, point: &[f64]) -> DVector<f64> {
     DVector::from_vec(row)
 }
 
-/// Where `a (x - ½) + b (x - ½)²` is least in [0, 1].
+/// Returns the `x` in [0, 1] that minimises `a (x - ½) + b (x - ½)²`.
 fn least_of_parabola(a: f64, b: f64) -> f64 {
     if b > 0.0 {
         (0.5 - a / (2.0 * b)).clamp(0.0, 1.0)

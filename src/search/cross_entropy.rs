@@ -1,22 +1,22 @@
-//! A distribution fitted to the best points, again and again.
+//! The cross-entropy strategy: a distribution fitted repeatedly to the best points.
 
 use super::archive::Archive;
 use super::proposal::{Component, Marginal, Proposal};
 use super::space::{Dimension, Space, bucket};
 
-/// The lowest margins that a fit is chosen from. Few enough to follow the margin down, many enough not to lose a valley.
+/// Number of lowest margins from which the elite is chosen: few enough to descend, many enough not to lose a valley.
 const CANDIDATES: usize = 24;
 
-/// Points of one fit: the nearest of the candidates to the best of them, so that two valleys are not averaged.
+/// Number of points in a fit: the candidates nearest to the best one, so that two valleys are not averaged.
 const ELITE: usize = 8;
 
-/// A fit never gets narrower than this share of an axis, so that it does not stand still.
+/// Minimum standard deviation of a fit, as a share of an axis, so that it does not stall.
 const LEAST_SIGMA: f64 = 0.04;
 
-/// Weight of the uniform distribution in the shares of a categorical axis, in points.
+/// Weight of the uniform prior of a categorical axis, in points.
 const PRIOR: f64 = 0.5;
 
-/// Independent normal distributions (and shares of categories) fitted to the elite of what is open.
+/// Fits independent normal distributions (and shares of categories) to the elite of the open points.
 ///
 /// Source: Rubinstein's cross-entropy method (1999), with an elite that is a neighbourhood.
 pub(crate) fn propose(space: &Space, archive: &Archive, property: usize) -> Proposal {

@@ -1,14 +1,14 @@
-//! How probable a failure is under the nominal distribution, from points that were drawn otherwise.
+//! Estimates the probability of a failure under the nominal distribution from importance-weighted points.
 
 use statrs::distribution::{ContinuousCDF, Gamma};
 
-/// Half of what a 95 % interval leaves out.
+/// Probability of each tail outside a 95 % interval.
 const TAIL: f64 = 0.025;
 
 /// A probability with its 95 % confidence interval. All three lie in [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// The unbiased estimate, or 1 where that is above.
+    /// The unbiased estimate, clamped to 1.
     pub rate: f64,
     /// Lower end.
     pub low: f64,
@@ -16,18 +16,18 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// Sums over weighted points, some of which failed.
+/// Sums of weights of failed and passed points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Weighted {
     points: u64,
     largest: f64,
-    /// Sums of weights and of their squares: of those that failed, and of the others.
+    /// Sum of weights and sum of squared weights of the failed points, and of the passed points.
     failed: [f64; 2],
     passed: [f64; 2],
 }
 
 impl Weighted {
-    /// Takes one point: its weight, and the largest weight that any point drawn with it could have had.
+    /// Adds a point with its weight and the largest possible weight of a point in its generation.
     pub fn add(&mut self, weight: f64, largest: f64, failed: bool) {
         self.points += 1;
         self.largest = self.largest.max(largest);
@@ -36,16 +36,16 @@ impl Weighted {
         sums[1] += weight * weight;
     }
 
-    /// How many points there were.
+    /// Number of points.
     pub fn points(&self) -> u64 {
         self.points
     }
 
-    /// The probability of failing; nothing where there was no point.
+    /// Estimates the probability of a failure. Returns `None` without points.
     ///
-    /// Of the two events the one with less weight is counted, so that the interval holds for failures that are rare, for
-    /// passes that are, and where none was seen: what was never looked at may hide as much as the largest weight allows.
-    /// Source: the gamma interval for weighted sums of counts of Fay and Feuer (1997), which does not fall under its level.
+    /// The interval counts the event (failure or pass) with less total weight, so that it is valid for rare failures,
+    /// rare passes, and unseen events: an unseen event may have up to the largest weight. Source: the conservative
+    /// gamma interval of Fay and Feuer (1997) for weighted sums of counts.
     pub fn estimate(&self) -> Option<Estimate> {
         if self.points == 0 {
             return None;
@@ -59,7 +59,7 @@ impl Weighted {
             let [rate, low, high] = of(self.failed);
             Estimate { rate, low, high }
         } else {
-            // The rate stays the unbiased one of the failures; the ends come from the passes.
+            // The rate is the unbiased one of the failures; the ends come from the passes.
             let [_, low, high] = of(self.passed);
             let rate = (self.failed[0] / points).clamp(0.0, 1.0);
             Estimate { rate, low: (1.0 - high).min(rate), high: (1.0 - low).max(rate) }
@@ -67,7 +67,7 @@ impl Weighted {
     }
 }
 
-/// Ends of the interval of a weighted sum of counts with this variance.
+/// Returns the ends of the interval of a weighted sum of counts with this variance.
 fn gamma_interval(sum: f64, variance: f64, largest: f64) -> (f64, f64) {
     let quantile = |sum: f64, variance: f64, level: f64| {
         let shape = sum * sum / variance;
@@ -87,7 +87,7 @@ mod tests {
         sums.estimate().expect("there are points")
     }
 
-    /// Garwood's exact limits of a Poisson mean, from his table of 1936, which the interval has for equal weights.
+    /// For equal weights, the interval has Garwood's exact limits of a Poisson mean (table of 1936).
     #[test]
     fn equal_weights_give_the_exact_interval_of_a_count() {
         for (count, low, high) in [(0, 0.0, 3.689), (1, 0.025_32, 5.572), (5, 1.623, 11.668), (10, 4.795, 18.390)] {

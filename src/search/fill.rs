@@ -1,33 +1,34 @@
-//! Points that fill the cube without looking at margins.
+//! Point sets that fill the cube independently of margins.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// A generator of its own for each purpose and index, so that no purpose moves another's numbers.
+/// Returns a separate generator for each purpose and index, so that purposes don't affect each other's numbers.
 pub(crate) fn stream(seed: u64, purpose: u64, index: u64) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream((purpose << 48) | index);
     generator
 }
 
-/// A number in [0, 1) from 53 random bits.
+/// Draws a number in [0, 1) from 53 random bits.
 pub(crate) fn unit(generator: &mut ChaCha8Rng) -> f64 {
     (generator.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// The plain random point of an index.
+/// Returns the plain random point of an index.
 pub(crate) fn random(seed: u64, index: u64, width: usize) -> Vec<f64> {
     let mut generator = stream(seed, 1, index);
     (0..width).map(|_| unit(&mut generator)).collect()
 }
 
-/// Axes of Halton's sequence; further ones are random. Two axes of large bases go up and down together for many points.
+/// Maximum number of axes of Halton's sequence; further axes are random. Axes with large bases are correlated for many
+/// points.
 const HALTON_AXES: usize = 12;
 
-/// The point of an index in Halton's sequence, shifted around the cube by a vector that the seed gives.
+/// Returns the point of an index in Halton's sequence, shifted modulo 1 by a vector derived from the seed.
 ///
-/// Source: Halton (1960); the shift of Cranley and Patterson (1976) makes each point uniform, so that means of it are
-/// unbiased.
+/// Source: Halton (1960); the shift of Cranley and Patterson (1976) makes each point uniform, so that means over points
+/// are unbiased.
 pub(crate) fn halton(seed: u64, index: u64, width: usize) -> Vec<f64> {
     let mut generator = stream(seed, 2, 0);
     let mut point: Vec<f64> = primes(width.min(HALTON_AXES))
@@ -42,7 +43,7 @@ pub(crate) fn halton(seed: u64, index: u64, width: usize) -> Vec<f64> {
     point
 }
 
-/// As many points as asked, one in each of as many slices of every axis.
+/// Returns `count` points, one in each of `count` slices of every axis.
 ///
 /// Source: McKay, Beckman and Conover (1979).
 pub(crate) fn latin_hypercube(seed: u64, generation: u64, count: usize, width: usize) -> Vec<Vec<f64>> {
@@ -60,7 +61,7 @@ pub(crate) fn latin_hypercube(seed: u64, generation: u64, count: usize, width: u
     points
 }
 
-/// The digits of a number in a base, mirrored at the point.
+/// Mirrors the digits of a number in a base at the radix point.
 fn radical_inverse(mut number: u64, base: u64) -> f64 {
     let (mut value, mut digit) = (0.0, 1.0);
     while number > 0 {
@@ -87,7 +88,7 @@ fn primes(count: usize) -> Vec<u64> {
 mod tests {
     use super::*;
 
-    /// Each axis of each generation has exactly one point in each slice.
+    /// Each slice of each axis has exactly one point.
     #[test]
     fn a_latin_hypercube_has_one_point_in_each_slice() {
         let points = latin_hypercube(7, 3, 20, 8);
@@ -98,7 +99,8 @@ mod tests {
         }
     }
 
-    /// In every cell of a 4 × 4 grid of two axes are about as many points as its share; random ones spread far more.
+    /// Each cell of a 4 × 4 grid over two axes has nearly equally many points; the counts of random points vary far
+    /// more.
     #[test]
     fn halton_fills_more_evenly_than_random() {
         let spread = |point: &dyn Fn(u64) -> Vec<f64>| {

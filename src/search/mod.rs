@@ -1,14 +1,14 @@
-//! Where to look next: batches of points of a unit cube, chosen with what the earlier ones showed, and what a failure's
-//! probability is in the whole cube, whatever was looked at.
+//! Searches a unit cube for failures: proposes batches of points from earlier results, and estimates without bias the
+//! probability of a failure in the whole cube.
 //!
-//! Every strategy draws from a density that it knows, so that each point carries its importance weight. The guided ones
-//! (cross-entropy, bandit, boundary) are fed by margins, before anything has failed too, and make at least four plain
-//! random points for each that they choose: the same points that `random` makes. So they need at most 1.25 times as many
-//! to the first counterexample, and a few of a generation, however a margin may mislead them. Where the space says
-//! what is unusual (much noise, many things), four of five of the points that no margin chose are so: a failure that
-//! needs neither is found as fast as before, and one that needs everything to be as usual later.
+//! Every strategy draws from a known density, so that each point has an importance weight. The guided strategies
+//! (cross-entropy, bandit, boundary) learn from margins, even before the first failure. For each point that they choose
+//! they draw at least four plain random points, the same points as `random`. So even if margins mislead them, they need
+//! at most 1.25 times as many points to the first counterexample, plus a few of a generation. If the space declares
+//! unusual values (much noise, many objects), four of five of the points not chosen by margins are unusual. Failures
+//! that don't depend on these values are found as fast as before; failures that need usual values are found later.
 //!
-//! Never: knows a scene, a rule or a run, decides what failed, or depends on how many workers ask.
+//! Never: depends on scenes, rules, runs or the number of workers, or decides what failed.
 
 mod archive;
 mod bandit;

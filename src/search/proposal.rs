@@ -1,4 +1,4 @@
-//! Densities on the cube that can be drawn from.
+//! Densities on the cube that can be sampled.
 
 use rand_chacha::ChaCha8Rng;
 use statrs::function::erf::{erf, erf_inv};
@@ -9,40 +9,41 @@ use super::space::bucket;
 /// The largest number below 1, so that a point stays in the half-open cube.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// No number is farther from its mean than so many standard deviations: noise is never drawn from beyond them.
+/// Noise is clamped to this many standard deviations.
 const FARTHEST: f64 = 4.0;
 
 /// The distribution of one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Marginal {
-    /// Normal, cut off at 0 and 1.
+    /// Normal, truncated to [0, 1].
     Normal {
-        /// Mean before the cut, in [0, 1].
+        /// Mean before truncation, in [0, 1].
         mean: f64,
-        /// Standard deviation before the cut, positive.
+        /// Standard deviation before truncation, positive.
         sigma: f64,
     },
-    /// The quantile of a normally distributed number that is far from its mean: so many of its standard deviations at
-    /// least, four at most, every distance as often as any other.
+    /// The quantile of a normally distributed number far from its mean. The distance is uniform from this many standard
+    /// deviations to four.
     Far(f64),
-    /// Normal about the value of an earlier axis, cut off at 0 and 1.
+    /// Normal about the value of an earlier axis, truncated to [0, 1].
     Beside {
         /// Index of that axis.
         axis: usize,
-        /// Standard deviation before the cut, positive.
+        /// Standard deviation before truncation, positive.
         sigma: f64,
     },
-    /// Constant in each of as many equal intervals as there are shares; the shares sum to 1.
+    /// Piecewise constant on equal intervals, one for each share. The shares sum to 1.
     Steps(Vec<f64>),
 }
 
 impl Marginal {
-    /// The nominal distribution.
+    /// Returns the nominal distribution.
     pub fn uniform() -> Self {
         Self::Steps(vec![1.0])
     }
 
-    /// A distribution in steps, with shares in proportion to these numbers; uniform where they are no proportion.
+    /// Returns a piecewise constant distribution with shares proportional to these numbers, or the uniform one if they
+    /// are negative, not finite or all 0.
     pub fn steps(proportions: &[f64]) -> Self {
         let sum: f64 = proportions.iter().sum();
         if sum.is_finite() && sum > 0.0 && proportions.iter().all(|share| *share >= 0.0) {
@@ -52,7 +53,7 @@ impl Marginal {
         }
     }
 
-    /// Against the uniform density, where the earlier axes have these values.
+    /// Returns the density relative to the uniform one, given the values of earlier axes.
     fn density(&self, value: f64, earlier: &[f64]) -> f64 {
         match self {
             Self::Beside { axis, sigma } => beside(*axis, *sigma, earlier).density(value, earlier),
@@ -67,7 +68,7 @@ impl Marginal {
                 if !(*nearest..=FARTHEST).contains(&deviation.abs()) {
                     return 0.0;
                 }
-                // By the density of a normal distribution, which is how the quantiles lie along the deviations.
+                // Divide by the normal density, the derivative of the quantile with respect to the deviation.
                 let normal = libm::exp(-0.5 * deviation * deviation) / libm::sqrt(std::f64::consts::TAU);
                 0.5 / (FARTHEST - nearest) / normal
             }
@@ -85,7 +86,7 @@ impl Marginal {
                 let (low, high) = cut(*mean, *sigma);
                 mean + sigma * quantile(low + (high - low) * share)
             }
-            // Drawn above, by what it is.
+            // Handled above.
             Self::Beside { .. } => share,
             Self::Far(nearest) => {
                 let along = (2.0 * share - 1.0) * (FARTHEST - nearest);
@@ -106,12 +107,12 @@ impl Marginal {
     }
 }
 
-/// The distribution that lies beside an earlier axis; about the middle where there is none.
+/// Returns the distribution about the value of an earlier axis, or about the middle if it has no value.
 fn beside(axis: usize, sigma: f64, earlier: &[f64]) -> Marginal {
     Marginal::Normal { mean: earlier.get(axis).copied().unwrap_or(0.5), sigma }
 }
 
-/// The distribution function of a normal distribution at 0 and 1.
+/// Evaluates a normal distribution function at 0 and 1.
 fn cut(mean: f64, sigma: f64) -> (f64, f64) {
     (below((0.0 - mean) / sigma), below((1.0 - mean) / sigma))
 }
@@ -121,22 +122,22 @@ fn below(deviation: f64) -> f64 {
     0.5 * (1.0 + erf(deviation / std::f64::consts::SQRT_2))
 }
 
-/// Its inverse.
+/// The inverse of [`below`].
 fn quantile(share: f64) -> f64 {
     std::f64::consts::SQRT_2 * erf_inv(2.0 * share - 1.0)
 }
 
-/// Axes that know of each other only what lies beside what.
+/// A distribution with one marginal for each axis. Axes are independent, except for [`Marginal::Beside`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Component(pub Vec<Marginal>);
 
 impl Component {
-    /// Against the uniform density.
+    /// Returns the density relative to the uniform one.
     pub(super) fn density(&self, point: &[f64]) -> f64 {
         self.0.iter().zip(point).map(|(marginal, value)| marginal.density(*value, point)).product()
     }
 
-    /// A point of its own for a generator.
+    /// Draws a point.
     pub(super) fn draw(&self, generator: &mut ChaCha8Rng) -> Vec<f64> {
         let mut point = Vec::with_capacity(self.0.len());
         for marginal in &self.0 {
@@ -147,12 +148,12 @@ impl Component {
     }
 }
 
-/// An even mixture of components. A mixture of none is the uniform distribution.
+/// An equally weighted mixture of components. An empty mixture is the uniform distribution.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Proposal(pub Vec<Component>);
 
 impl Proposal {
-    /// Against the uniform density: its mean over the cube is 1.
+    /// Returns the density relative to the uniform one. Its mean over the cube is 1.
     pub fn density(&self, point: &[f64]) -> f64 {
         if self.0.is_empty() {
             return 1.0;
@@ -160,7 +161,7 @@ impl Proposal {
         self.0.iter().map(|component| component.density(point)).sum::<f64>() / self.0.len() as f64
     }
 
-    /// A point of its own for a generator.
+    /// Draws a point.
     pub(crate) fn draw(&self, generator: &mut ChaCha8Rng, width: usize) -> Vec<f64> {
         let chosen = bucket(unit(generator), self.0.len());
         match self.0.get(chosen) {
@@ -195,7 +196,7 @@ mod tests {
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
     }
 
-    /// What is drawn has the density that is told: weighted by its inverse, every quarter has its share.
+    /// Samples follow the reported density: weighted by its inverse, every quarter has an equal share.
     #[test]
     fn what_is_drawn_has_the_density() {
         for density in [skewed(), far()] {
@@ -209,7 +210,7 @@ mod tests {
         }
     }
 
-    /// On a grid: so steep a density that random points tell little of its mean.
+    /// Uses a grid, because random points estimate the mean of so steep a density poorly.
     #[test]
     fn far_numbers_have_a_density_of_mean_one() {
         for nearest in [0.0, 1.0, 2.0, 3.0] {

@@ -1,4 +1,4 @@
-//! Asking for points and telling what came of them, generation by generation.
+//! The ask-and-tell loop of a search, generation by generation.
 
 use std::collections::VecDeque;
 
@@ -10,45 +10,46 @@ use super::space::Space;
 use super::strategy::Strategy;
 use super::{bandit, boundary, cross_entropy, unusual};
 
-/// Points of one generation at most. It is fixed, so that what is asked does not depend on who runs it.
+/// Maximum number of points in a generation. It is fixed, so that points don't depend on the number of workers.
 pub const GENERATION: usize = 20;
 
-/// Share of unusual points among those that no margin chose, where the space says what is unusual: a weight is at most
-/// 5 then, or 8 with chosen points.
+/// Share of unusual points among those not chosen by margins, if the space declares unusual values. Weights are then at
+/// most 5, or 8 with chosen points.
 const UNUSUAL: f64 = 0.8;
 
-/// Points that no margin chose before the first that one does: twice as many as there are coefficients in a model of 8 axes.
+/// Number of points before the first one chosen by margins: about twice the number of coefficients in a model of 8
+/// axes.
 const FIRST_PLAIN: usize = 40;
 
-/// Chosen points for each other one, so that at most 1.25 times as many points are needed as plain ones.
+/// Maximum number of chosen points per other point. It limits the total to 1.25 times the number of other points.
 const CHOSEN_FOR_A_PLAIN: f64 = 0.25;
 
-/// Share of chosen points in one generation at most: with 12 plain ones of 20 a weight is at most 20/12.
+/// Maximum share of chosen points in a generation. With 12 plain points of 20, weights are at most 20/12.
 const MOST_CHOSEN: f64 = 0.4;
 
-/// A failing place is left for others when so many chosen points of one property have failed in it.
+/// A failing region is closed after this many failures of chosen points of one property.
 const FAILURES_OF_A_PLACE: usize = 12;
 
-/// A place is left when so many chosen points brought nothing lower.
+/// A region is closed after this many chosen points without a lower margin.
 const PATIENCE: usize = 24;
 
-/// Radius of what is left, as a distance by root mean square over the axes: two random points are 0.4 apart.
+/// Radius of a closed region, as a root mean square distance over the axes. Two random points have distance 0.4.
 const PLACE_RADIUS: f64 = 0.1;
 
-/// A point that should be tried.
+/// A point to evaluate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ask {
     /// Its coordinates in [0, 1).
     pub point: Vec<f64>,
-    /// Importance weight: the nominal density by the one that its generation was drawn from.
+    /// Importance weight: the nominal density divided by the density of the point's generation.
     pub weight: f64,
-    /// The largest weight that any point of its generation could have had.
+    /// The largest possible weight of a point in this generation.
     pub largest_weight: f64,
-    /// The property that it was chosen for; nothing for a plain point.
+    /// The property for which the point was chosen, or `None` if margins did not choose it.
     pub focus: Option<usize>,
 }
 
-/// A search that goes on: ask, try, tell.
+/// A search in progress: ask for points, evaluate them, tell the results.
 #[derive(Debug, Clone)]
 pub struct Search {
     space: Space,
@@ -59,16 +60,17 @@ pub struct Search {
     unusual: usize,
     chosen: usize,
     waiting: VecDeque<Ask>,
-    /// What the generation's points told so far. Only as a whole are they as their weights say.
+    /// Weight, largest weight and failures of the generation's points so far. The weights are valid only for a whole
+    /// generation.
     told: Vec<(f64, f64, Vec<bool>)>,
     archive: Archive,
-    /// For each property: the tried points at which its present place was begun.
+    /// For each property: the number of points evaluated when its current region was started.
     begun: Vec<usize>,
     rates: Vec<Weighted>,
 }
 
 impl Search {
-    /// A search of a cube. The same seed and the same answers give the same points, on every machine.
+    /// Creates a search of a cube. The same seed and results give the same points on every machine.
     pub fn new(space: Space, strategy: Strategy, seed: u64) -> Self {
         Self {
             space,
@@ -86,16 +88,17 @@ impl Search {
         }
     }
 
-    /// The points of the next generation: [`GENERATION`], or as many as are wanted still.
+    /// Returns the points of the next generation: [`GENERATION`], or `wanted` if that is less.
     ///
-    /// What was asked before and not told is given up, and counts for no rate: weights are right for whole generations.
+    /// Drops pending points of the previous generation. An incomplete generation does not count for rates, because
+    /// weights are valid only for whole generations.
     pub fn ask(&mut self, wanted: usize) -> Vec<Ask> {
         let size = wanted.min(GENERATION);
         let asked: Vec<Ask> = match self.strategy {
             Strategy::Random => self.plain_points(size).into_iter().map(plain).collect(),
             Strategy::Halton => {
                 let first = self.generation * GENERATION as u64;
-                // The sequence begins at 1: its point 0 is the same corner in every axis.
+                // Start at index 1: point 0 is 0 on every axis.
                 let indices = first + 1..=first + size as u64;
                 indices.map(|index| plain(fill::halton(self.seed, index, self.width()))).collect()
             }
@@ -111,26 +114,27 @@ impl Search {
         asked
     }
 
-    /// What each property said of the next point that was asked for, in the order of asking.
+    /// Records the results of each property for the next pending point, in the order of [`Search::ask`].
     ///
-    /// A list may be empty, for a point of which nothing could be learnt. What was not asked for is ignored.
+    /// The list may be empty for a point without results. Results without a pending point are ignored.
     pub fn tell(&mut self, told: Vec<Told>) {
         let Some(ask) = self.waiting.pop_front() else { return };
         self.count(&ask, &told);
         self.learn(ask, told);
     }
 
-    /// The same where the next point could not be tried, and one that was drawn at random from those that can be stood in.
+    /// Records results for the next pending point if it is infeasible and was replaced by a random feasible point.
     ///
-    /// It takes over the weight: the points that can't be tried have, weighted, their nominal share, and what stands in for
-    /// them is as all the others are; so rates are unbiased for the distribution of what can be tried. Nothing is learnt.
+    /// The replacement takes over the weight. Infeasible points have, weighted, their nominal share, and replacements
+    /// are distributed like all feasible points, so rates are unbiased for the distribution of feasible points.
+    /// Strategies don't learn from the replacement.
     pub fn tell_stand_in(&mut self, told: &[Told]) {
         let Some(ask) = self.waiting.pop_front() else { return };
         self.count(&ask, told);
         self.learn(ask, Vec::new());
     }
 
-    /// Counts an answer when its generation is whole.
+    /// Stores a result, and adds a generation to the rates when it is complete.
     fn count(&mut self, ask: &Ask, told: &[Told]) {
         let failed = told.iter().map(|told| told.failed).collect();
         self.told.push((ask.weight, ask.largest_weight, failed));
@@ -153,17 +157,18 @@ impl Search {
         }
     }
 
-    /// How points are chosen.
+    /// The strategy of the search.
     pub fn strategy(&self) -> Strategy {
         self.strategy
     }
 
-    /// Points that the estimates are made from: those of generations that were told as a whole.
+    /// Number of points in the estimates: those of complete generations.
     pub fn counted(&self) -> u64 {
         self.rates.iter().map(Weighted::points).max().unwrap_or(0)
     }
 
-    /// The probability of each property failing under the uniform distribution; nothing for one never told of.
+    /// Estimates the failure probability of each property under the uniform distribution. An entry is `None` without
+    /// points.
     pub fn estimates(&self) -> Vec<Option<Estimate>> {
         self.rates.iter().map(Weighted::estimate).collect()
     }
@@ -178,11 +183,11 @@ impl Search {
         (first..self.plain).map(|index| fill::random(self.seed, index as u64, self.width())).collect()
     }
 
-    /// Unusual points first, then plain ones, then those that are chosen with what is known.
+    /// Draws unusual points first, then plain ones, then those chosen by margins.
     fn guided(&mut self, size: usize) -> Vec<Ask> {
         let focus = if self.plain + self.unusual < FIRST_PLAIN { None } else { self.focus() };
         let proposal = focus.map(|property| self.propose(property)).unwrap_or_default();
-        // A proposal of nothing is the uniform distribution, of which plain points are as good.
+        // An empty proposal is the uniform distribution: draw plain points instead.
         let chosen = if proposal == Proposal::default() { 0 } else { self.credit(size) };
         let kinds = unusual::kinds(&self.space);
         let unusual = if kinds.is_empty() { 0 } else { (UNUSUAL * (size - chosen) as f64) as usize };
@@ -199,8 +204,8 @@ impl Search {
         self.chosen += chosen;
         let largest_weight = size as f64 / plain_count as f64;
         let weighted = |(point, focus): (Vec<f64>, Option<usize>)| {
-            // The balance heuristic of Veach and Guibas (1995), within a generation: what a proposal depends on is then
-            // told before any of its points is drawn, and the estimate stays unbiased.
+            // The balance heuristic of Veach and Guibas (1995), within a generation. A proposal depends only on earlier
+            // generations, so that the estimate stays unbiased.
             let unusual: f64 = of_kinds.iter().map(|kind| kind.density(&point)).sum();
             let density = plain_count as f64 + unusual + chosen as f64 * proposal.density(&point);
             Ask { point, weight: size as f64 / density, largest_weight, focus }
@@ -208,14 +213,15 @@ impl Search {
         points.into_iter().map(weighted).collect()
     }
 
-    /// How many points may be chosen in the next generation.
+    /// Returns the maximum number of chosen points in the next generation.
     fn credit(&self, size: usize) -> usize {
         let others = |count: usize| self.plain + self.unusual + size - count;
         let affordable = |count: usize| (self.chosen + count) as f64 <= CHOSEN_FOR_A_PLAIN * others(count) as f64;
         (0..=(MOST_CHOSEN * size as f64) as usize).rev().find(|count| affordable(*count)).unwrap_or(0)
     }
 
-    /// The property that the next points are chosen for: in turn, those that have not failed yet before all others.
+    /// Returns the property for which the next points are chosen: round robin over the properties that have not failed
+    /// yet, or over all once each has failed. Returns `None` if no property has informative margins.
     fn focus(&self) -> Option<usize> {
         let telling: Vec<usize> =
             (0..self.archive.properties()).filter(|property| self.archive.says_something(*property)).collect();
@@ -234,7 +240,7 @@ impl Search {
         }
     }
 
-    /// Closes the place where a property was looked for, when enough failed there or nothing gets lower any more.
+    /// Closes the current region of a property after enough failures, or when the margin no longer decreases.
     fn leave_if_done(&mut self, property: usize) {
         let begun = self.begun[property];
         let own: Vec<&Tried> =
@@ -262,7 +268,7 @@ mod tests {
     use super::super::space::Dimension;
     use super::*;
 
-    /// Fails where the first two of the axes are low and the third is category 2: 0.3 · 0.2 / 4 of the volume.
+    /// Volume of the failing region, where the first two axes are low and the third is category 2: 0.3 · 0.2 / 4.
     const VOLUME: f64 = 0.015;
 
     fn margin(point: &[f64]) -> f64 {
@@ -279,7 +285,7 @@ mod tests {
         Told { failed: margin < 0.0, margin: Some(margin) }
     }
 
-    /// The search after so many generations, and all that was asked.
+    /// Returns the search after this many generations, and all its points.
     fn searched(strategy: Strategy, seed: u64, generations: usize) -> (Search, Vec<Ask>) {
         let mut search = Search::new(space(), strategy, seed);
         let mut asked = Vec::new();
@@ -304,7 +310,7 @@ mod tests {
         }
     }
 
-    /// Over many seeds the mean of the rates is the volume, nearly all intervals hold it, and weights have mean 1.
+    /// Over many seeds the mean rate is the volume, nearly all intervals contain it, and weights have mean 1.
     #[test]
     fn rates_are_unbiased_however_points_were_chosen() {
         const SEEDS: u64 = 200;
@@ -312,7 +318,7 @@ mod tests {
             let (mut rates, mut held, mut weights) = (0.0, 0, 0.0);
             for seed in 0..SEEDS {
                 let (search, asked) = searched(strategy, seed, 25);
-                let estimate = search.estimates()[0].expect("points were told");
+                let estimate = search.estimates()[0].expect("the points have results");
                 rates += estimate.rate / SEEDS as f64;
                 held += u64::from((estimate.low..=estimate.high).contains(&VOLUME));
                 weights += asked.iter().map(|ask| ask.weight).sum::<f64>() / asked.len() as f64 / SEEDS as f64;
@@ -324,7 +330,7 @@ mod tests {
         }
     }
 
-    /// Chosen points fail far more often than plain ones, which fail as often as the volume says.
+    /// Chosen points fail far more often than plain ones, whose failure rate is the volume.
     #[test]
     fn guided_strategies_converge() {
         for strategy in Strategy::ALL.into_iter().filter(|strategy| strategy.is_guided()) {
@@ -336,8 +342,8 @@ mod tests {
         }
     }
 
-    /// The plain points of a guided search are those of a random one, and at least four for each that is chosen: whatever
-    /// margins say, a search is never far behind.
+    /// A guided search has the plain points of a random search, at least four for each chosen point. So misleading
+    /// margins cost little.
     #[test]
     fn a_guided_search_contains_the_random_one() {
         let random = searched(Strategy::Random, 3, 40).1;
@@ -369,7 +375,8 @@ mod tests {
         }
     }
 
-    /// Two properties that fail in opposite corners, seldom: both are found, and the chosen points are shared.
+    /// Two properties fail rarely, in opposite corners: both failures are found, and the properties share the chosen
+    /// points.
     #[test]
     fn several_properties_are_all_looked_for() {
         for strategy in Strategy::ALL.into_iter().filter(|strategy| strategy.is_guided()) {
@@ -383,12 +390,13 @@ mod tests {
                     search.tell(margins.map(told).to_vec());
                 }
             }
-            // Of plain random points 1.2⁶ / 6! = 0.0041 fail, that is four of 1000 (the distribution of Irwin and Hall).
+            // A share of 1.2⁶ / 6! = 0.0041 of plain random points fails, four of 1000 (Irwin–Hall distribution).
             assert!(failed.iter().all(|count| *count >= 12), "{strategy:?}: {failed:?}");
         }
     }
 
-    /// Fails where noise is large and there are many things: 0.0027 · 2/5 of the volume, or where neither is special.
+    /// One property fails if noise is large and there are many objects, 0.0027 · 2/5 of the volume; another if both are
+    /// usual.
     #[test]
     fn what_is_unusual_is_tried_early_and_rates_stay_unbiased() {
         let space = Space::new([Dimension::Normal, Dimension::Rising(5), Dimension::Continuous]);
@@ -412,7 +420,7 @@ mod tests {
             }
             found += failed[0];
             for (property, estimate) in search.estimates().into_iter().enumerate() {
-                let estimate = estimate.expect("points were told");
+                let estimate = estimate.expect("the points have results");
                 rates[property] += estimate.rate / SEEDS as f64;
                 held[property] += u64::from((estimate.low..=estimate.high).contains(&truth[property]));
             }
@@ -423,7 +431,7 @@ mod tests {
         assert!(held.iter().all(|held| held * 100 >= SEEDS * 93), "{held:?}");
     }
 
-    /// A third of the cube can't be tried; what can fails in a fifth of it.
+    /// A third of the cube is infeasible. A fifth of the rest fails.
     #[test]
     fn stand_ins_keep_rates_unbiased() {
         let space = Space::new([Dimension::Normal, Dimension::Continuous]);
@@ -442,12 +450,12 @@ mod tests {
                         let stand_in =
                             std::iter::repeat_with(|| [fill::unit(&mut generator), fill::unit(&mut generator)])
                                 .find(|point| possible(point))
-                                .expect("there is no end");
+                                .expect("the iterator is infinite");
                         search.tell_stand_in(&[told(margin(&stand_in))]);
                     }
                 }
             }
-            let estimate = search.estimates()[0].expect("points were told");
+            let estimate = search.estimates()[0].expect("the points have results");
             rates += estimate.rate / SEEDS as f64;
             held += u64::from((estimate.low..=estimate.high).contains(&0.2));
         }
@@ -455,7 +463,7 @@ mod tests {
         assert!(held * 100 >= SEEDS * 94, "{held}");
     }
 
-    /// The rest of a generation that was stopped is not known, so its beginning counts for no rate.
+    /// The results of an interrupted generation are incomplete, so that it does not count for rates.
     #[test]
     fn only_whole_generations_count() {
         let mut search = Search::new(space(), Strategy::Bandit, 1);

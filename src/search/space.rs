@@ -1,27 +1,27 @@
-//! The cube that is searched.
+//! The search space, a unit cube.
 
-/// One axis of the cube.
+/// An axis of the cube.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dimension {
-    /// A quantile in [0, 1): near values mean near things.
+    /// A quantile in [0, 1). Near values have similar effects.
     Continuous,
-    /// One of so many values, none nearer to another: value `i` of `k` is the interval [i/k, (i+1)/k).
+    /// One of this many unordered values: value `i` of `k` is the interval [i/k, (i+1)/k).
     Categorical(usize),
-    /// A quantile of something that is normally distributed about what is nominal: the middle is nominal, the ends are
-    /// unusual.
+    /// A quantile of a normal distribution about the nominal value: the middle is nominal, the ends are unusual.
     Normal,
-    /// One of so many values in order, the last of which is the hardest: intervals as those of [`Dimension::Categorical`].
+    /// One of this many ordered values, the last of which is the hardest. Intervals are as in
+    /// [`Dimension::Categorical`].
     Rising(usize),
-    /// A quantile in [0, 1) that says where something is along the same side as the axis with this earlier index says it of
-    /// another thing: equal values put the two next to each other, which is unusual.
+    /// A quantile in [0, 1) of a position on the same side as the earlier axis with this index, which is the position
+    /// of another object. Equal values put the two objects next to each other, which is unusual.
     Beside(usize),
-    /// The same as [`Dimension::Normal`] of something that matters only where things are close to each other. There are
-    /// many of these, and each matters seldom: no strategy learns from them.
+    /// Like [`Dimension::Normal`], for a quantity that matters only if objects are close to each other. There are many
+    /// such axes, and each seldom matters, so that no strategy learns from them.
     Aside,
 }
 
 impl Dimension {
-    /// How many values there are where none is nearer to another.
+    /// Returns the number of values of a categorical axis, and `None` for other axes.
     pub(crate) fn categories(self) -> Option<usize> {
         match self {
             Self::Categorical(count) => Some(count),
@@ -29,7 +29,7 @@ impl Dimension {
         }
     }
 
-    /// Whether a strategy learns where along it margins are low.
+    /// Whether strategies learn where along this axis margins are low.
     pub(crate) fn is_learnt(self) -> bool {
         self != Self::Aside
     }
@@ -42,7 +42,8 @@ pub struct Space {
 }
 
 impl Space {
-    /// The cube with these axes. An axis of no value counts as one of a single value, one beside no earlier axis as continuous.
+    /// Creates the cube with these axes. An axis without values becomes an axis with one value; an axis beside no
+    /// earlier axis becomes continuous.
     pub fn new(dimensions: impl IntoIterator<Item = Dimension>) -> Self {
         let whole = |(index, dimension)| match dimension {
             Dimension::Beside(other) if other >= index => Dimension::Continuous,
@@ -58,7 +59,8 @@ impl Space {
         &self.dimensions
     }
 
-    /// How far apart two points are: root mean square over the axes that are learnt; two values of a categorical axis are 1 apart.
+    /// Returns the root mean square distance of two points over the learnt axes. Different values of a categorical axis
+    /// have distance 1.
     pub(crate) fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for ((dimension, a), b) in
@@ -75,7 +77,7 @@ impl Space {
     }
 }
 
-/// Which of `count` equal intervals of [0, 1) a number is in.
+/// Returns the index of a number's interval among `count` equal intervals of [0, 1).
 pub(crate) fn bucket(value: f64, count: usize) -> usize {
     ((value.max(0.0) * count as f64) as usize).min(count.saturating_sub(1))
 }

@@ -1,28 +1,29 @@
 //! The names of the strategies.
 
-/// How the next points are chosen.
+/// A strategy that chooses the next points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Strategy {
     /// Independent uniform points.
     Random,
-    /// Halton's sequence with a random shift: fills the cube evenly in few dimensions.
+    /// Halton's sequence with a random shift. Fills the cube evenly in low dimensions.
     Halton,
-    /// Each generation has one point in each of as many slices of every axis.
+    /// Latin hypercube: each generation of n points has one point in each of n slices of every axis.
     LatinHypercube,
-    /// Normal distributions that follow the points of the lowest margin.
+    /// Normal distributions fitted to the points with the lowest margins.
     CrossEntropy,
-    /// Each axis in slices, played like the arms of a bandit.
+    /// A multi-armed bandit for each axis, whose arms are slices.
     Bandit,
-    /// A quadratic model of the margin, asked for where it is least, and then for the edge of what fails.
+    /// A quadratic model of the margin. Samples its minimum, and after the first failure also the boundary between pass
+    /// and fail.
     Boundary,
 }
 
 impl Strategy {
-    /// All of them, in the order in which they are told.
+    /// All strategies, in the order of help texts.
     pub const ALL: [Self; 6] =
         [Self::Random, Self::Halton, Self::LatinHypercube, Self::CrossEntropy, Self::Bandit, Self::Boundary];
 
-    /// The name that a campaign file uses.
+    /// Returns the name used in config files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
@@ -34,12 +35,12 @@ impl Strategy {
         }
     }
 
-    /// The strategy of a name.
+    /// Returns the strategy of a name, or `None` if the name is unknown.
     pub fn by_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|strategy| strategy.name() == name)
     }
 
-    /// Whether it learns from margins.
+    /// Whether the strategy learns from margins.
     pub fn is_guided(self) -> bool {
         matches!(self, Self::CrossEntropy | Self::Bandit | Self::Boundary)
     }

@@ -1,30 +1,32 @@
-//! What is unusual before anything is known, one kind at a time: senses that err much, and things close to each other.
+//! Points that are unusual a priori, one kind at a time: large perception errors, and objects close to each other.
 
 use super::proposal::{Component, Marginal};
 use super::space::{Dimension, Space};
 
-/// Noise is unusual from so many standard deviations on: twenty times rarer than noise that is not.
+/// Noise is unusual from this many standard deviations: about 5 % of all noise.
 const FAR: f64 = 2.0;
 
-/// Standard deviation of how far things lie from what they are put beside, in shares of the way that they could be.
+/// Standard deviation of the distance between objects placed beside each other, as a share of the axis.
 const BESIDE: f64 = 0.2;
 
-/// How much a larger count of things is preferred to a smaller one: its rank to this power.
+/// Exponent of the preference for many objects: a count's weight is its rank to this power.
 const MANY: i32 = 2;
 
-/// Points of the first turn.
+/// Number of points in the first turn.
 const FIRST_TURN: usize = 2;
 
-/// Each turn is so many times as long as the one before.
+/// Ratio of the lengths of successive turns.
 const LONGER: usize = 3;
 
-/// The kinds of unusual points that a space has: what the search is about is perceived far from where it is; and there are
-/// many things, close to what the search is about, and perceived far from where they are. Everything else stays as it is.
+/// Returns the kinds of unusual points of a space. In the first, perception errors of the target and the base are
+/// large; in the second, there are many other objects, close to the target, with large perception errors. All other
+/// axes stay uniform.
 ///
-/// One at a time, because together they hide each other: a hand that goes astray in a crowd always fails in the same way.
+/// Each point has one kind, because the kinds mask each other: a misplaced gripper in a crowd always fails in the same
+/// way.
 ///
-/// The idea is that of scaled-sigma sampling (Sun, Li and others, 2015), which finds rare failures of circuits where noise is
-/// made larger; here every distance, from where it is unusual up to four deviations, is as frequent as any other.
+/// Based on scaled-sigma sampling (Sun, Li and others, 2015), which finds rare failures of circuits by enlarging the
+/// noise. Here the distance is uniform from [`FAR`] to four standard deviations.
 pub(crate) fn kinds(space: &Space) -> Vec<Component> {
     let of = |axis: fn(&Dimension) -> Option<Marginal>| {
         let axes: Vec<Option<Marginal>> = space.dimensions().iter().map(axis).collect();
@@ -34,9 +36,9 @@ pub(crate) fn kinds(space: &Space) -> Vec<Component> {
     [of(astray), of(crowded)].into_iter().flatten().collect()
 }
 
-/// Which of so many kinds the unusual point of this number in its generation is of: in turns, the first of two points and
-/// each next one three times as long. What is common in the first kind takes few points, and the next one need not wait for
-/// what is rare in it.
+/// Returns the kind of a generation's unusual point with this number. Kinds take turns; the first turn has two points,
+/// and each further turn is three times as long. Frequent failures of the first kind need only a few points, and the
+/// next kind does not wait for rare failures of the first.
 pub(crate) fn kind_at(number: usize, kinds: usize) -> usize {
     let (mut turn, mut end) = (0, FIRST_TURN);
     while number >= end {

@@ -1,4 +1,4 @@
-//! From findings to outcomes.
+//! Derives outcomes from the rules' findings.
 
 use std::collections::BTreeMap;
 
@@ -7,23 +7,23 @@ use crate::ontology::{Action, Ontology, Property};
 use crate::rules::{Findings, RuleFault, WitnessRow};
 use crate::verdict::{Judgement, Outcome};
 
-/// How an action came to its end.
+/// How an action ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Fate {
-    /// By its own report: the rules decide.
+    /// The action reported its end: the rules decide.
     Completed,
-    /// By a fault of simulation, transport or tool.
+    /// A fault in the simulation, the transport or the tool.
     Broken(String),
-    /// By a budget.
+    /// A budget was exhausted.
     Timeout(String),
-    /// It was never reached.
+    /// The action was never reached.
     NotReached,
 }
 
-/// Outcomes of an action's success properties, in the action's order.
+/// Returns the outcomes of an action's success properties, in the action's order.
 ///
-/// `findings` holds what the rules found for them and for the action's preconditions; where the fate is not
-/// `Completed` it is not looked at. A property without findings is `broken`: a verdict is never made up.
+/// `findings` holds the rules' findings for these properties and for the action's preconditions. It is ignored unless
+/// the fate is `Completed`. A property without findings is `broken`: verdicts are never invented.
 pub fn judge(
     ontology: &Ontology,
     action: &Action,
@@ -41,7 +41,7 @@ pub fn judge(
             Fate::Completed => match (&unmet, findings.get(iri)) {
                 (Some(unmet), _) => unmet.clone(),
                 (None, Some(result)) => outcome_of(result, property),
-                (None, None) => (Outcome::Broken, None, "no rule was evaluated for it".to_owned()),
+                (None, None) => (Outcome::Broken, None, "no rule was evaluated for this property".to_owned()),
             },
         };
         Judgement { property: iri.clone(), outcome, margin, witness, rule_digest: rule_digest(iri), held_before: None }
@@ -49,7 +49,8 @@ pub fn judge(
     action.success_properties.iter().map(decide).collect()
 }
 
-/// The outcome that all success properties share where a precondition does not hold.
+/// Returns the outcome that all success properties share if a precondition does not hold, or `None` if all
+/// preconditions hold or are inapplicable.
 fn unmet_precondition(
     ontology: &Ontology,
     action: &Action,
@@ -82,13 +83,13 @@ fn outcome_of(result: &Result<Findings, RuleFault>, property: Option<&Property>)
     }
 }
 
-/// The rule author's words, or the witness tuples spelt out, or how far it was from holding.
+/// Returns the rule author's explanation, or else the witness tuples as text, or else the distance from holding.
 fn words(found: &Findings, property: Option<&Property>) -> String {
     if !found.because.is_empty() {
         return found.because.join("; ");
     }
     if !found.applicable {
-        return "it does not apply here".to_owned();
+        return "the property does not apply".to_owned();
     }
     if !found.witness.is_empty() {
         let mut rows: Vec<String> = found.witness.iter().map(spell).collect();
@@ -126,7 +127,7 @@ fn readable(term: &Term) -> String {
     }
 }
 
-/// A number to four significant digits.
+/// Formats a number with four significant digits.
 fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();

@@ -1,33 +1,33 @@
-//! The six outcomes and what stands behind each.
+//! The six outcomes, and judgements: outcomes with their evidence.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Outcome of one property in one action execution. Never folded into two.
+/// Outcome of one property in one action execution. The six outcomes are never reduced to pass and fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// It holds.
+    /// The property holds.
     Passed,
-    /// It does not hold, and that is the robot's doing.
+    /// The property does not hold, and the robot is the cause.
     Failed,
-    /// It says nothing about this action.
+    /// The property does not apply to this action.
     Inapplicable,
-    /// Simulation, transport or the tool was at fault.
+    /// The simulation, the transport or the tool failed.
     Broken,
-    /// A budget was spent.
+    /// A budget was exhausted.
     Timeout,
     /// The action was never reached.
     Untested,
 }
 
 impl Outcome {
-    /// All six, in the order in which reports count them.
+    /// All six outcomes, in the order of reports.
     pub const ALL: [Self; 6] =
         [Self::Passed, Self::Failed, Self::Inapplicable, Self::Broken, Self::Timeout, Self::Untested];
 
-    /// The word for it.
+    /// Returns the outcome's name.
     pub fn word(self) -> &'static str {
         match self {
             Self::Passed => "passed",
@@ -39,12 +39,12 @@ impl Outcome {
         }
     }
 
-    /// The outcome of a word.
+    /// Returns the outcome of a name, or `None` if the name is unknown.
     pub fn from_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|outcome| outcome.word() == word)
     }
 
-    /// Local name of EARL's outcome value.
+    /// Returns the local name of the corresponding EARL outcome value.
     pub fn earl(self) -> &'static str {
         match self {
             Self::Passed => "passed",
@@ -62,29 +62,29 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// Outcome of one property with what proves it.
+/// Outcome of one property with its evidence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judgement {
     /// IRI of the property.
     pub property: String,
     /// The outcome.
     pub outcome: Outcome,
-    /// How far from flipping, in the property's unit; positive: passed.
+    /// Distance from flipping, in the property's unit; positive if passed.
     pub margin: Option<f64>,
-    /// In words: the rule author's, or made from the witness tuples, or the reason of a fault.
+    /// Explanation: the rule author's text, or the witness tuples as text, or the reason of a fault.
     pub witness: String,
-    /// Digest of the rule file that decided (empty where none did).
+    /// Digest of the rule file that decided. Empty if none did.
     pub rule_digest: String,
-    /// Whether what passed had held before the action already: then it shows nothing about the action.
+    /// Whether a passed property had already held before the action. If so, it is no evidence about the action.
     ///
-    /// Nothing where that was not looked at: where it did not pass, and for what states that something must not happen,
-    /// which has not happened before an action.
+    /// `None` if this was not checked: if the property did not pass, or if it states that something must not happen,
+    /// which is always the case before an action.
     #[serde(default)]
     pub held_before: Option<bool>,
 }
 
 impl Judgement {
-    /// Whether another says the same in every part. (A margin that is no number is the same as another such.)
+    /// Whether two judgements are equal in every field. Unlike `==`, two NaN margins are equal.
     pub fn says_the_same(&self, other: &Self) -> bool {
         let margin =
             |of: &Self| of.margin.map(|value| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() });

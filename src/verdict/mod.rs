@@ -1,6 +1,6 @@
-//! Turns what the rules found into outcomes with witness and margin, and outcomes into scores and rates.
+//! Turns the rules' findings into outcomes with witness and margin, and outcomes into scores and rates.
 //!
-//! Never: evaluates a rule, looks at a trace, or folds the six outcomes into two.
+//! Never: evaluates a rule, reads a trace, or reduces the six outcomes to pass and fail.
 
 mod judge;
 mod judgement;

@@ -1,25 +1,25 @@
-//! Whether a scene that is run again fails as it did.
+//! Compares the failures of a scene that is run again with those expected.
 
 use std::collections::BTreeSet;
 
 use crate::base::names;
 use crate::verdict::{Judgement, Outcome};
 
-/// How a scene's failures today compare with those that are expected of it. Properties go by their local names.
+/// How the failures of a scene compare with the expected ones. Properties are identified by their local names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Recurrence {
-    /// Just the expected properties fail; where none is expected, none fails.
+    /// Exactly the expected properties fail. If none is expected, none fails.
     AsBefore,
-    /// Some were expected to fail, and none does.
+    /// Failures were expected, and no property fails.
     NoLonger,
-    /// Other properties fail than expected, or more, or fewer.
+    /// The failed properties differ from the expected ones. Holds the failed properties.
     Otherwise(BTreeSet<String>),
-    /// Nothing fails, but of these it could not be decided, or there are none such any more.
+    /// No property fails, but these are undecided or no longer exist.
     Undecided(BTreeSet<String>),
 }
 
 impl Recurrence {
-    /// Compares what is expected to fail with what came of all actions.
+    /// Compares the properties expected to fail with the judgements of all actions.
     pub fn of<'a>(expected: &BTreeSet<String>, judgements: impl Iterator<Item = &'a Judgement>) -> Self {
         let (mut failed, mut undecided, mut decided) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
         for judgement in judgements {
@@ -43,7 +43,7 @@ impl Recurrence {
         }
     }
 
-    /// The word for it.
+    /// Returns the name used in reports.
     pub fn word(&self) -> &'static str {
         match self {
             Self::AsBefore => "as before",
@@ -58,7 +58,7 @@ impl Recurrence {
 mod tests {
     use super::*;
 
-    /// What is expected to fail, what comes of each property, and what that is.
+    /// Properties expected to fail, outcome of each property, and the resulting recurrence.
     type Row = (&'static [&'static str], &'static [(&'static str, Outcome)], Recurrence);
 
     fn recurrence(expected: &[&str], outcomes: &[(&str, Outcome)]) -> Recurrence {

@@ -7,15 +7,15 @@ use crate::verdict::Outcome;
 /// How often each outcome occurred.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
-    /// It held.
+    /// The property held.
     pub passed: u64,
-    /// It did not hold.
+    /// The property did not hold.
     pub failed: u64,
-    /// It said nothing.
+    /// The property did not apply.
     pub inapplicable: u64,
-    /// Simulation or tool was at fault.
+    /// The simulation or the tool failed.
     pub broken: u64,
-    /// A budget was spent.
+    /// A budget was exhausted.
     pub timeout: u64,
     /// The action was never reached.
     pub untested: u64,
@@ -31,29 +31,30 @@ impl Counts {
         counts
     }
 
-    /// Counts one more.
+    /// Counts one outcome.
     pub fn add(&mut self, outcome: Outcome) {
         *self.slot(outcome) += 1;
     }
 
-    /// Counts as often again as another counted.
+    /// Adds the counts of another.
     pub fn add_all(&mut self, other: Self) {
         for outcome in Outcome::ALL {
             *self.slot(outcome) += other.get(outcome);
         }
     }
 
-    /// How often one outcome occurred.
+    /// Returns the count of one outcome.
     pub fn get(mut self, outcome: Outcome) -> u64 {
         *self.slot(outcome)
     }
 
-    /// All of them together.
+    /// Returns the sum of all counts.
     pub fn total(self) -> u64 {
         Outcome::ALL.into_iter().map(|outcome| self.get(outcome)).sum()
     }
 
-    /// Those that say something about the robot: passed and failed. The denominator of a pass rate.
+    /// Returns the number of passed and failed outcomes, the denominator of a pass rate. Only these are evidence about
+    /// the robot.
     pub fn decided(self) -> u64 {
         self.passed + self.failed
     }
@@ -70,23 +71,22 @@ impl Counts {
     }
 }
 
-/// A: the share of an action's properties that passed, in [0, 1].
+/// Computes A: the share of an action's properties that passed, in [0, 1].
 ///
-/// A property that says nothing about this action (`inapplicable`) leaves the denominator, unless none is left:
-/// an action of which nothing could be shown scores 0, as one whose properties were broken, timed out or untested.
-/// Source: the paper, equation 1.
+/// Inapplicable properties are not counted in the denominator. An action without applicable properties scores 0, like
+/// an action whose properties were all broken, timed out or untested. Source: the paper, equation 1.
 pub fn action_score(outcomes: impl IntoIterator<Item = Outcome>) -> f64 {
     let counts = Counts::of(outcomes);
     let applicable = counts.total() - counts.inapplicable;
     if applicable == 0 { 0.0 } else { counts.passed as f64 / applicable as f64 }
 }
 
-/// S: the mean of A over a test's actions, in [0, 1]. Source: the paper, equation 2.
+/// Computes S: the mean of A over a test's actions, in [0, 1]. Source: the paper, equation 2.
 pub fn run_score(action_scores: &[f64]) -> f64 {
     mean(action_scores.iter().copied()).unwrap_or(0.0)
 }
 
-/// T is the mean of S over runs (the paper, equation 3); nothing where there are none.
+/// Returns the mean of the values, or `None` if there are none. T is the mean of S over runs (the paper, equation 3).
 pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0u64), |(sum, count), value| (sum + value, count + 1));
     (count > 0).then(|| sum / count as f64)

@@ -1,14 +1,14 @@
-//! How sure a rate is.
+//! Confidence intervals of rates.
 
 use serde::Serialize;
 
-/// Quantile of the normal distribution that leaves 2.5 % above: intervals are of 95 %.
+/// The 97.5 % quantile of the normal distribution, for 95 % intervals.
 const Z: f64 = 1.959_963_984_540_054;
 
 /// A rate with its 95 % confidence interval. All three lie in [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
-    /// Successes by trials.
+    /// Successes divided by trials.
     pub rate: f64,
     /// Lower end.
     pub low: f64,
@@ -16,9 +16,10 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// Wilson's score interval (1927), which holds for few trials and at 0 and 1; nothing where there was no trial.
+/// Computes Wilson's score interval (1927), which is valid for few trials and for rates of 0 and 1. Returns `None`
+/// without trials.
 ///
-/// More successes than trials count as all of them.
+/// `successes` is clamped to `trials`.
 pub fn wilson(successes: u64, trials: u64) -> Option<Interval> {
     if trials == 0 {
         return None;
@@ -28,9 +29,9 @@ pub fn wilson(successes: u64, trials: u64) -> Option<Interval> {
     wilson_share(successes / trials, trials)
 }
 
-/// The same for a share of trials that need not be a whole number; nothing where there was none.
+/// Computes Wilson's interval for a rate and a number of trials that need not be an integer.
 ///
-/// Shape: the rate from 0 to 1.
+/// Returns `None` if `trials` is not positive or the rate is outside [0, 1].
 pub fn wilson_share(rate: f64, trials: f64) -> Option<Interval> {
     if trials <= 0.0 || !(0.0..=1.0).contains(&rate) {
         return None;
@@ -38,13 +39,13 @@ pub fn wilson_share(rate: f64, trials: f64) -> Option<Interval> {
     let denominator = 1.0 + Z * Z / trials;
     let centre = (rate + Z * Z / (2.0 * trials)) / denominator;
     let half = Z / denominator * libm::sqrt(rate * (1.0 - rate) / trials + Z * Z / (4.0 * trials * trials));
-    // At 0 and 1 the ends meet the rate exactly, but for rounding.
+    // At rates of 0 and 1, the end equals the rate exactly; avoid rounding errors.
     let low = if rate == 0.0 { 0.0 } else { (centre - half).max(0.0) };
     let high = if rate == 1.0 { 1.0 } else { (centre + half).min(1.0) };
     Some(Interval { rate, low, high })
 }
 
-/// Trials after which the interval is at most so wide, whatever the rate.
+/// Returns the number of trials after which the interval is at most `width` wide at any rate.
 ///
 /// Source: the interval is widest at a rate of one half, where its width is z / √(n + z²).
 pub fn trials_for_width(width: f64) -> u64 {

@@ -1,10 +1,10 @@
-//! The tables of a dataset: their columns, and what each says.
+//! The tables of a dataset, with descriptions of their columns.
 
 use serde::Serialize;
 
 use crate::analysis::ColumnKind;
 
-/// One column.
+/// Description of a column.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Said {
     pub name: &'static str,
@@ -14,7 +14,7 @@ pub(super) struct Said {
     pub description: &'static str,
 }
 
-/// One table.
+/// Description of a table.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct TableSaid {
     pub file: &'static str,
@@ -40,81 +40,77 @@ const fn number(name: &'static str, unit: &'static str, description: &'static st
 
 const RUN: Said = text("run", "id of the run");
 const STEP: Said = count("step", "position of the action in the test, from 1");
-const TIME: Said = number("time_s", "s", "since the action began; ten rows a second, and the first is how it began");
+const TIME: Said = number("time_s", "s", "time since the action began; ten rows a second, the first at its start");
 
-/// What was done, and what came of it.
+/// Actions with their results.
 pub(super) const ACTIONS: TableSaid = TableSaid {
     file: "actions.parquet",
     rows: "one for each action of each run",
     columns: &[
         RUN,
-        text("campaign", "id of its campaign"),
+        text("campaign", "id of the campaign"),
         count("index", "position of the run in the campaign, from 0"),
         STEP,
         text("action", "the action (IRI)"),
-        text("parameters", "values of its designators (JSON)"),
-        text("end", "how it ended: completed, broken, timeout or untested"),
-        truth("reported", "whether it reported success itself"),
-        text("message", "its own words, or why it did not complete"),
-        number("duration_s", "s", "simulated time that it took"),
-        count("properties_passed", "how many of its success properties passed; outcomes.parquet has each"),
-        count("properties", "how many it has"),
-        number("score", "1", "share of its properties that passed"),
+        text("parameters", "values of the action's designators (JSON)"),
+        text("end", "how the action ended: completed, broken, timeout or untested"),
+        truth("reported", "whether the action reported success"),
+        text("message", "the action's message, or the reason why it did not complete"),
+        number("duration_s", "s", "simulated duration of the action"),
+        count("properties_passed", "number of success properties that passed; see outcomes.parquet for each"),
+        count("properties", "number of success properties"),
+        number("score", "1", "share of the success properties that passed"),
     ],
 };
 
-/// What each joint measured and was told.
+/// Observations and commands of each joint.
 pub(super) const JOINTS: TableSaid = TableSaid {
     file: "joints.parquet",
-    rows: "one for each action, moment and joint",
+    rows: "one for each action, time and joint",
     columns: &[
         RUN,
         STEP,
         TIME,
-        text("joint", "its name in the URDF"),
-        number("position", "m or rad", "observation: measured position, that of the base by the robot's own belief"),
+        text("joint", "name of the joint in the URDF"),
+        number("position", "m or rad", "observation: measured position; for joints of the base, the localised one"),
         number("velocity", "m/s or rad/s", "observation: measured velocity"),
-        number("effort", "N or N m", "observation: what its motor gives beyond what holds the robot's own weight"),
-        number(
-            "target",
-            "m or rad",
-            "command: where its controller was told to go in the control tick that ended then",
-        ),
+        number("effort", "N or N m", "observation: effort of the motor, without gravity compensation"),
+        number("target", "m or rad", "command: target of the controller in the control tick that ended at this time"),
     ],
 };
 
-/// What the robot as a whole measured and was told.
+/// Observations and commands of the gripper and the base.
 pub(super) const ROBOT: TableSaid = TableSaid {
     file: "robot.parquet",
-    rows: "one for each action and moment",
+    rows: "one for each action and time",
     columns: &[
         RUN,
         STEP,
         TIME,
         number("opening_m", "m", "observation: measured gap between the fingers"),
-        number("finger_left_n", "N", "observation: what the left finger presses with"),
-        number("finger_right_n", "N", "observation: what the right finger presses with"),
-        number("told_opening_m", "m", "command: the gap that the fingers were told to go to"),
-        number("told_force_n", "N", "command: the largest force that a finger was told to give"),
-        number("base_x_m", "m", "observation: where the base believes that it is"),
-        number("base_y_m", "m", "observation: where the base believes that it is"),
-        number("base_heading_rad", "rad", "observation: which way the base believes that it faces"),
-        number("true_base_x_m", "m", "truth: where the base is"),
-        number("true_base_y_m", "m", "truth: where the base is"),
-        number("true_base_heading_rad", "rad", "truth: which way the base faces"),
+        number("finger_left_n", "N", "observation: force of the left finger"),
+        number("finger_right_n", "N", "observation: force of the right finger"),
+        number("told_opening_m", "m", "command: target gap between the fingers"),
+        number("told_force_n", "N", "command: maximum force of each finger"),
+        number("base_x_m", "m", "observation: localised x of the base"),
+        number("base_y_m", "m", "observation: localised y of the base"),
+        number("base_heading_rad", "rad", "observation: localised heading of the base"),
+        number("true_base_x_m", "m", "truth: x of the base"),
+        number("true_base_y_m", "m", "truth: y of the base"),
+        number("true_base_heading_rad", "rad", "truth: heading of the base"),
     ],
 };
 
-/// Where things truly were.
+/// Ground truth of objects.
 pub(super) const OBJECTS: TableSaid = TableSaid {
     file: "objects.parquet",
-    rows: "one for each action, moment and object that can move: the truth, which no robot is told",
+    rows: "one for each action, time and movable object: ground truth, which no robot receives",
     columns: &[
         RUN,
         STEP,
         TIME,
-        text("object", "its id"),
-        number("x_m", "m", "true position in the world, of the middle of its foot"),
+        text("object", "id of the object"),
+        number("x_m", "m", "true position in the world, of the centre of the object's base"),
         number("y_m", "m", "true position in the world"),
         number("z_m", "m", "true position in the world"),
         number("qx", "1", "true rotation, as a unit quaternion"),
@@ -124,26 +120,30 @@ pub(super) const OBJECTS: TableSaid = TableSaid {
     ],
 };
 
-/// What the robot took things for.
+/// Perceived objects.
 pub(super) const PERCEPTS: TableSaid = TableSaid {
     file: "percepts.parquet",
-    rows: "one for each thing that was perceived, in the order in which it was",
+    rows: "one for each perceived object, in the order of perception",
     columns: &[
         RUN,
         STEP,
-        count("number", "which of the action's it is, from 1"),
-        text("source", "detector: the reference perception was asked; reported: the action told it in its end"),
-        text("object", "its id, where the perception names one"),
-        text("category", "what it seems to be (IRI), where that is told"),
-        number("x_m", "m", "where its foot seems to be, by the base's belief of where it stands itself"),
-        number("y_m", "m", "where its foot seems to be"),
-        number("z_m", "m", "where its foot seems to be"),
-        number("qx", "1", "how it seems to be turned, as a unit quaternion"),
-        number("qy", "1", "how it seems to be turned"),
-        number("qz", "1", "how it seems to be turned"),
-        number("qw", "1", "how it seems to be turned"),
-        number("width_m", "m", "how large it seems to be along its own x"),
-        number("depth_m", "m", "how large it seems to be along its own y"),
-        number("height_m", "m", "how high it seems to be"),
+        count("number", "number of the percept in the action, from 1"),
+        text("source", "detector: from the reference perception; reported: from the action's final report"),
+        text("object", "id of the object, if the perception names one"),
+        text("category", "perceived class (IRI), if reported"),
+        number(
+            "x_m",
+            "m",
+            "perceived position of the centre of the object's base, given the localised pose of the robot",
+        ),
+        number("y_m", "m", "perceived position"),
+        number("z_m", "m", "perceived position"),
+        number("qx", "1", "perceived rotation, as a unit quaternion"),
+        number("qy", "1", "perceived rotation"),
+        number("qz", "1", "perceived rotation"),
+        number("qw", "1", "perceived rotation"),
+        number("width_m", "m", "perceived size along the object's x"),
+        number("depth_m", "m", "perceived size along the object's y"),
+        number("height_m", "m", "perceived height"),
     ],
 };

@@ -1,7 +1,6 @@
-//! Runs as data for learning: what the robot measured and was told, what it took things for, where they truly were, and what came
-//! of it.
+//! Export of runs as learning data: observations, commands, percepts, ground truth and outcomes.
 //!
-//! Never: simulates, draws a picture, decides what is a success (outcomes are the rules'), or leaves out runs that failed.
+//! Never: simulates, renders an image, decides successes (the rules do), or leaves out failed runs.
 
 mod columns;
 mod sheet;

@@ -1,4 +1,4 @@
-//! A table that is filled row by row and written piece by piece.
+//! A table that is filled row by row and written in batches.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -10,22 +10,22 @@ use crate::analysis::dataset::columns::TableSaid;
 use crate::analysis::tables::{Cell, series, unwritten};
 use crate::base::Diagnostics;
 
-/// Rows that are in memory at once, at most about.
+/// Approximate maximum number of rows in memory.
 const ROWS_AT_ONCE: usize = 100_000;
 
-/// One table of a dataset while it is written.
+/// Writer of one table of a dataset.
 pub(super) struct Sheet {
     said: TableSaid,
     path: PathBuf,
     writer: BatchedWriter<File>,
     cells: Vec<Vec<Cell>>,
     waiting: usize,
-    /// Rows up to now.
+    /// Number of rows so far.
     pub(super) rows: usize,
 }
 
 impl Sheet {
-    /// An empty table in a folder.
+    /// Creates an empty table in a folder.
     pub(super) fn begin(said: TableSaid, folder: &Path) -> Result<Self, Diagnostics> {
         let path = folder.join(said.file);
         let cells: Vec<Vec<Cell>> = said.columns.iter().map(|_| Vec::new()).collect();
@@ -37,7 +37,7 @@ impl Sheet {
         Ok(Self { said, path, writer, cells, waiting: 0, rows: 0 })
     }
 
-    /// Adds a row, in the order of the columns.
+    /// Adds a row. Cells are in the order of the columns.
     pub(super) fn push(&mut self, row: impl IntoIterator<Item = Cell>) {
         for (cells, cell) in self.cells.iter_mut().zip(row) {
             cells.push(cell);
@@ -45,12 +45,12 @@ impl Sheet {
         (self.waiting, self.rows) = (self.waiting + 1, self.rows + 1);
     }
 
-    /// Writes what is waiting, if that is much.
+    /// Writes the pending rows if there are many.
     pub(super) fn make_room(&mut self) -> Result<(), Diagnostics> {
         if self.waiting >= ROWS_AT_ONCE { self.flush() } else { Ok(()) }
     }
 
-    /// Writes what is waiting and closes the file.
+    /// Writes the pending rows and closes the file.
     pub(super) fn finish(mut self) -> Result<(PathBuf, usize), Diagnostics> {
         self.flush()?;
         self.writer.finish().map_err(|error| unwritten(&self.path, &error))?;

@@ -1,11 +1,11 @@
-//! One stored run as rows of the dataset's tables.
+//! Converts stored runs to rows of the dataset's tables.
 
 use crate::analysis::dataset::sheet::Sheet;
 use crate::analysis::tables::Cell;
 use crate::history::{ActionDetail, RunDetail, Trace};
 use crate::verdict::Outcome;
 
-/// The tables that hold rows of runs.
+/// The tables with rows of runs.
 pub(super) struct Sheets {
     pub actions: Sheet,
     pub joints: Sheet,
@@ -15,8 +15,8 @@ pub(super) struct Sheets {
 }
 
 impl Sheets {
-    /// Adds a run. False where its trace holds no course of the robot, as those of earlier versions don't: then only what was done
-    /// and perceived is added.
+    /// Adds a run. Returns `false` if its trace lacks the robot's motion, as in earlier versions; then only actions and
+    /// percepts are added.
     pub(super) fn add(&mut self, run: &RunDetail, trace: &Trace) -> bool {
         for action in &run.actions {
             self.add_action(run, action);
@@ -57,7 +57,7 @@ impl Sheets {
     }
 
     fn add_courses(&mut self, run: &str, trace: &Trace) -> bool {
-        // Poses were kept at the same moments. The first of an action is the last of the one before.
+        // Poses are stored at the same times. The first pose of an action is the last of the previous one.
         let (mut frame, mut any) = (0usize, false);
         for (step, course) in (1usize..).zip(&trace.robot_courses) {
             let motion = &course.motion;
@@ -86,7 +86,7 @@ impl Sheets {
     }
 }
 
-/// A number that was kept as a single; one that is none is missing.
+/// Converts an f32 to a cell. A number that is not finite becomes missing.
 fn single(value: f32) -> Cell {
     Cell::Number(value.is_finite().then_some(f64::from(value)))
 }

@@ -1,4 +1,4 @@
-//! A dataset in a folder: its tables, and the description of their columns.
+//! Export of a dataset to a folder: its tables, and a description of their columns.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,23 +13,23 @@ use crate::analysis::{Hierarchy, Mirror, TableFilter, export_parquet};
 use crate::base::Diagnostics;
 use crate::history::History;
 
-/// What was written.
+/// A written dataset.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Dataset {
-    /// Runs that it holds.
+    /// Number of runs.
     pub runs: usize,
-    /// Of them those whose traces hold no course of the robot, since an earlier version kept them.
+    /// Number of runs whose traces lack the robot's motion, because an earlier version stored them.
     pub without_course: usize,
-    /// Its tables, each with how many rows it has.
+    /// Paths of the tables with their numbers of rows.
     pub tables: Vec<(PathBuf, usize)>,
-    /// The description of their columns.
+    /// Path of the description of the columns.
     pub schema: PathBuf,
 }
 
-/// Writes observations, commands, percepts, the truth and outcomes of runs into a folder, which is made.
+/// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder, creating it if needed.
 ///
 /// # Errors
-/// `A001` it can't be written; the history or a trace can't be read.
+/// `A001` if it can't be written; errors of reading the history or a trace.
 pub fn export_dataset(
     history: &History,
     mirror: &Mirror,
@@ -68,13 +68,13 @@ pub fn export_dataset(
     Ok(dataset)
 }
 
-/// What every table and column says.
+/// Returns the description of every table and column.
 fn schema() -> Value {
     let mut outcomes = outcomes_schema();
     if let Some(outcomes) = outcomes.as_object_mut() {
         outcomes.insert("file".to_owned(), json!("outcomes.parquet"));
     }
-    let frames = "positions are in the world's frame, Z up: those of percepts, of the base's joints and of base_* as the robot \
-                  believes it to lie, those of objects and of true_base_* as it does";
+    let frames = "positions are in the world frame, Z up; those of percepts, the base's joints and base_* are the \
+                  robot's estimates, those of objects and true_base_* are ground truth";
     json!({ "frames": frames, "tables": [json!(ACTIONS), json!(JOINTS), json!(ROBOT), json!(OBJECTS), json!(PERCEPTS), outcomes] })
 }

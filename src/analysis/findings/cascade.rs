@@ -1,4 +1,4 @@
-//! Which action's failure leads to which later one.
+//! Cascades: failures of one action that lead to failures of a later one.
 
 use std::collections::BTreeMap;
 
@@ -17,24 +17,25 @@ pub struct Judged {
     pub property: String,
 }
 
-/// Two failures of which the later one comes more often where the earlier one came.
+/// Two failures, of which the later one is more frequent after the earlier one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cascade {
-    /// What failed first.
+    /// The earlier failure.
     pub first: Judged,
-    /// What failed at a later action.
+    /// The later failure.
     pub later: Judged,
-    /// Runs in which both were decided: within are those in which the first failed.
+    /// Counts of the runs in which both were decided. "Within" are those in which the first failed.
     pub table: TwoByTwo,
-    /// Fisher's exact test, one-sided.
+    /// One-sided p-value of Fisher's exact test.
     pub p: f64,
-    /// The same, adjusted for all pairs (Benjamini and Hochberg).
+    /// `p` adjusted for all pairs (Benjamini and Hochberg).
     pub q: f64,
 }
 
-/// Pairs of failures at different steps of the same run that go together beyond chance, the surest first.
+/// Finds pairs of failures at different steps of a run that are significantly associated, most significant first.
 ///
-/// A later action that was not reached, or that could not be judged, counts neither way. Of the runs of one scene the first counts.
+/// A later action that was not reached or could not be judged is not counted. Of the runs of one scene only the first
+/// is counted.
 pub fn cascades(table: &OutcomeTable, level: f64) -> Vec<Cascade> {
     let runs = table.text("run");
     let further = Scenes::of(table).further_runs();

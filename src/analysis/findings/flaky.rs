@@ -1,24 +1,25 @@
-//! Scenes that sometimes pass and sometimes fail.
+//! Flaky scenes, which sometimes pass and sometimes fail.
 
 use std::collections::BTreeMap;
 
 use crate::analysis::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::analysis::{OutcomeTable, Repeated, consistency};
 
-/// A scene whose runs went both ways.
+/// A scene with passed and failed runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FlakyScene {
-    /// Id of its campaign.
+    /// ID of the campaign.
     pub campaign: String,
-    /// Its number there.
+    /// Number of the scene in the campaign.
     pub scene: u64,
-    /// So many of its runs passed.
+    /// Number of passed runs.
     pub passed: u64,
-    /// Of so many.
+    /// Number of decided runs.
     pub of: u64,
 }
 
-/// Scenes that are flaky in a property, in the order of the table; and how many scenes were run more than once.
+/// Returns the scenes that are flaky in a property, in the order of the table, and the number of scenes with several
+/// runs.
 pub fn flaky_scenes(table: &OutcomeTable, of: &JudgedProperty) -> (Vec<FlakyScene>, u64) {
     let outcomes = outcomes(table);
     let (campaign, scene) = (table.text("campaign"), table.number("scene"));

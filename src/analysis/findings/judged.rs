@@ -1,4 +1,4 @@
-//! The properties in a table, and which rows judge them.
+//! The properties in a table, and the rows that judge them.
 
 use std::collections::BTreeMap;
 
@@ -14,11 +14,11 @@ pub struct JudgedProperty {
     pub property: String,
     /// How often each outcome occurred.
     pub counts: Counts,
-    /// Its rows, in order.
+    /// Indices of its rows, in order.
     pub rows: Vec<u32>,
 }
 
-/// Every property of every action, by action, then property.
+/// Returns every property of every action, sorted by action, then property.
 pub fn judged(table: &OutcomeTable) -> Vec<JudgedProperty> {
     let (actions, properties) = (table.text("action"), table.text("property"));
     let outcomes = outcomes(table);
@@ -44,7 +44,7 @@ pub fn judged(table: &OutcomeTable) -> Vec<JudgedProperty> {
     judged
 }
 
-/// The outcome of every row; what is none is nobody's success.
+/// Returns the outcome of every row. A missing or unknown outcome counts as broken.
 pub(super) fn outcomes(table: &OutcomeTable) -> Vec<Outcome> {
     let column = table.text("outcome");
     let known: Vec<Outcome> =
@@ -52,7 +52,7 @@ pub(super) fn outcomes(table: &OutcomeTable) -> Vec<Outcome> {
     column.of_row.iter().map(|of| of.map_or(Outcome::Broken, |of| known[of as usize])).collect()
 }
 
-/// Whether a row failed; nothing where it was not decided.
+/// Returns whether an outcome is a failure, or `None` if it is undecided.
 pub(super) fn failed(outcome: Outcome) -> Option<bool> {
     match outcome {
         Outcome::Failed => Some(true),

@@ -1,31 +1,31 @@
-//! How margins are spread.
+//! Quantiles of margins.
 
 use serde::Serialize;
 
-/// Quantiles of numbers. Unit: theirs.
+/// Quantiles of numbers, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quantiles {
-    /// How many numbers there are.
+    /// Number of values.
     pub count: u64,
-    /// The smallest.
+    /// Minimum.
     pub least: f64,
-    /// A twentieth lies below.
+    /// 5th percentile.
     pub p05: f64,
-    /// A quarter lies below.
+    /// 25th percentile.
     pub p25: f64,
-    /// The median.
+    /// Median.
     pub p50: f64,
-    /// A quarter lies above.
+    /// 75th percentile.
     pub p75: f64,
-    /// A twentieth lies above.
+    /// 95th percentile.
     pub p95: f64,
-    /// The largest.
+    /// Maximum.
     pub most: f64,
 }
 
-/// Quantiles of the numbers that are finite; nothing where there is none.
+/// Returns the quantiles of the finite numbers, or `None` if there are none.
 ///
-/// Between two numbers by their distance (type 7 of Hyndman and Fan, "Sample quantiles in statistical packages", The American
+/// Interpolates linearly (type 7 of Hyndman and Fan, "Sample quantiles in statistical packages", The American
 /// Statistician 50 (1996) 361–365).
 pub fn quantiles(numbers: impl IntoIterator<Item = f64>) -> Option<Quantiles> {
     let mut sorted: Vec<f64> = numbers.into_iter().filter(|number| number.is_finite()).collect();
@@ -53,7 +53,7 @@ pub fn quantiles(numbers: impl IntoIterator<Item = f64>) -> Option<Quantiles> {
 mod tests {
     use super::*;
 
-    /// As `numpy.quantile` gives them.
+    /// Reference values from `numpy.quantile`.
     #[test]
     fn quantiles_are_the_usual_ones() {
         let found = quantiles([4.0, 1.0, f64::NAN, 3.0, 2.0]).expect("there are numbers");

@@ -1,8 +1,9 @@
-//! What the table of outcomes says of when and why actions fail.
+//! Findings from the table of outcomes: when and why actions fail.
 //!
-//! Only passed and failed outcomes say something of the robot; all others are counted and told, and are never failures.
+//! Only passed and failed outcomes are evidence about the robot. All others are counted and reported, but never as
+//! failures.
 //!
-//! Never: reads a file, or knows what a property means.
+//! Never: reads a file, or depends on the meaning of a property.
 
 mod cascade;
 mod flaky;
@@ -24,7 +25,7 @@ pub use property::{Example, PropertyFindings, property_findings};
 pub use trend::{ChangePoint, Trend, TrendPoint, trend};
 pub use two_way::{TwoWay, TwoWayCell, two_way};
 
-/// Columns of the table that findings are made of, beside the parameters of the scene.
+/// Columns of the table that findings need, in addition to the parameters of the scene.
 pub const FINDING_COLUMNS: [&str; 13] = [
     "run",
     "campaign",

@@ -1,4 +1,4 @@
-//! Runs of a table that fail alike.
+//! Failure modes from a table.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,9 +6,9 @@ use crate::analysis::findings::judged::{failed, outcomes};
 use crate::analysis::findings::scenes::Scenes;
 use crate::analysis::{FailureMode, OutcomeTable, wilson};
 
-/// Failure modes of the runs of a table, the most frequent first, then by their properties.
+/// Returns the failure modes of the runs of a table, most frequent first, then sorted by their properties.
 ///
-/// A run in which no property passed or failed tested nothing, and is left out.
+/// Runs in which no property passed or failed tested nothing and are left out.
 pub fn table_failure_modes(table: &OutcomeTable) -> Vec<FailureMode> {
     let (runs, properties) = (table.text("run"), table.text("property"));
     let mut failed_in: BTreeMap<u32, (usize, BTreeSet<u32>)> = BTreeMap::new();

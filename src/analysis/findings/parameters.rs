@@ -1,11 +1,11 @@
-//! The parameters of scenes in some rows of a table.
+//! Scene parameters of selected rows of a table.
 
 use std::collections::BTreeMap;
 
 use crate::analysis::{ColumnKind, Hierarchy, OutcomeTable, Parameter, TextColumn, Values, columns};
 use crate::base::names;
 
-/// Every parameter of the scenes of some rows, and every designator that has one value in each.
+/// Returns every scene parameter of the selected rows, and every designator that has exactly one value in each row.
 pub(super) fn parameters(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarchy) -> Vec<Parameter> {
     let mut found: Vec<Parameter> = Vec::new();
     for column in columns().iter().filter(|column| column.parameter) {
@@ -27,7 +27,7 @@ fn numbers(column: &[f64], rows: &[u32]) -> Values {
     Values::Numbers(rows.iter().map(|row| column.get(*row as usize).copied().unwrap_or(f64::NAN)).collect())
 }
 
-/// Kinds in the order in which they are met; IRIs by their local names, with the classes above them.
+/// Returns kinds in the order of first occurrence. IRIs become local names, with their superclasses.
 fn kinds(column: &TextColumn, rows: &[u32], hierarchy: &Hierarchy) -> Values {
     let mut place_of: BTreeMap<u32, u32> = BTreeMap::new();
     let (mut names, mut above) = (Vec::new(), Vec::new());
@@ -46,7 +46,7 @@ fn kinds(column: &TextColumn, rows: &[u32], hierarchy: &Hierarchy) -> Values {
     Values::Kinds { of_run, names, above }
 }
 
-/// Designators that have just one value in each row, as columns over the rows.
+/// Returns the designators that have exactly one value in each row, as columns over the rows.
 fn designators(column: &TextColumn, rows: &[u32]) -> Vec<(String, TextColumn)> {
     let read = |text: &String| -> BTreeMap<String, Vec<String>> { serde_json::from_str(text).unwrap_or_default() };
     let known: Vec<BTreeMap<String, Vec<String>>> = column.texts.iter().map(read).collect();

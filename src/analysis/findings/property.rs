@@ -1,4 +1,4 @@
-//! When one property of one action fails.
+//! Findings about one property of one action.
 
 use std::collections::BTreeSet;
 
@@ -10,10 +10,10 @@ use crate::analysis::{Hierarchy, Interval, OutcomeTable, PatternOptions, Pattern
 use crate::base::digest_of;
 use crate::verdict::{Counts, Outcome};
 
-/// One run of so many is kept aside to confirm what the others show.
+/// One of this many runs is held out to confirm the patterns of the others.
 const HELD_OUT_EVERY: u64 = 3;
 
-/// What a property's outcomes say.
+/// Findings from a property's outcomes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PropertyFindings {
     /// IRI of the action.
@@ -22,37 +22,37 @@ pub struct PropertyFindings {
     pub property: String,
     /// How often each outcome occurred.
     pub counts: Counts,
-    /// Share of failed among passed and failed. Its interval knows which runs are of one scene.
+    /// Share of failed among passed and failed. The interval accounts for runs of the same scene.
     pub failing: Option<Interval>,
     /// Margins of its decided outcomes.
     pub margins: Option<Quantiles>,
-    /// Decided runs that patterns were looked for in.
+    /// Decided runs from which patterns were mined.
     pub subject: Subject,
-    /// What these runs are.
+    /// IDs and rows of these runs.
     pub examples: Vec<Example>,
-    /// Decided runs that went bit for bit like a later one, and count once.
+    /// Number of decided runs that were left out because a later run is bit-identical.
     pub twins: u64,
-    /// Decided runs of a scene that another run stands for.
+    /// Number of decided runs that were left out because another run of the same scene is used.
     pub repeated: u64,
-    /// Of the runs looked at, those whose scene a search chose.
+    /// Number of used runs whose scene a search chose.
     pub steered: u64,
-    /// When it fails more often than elsewhere.
+    /// Patterns of its failures.
     pub patterns: Patterns,
 }
 
 /// A run of a subject.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Example {
-    /// Id of the run.
+    /// ID of the run.
     pub run: String,
-    /// Its row in the table.
+    /// Index of its row in the table.
     pub row: u32,
 }
 
-/// Looks for patterns in the decided runs of a property.
+/// Mines patterns in the decided runs of a property.
 ///
-/// Runs have to be independent of each other: of those that went bit for bit alike the newest counts, and of those of one scene the
-/// first. Which runs are kept aside follows from their ids (or that of their scene), and so is the same every time.
+/// Runs must be independent: of bit-identical runs only the newest is used, and of the runs of one scene only the
+/// first. Held-out runs are selected by a hash of their ID (or their scene's), so that the selection is reproducible.
 pub fn property_findings(
     table: &OutcomeTable,
     of: &JudgedProperty,
@@ -96,7 +96,7 @@ pub fn property_findings(
     }
 }
 
-/// Of rows whose runs went bit for bit alike the last one, at the same step.
+/// Drops rows for which a later row has the same step and a bit-identical run.
 fn newest_of_alike(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
     let (hash, step) = (table.text("trace_hash"), table.number("step"));
     let mut seen = BTreeSet::new();
@@ -106,7 +106,7 @@ fn newest_of_alike(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
         .copied()
         .filter(|row| {
             let at = *row as usize;
-            // A run that has none (it was broken before its first state) is like no other.
+            // A run without a hash (broken before its first state) is never a duplicate.
             match (hash.of_row.get(at).copied().flatten(), step.get(at)) {
                 (Some(hash), Some(step)) => seen.insert((hash, step.to_bits())),
                 _ => true,

@@ -1,10 +1,10 @@
-//! Runs of one scene are alike: they don't count as so many scenes.
+//! Groups runs by scene, because runs of one scene are not independent.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::analysis::{OutcomeTable, SceneRuns};
 
-/// Which runs of a table are of the same scene.
+/// The scenes of a table's runs.
 pub(super) struct Scenes<'a> {
     campaign: &'a [Option<u32>],
     run: &'a [Option<u32>],
@@ -12,7 +12,7 @@ pub(super) struct Scenes<'a> {
     step: &'a [f64],
 }
 
-/// A scene in a table: one that was run several times in a campaign, or a run that is alone.
+/// A scene in a table: a repeated scene of a campaign, or a single run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Key {
     Repeated(Option<u32>, u64),
@@ -36,7 +36,7 @@ impl<'a> Scenes<'a> {
         }
     }
 
-    /// Of rows of the same scene and step the first.
+    /// Keeps the first of the rows with the same scene and step.
     pub fn first_rows(&self, rows: &[u32]) -> Vec<u32> {
         let mut seen = BTreeSet::new();
         let is_first = |row: &u32| match self.key(*row as usize) {
@@ -46,7 +46,7 @@ impl<'a> Scenes<'a> {
         rows.iter().copied().filter(is_first).collect()
     }
 
-    /// Runs whose scene another run before them has had.
+    /// Returns the runs whose scene an earlier run has had.
     pub fn further_runs(&self) -> BTreeSet<u32> {
         let mut first = BTreeMap::new();
         let mut further = BTreeSet::new();
@@ -60,7 +60,7 @@ impl<'a> Scenes<'a> {
         further
     }
 
-    /// Which of some rows are of the same scene; nothing where every scene was run once.
+    /// Groups rows by scene. Returns `None` if every scene was run once.
     pub fn runs(&self, rows: impl Iterator<Item = usize>) -> Option<SceneRuns> {
         let repeated = self.scene.iter().any(|scene| !scene.is_nan());
         repeated.then(|| SceneRuns::new(rows.map(|row| self.key(row))))

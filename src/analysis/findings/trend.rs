@@ -1,48 +1,48 @@
-//! How often a property fails from campaign to campaign, and where that changed.
+//! Failure rate of a property over campaigns, with change points.
 
 use crate::analysis::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::analysis::findings::scenes::Scenes;
 use crate::analysis::{Interval, OutcomeTable, TwoByTwo, wilson};
 
-/// One campaign.
+/// A campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrendPoint {
-    /// Id of the campaign.
+    /// ID of the campaign.
     pub campaign: String,
-    /// When its first run in the table began (RFC 3339).
+    /// Start of its first run in the table (RFC 3339).
     pub started: String,
-    /// Decided runs, the first of each scene.
+    /// Number of decided runs, one for each scene.
     pub runs: u64,
-    /// Of them failed.
+    /// Number of failed runs among them.
     pub failed: u64,
-    /// Share of failed.
+    /// Failure rate.
     pub failing: Option<Interval>,
 }
 
-/// A place between two campaigns where the share of failures changed.
+/// A change of the failure rate between two campaigns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChangePoint {
-    /// Position of the first campaign behind it.
+    /// Index of the first campaign after the change.
     pub at: usize,
-    /// Share of failures of the campaigns before, since the change before that.
+    /// Failure rate since the previous change.
     pub before: Interval,
-    /// The same behind, until the next change.
+    /// Failure rate until the next change.
     pub behind: Interval,
-    /// Fisher's exact test, two-sided, times the number of places where it could have been.
+    /// Two-sided p-value of Fisher's exact test, times the number of candidate positions.
     pub p: f64,
 }
 
-/// A property over campaigns.
+/// Trend of a property over campaigns.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trend {
-    /// Campaigns in which it was decided, in the order of their starts.
+    /// Campaigns in which the property was decided, sorted by start.
     pub points: Vec<TrendPoint>,
-    /// Changes, in that order.
+    /// Changes, in the same order.
     pub changes: Vec<ChangePoint>,
 }
 
-/// The campaigns of a property, and where its share of failures changed: the place that parts them most surely, if it does so beyond
-/// chance at the level, and then the same before and behind it.
+/// Computes the trend of a property. Change points are found by recursive splitting at the position with the lowest
+/// p-value, if it is significant at `level`.
 pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
     let outcomes = outcomes(table);
     let (campaign, started) = (table.text("campaign"), table.text("started"));

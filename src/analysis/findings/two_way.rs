@@ -1,37 +1,37 @@
-//! How often something fails, by one or two parameters: what heat maps show.
+//! Failure rates by one or two parameters, for heat maps.
 
 use crate::analysis::{Interval, Parameter, Subject, Values, simplest_between, wilson};
 
-/// Cells along an axis of numbers at most.
+/// Maximum number of cells along a numeric axis.
 const MOST_CELLS: usize = 8;
 
-/// Failures by one or two parameters.
+/// Failure rates by one or two parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwoWay {
-    /// Names of the parameters: down, and across where there are two.
+    /// Names of the parameters: that of the rows and, if there are two, that of the columns.
     pub by: Vec<String>,
-    /// What stands for each row.
+    /// Labels of the rows.
     pub down: Vec<String>,
-    /// What stands for each column; one without a name where there is one parameter.
+    /// Labels of the columns. A single empty label if there is only one parameter.
     pub across: Vec<String>,
-    /// Row by row. Runs in which a parameter has no value are in none.
+    /// Cells by row and column. Runs without a value are in no cell.
     pub cells: Vec<Vec<TwoWayCell>>,
 }
 
-/// One cell.
+/// A cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TwoWayCell {
-    /// Decided runs.
+    /// Number of decided runs.
     pub runs: u64,
-    /// Of them failed.
+    /// Number of failed runs among them.
     pub failed: u64,
-    /// Share of failed; nothing where there are no runs.
+    /// Failure rate. `None` without runs.
     pub failing: Option<Interval>,
 }
 
-/// Counts failures by one or two parameters, by name; nothing where one is not there.
+/// Counts failures by one or two named parameters. Returns `None` if one does not exist.
 ///
-/// Ranges of numbers are cut in equal steps, so that a map of positions is one.
+/// Numeric ranges are cut into equal steps, so that positions form an undistorted map.
 pub fn two_way(subject: &Subject, by: &[&str]) -> Option<TwoWay> {
     let parameter = |name: &str| subject.parameters.iter().find(|parameter| parameter.name == name);
     let down = labelled(parameter(by.first()?)?);
@@ -52,7 +52,7 @@ pub fn two_way(subject: &Subject, by: &[&str]) -> Option<TwoWay> {
     Some(TwoWay { by, down: down.0, across: across.0, cells })
 }
 
-/// Labels, and for each run which it has.
+/// Returns labels, and the index of each run's label.
 fn labelled(parameter: &Parameter) -> (Vec<String>, Vec<Option<usize>>) {
     match &parameter.values {
         Values::Kinds { of_run, names, .. } => {
@@ -76,7 +76,7 @@ fn labelled(parameter: &Parameter) -> (Vec<String>, Vec<Option<usize>>) {
     }
 }
 
-/// Bounds of equal steps that hold all numbers: a round step, and as many as that takes, but not many.
+/// Returns the bounds of a few equal, round steps that cover all numbers.
 fn bounds(numbers: &[f64]) -> Vec<f64> {
     let known = || numbers.iter().copied().filter(|number| number.is_finite());
     let (Some(least), Some(most)) = (known().min_by(f64::total_cmp), known().max_by(f64::total_cmp)) else {
@@ -85,8 +85,7 @@ fn bounds(numbers: &[f64]) -> Vec<f64> {
     if least == most {
         return vec![least, most];
     }
-    // The steps that people read easily are 1, 2 and 5 times a power of ten.
-    // There is nothing between whole numbers.
+    // Round steps are 1, 2 and 5 times a power of ten. For integers, the step is at least 1.
     let finest = if known().all(|number| number.fract() == 0.0) { 1.0 } else { 0.0 };
     let rough = f64::max((most - least) / MOST_CELLS as f64, finest);
     let power = libm::exp10(libm::floor(libm::log10(rough)));

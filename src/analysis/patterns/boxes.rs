@@ -1,36 +1,36 @@
-//! The box of cells with the highest score, among all of them.
+//! Exhaustive search for the box of cells with the highest score.
 
 use crate::analysis::patterns::Condition;
 use crate::analysis::patterns::cells::{Axis, Choices};
 use crate::analysis::patterns::likelihood::{Count, Likelihood, one};
 
-/// Adding up the boxes of three parameters costs as much as counting so many runs. (Measured with eight cells each.)
+/// Summing the boxes of three parameters costs as much as counting this many runs. (Measured with eight cells each.)
 const BOXES_IN_RUNS: u64 = 50_000;
 
-/// What was found, and how much was looked at.
+/// The best box, and the extent of the search.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Best {
-    /// Conditions on different parameters; none where nothing scores above 0.
+    /// Conditions on different parameters. Empty if no box scores above 0.
     pub conditions: Vec<Condition>,
-    /// Its score.
+    /// Score of the box.
     pub score: f64,
-    /// How many boxes there were.
+    /// Number of boxes tried.
     pub tried: u64,
-    /// Parameters of which three were combined.
+    /// Number of parameters whose triples were combined.
     pub combined: usize,
 }
 
-/// The runs that take part, in the cells of every parameter.
+/// The open runs, in the cells of every parameter.
 pub(super) struct Runs<'a> {
     axes: &'a [Axis],
-    /// Of each axis the cells of the runs.
+    /// For each axis, the cells of the runs.
     cells: Vec<Vec<u8>>,
     ones: Vec<Count>,
     likelihood: &'a Likelihood,
 }
 
 impl<'a> Runs<'a> {
-    /// The runs that are open.
+    /// Selects the open runs.
     pub fn new(axes: &'a [Axis], failed: &[bool], open: &[bool], likelihood: &'a Likelihood) -> Self {
         let part: Vec<usize> = (0..open.len()).filter(|run| open[*run]).collect();
         let of = |axis: &Axis| part.iter().map(|run| axis.of_run[*run]).collect();
@@ -42,11 +42,11 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// The box of at most so many conditions (three at most) with the highest score; of several the one with fewer conditions, then that
-    /// of earlier parameters.
+    /// Returns the box with the highest score and at most `most_conditions` conditions (at most three). Ties go to
+    /// fewer conditions, then to earlier parameters.
     ///
-    /// Every box is looked at, but for those whose failures alone could not make the score. Only where three of all parameters at a time
-    /// would take more than `work` steps, those parameters that make the best pairs are combined, as many as that allows.
+    /// Every box is tried, except those whose upper bound does not exceed the best score. If all triples of parameters
+    /// would take more than `work` steps, only the parameters of the best pairs are combined, as many as `work` allows.
     pub fn best(&self, most_conditions: usize, work: u64) -> Best {
         let mut best = Best::default();
         for axis in 0..self.axes.len() {
@@ -79,7 +79,7 @@ impl<'a> Runs<'a> {
         best
     }
 
-    /// The parameters to combine three at a time: the most promising ones, in their own order.
+    /// Selects the most promising parameters for triples, in their original order.
     fn promising(&self, promise: &[f64], work: u64) -> Vec<usize> {
         let runs = self.ones.len() as u64;
         let triples = |count: u64| count * count.saturating_sub(1) * count.saturating_sub(2) / 6;
@@ -103,7 +103,7 @@ impl<'a> Runs<'a> {
         best.take(score, || vec![along.condition(place)]);
     }
 
-    /// Looks at all pairs of conditions; the score of the best pair.
+    /// Tries all pairs of conditions on two parameters. Returns the score of the best pair.
     fn rectangles(&self, [first, second]: [usize; 2], best: &mut Best) -> f64 {
         let (across, along) = (&self.axes[first], &self.axes[second]);
         let mut sums = vec![0; across.cells * along.cells];
@@ -150,12 +150,12 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// What no box within some cells can exceed.
+    /// Returns an upper bound of the score of any box within these cells.
     fn limit(&self, cells: &[Count]) -> f64 {
         self.likelihood.most(cells.iter().fold(0, |sum, count| sum.wrapping_add(*count)))
     }
 
-    /// Where each run lies in the cells of two parameters.
+    /// Returns the cell of each run in the grid of two parameters.
     fn places(&self, [first, second]: [usize; 2]) -> Vec<u32> {
         let width = self.axes[second].cells as u32;
         let cells = self.cells[first].iter().zip(&self.cells[second]);
@@ -173,7 +173,7 @@ impl Best {
 }
 
 impl Axis {
-    /// The condition with the highest score, and its place; 0 where none scores more.
+    /// Returns the highest score and the index of its condition, or (0, 0) if no score exceeds 0.
     fn highest(&self, row: &[Count], likelihood: &Likelihood) -> (f64, usize) {
         let mut highest = (0.0, 0);
         let mut place = 0;

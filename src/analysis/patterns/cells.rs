@@ -1,44 +1,44 @@
-//! Each parameter in cells, and the conditions that are unions of cells.
+//! Discretisation of parameters into cells, and the conditions that are unions of cells.
 
 use crate::analysis::patterns::likelihood::Count;
 use crate::analysis::patterns::{Condition, Parameter, Subject, Values, simplest_between};
 
-/// More kinds than this are not looked at: a name for each scene makes no pattern.
+/// Parameters with more kinds than this are ignored: a unique name for each scene makes no pattern.
 const MOST_KINDS: usize = 64;
 
-/// One parameter in cells. Cell 0 is that of the runs in which it has no value.
+/// A parameter divided into cells. Cell 0 holds the runs without a value.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
-    /// Place of the parameter.
+    /// Index of the parameter.
     pub parameter: usize,
-    /// How many cells there are.
+    /// Number of cells.
     pub cells: usize,
     /// The cell of each run.
     pub of_run: Vec<u8>,
-    /// What may be asked for.
+    /// The possible conditions.
     pub choices: Choices,
 }
 
 /// Conditions on one parameter.
 #[derive(Debug, Clone)]
 pub(super) enum Choices {
-    /// All ranges of neighbouring cells: the bounds between cells 1, 2, …, each with the value before it.
+    /// All ranges of adjacent cells, given by the cuts between cells 1, 2, ….
     Ranges(Vec<Cut>),
     /// Kinds with their cells.
     Kinds(Vec<(String, Vec<usize>)>),
 }
 
-/// A place to cut numbers in two.
+/// A cut between two cells of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cut {
-    /// The first value above.
+    /// The smallest value above the cut.
     pub at: f64,
-    /// A number that parts the values below from those above.
+    /// A number between the values below and above.
     pub bound: f64,
 }
 
 impl Axis {
-    /// How many conditions there are.
+    /// Number of conditions.
     pub fn len(&self) -> usize {
         match &self.choices {
             Choices::Ranges(_) => (self.cells - 1) * self.cells / 2,
@@ -46,12 +46,13 @@ impl Axis {
         }
     }
 
-    /// Sums over the cells of every condition, from rows of counts (one row a cell, one after the other) to rows (one a condition).
+    /// Sums counts over the cells of every condition. The input has one row of counts for each cell, the output one for
+    /// each condition.
     pub fn expand(&self, cells: &[Count], width: usize, out: &mut Vec<Count>) {
         out.clear();
         let row = |cell: usize| &cells[cell * width..(cell + 1) * width];
         let mut sum = vec![0; width];
-        // There are not 2^32 runs.
+        // Does not overflow: there are fewer than 2^32 runs.
         let add = |sum: &mut [Count], row: &[Count]| {
             sum.iter_mut().zip(row).for_each(|(sum, count)| *sum = sum.wrapping_add(*count));
         };
@@ -75,7 +76,7 @@ impl Axis {
         }
     }
 
-    /// The condition at a place of what [`Axis::expand`] gives.
+    /// Returns the condition with an index in the output of [`Axis::expand`].
     pub fn condition(&self, place: usize) -> Condition {
         match &self.choices {
             Choices::Kinds(kinds) => Condition::Kind { parameter: self.parameter, kind: kinds[place].0.clone() },
@@ -91,7 +92,7 @@ impl Axis {
         }
     }
 
-    /// First and last cell of a range.
+    /// Returns the first and last cell of a range.
     fn range(&self, place: usize) -> (usize, usize) {
         let mut left = place;
         for first in 1..self.cells {
@@ -105,10 +106,10 @@ impl Axis {
     }
 }
 
-/// Cells of every parameter that takes more than one value among the runs that take part, and of no other. Of several parameters
-/// that are the same in all runs, or part them into kinds in the same way, the first stands for all.
+/// Divides every parameter that varies among the participating runs into cells. Of parameters with equal values in all
+/// runs, or with the same partition into kinds, only the first is used.
 ///
-/// Numbers are cut so that every cell has about as many runs; where there are few different ones, each has a cell.
+/// Numbers are cut into cells of about equally many runs, or into one cell for each distinct number if there are few.
 pub(super) fn axes(subject: &Subject, takes_part: &[bool], cells: usize) -> Vec<Axis> {
     let mut axes: Vec<Axis> = Vec::new();
     for (place, parameter) in subject.parameters.iter().enumerate() {
@@ -153,7 +154,7 @@ fn axis(place: usize, parameter: &Parameter, takes_part: &[bool], cells: usize) 
     met.any(|cell| cell != first).then_some(axis)
 }
 
-/// Cuts between cells of about as many values each.
+/// Returns the cuts between cells of about equally many values.
 fn cuts(numbers: &[f64], takes_part: &[bool], cells: usize) -> Vec<Cut> {
     let mut sorted: Vec<f64> =
         numbers.iter().zip(takes_part).filter(|(value, part)| **part && !value.is_nan()).map(|(v, _)| *v).collect();
@@ -172,9 +173,9 @@ fn cuts(numbers: &[f64], takes_part: &[bool], cells: usize) -> Vec<Cut> {
     places.into_iter().map(cut).collect()
 }
 
-/// Every kind and every kind above, each set of members once, by the name that is nearest to its members.
+/// Returns every kind and superkind with its cells. Of kinds with equal members, only the one nearest to them is used.
 ///
-/// A kind that has runs of its own and kinds below it is meant with all of them; one that everything belongs to is no condition.
+/// A kind includes all kinds below it. A kind that includes everything is not a condition.
 fn kinds(names: &[String], above: &[Vec<String>]) -> Vec<(String, Vec<usize>)> {
     let mut higher: Vec<&String> = above.iter().flatten().filter(|name| !names.contains(name)).collect();
     let nearness = |name: &String| above.iter().filter_map(|list| list.iter().position(|known| known == name)).min();

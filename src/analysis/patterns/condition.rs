@@ -5,33 +5,34 @@ use crate::analysis::patterns::{Subject, Values};
 /// A condition on one parameter of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Condition {
-    /// It is of this kind, or of one below it.
+    /// The value is of this kind or a subkind.
     Kind {
-        /// Place of the parameter.
+        /// Index of the parameter.
         parameter: usize,
         /// Name of the kind.
         kind: String,
     },
-    /// It lies in a range; without both ends: it has a value at all.
+    /// The value is in a range. Without both ends: the parameter has a value.
     Range {
-        /// Place of the parameter.
+        /// Index of the parameter.
         parameter: usize,
-        /// It is at least this.
+        /// Inclusive lower end.
         low: Option<f64>,
-        /// It is less than this.
+        /// Exclusive upper end.
         high: Option<f64>,
     },
 }
 
 impl Condition {
-    /// Place of its parameter.
+    /// Index of the parameter.
     pub fn parameter(&self) -> usize {
         match self {
             Self::Kind { parameter, .. } | Self::Range { parameter, .. } => *parameter,
         }
     }
 
-    /// For each run whether it holds. A run whose parameter has no value satisfies no condition on it.
+    /// Returns for each run whether the condition holds. A run without a value for the parameter satisfies no condition
+    /// on it.
     pub fn holds(&self, subject: &Subject) -> Vec<bool> {
         match (self, &subject.parameters[self.parameter()].values) {
             (Self::Range { low, high, .. }, Values::Numbers(numbers)) => numbers
@@ -45,12 +46,12 @@ impl Condition {
                     names.iter().zip(above).map(|(name, above)| name == kind || above.contains(kind)).collect();
                 of_run.iter().map(|of| of.is_some_and(|of| belongs[of as usize])).collect()
             }
-            // A condition of the other sort says nothing about this parameter.
+            // A condition of the wrong type holds for no run.
             _ => vec![false; subject.len()],
         }
     }
 
-    /// The same condition with less to it: without its lower end, without its upper end, or gone.
+    /// Returns weaker conditions: without the lower end, without the upper end, or `None` for no condition.
     pub(super) fn weaker(&self) -> Vec<Option<Self>> {
         match self {
             Self::Range { parameter, low: low @ Some(_), high: high @ Some(_) } => vec![
@@ -62,7 +63,7 @@ impl Condition {
     }
 }
 
-/// Whether all conditions hold, for each run.
+/// Returns for each run whether all conditions hold.
 pub(super) fn all_hold(conditions: &[Condition], subject: &Subject) -> Vec<bool> {
     let mut holds = vec![true; subject.len()];
     for condition in conditions {
@@ -73,8 +74,7 @@ pub(super) fn all_hold(conditions: &[Condition], subject: &Subject) -> Vec<bool>
     holds
 }
 
-/// The number with the fewest digits behind the point that is above `low` and not above `high`: a bound between two values that
-/// people can read.
+/// Returns the number with the fewest decimals in (`low`, `high`]: a readable bound between two values.
 pub fn simplest_between(low: f64, high: f64) -> f64 {
     for digits in 0..16 {
         let scale = libm::exp10(f64::from(digits));

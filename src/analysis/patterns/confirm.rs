@@ -1,18 +1,18 @@
-//! Patterns on runs that took no part in finding them.
+//! Confirmation of patterns on held-out runs.
 
 use crate::analysis::patterns::condition::all_hold;
 use crate::analysis::patterns::{Condition, Subject};
 use crate::analysis::{TwoByTwo, holm};
 
-/// Counts failures within and outside of a pattern, among some runs.
+/// Counts failures within and outside a pattern, among the selected runs.
 pub(super) fn count(subject: &Subject, within: &[bool], among: impl Fn(usize) -> bool) -> TwoByTwo {
     let mut table = TwoByTwo::default();
     (0..subject.len()).filter(|run| among(*run)).for_each(|run| table.add(within[run], subject.failed[run]));
     table
 }
 
-/// Each pattern among the runs kept aside that no pattern before it has, with Holm's adjusted probability that at least so many of
-/// its runs would fail if they failed as often as the rest.
+/// Counts each pattern among the held-out runs that no earlier pattern contains, with the one-sided p-value of Fisher's
+/// test, adjusted by Holm.
 pub(super) fn confirm(patterns: &[Vec<Condition>], subject: &Subject) -> Vec<(TwoByTwo, f64)> {
     let mut explained = vec![false; subject.len()];
     let tables: Vec<TwoByTwo> = patterns

@@ -1,4 +1,4 @@
-//! A pattern folded into the simplest that says as much.
+//! Simplification of patterns.
 
 use crate::analysis::TwoByTwo;
 use crate::analysis::patterns::Condition;
@@ -7,10 +7,10 @@ use crate::analysis::patterns::condition::all_hold;
 use crate::analysis::patterns::confirm::count;
 use crate::analysis::patterns::refine::Field;
 
-/// Takes away, one after the other, conditions and ends of ranges that the runs do not ask for: where the runs that one shuts out do not
-/// fail less, beyond what the best of so many conditions shows by chance. What is left is one of the boxes that were tried.
+/// Removes, one by one, conditions and ends of ranges that are not significant: those whose excluded runs do not fail
+/// significantly less, corrected for the number of alternative conditions. The result is one of the boxes tried.
 pub(super) fn fold(conditions: &mut Vec<Condition>, field: &Field<'_>, level: f64) {
-    // Any of these could have stood there.
+    // Any of these conditions could have been chosen.
     let rivals = field.axes.iter().map(Axis::len).sum::<usize>().max(1) as f64;
     loop {
         let within = all_hold(conditions, field.subject);
@@ -26,7 +26,7 @@ pub(super) fn fold(conditions: &mut Vec<Condition>, field: &Field<'_>, level: f6
     }
 }
 
-/// All patterns with one condition, or one end of a range, less; none is empty.
+/// Returns all nonempty patterns with one condition, or one end of a range, removed.
 fn simpler(conditions: &[Condition]) -> Vec<Vec<Condition>> {
     let mut found = Vec::new();
     for (at, condition) in conditions.iter().enumerate() {
@@ -43,7 +43,7 @@ fn simpler(conditions: &[Condition]) -> Vec<Vec<Condition>> {
     found
 }
 
-/// The runs within, beside those that only the simpler pattern has.
+/// Compares the runs within the pattern with those that only the simpler pattern contains.
 fn shut_out(within: &[bool], simpler: &[bool], field: &Field<'_>) -> TwoByTwo {
     count(field.subject, within, |run| field.open[run] && simpler[run])
 }

@@ -1,36 +1,38 @@
-//! How much better two rates describe runs than one: within a pattern and outside it.
+//! Likelihood ratio score of patterns: separate failure rates within and outside a pattern against one common rate.
 
-/// Runs and failures among them, added together: failures in the upper half.
+/// Number of runs in the lower half, and of failures among them in the upper half. Counts can be added.
 pub(super) type Count = u64;
 
-/// One run.
+/// Returns the count of one run.
 pub(super) fn one(failed: bool) -> Count {
     1 | (u64::from(failed) << 32)
 }
 
-/// Runs and failures of a count.
+/// Returns the runs and failures of a count.
 pub(super) fn parts(count: Count) -> (usize, usize) {
     ((count & 0xFFFF_FFFF) as usize, (count >> 32) as usize)
 }
 
 /// Scores patterns among some runs.
 ///
-/// The score is the logarithm of the likelihood ratio between one rate of failures within the pattern and another outside it, and
-/// the same rate everywhere (binomial). It is largest where the line is drawn as the runs are, whatever the size of the pattern;
-/// weighted relative accuracy, which is told beside it, hardly minds runs in a pattern that fail like all others. Unit: nats.
+/// The score is the logarithm of the likelihood ratio between one rate of failures within the pattern and another
+/// outside it, and the same rate everywhere (binomial). It is largest for the true boundary, regardless of the
+/// pattern's size, whereas weighted relative accuracy, which is reported too, hardly penalises runs in a pattern that
+/// fail like all others. Unit: nats.
 ///
-/// Source: M. Kulldorff, "A spatial scan statistic", Communications in Statistics – Theory and Methods 26 (1997) 1481–1496.
+/// Source: M. Kulldorff, "A spatial scan statistic", Communications in Statistics – Theory and Methods 26 (1997)
+/// 1481–1496.
 pub(super) struct Likelihood {
     runs: usize,
     failed: usize,
-    /// x ln x of every whole number up to the runs.
+    /// x ln x for every integer from 0 to the number of runs.
     x_ln_x: Vec<f64>,
-    /// That of one rate for all.
+    /// Log-likelihood of a common rate.
     alike: f64,
 }
 
 impl Likelihood {
-    /// For so many runs.
+    /// Creates the scores for these runs.
     pub fn new(all: Count) -> Self {
         let (runs, failed) = parts(all);
         let x_ln_x: Vec<f64> = (0..=runs).map(|x| if x == 0 { 0.0 } else { x as f64 * libm::log(x as f64) }).collect();
@@ -38,10 +40,10 @@ impl Likelihood {
         Self { runs, failed, x_ln_x, alike }
     }
 
-    /// The score of a pattern; 0 where its runs fail no more than the others.
+    /// Returns the score of a pattern, or 0 if its runs fail no more often than the others.
     pub fn gain(&self, within: Count) -> f64 {
         let (runs, failed) = parts(within);
-        // Both are below 2^32.
+        // No overflow: all counts are below 2^32.
         if failed as u64 * self.runs as u64 <= runs as u64 * self.failed as u64 {
             return 0.0;
         }
@@ -52,7 +54,7 @@ impl Likelihood {
             - self.alike
     }
 
-    /// What no part of a pattern can exceed: all its failures without its passes.
+    /// Returns an upper bound of the score of any part of a pattern: that of all its failures without its passes.
     pub fn most(&self, within: Count) -> f64 {
         let (_, failed) = parts(within);
         self.gain(failed as u64 | ((failed as u64) << 32))

@@ -1,4 +1,5 @@
-//! Patterns one after the other: the strongest, then the strongest among the runs that it does not explain.
+//! Sequential covering: finds the strongest pattern, then the strongest among the runs that it does not explain, and so
+//! on.
 
 use crate::analysis::patterns::boxes::Runs;
 use crate::analysis::patterns::cells::{Axis, axes};
@@ -10,21 +11,21 @@ use crate::analysis::patterns::refine::{Field, refine};
 use crate::analysis::patterns::{Condition, Subject};
 use crate::analysis::{Interval, TwoByTwo, benjamini_hochberg, wilson};
 
-/// Fewer failures (or passes) than this show nothing that could be told from chance.
+/// Minimum number of failures and of passes. With fewer, no pattern can be significant.
 const LEAST_OF_EACH: u64 = 4;
 
-/// How patterns are looked for.
+/// Options of pattern mining.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PatternOptions {
-    /// Conditions of a pattern at most: 1 to 3.
+    /// Maximum number of conditions of a pattern: 1 to 3.
     pub most_conditions: usize,
-    /// Share of false patterns among those found that is bearable, on average; and the chance at which one is confirmed.
+    /// Accepted false discovery rate, and significance level of the confirmation.
     pub level: f64,
-    /// Cells into which numbers are cut at most: 2 to 64.
+    /// Maximum number of cells of a numeric parameter: 2 to 64.
     pub cells: usize,
-    /// Patterns at most.
+    /// Maximum number of patterns.
     pub most_patterns: usize,
-    /// Steps of the search for each pattern: runs times combinations of three parameters.
+    /// Maximum number of steps of the search for each pattern: runs times triples of parameters.
     pub work: u64,
 }
 
@@ -37,67 +38,69 @@ impl Default for PatternOptions {
 /// A condition on scenes under which runs fail more often than elsewhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pattern {
-    /// All of them hold; each is about another parameter.
+    /// Conjunction of conditions on different parameters.
     pub conditions: Vec<Condition>,
-    /// Places of the runs in which they hold.
+    /// Indices of the runs in which they hold.
     pub runs: Vec<usize>,
-    /// Among all decided runs.
+    /// Counts among all decided runs.
     pub all: TwoByTwo,
-    /// Among the runs that it was found in (without those kept aside, and without those of earlier patterns), with bounds at the cuts: those
-    /// between them were not all tried, and so are no part of the test.
+    /// Counts among the training runs (without held-out runs and those of earlier patterns), with bounds at the cuts.
+    /// Refined bounds are not part of the test, because not all of them were tried.
     pub searched: TwoByTwo,
-    /// Among the runs kept aside that no earlier pattern has.
+    /// Counts among the held-out runs that no earlier pattern contains.
     pub held_out: TwoByTwo,
-    /// Share of its runs that failed.
+    /// Failure rate within the pattern.
     pub rate: Interval,
-    /// Share of all other runs that failed, where there are others.
+    /// Failure rate of all other runs. `None` if there are none.
     pub elsewhere: Option<Interval>,
-    /// How many times as often its runs fail as all runs.
+    /// Failure rate within the pattern divided by the overall failure rate.
     pub lift: f64,
-    /// Weighted relative accuracy: its share of all runs times how much more often they fail than all runs.
+    /// Weighted relative accuracy: the pattern's share of all runs times the difference between its failure rate and
+    /// the overall rate.
     pub wracc: f64,
-    /// Fisher's exact test, one-sided, among the runs that it was found in.
+    /// One-sided p-value of Fisher's exact test among the training runs.
     pub p: f64,
-    /// The same, adjusted for everything that was tried (Benjamini and Hochberg); an upper bound.
+    /// `p` adjusted for all boxes tried (Benjamini and Hochberg), an upper bound.
     pub q: f64,
-    /// Fisher's exact test, one-sided, among the runs kept aside, adjusted for the patterns that were found (Holm).
+    /// One-sided p-value of Fisher's exact test among the held-out runs, adjusted for the number of patterns (Holm).
     pub p_held_out: f64,
-    /// Whether it holds among the runs kept aside too.
+    /// Whether the pattern is significant among the held-out runs.
     pub confirmed: bool,
 }
 
-/// What was found.
+/// The result of pattern mining.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Patterns {
-    /// In the order in which they were found: what they explain together most first.
+    /// Patterns in the order of discovery, strongest first.
     pub patterns: Vec<Pattern>,
-    /// Decided runs.
+    /// Number of decided runs.
     pub runs: u64,
-    /// Of them failed.
+    /// Number of failed runs.
     pub failed: u64,
-    /// Runs that were kept aside to confirm.
+    /// Number of held-out runs for the confirmation.
     pub held_out: u64,
-    /// Conditions and combinations of them that were tried.
+    /// Number of conditions and combinations of conditions tried.
     pub tried: u64,
-    /// Parameters that take more than one value.
+    /// Number of parameters that vary.
     pub parameters: usize,
-    /// Conditions of a pattern at most: fewer than were asked for where so many more chances to err would hide every pattern.
+    /// Maximum number of conditions tried. It is lower than requested if the correction for more combinations would
+    /// hide every pattern.
     pub depth: usize,
-    /// Parameters of which every three were combined.
+    /// Number of parameters whose triples were combined.
     pub combined: usize,
 }
 
 impl Patterns {
-    /// Patterns that hold among the runs kept aside too.
+    /// Iterates over the confirmed patterns.
     pub fn confirmed(&self) -> impl Iterator<Item = &Pattern> {
         self.patterns.iter().filter(|pattern| pattern.confirmed)
     }
 }
 
-/// Looks for the conditions under which runs fail more often than elsewhere.
+/// Finds the conditions under which runs fail more often than elsewhere.
 ///
-/// The score of a pattern is the likelihood ratio of two rates, within and outside, against one; of those that score alike the one with
-/// fewer conditions is taken. The same runs in the same order give the same patterns.
+/// The score of a pattern is the likelihood ratio of separate failure rates within and outside against one common rate.
+/// Ties go to fewer conditions. The same runs in the same order give the same patterns.
 pub fn mine(subject: &Subject, options: &PatternOptions) -> Patterns {
     let mut found = Patterns {
         runs: subject.len() as u64,
@@ -141,12 +144,12 @@ pub fn mine(subject: &Subject, options: &PatternOptions) -> Patterns {
     found
 }
 
-/// As many cells as the runs are worth: with few runs, many narrow ranges would only be so many chances to err.
+/// Returns the number of cells for a number of runs. With few runs, many narrow ranges would only add false positives.
 fn cells(runs: usize, most: usize) -> usize {
     (libm::cbrt(runs as f64) as usize).clamp(4, 64).min(most.max(2))
 }
 
-/// The patterns with their counts among the runs that were still open when each was found.
+/// Finds patterns, each with its counts among the runs that were still open when it was found.
 fn search(
     subject: &Subject,
     mut open: Vec<bool>,
@@ -174,12 +177,13 @@ fn search(
         let field = Field { subject, open: &open, axes, likelihood: &likelihood };
         fold(&mut best.conditions, &field, options.level);
         let table = count(subject, &all_hold(&best.conditions, subject), |run| open[run]);
-        // What comes later is weaker: where this one is no finding, neither are those.
+        // Later patterns are weaker: if this one is not significant, they are not either.
         let rank = rounds.len() as f64 + 1.0;
         if table.fisher().greater * found.tried as f64 / rank > options.level {
             break;
         }
-        // Bounds between the cuts describe better what was found; they take no part in the test, as they were not all tried.
+        // Bounds between the cuts describe the pattern better. They are not part of the test, because not all of them
+        // were tried.
         refine(&mut best.conditions, &field);
         let within = all_hold(&best.conditions, subject);
         open.iter_mut().zip(&within).for_each(|(open, within)| *open &= !within);
@@ -188,16 +192,18 @@ fn search(
     rounds
 }
 
-/// As many conditions as still let a pattern be told from chance that has half of all failures and no pass; at least one.
+/// Returns the maximum number of conditions, at least one, with which a pattern of half of all failures and no passes
+/// would still be significant.
 ///
-/// It depends on how many runs there are and how many failed, not on which: looking deeper in many runs and less deep in few is no
-/// choice by result.
+/// It depends only on the numbers of runs and failures, not on which runs failed, so that the choice does not bias the
+/// test.
 fn affordable_depth(axes: &[Axis], whole: TwoByTwo, options: &PatternOptions) -> usize {
     let failed_in = whole.failed_in.div_ceil(2);
     let ideal =
         TwoByTwo { failed_in, passed_in: 0, failed_out: whole.failed_in - failed_in, passed_out: whole.passed_in };
     let p = ideal.fisher().greater;
-    // How many boxes there are of one, two and three conditions: sums of products of the conditions on different parameters.
+    // Number of boxes of one, two and three conditions: sums of products of the numbers of conditions on different
+    // parameters.
     let mut boxes = [1.0, 0.0, 0.0, 0.0];
     for axis in axes {
         for conditions in (1..boxes.len()).rev() {

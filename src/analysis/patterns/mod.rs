@@ -1,10 +1,10 @@
-//! When something fails: conditions on scenes under which it does so more often than elsewhere, found in the runs.
+//! Mines failure patterns: conditions on scenes under which runs fail more often than elsewhere (subgroup discovery).
 //!
-//! The search is exhaustive: of the counts of every pair and triple of parameters, cell by cell, sums over all boxes follow at
-//! about an addition each, so that no box has to be left out. What is found is folded into the simplest, its bounds are refined, it is
-//! tested against all that was tried, and again on runs that took no part in finding it.
+//! The search is exhaustive: from the counts in the cells of each pair and triple of parameters, the sum over any box
+//! takes about one addition, so that all boxes can be searched. A found pattern is simplified, its bounds are refined,
+//! and it is tested with a correction for all boxes tried, and again on held-out runs.
 //!
-//! Never: looks at a history, knows what a parameter means, or calls a run that was not decided a failure.
+//! Never: reads a history, depends on the meaning of parameters, or counts an undecided run as a failure.
 
 mod boxes;
 mod cells;

@@ -1,4 +1,4 @@
-//! The bounds of ranges, moved to where they part failures from passes best.
+//! Refinement of range bounds to the best separation of failures and passes.
 
 use std::ops::RangeInclusive;
 
@@ -7,10 +7,10 @@ use crate::analysis::patterns::condition::all_hold;
 use crate::analysis::patterns::likelihood::{Count, Likelihood, one};
 use crate::analysis::patterns::{Condition, Subject, Values, simplest_between};
 
-/// Bounds depend on each other, but settle soon.
+/// Bounds depend on each other, but converge quickly.
 const MOST_PASSES: usize = 4;
 
-/// The open runs, and how patterns among them are scored.
+/// The open runs, and the score of patterns among them.
 pub(super) struct Field<'a> {
     pub subject: &'a Subject,
     pub open: &'a [bool],
@@ -18,7 +18,8 @@ pub(super) struct Field<'a> {
     pub likelihood: &'a Likelihood,
 }
 
-/// Moves each bound, one after the other while the rest stays, between the cuts on either side of it to where the score is highest.
+/// Moves each bound in turn to the position with the highest score between the adjacent cuts, with all other bounds
+/// fixed.
 pub(super) fn refine(conditions: &mut [Condition], field: &Field<'_>) {
     for _ in 0..MOST_PASSES {
         let before = conditions.to_vec();
@@ -35,7 +36,7 @@ pub(super) fn refine(conditions: &mut [Condition], field: &Field<'_>) {
     }
 }
 
-/// Different values in order, and before each (and behind the last) the runs below.
+/// Sorted distinct values with cumulative counts: the runs below each value, and below the end.
 struct Scale {
     values: Vec<f64>,
     below: Vec<Count>,
@@ -62,12 +63,12 @@ impl Scale {
         scale
     }
 
-    /// How many values are below a bound.
+    /// Returns the number of values below a bound.
     fn place(&self, bound: f64) -> usize {
         self.values.partition_point(|value| *value < bound)
     }
 
-    /// A bound with so many values below; nothing where that is all or none.
+    /// Returns a bound with this many values below it, or `None` if that is all values or none.
     fn bound(&self, place: usize) -> Option<f64> {
         (place > 0 && place < self.values.len()).then(|| simplest_between(self.values[place - 1], self.values[place]))
     }
@@ -101,7 +102,7 @@ fn refined(condition: &Condition, others: &[Condition], field: &Field<'_>) -> Op
     Some(Condition::Range { parameter: *parameter, low, high })
 }
 
-/// The place with the highest score; the one that is taken now where no other has a higher one.
+/// Returns the position with the highest score. Ties go to the current position.
 fn best(now: usize, places: impl Iterator<Item = usize>, score: impl Fn(usize) -> f64) -> usize {
     let mut best = (score(now), now);
     for place in places {
@@ -113,7 +114,7 @@ fn best(now: usize, places: impl Iterator<Item = usize>, score: impl Fn(usize) -
     best.1
 }
 
-/// The places between the cut before a bound and the cut behind it.
+/// Returns the positions from the cut before a bound to the cut after it.
 fn window(bound: f64, cuts: &[Cut], scale: &Scale) -> RangeInclusive<usize> {
     let before = cuts.iter().rev().map(|cut| cut.bound).find(|cut| *cut < bound);
     let behind = cuts.iter().map(|cut| cut.bound).find(|cut| *cut > bound);

@@ -1,50 +1,50 @@
-//! What patterns are looked for in: runs that passed or failed, and the parameters of their scenes.
+//! The input of pattern mining: decided runs, and the parameters of their scenes.
 
 /// Decided runs with their parameters. Every list has one entry for each run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Subject {
     /// Whether the run failed.
     pub failed: Vec<bool>,
-    /// Whether the run takes no part in finding patterns, but confirms them.
+    /// Whether the run is held out of the search, to confirm patterns.
     pub held_out: Vec<bool>,
-    /// What may make a difference.
+    /// Parameters that may affect the outcome.
     pub parameters: Vec<Parameter>,
 }
 
 /// One parameter of the scenes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
-    /// Its name, such as `target_friction`.
+    /// Name, such as `target_friction`.
     pub name: String,
-    /// Unit of its numbers, where they have one.
+    /// Unit of its numbers, if any.
     pub unit: Option<String>,
-    /// Its value in each run.
+    /// Values, one for each run.
     pub values: Values,
 }
 
 /// Values of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
-    /// Numbers; NaN where it has none.
+    /// Numbers, NaN if missing.
     Numbers(Vec<f64>),
-    /// One of several kinds, each of which may belong to kinds above it.
+    /// Categories, each of which may have superkinds.
     Kinds {
-        /// For each run the place of its kind in `names`, which are in the order in which they are met; nothing where it has none.
+        /// Index in `names` of each run's kind, `None` if missing. Names are in the order of first occurrence.
         of_run: Vec<Option<u32>>,
-        /// Names of the kinds that occur.
+        /// Names of the kinds.
         names: Vec<String>,
-        /// For each of them the kinds above it, the nearest first.
+        /// Superkinds of each kind, nearest first.
         above: Vec<Vec<String>>,
     },
 }
 
 impl Subject {
-    /// Decided runs.
+    /// Number of decided runs.
     pub fn len(&self) -> usize {
         self.failed.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no runs.
     pub fn is_empty(&self) -> bool {
         self.failed.is_empty()
     }

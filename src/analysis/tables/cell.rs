@@ -1,6 +1,6 @@
-//! One value of the table.
+//! A value of the table.
 
-/// A value, or nothing where there is none.
+/// A value, or `None` if it is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::analysis) enum Cell {
     Text(Option<String>),
@@ -18,7 +18,7 @@ impl Cell {
         Self::Number(Some(number))
     }
 
-    /// What no count of ours exceeds stays exact.
+    /// Creates a count. Counts above `i64::MAX` saturate.
     pub fn count(count: impl TryInto<i64>) -> Self {
         Self::Count(Some(count.try_into().unwrap_or(i64::MAX)))
     }

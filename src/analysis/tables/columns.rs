@@ -1,4 +1,4 @@
-//! The columns of the table: name, sort, unit, what each says, and where it comes from.
+//! The columns of the table: name, type, unit, description and source.
 
 use serde::Serialize;
 use serde_json::json;
@@ -8,181 +8,200 @@ use crate::analysis::tables::place::{Place, angle};
 use crate::base::names;
 use crate::history::{ObjectDetail, Role};
 
-/// What sort of values a column has. Any of them may be missing.
+/// Type of a column's values. Any value may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ColumnKind {
-    /// Text; IRIs are whole.
+    /// Text. IRIs are not shortened.
     Text,
     /// A floating-point number.
     Number,
-    /// A whole number.
+    /// An integer.
     Count,
     /// True or false.
     Truth,
 }
 
-/// One column of the table.
+/// A column of the table.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Column {
-    /// Its name.
+    /// Name of the column.
     pub name: &'static str,
-    /// What sort of values it has.
+    /// Type of its values.
     #[serde(rename = "type")]
     pub kind: ColumnKind,
-    /// Unit of its numbers; empty where they have none.
+    /// Unit of its numbers, empty if they have none.
     pub unit: &'static str,
-    /// Whether it is a parameter of the scene: something that was so before the robot did anything, and may make a difference.
+    /// Whether it is a parameter of the scene: a quantity fixed before the robot acts that may affect the outcome.
     pub parameter: bool,
-    /// What it says.
+    /// Description of its values.
     pub description: &'static str,
     #[serde(skip)]
     pub(super) cell: fn(&Place<'_>) -> Cell,
 }
 
-/// All columns, in their order.
+/// Returns all columns in order.
 pub fn columns() -> &'static [Column] {
     COLUMNS
 }
 
 const COLUMNS: &[Column] = &[
     text("run", "id of the run", |p| Cell::text(&p.run.row.run)),
-    text("campaign", "id of its campaign", |p| Cell::text(&p.run.row.campaign)),
+    text("campaign", "id of the campaign", |p| Cell::text(&p.run.row.campaign)),
     count("index", "position of the run in the campaign, from 0", |p| Cell::count(p.run.row.index)),
-    count("scene", "number of its scene, where scenes are run more than once", |p| {
+    count("scene", "number of the scene, if scenes are repeated", |p| {
         Cell::Count(p.run.row.repetition.and_then(|repetition| repetition.scene.try_into().ok()))
     }),
-    count("repetition", "which run of its scene it is, from 0, where scenes are run more than once", |p| {
+    count("repetition", "number of the run among those of its scene, from 0, if scenes are repeated", |p| {
         Cell::Count(p.run.row.repetition.and_then(|repetition| repetition.number.try_into().ok()))
     }),
-    number("weight", "1", "importance weight of its scene, where a search chose it", |p| {
-        Cell::Number(p.run.row.weight)
-    }),
+    number("weight", "1", "importance weight of the scene, if a search chose it", |p| Cell::Number(p.run.row.weight)),
     text("test", "names of the run's actions, joined by a space", |p| Cell::text(&p.run.row.test)),
     text("status", "how the run ended: completed, broken or timeout", |p| Cell::text(p.run.row.status.word())),
     number("score", "1", "the run's score S", |p| Cell::number(p.run.row.score)),
     text("started", "when the run began (RFC 3339)", |p| Cell::text(&p.run.row.started)),
-    text("trace_hash", "digest over every state: runs with the same one went the same way", |p| {
+    text("trace_hash", "digest of all states: runs with equal digests are identical", |p| {
         Cell::text(&p.run.row.trace_hash)
     }),
-    text("program_version", "version of the program that ran it", |p| Cell::text(&p.run.program_version)),
+    text("program_version", "version of actcheck that performed the run", |p| Cell::text(&p.run.program_version)),
     count("step", "position of the action in the test, from 1", |p| Cell::count(p.action.step)),
     text("action", "the action (IRI)", |p| Cell::text(&p.action.action)),
     text("action_end", "how the action ended: completed, broken, timeout or untested", |p| Cell::text(&p.action.end)),
     truth("reported", "whether the action reported success", |p| Cell::Truth(p.action.reported)),
-    text("message", "the action's own words, or why it did not complete", |p| Cell::Text(p.action.message.clone())),
+    text("message", "the action's message, or the reason why it did not complete", |p| {
+        Cell::Text(p.action.message.clone())
+    }),
     number("duration_s", "s", "simulated time that the action took", |p| Cell::number(p.action.duration_secs)),
     text("property", "the property (IRI)", |p| Cell::text(&p.judgement.property)),
     text("outcome", "passed, failed, inapplicable, broken, timeout or untested", |p| {
         Cell::text(p.judgement.outcome.word())
     }),
-    number("margin", "the property's", "how far the outcome was from flipping; positive: passed", |p| {
+    number("margin", "the property's", "distance of the outcome from flipping; positive if passed", |p| {
         Cell::Number(p.judgement.margin)
     }),
-    text("witness", "what shows the outcome, in words", |p| Cell::text(&p.judgement.witness)),
-    truth("held_before", "whether the property held before the action already", |p| {
+    text("witness", "explanation of the outcome", |p| Cell::text(&p.judgement.witness)),
+    truth("held_before", "whether the property already held before the action", |p| {
         Cell::Truth(p.judgement.held_before)
     }),
-    text("designators", "designators of the action with their values, objects by their models (JSON)", designators),
+    text(
+        "designators",
+        "designators of the action with their values; objects are given by their models (JSON)",
+        designators,
+    ),
     text("world", "name of the world", |p| Cell::text(&p.run.world)).of_scene(),
-    number("base_x_m", "m", "where the base stood at first", |p| Cell::number(p.run.robot_base[0])).of_scene(),
-    number("base_y_m", "m", "where the base stood at first", |p| Cell::number(p.run.robot_base[1])).of_scene(),
-    number("base_yaw_rad", "rad", "which way the base faced at first", |p| Cell::number(p.run.robot_base[2]))
+    number("base_x_m", "m", "initial x of the base, in the world", |p| Cell::number(p.run.robot_base[0])).of_scene(),
+    number("base_y_m", "m", "initial y of the base, in the world", |p| Cell::number(p.run.robot_base[1])).of_scene(),
+    number("base_yaw_rad", "rad", "initial heading of the base", |p| Cell::number(p.run.robot_base[2])).of_scene(),
+    count("others", "number of clutter objects around the target", |p| Cell::count(with_role(p, Role::Other)))
         .of_scene(),
-    count("others", "things that stand around: the clutter", |p| Cell::count(with_role(p, Role::Other))).of_scene(),
-    count("place_others", "things that stand where the target is to be placed", |p| {
+    count("place_others", "number of objects on the surface where the target is to be placed", |p| {
         Cell::count(with_role(p, Role::PlaceOther))
     })
     .of_scene(),
-    count("obstacles", "obstacles on the floor", |p| Cell::count(with_role(p, Role::Obstacle))).of_scene(),
-    text("surface_category", "class of the platform that the target stands on (IRI)", |p| category(p.scene.surface))
-        .of_scene(),
+    count("obstacles", "number of obstacles on the floor", |p| Cell::count(with_role(p, Role::Obstacle))).of_scene(),
+    text("surface_category", "class of the platform under the target (IRI)", |p| category(p.scene.surface)).of_scene(),
     text("surface_model", "model of the platform", |p| model(p.scene.surface)).of_scene(),
     text("target_category", "class of the target (IRI)", |p| category(p.scene.target)).of_scene(),
-    text("target_model", "model of the target: what the action handles", |p| model(p.scene.target)).of_scene(),
-    number("target_x_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.x)).of_scene(),
-    number("target_y_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.y)).of_scene(),
-    number("target_z_m", "m", "where the target was placed, in the world", |p| of_target(p, |t| t.z)).of_scene(),
-    number("target_yaw_rad", "rad", "which way the target was turned, in the world", |p| {
-        of_target(p, |t| angle(t.yaw))
-    })
-    .of_scene(),
-    number("target_mass_kg", "kg", "the target's mass", |p| of_target(p, |t| t.mass_kg)).of_scene(),
-    number("target_friction", "1", "the target's friction coefficient", |p| of_target(p, |t| t.friction)).of_scene(),
-    number("target_restitution", "1", "how much the target bounces", |p| of_target(p, |t| t.restitution)).of_scene(),
+    text("target_model", "model of the target, the object that the action handles", |p| model(p.scene.target))
+        .of_scene(),
+    number("target_x_m", "m", "initial x of the target, in the world", |p| of_target(p, |t| t.x)).of_scene(),
+    number("target_y_m", "m", "initial y of the target, in the world", |p| of_target(p, |t| t.y)).of_scene(),
+    number("target_z_m", "m", "initial z of the target, in the world", |p| of_target(p, |t| t.z)).of_scene(),
+    number("target_yaw_rad", "rad", "initial yaw of the target, in the world", |p| of_target(p, |t| angle(t.yaw)))
+        .of_scene(),
+    number("target_mass_kg", "kg", "mass of the target", |p| of_target(p, |t| t.mass_kg)).of_scene(),
+    number("target_friction", "1", "friction coefficient of the target", |p| of_target(p, |t| t.friction)).of_scene(),
+    number("target_restitution", "1", "restitution coefficient of the target", |p| of_target(p, |t| t.restitution))
+        .of_scene(),
     number("robot_distance_m", "m", "horizontal distance of the target from the base", |p| {
         of_target(p, |t| t.robot_distance_m)
     })
     .of_scene(),
-    number("target_ahead_m", "m", "how far ahead of the base the target lay", |p| {
+    number("target_ahead_m", "m", "initial distance of the target ahead of the base", |p| {
         Cell::Number(p.scene.target_from_base(p.run.robot_base).map(|[ahead, _]| ahead))
     })
     .of_scene(),
-    number("target_left_m", "m", "how far to the left of the base the target lay", |p| {
+    number("target_left_m", "m", "initial distance of the target to the left of the base", |p| {
         Cell::Number(p.scene.target_from_base(p.run.robot_base).map(|[_, left]| left))
     })
     .of_scene(),
-    number("target_turned_rad", "rad", "which way the target was turned, seen from the base", |p| {
+    number("target_turned_rad", "rad", "initial yaw of the target, relative to the base", |p| {
         of_target(p, |t| angle(t.yaw - p.run.robot_base[2]))
     })
     .of_scene(),
-    number("surface_x_m", "m", "where the target was on its surface, from the middle, along the surface's x", |p| {
+    number("surface_x_m", "m", "position of the target on its surface, from the centre along the surface's x", |p| {
         Cell::Number(p.scene.target_on_surface().map(|[x, _]| x))
     })
     .of_scene(),
-    number("surface_y_m", "m", "where the target was on its surface, from the middle, along the surface's y", |p| {
+    number("surface_y_m", "m", "position of the target on its surface, from the centre along the surface's y", |p| {
         Cell::Number(p.scene.target_on_surface().map(|[_, y]| y))
     })
     .of_scene(),
-    text("neighbour_category", "class of the thing nearest to the target (IRI)", |p| category(neighbour(p))).of_scene(),
-    text("neighbour_model", "model of the thing nearest to the target", |p| model(neighbour(p))).of_scene(),
-    number("neighbour_distance_m", "m", "horizontal distance of the nearest thing's middle from the target's", |p| {
-        Cell::Number(p.scene.neighbour.map(|(_, distance)| distance))
-    })
+    text("neighbour_category", "class of the object nearest to the target (IRI)", |p| category(neighbour(p)))
+        .of_scene(),
+    text("neighbour_model", "model of the object nearest to the target", |p| model(neighbour(p))).of_scene(),
+    number(
+        "neighbour_distance_m",
+        "m",
+        "horizontal distance between the centres of the nearest object and the target",
+        |p| Cell::Number(p.scene.neighbour.map(|(_, distance)| distance)),
+    )
     .of_scene(),
     number(
         "neighbour_direction_rad",
         "rad",
-        "which way the nearest thing lies from the target: 0 towards the base",
+        "direction from the target to the nearest object; 0 is towards the base",
         |p| Cell::Number(p.scene.neighbour_direction(p.run.robot_base)),
     )
     .of_scene(),
-    number("obstacle_distance_m", "m", "distance of the nearest obstacle from the straight way to the target", |p| {
+    number("obstacle_distance_m", "m", "distance of the nearest obstacle from the straight line to the target", |p| {
         Cell::Number(p.scene.obstacle_distance_m)
     })
     .of_scene(),
-    number("position_noise_m", "m", "how wrong perceived positions are (standard deviation)", |p| {
-        noise(p, "positionNoise")
+    number("position_noise_m", "m", "standard deviation of perceived positions", |p| noise(p, "positionNoise"))
+        .of_scene(),
+    number("height_noise_m", "m", "standard deviation of perceived heights", |p| noise(p, "heightNoise")).of_scene(),
+    number("yaw_noise_rad", "rad", "standard deviation of perceived headings", |p| noise(p, "yawNoise")).of_scene(),
+    number("size_noise_m", "m", "standard deviation of perceived sizes", |p| noise(p, "sizeNoise")).of_scene(),
+    number("localisation_noise_m", "m", "standard deviation of the robot's localisation", |p| {
+        noise(p, "localisationNoise")
     })
     .of_scene(),
-    number("height_noise_m", "m", "how wrong perceived heights are", |p| noise(p, "heightNoise")).of_scene(),
-    number("yaw_noise_rad", "rad", "how wrong perceived headings are", |p| noise(p, "yawNoise")).of_scene(),
-    number("size_noise_m", "m", "how wrong perceived sizes are", |p| noise(p, "sizeNoise")).of_scene(),
-    number("localisation_noise_m", "m", "how wrong the robot's own position is", |p| noise(p, "localisationNoise"))
+    number("heading_noise_rad", "rad", "standard deviation of the robot's localised heading", |p| {
+        noise(p, "headingNoise")
+    })
+    .of_scene(),
+    number("gripper_noise_m", "m", "standard deviation of the gripper's opening", |p| noise(p, "gripperNoise"))
         .of_scene(),
-    number("heading_noise_rad", "rad", "how wrong the robot's own heading is", |p| noise(p, "headingNoise")).of_scene(),
-    number("gripper_noise_m", "m", "how wrong the gripper's opening is", |p| noise(p, "gripperNoise")).of_scene(),
-    number("range_noise_m", "m", "how wrong the camera's ranges are", |p| noise(p, "rangeNoise")).of_scene(),
-    number("odometry_drift", "1", "how wrong wheels are about the way, as a share of it (standard deviation)", |p| {
+    number("range_noise_m", "m", "standard deviation of the camera's ranges", |p| noise(p, "rangeNoise")).of_scene(),
+    number("odometry_drift", "1", "standard deviation of odometry, as a share of the distance travelled", |p| {
         noise(p, "odometryDrift")
     })
     .of_scene(),
-    number("heading_drift_rad", "rad", "how wrong wheels are about the heading, for each radian and metre", |p| {
-        noise(p, "odometryHeadingDrift")
+    number(
+        "heading_drift_rad",
+        "rad",
+        "standard deviation of the odometry's heading, for each radian and metre",
+        |p| noise(p, "odometryHeadingDrift"),
+    )
+    .of_scene(),
+    number("landmark_every_m", "m", "distance between landmarks; 0 without landmarks", |p| {
+        noise(p, "landmarkDistance")
     })
     .of_scene(),
-    number("landmark_every_m", "m", "way between landmarks; 0 where there are none", |p| noise(p, "landmarkDistance"))
+    number("landmark_noise_m", "m", "standard deviation of positions from landmarks", |p| noise(p, "landmarkNoise"))
         .of_scene(),
-    number("landmark_noise_m", "m", "how wrong positions by landmarks are", |p| noise(p, "landmarkNoise")).of_scene(),
-    number("landmark_noise_rad", "rad", "how wrong headings by landmarks are", |p| noise(p, "landmarkHeadingNoise"))
-        .of_scene(),
-    number("target_displacement_m", "m", "how far the target came from its place during the run", |p| {
+    number("landmark_noise_rad", "rad", "standard deviation of headings from landmarks", |p| {
+        noise(p, "landmarkHeadingNoise")
+    })
+    .of_scene(),
+    number("target_displacement_m", "m", "displacement of the target during the run", |p| {
         Cell::Number(p.scene.target.and_then(|target| target.displacement_m))
     }),
-    number("target_tilt_rad", "rad", "largest angle of the target from the vertical during the run", |p| {
+    number("target_tilt_rad", "rad", "largest tilt of the target from the vertical during the run", |p| {
         Cell::Number(p.scene.target.and_then(|target| target.max_tilt_rad))
     }),
-    number("others_displacement_m", "m", "how far any other thing came from its place during the run", |p| {
+    number("others_displacement_m", "m", "largest displacement of any other object during the run", |p| {
         let others = p.run.objects.iter().filter(|object| object.role.is_bystander());
         Cell::Number(others.filter_map(|object| object.displacement_m).max_by(f64::total_cmp))
     }),

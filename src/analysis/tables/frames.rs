@@ -1,4 +1,4 @@
-//! Runs to the rows of the table, and the table to what the table library holds.
+//! Converts runs to rows of the table, and rows to data frames.
 
 use std::collections::BTreeMap;
 
@@ -10,14 +10,14 @@ use crate::analysis::tables::place::{ActionScene, Hierarchy, Place};
 use crate::base::names;
 use crate::history::RunDetail;
 
-/// Columns of categories, and the columns that name the classes above them.
+/// Columns of categories, with the columns of their superclasses.
 const KINDS: [(&str, &str); 3] = [
     ("surface_category", "surface_kinds"),
     ("target_category", "target_kinds"),
     ("neighbour_category", "neighbour_kinds"),
 ];
 
-/// Rows of runs, column by column.
+/// Rows of runs, stored by column.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     cells: Vec<Vec<Cell>>,
@@ -40,7 +40,7 @@ impl Rows {
         }
     }
 
-    /// As a table of the library.
+    /// Converts the rows to a data frame.
     pub fn frame(mut self) -> Result<DataFrame, PolarsError> {
         self.cells.resize_with(columns().len(), Vec::new);
         let series = columns().iter().zip(self.cells).map(|(column, cells)| series(column.name, column.kind, cells));
@@ -48,7 +48,7 @@ impl Rows {
     }
 }
 
-/// Cells as a column of the library; those of another sort are missing.
+/// Converts cells to a column of a data frame. Cells of another type become missing.
 pub(in crate::analysis) fn series(name: &str, kind: ColumnKind, cells: Vec<Cell>) -> Series {
     let name = name.into();
     let cells = cells.into_iter();
@@ -73,7 +73,8 @@ pub(in crate::analysis) fn series(name: &str, kind: ColumnKind, cells: Vec<Cell>
     .into()
 }
 
-/// Adds the classes above each category: local names, the nearest first, joined by a space, the category itself before them.
+/// Adds a column for each category column: local names of the category and its superclasses, nearest first, joined by
+/// spaces.
 pub(super) fn with_kinds(frame: &mut DataFrame, hierarchy: &Hierarchy) -> Result<(), PolarsError> {
     for (from, to) in KINDS {
         let mut known: BTreeMap<&str, String> = BTreeMap::new();
@@ -89,9 +90,9 @@ pub(super) fn with_kinds(frame: &mut DataFrame, hierarchy: &Hierarchy) -> Result
     Ok(())
 }
 
-/// What the columns that [`with_kinds`] adds are called, and what they say.
+/// Returns the names and descriptions of the columns that [`with_kinds`] adds.
 pub(super) fn kinds_columns() -> impl Iterator<Item = (&'static str, String)> {
-    KINDS.into_iter().map(|(from, to)| (to, format!("{from} and the classes above it, local names, the nearest first")))
+    KINDS.into_iter().map(|(from, to)| (to, format!("local names of {from} and its superclasses, nearest first")))
 }
 
 fn told(category: &str, hierarchy: &Hierarchy) -> String {

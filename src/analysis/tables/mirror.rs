@@ -1,4 +1,4 @@
-//! The table beside a history, in as many files as it was written in pieces.
+//! The table beside a history, stored as several Parquet files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -11,36 +11,36 @@ use crate::analysis::tables::frames::Rows;
 use crate::base::{Diagnostic, Diagnostics, digest_of};
 use crate::history::{History, RunDetail};
 
-/// Runs of a file at most: so many are in memory at once.
+/// Maximum number of runs in a file, and so in memory at once.
 const RUNS_IN_A_FILE: usize = 2_000;
-/// Says which columns the files have.
+/// File with the digest of the columns.
 const SCHEMA: &str = "SCHEMA";
 
-/// The mirror of a history that is as the store is.
+/// An up-to-date mirror of a history's store.
 #[derive(Debug)]
 pub struct Mirror {
     folder: PathBuf,
-    /// Its files, by campaign in the order of their starts, then in the order in which they were written.
+    /// Its files, sorted by the start of the campaign, then by the time of writing.
     files: Vec<(String, PathBuf)>,
 }
 
-/// What bringing a mirror up to date took.
+/// The changes made by an update.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MirrorChange {
-    /// Runs that were written.
+    /// Number of runs written.
     pub added: usize,
-    /// Runs that had been there already.
+    /// Number of runs that were already present.
     pub kept: usize,
 }
 
 impl Mirror {
-    /// Brings the mirror of a history up to date: writes the runs that it lacks, and anew what the store does not have or what can't be
-    /// read.
+    /// Updates the mirror of a history: writes missing runs, and rewrites files that can't be read or hold runs that
+    /// the store lacks.
     ///
-    /// Campaigns that hold the smaller form of a run are left out: their scenes are chosen to fail.
+    /// Campaigns of shrunk runs are left out, because their scenes are selected to fail.
     ///
     /// # Errors
-    /// `A001` it can't be written; the history can't be read. What is there is whole.
+    /// `A001` if it can't be written; errors of reading the history. All existing files are complete.
     pub fn update(history: &History) -> Result<(Self, MirrorChange), Diagnostics> {
         let folder = history.dir().join("tables");
         fs::create_dir_all(&folder).map_err(|error| unwritten(&folder, &error))?;
@@ -62,7 +62,7 @@ impl Mirror {
         Ok((mirror, change))
     }
 
-    /// Makes the mirror of a history anew.
+    /// Rebuilds the mirror of a history.
     ///
     /// # Errors
     /// As [`Mirror::update`].
@@ -74,10 +74,10 @@ impl Mirror {
         Self::update(history)
     }
 
-    /// A mirror of runs that come from elsewhere than a history, in a folder of its own.
+    /// Creates a mirror of runs from a source other than a history, in its own folder.
     ///
     /// # Errors
-    /// `A001` it can't be written.
+    /// `A001` if it can't be written.
     pub fn of_runs(
         folder: &Path,
         campaign: &str,
@@ -95,17 +95,17 @@ impl Mirror {
         Ok(mirror)
     }
 
-    /// Its folder.
+    /// Folder of the mirror.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Its files with their campaigns.
+    /// Iterates over its files with their campaigns.
     pub(super) fn files(&self) -> impl Iterator<Item = (&str, &Path)> {
         self.files.iter().map(|(campaign, file)| (campaign.as_str(), file.as_path()))
     }
 
-    /// Files by campaign, in the order in which they were written. What was being written when a process was killed is removed.
+    /// Returns the files by campaign, in the order of writing. Removes partial files of killed processes.
     fn present(&self) -> Result<BTreeMap<String, Vec<PathBuf>>, Diagnostics> {
         let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
         let entries = fs::read_dir(&self.folder).map_err(|error| unwritten(&self.folder, &error))?;
@@ -114,7 +114,7 @@ impl Mirror {
             if let Some((campaign, _)) = name.strip_suffix(".parquet").and_then(|stem| stem.rsplit_once('.')) {
                 found.entry(campaign.to_owned()).or_default().push(path);
             } else if name.ends_with(".tmp") {
-                // Harmless where it stays.
+                // A failure is harmless.
                 let _ = fs::remove_file(&path);
             }
         }
@@ -138,7 +138,7 @@ impl Mirror {
                     there.extend(runs);
                     self.files.push((campaign.to_owned(), file));
                 }
-                // Another history's, twice, or damaged: the store has it.
+                // From another history, duplicate, or corrupt: rewrite it from the store.
                 _ => fs::remove_file(&file).map_err(|error| unwritten(&file, &error))?,
             }
         }
@@ -156,7 +156,7 @@ impl Mirror {
         Ok(())
     }
 
-    /// Writes some rows as a file of their own, which is there whole or not at all.
+    /// Writes rows to a new file atomically.
     fn write(&self, campaign: &str, rows: Rows) -> Result<PathBuf, Diagnostics> {
         let taken = |number: &usize| self.files.iter().any(|(_, file)| *file == self.file(campaign, *number));
         let number = (0..).find(|number| !taken(number)).unwrap_or_default();
@@ -176,23 +176,23 @@ impl Mirror {
     }
 }
 
-/// Some columns of a file, or all.
+/// Reads the wanted columns of a file, or all of them.
 pub(super) fn read(file: &Path, wanted: Option<&[&str]>) -> Result<DataFrame, PolarsError> {
     let wanted = wanted.map(|names| names.iter().map(|name| (*name).to_owned()).collect());
     ParquetReader::new(File::open(file)?).with_columns(wanted).finish()
 }
 
-/// A fault of reading a file of a mirror.
+/// Creates the diagnostic for an unreadable file of a mirror.
 pub(super) fn unread(file: &Path, error: &PolarsError) -> Diagnostics {
     Diagnostic::error("A002", format!("the table `{}` can't be read: {}", file.display(), plain(error)))
-        .help("`actcheck export --rebuild-mirror` makes it again")
+        .help("rebuild it with `actcheck export --rebuild-mirror`")
         .into()
 }
 
-/// A fault of writing a table.
+/// Creates the diagnostic for a table that can't be written.
 pub(in crate::analysis) fn unwritten(file: &Path, error: &impl ToString) -> Diagnostics {
     Diagnostic::error("A001", format!("the table `{}` can't be written: {}", file.display(), plain(error)))
-        .help("look at the folder's permissions and the room on the disk")
+        .help("check the folder's permissions and the free disk space")
         .into()
 }
 
@@ -206,14 +206,14 @@ fn runs_of(file: &Path) -> Result<BTreeSet<String>, PolarsError> {
     Ok(runs)
 }
 
-/// What tells tables apart that were written by programs with other columns.
+/// Digest of the columns, to detect tables written by versions with different columns.
 fn schema_digest() -> String {
     let told: Vec<String> =
         columns().iter().map(|column| format!("{} {:?} {}", column.name, column.kind, column.description)).collect();
     digest_of(&told.join("\n"))
 }
 
-/// Removes the files of a mirror.
+/// Removes all files of a mirror.
 fn clear(folder: &Path) -> Result<(), Diagnostics> {
     for path in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok).map(|entry| entry.path()) {
         if path.extension().is_some_and(|ending| ending == "parquet" || ending == "tmp") {

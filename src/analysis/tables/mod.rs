@@ -1,9 +1,9 @@
-//! Runs as a table: one row for each outcome of a property, with all that is known of the run, the action and the scene.
+//! Runs as a table: one row for each outcome of a property, with the data of the run, the action and the scene.
 //!
-//! The table lies beside the history, in its folder `tables`: a mirror in Parquet that analysis and notebooks read in a fraction of
-//! the time that the store takes. The store is the truth; the mirror can be made again from it at any time.
+//! The table is in the history's folder `tables`: a mirror in Parquet that analyses and notebooks read much faster than
+//! the store. The store is authoritative; the mirror can be rebuilt from it at any time.
 //!
-//! Never: changes what was kept, holds what the store does not, or reads a mirror that lacks runs of the store.
+//! Never: changes the store, holds data that the store lacks, or reads a mirror that lacks runs of the store.
 
 mod cell;
 mod columns;

@@ -1,4 +1,4 @@
-//! The table in memory, as analysis reads it: texts by number, numbers as they are.
+//! The table in memory, with interned texts, as the analyses read it.
 
 use std::collections::BTreeMap;
 
@@ -8,12 +8,12 @@ use crate::analysis::tables::columns::{ColumnKind, columns};
 use crate::analysis::tables::mirror::{Mirror, read, unread};
 use crate::base::Diagnostics;
 
-/// Which rows are asked for; the default is all.
+/// Selects rows of the table. The default is all rows.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct TableFilter {
-    /// Only those of these campaigns.
+    /// Only rows of these campaigns.
     pub campaigns: Option<Vec<String>>,
-    /// Only those of runs that began at this moment or later (RFC 3339, in UTC).
+    /// Only rows of runs that began at this time or later (RFC 3339, in UTC).
     pub since: Option<String>,
 }
 
@@ -22,10 +22,10 @@ impl TableFilter {
         self.campaigns.as_ref().is_none_or(|wanted| wanted.iter().any(|wanted| wanted == campaign))
     }
 
-    /// The rows that it lets through.
+    /// Returns the selected rows.
     pub(super) fn rows_of(&self, frame: DataFrame) -> Result<DataFrame, PolarsError> {
         let Some(since) = &self.since else { return Ok(frame) };
-        // All are written in UTC with as many digits, so that their order is that of their texts.
+        // All times are in UTC with the same number of digits, so that they sort as text.
         let late: Vec<bool> = frame
             .column("started")?
             .str()?
@@ -36,23 +36,23 @@ impl TableFilter {
     }
 }
 
-/// A column of texts: each different one once.
+/// A column of deduplicated texts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TextColumn {
-    /// For each row the place of its text in `texts`; nothing where it has none.
+    /// For each row, the index of its text in `texts`, or `None` if missing.
     pub of_row: Vec<Option<u32>>,
-    /// The texts, in the order in which they were met.
+    /// The distinct texts, in the order of first occurrence.
     pub texts: Vec<String>,
 }
 
 impl TextColumn {
-    /// The text of a row.
+    /// Returns the text of a row, or `None` if it is missing.
     pub fn get(&self, row: usize) -> Option<&str> {
         self.of_row.get(row).copied().flatten().and_then(|of| self.texts.get(of as usize)).map(String::as_str)
     }
 }
 
-/// Rows of the table with some of its columns. Counts are numbers, and so are truths: 0 and 1.
+/// Rows of the table with some of its columns. Counts and Booleans (0 and 1) are numbers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OutcomeTable {
     rows: usize,
@@ -64,7 +64,7 @@ impl OutcomeTable {
     /// Reads some columns of a mirror.
     ///
     /// # Errors
-    /// `A002` a file can't be read.
+    /// `A002` if a file can't be read.
     pub fn read(mirror: &Mirror, filter: &TableFilter, wanted: &[&str]) -> Result<Self, Diagnostics> {
         let mut table = Self::default();
         let mut names: Vec<&str> = wanted.to_vec();
@@ -85,23 +85,23 @@ impl OutcomeTable {
         Ok(table)
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.rows
     }
 
-    /// Whether there is none.
+    /// Whether the table has no rows.
     pub fn is_empty(&self) -> bool {
         self.rows == 0
     }
 
-    /// A column of texts that was asked for; without rows for any other.
+    /// Returns a text column, or an empty column if it was not read.
     pub fn text(&self, name: &str) -> &TextColumn {
         static NONE: TextColumn = TextColumn { of_row: Vec::new(), texts: Vec::new() };
         self.texts.get(name).unwrap_or(&NONE)
     }
 
-    /// A column of numbers that was asked for, NaN where there is none; empty for any other.
+    /// Returns a numeric column, with NaN for missing values, or an empty slice if it was not read.
     pub fn number(&self, name: &str) -> &[f64] {
         self.numbers.get(name).map_or(&[], Vec::as_slice)
     }
@@ -113,7 +113,7 @@ impl OutcomeTable {
     ) -> Result<(), PolarsError> {
         for (name, column) in &mut self.texts {
             let known = known.entry(name).or_default();
-            // Rows of one run stand together: most texts are those of the row before.
+            // Rows of a run are contiguous: most texts equal that of the previous row.
             let mut before: Option<(&str, u32)> = None;
             for text in frame.column(name)?.str()?.iter() {
                 let place = text.map(|text| match before {
@@ -136,7 +136,7 @@ impl OutcomeTable {
     }
 }
 
-/// The place of a text, which is added where it is new.
+/// Returns the index of a text, adding it if it is new.
 fn place_of(text: &str, known: &mut BTreeMap<String, u32>, texts: &mut Vec<String>) -> u32 {
     if let Some(place) = known.get(text) {
         return *place;

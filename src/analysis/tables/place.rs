@@ -1,4 +1,4 @@
-//! What a row is about: one property of one action of a run, in its scene.
+//! The source of a row: one property of one action of a run, in its scene.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -6,10 +6,10 @@ use std::f64::consts::{PI, TAU};
 use crate::history::{ActionDetail, ObjectDetail, Role, RunDetail};
 use crate::verdict::Judgement;
 
-/// Of each class (an IRI) the local names of all classes above it, the nearest first.
+/// Maps each class (an IRI) to the local names of all its superclasses, nearest first.
 pub type Hierarchy = BTreeMap<String, Vec<String>>;
 
-/// The scene of one action.
+/// The source data of one row.
 #[derive(Debug, Clone)]
 pub(super) struct Place<'a> {
     pub run: &'a RunDetail,
@@ -18,16 +18,17 @@ pub(super) struct Place<'a> {
     pub scene: &'a ActionScene<'a>,
 }
 
-/// The things that an action has to do with.
+/// The objects related to an action.
 #[derive(Debug, Clone)]
 pub(super) struct ActionScene<'a> {
-    /// The first target that the action's designators name, or the first of the scene.
+    /// The first target named by the action's designators, or else the first target of the scene.
     pub target: Option<&'a ObjectDetail>,
-    /// The platform that the designators name, or any; of several the one whose middle is nearest to the target.
+    /// The platform named by the designators, or else any platform. Of several, the one whose centre is nearest to the
+    /// target.
     pub surface: Option<&'a ObjectDetail>,
-    /// The nearest thing to the target that is no platform, with the distance. Unit: metres.
+    /// The object nearest to the target, except platforms, with its distance. Unit: metres.
     pub neighbour: Option<(&'a ObjectDetail, f64)>,
-    /// Smallest horizontal distance of an obstacle's middle from the straight way to the target. Unit: metres.
+    /// Smallest horizontal distance of an obstacle's centre from the straight line to the target. Unit: metres.
     pub obstacle_distance_m: Option<f64>,
 }
 
@@ -39,7 +40,7 @@ impl<'a> ActionScene<'a> {
             of_role().find(named).or_else(|| of_role().next())
         };
         let target = first(Role::Target);
-        // Tests that carry things name several: where the target stands is nearest.
+        // Designators of transport tests name several platforms: the nearest one is under the target.
         let platforms = || run.objects.iter().filter(|object| object.role == Role::Platform);
         let among = |wanted: &dyn Fn(&&'a ObjectDetail) -> bool| match target {
             Some(target) => {
@@ -60,19 +61,19 @@ impl<'a> ActionScene<'a> {
         Self { target, surface, neighbour, obstacle_distance_m }
     }
 
-    /// Where the target lies, seen from the robot's base. Units: metres. Shape: ahead, to the left.
+    /// Returns the target's position relative to the robot's base. Unit: metres. Shape: ahead, to the left.
     pub fn target_from_base(&self, base: [f64; 3]) -> Option<[f64; 2]> {
         self.target.map(|target| turned([target.x - base[0], target.y - base[1]], -base[2]))
     }
 
-    /// Where the target lies on its surface, from the surface's middle, along its own axes. Unit: metres.
+    /// Returns the target's position relative to the centre of its surface, along the surface's axes. Unit: metres.
     pub fn target_on_surface(&self) -> Option<[f64; 2]> {
         let (target, surface) = (self.target?, self.surface?);
         Some(turned([target.x - surface.x, target.y - surface.y], -surface.yaw))
     }
 
-    /// Which way the neighbour lies, seen from above the target: 0 towards the robot's base, positive counter-clockwise. Unit: radians,
-    /// in [-π, π).
+    /// Returns the direction from the target to its neighbour: 0 is towards the robot's base, positive is
+    /// counter-clockwise from above. Unit: radians, in [-π, π).
     pub fn neighbour_direction(&self, base: [f64; 3]) -> Option<f64> {
         let (target, (neighbour, _)) = (self.target?, self.neighbour?);
         let to_robot = libm::atan2(base[1] - target.y, base[0] - target.x);
@@ -80,10 +81,10 @@ impl<'a> ActionScene<'a> {
     }
 }
 
-/// An angle in [-π, π). Unit: radians.
+/// Normalises an angle to [-π, π). Unit: radians.
 pub(super) fn angle(radians: f64) -> f64 {
     let turned = (radians + PI).rem_euclid(TAU) - PI;
-    // Rounding may reach π itself.
+    // Rounding may yield π.
     if turned < PI { turned } else { -PI }
 }
 

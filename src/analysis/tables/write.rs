@@ -1,4 +1,4 @@
-//! The table for others: one file in Parquet or CSV, and the description of its columns.
+//! Export of the table: one file in Parquet or CSV, and a description of its columns.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -12,10 +12,11 @@ use crate::analysis::tables::mirror::{Mirror, read, unread, unwritten};
 use crate::analysis::tables::{Hierarchy, TableFilter};
 use crate::base::Diagnostics;
 
-/// Writes `outcomes.parquet` and `schema.json` into a folder, which is made. Returns the files and how many rows there are.
+/// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed. Returns the files and the number
+/// of rows.
 ///
 /// # Errors
-/// `A001` they can't be written, `A002` the mirror can't be read.
+/// `A001` if they can't be written, `A002` if the mirror can't be read.
 pub fn export_parquet(
     mirror: &Mirror,
     filter: &TableFilter,
@@ -35,7 +36,8 @@ pub fn export_parquet(
     })
 }
 
-/// Writes `outcomes.csv` and `schema.json` into a folder, which is made. Returns the files and how many rows there are.
+/// Writes `outcomes.csv` and `schema.json` into a folder, creating it if needed. Returns the files and the number of
+/// rows.
 ///
 /// # Errors
 /// As [`export_parquet`].
@@ -69,7 +71,7 @@ fn export(
     Ok((vec![table, described], rows))
 }
 
-/// What every column says.
+/// Returns the description of every column.
 pub(in crate::analysis) fn schema() -> Value {
     let mut described: Vec<Value> = columns().iter().map(|column| json!(column)).collect();
     described.extend(kinds_columns().map(|(name, description)| {
@@ -78,14 +80,14 @@ pub(in crate::analysis) fn schema() -> Value {
     json!({ "rows": "one for each run, action and property", "columns": described })
 }
 
-/// A table without rows: its columns are those of all others.
+/// Returns a table with all columns and no rows.
 fn empty(hierarchy: &Hierarchy) -> Result<DataFrame, PolarsError> {
     let mut frame = Rows::default().frame()?;
     with_kinds(&mut frame, hierarchy)?;
     Ok(frame)
 }
 
-/// Hands on the rows that a filter lets through, file by file.
+/// Passes the selected rows to `take`, file by file. Returns their number.
 fn each(
     mirror: &Mirror,
     filter: &TableFilter,
