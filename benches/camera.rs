@@ -1,9 +1,10 @@
-//! How many depth pictures of 320 × 240 does one core take in a second, and what is that beside a plain loop of ray casts?
+//! How many depth pictures of 320 × 240 does one core take in a second, and what is that beside a plain loop of ray
+//! casts?
 //!
-//! The pictures are of a table with five things on it, of the shipped campaign of perception and of an apartment, as the
-//! robot sees them, in time on the processor. At least 60 pictures a second are the aim. The plain loop casts the same rays
-//! against each solid of the first scene with parry, and keeps the nearest; the robot's own links and the floor, which the
-//! pictures have besides, are left out of it.
+//! The pictures are of a table with five things on it, of the shipped campaign of perception and of an apartment, as
+//! the robot sees them, in time on the processor. At least 60 pictures a second are the aim. The plain loop casts the
+//! same rays against each solid of the first scene with parry, and keeps the nearest; the robot's own links and the
+//! floor, which the pictures have besides, are left out of it.
 
 mod support;
 
@@ -47,7 +48,8 @@ fn main() {
     measured("the same in the apartment", &root.join("configs/perceive.toml"), Some([world, surfaces]));
 }
 
-/// Builds the first scene of a configuration, with some of its text replaced, and prints how fast pictures of it are taken.
+/// Builds the first scene of a configuration, with some of its text replaced, and prints how fast pictures of it are
+/// taken.
 fn measured(name: &str, config: &PathBuf, replaced: Option<[(&str, &str); 2]>) -> (Scene, World) {
     let mut text = std::fs::read_to_string(config).expect("the configuration is there");
     for (from, to) in replaced.into_iter().flatten() {

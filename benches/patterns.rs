@@ -1,10 +1,10 @@
 //! How fast are patterns found, does chance look like one, and how much does a million outcomes take?
 //!
-//! - `cargo bench --bench patterns`: what is planted in 10,000 runs with twelve parameters, the time for each, alarms in 100 tables whose
-//!   failures are drawn by lot, then 1,000,000 outcomes from the tables on disk to findings, with the most memory that it took. Demanded:
-//!   at most 5 alarms, under 10 s and under 1 GB on two cores.
-//! - `cargo bench --bench patterns -- tables DIR`: writes the planted tables as CSV for `patterns_peers.py`, which asks pysubgroup and
-//!   SliceLine the same and compares times.
+//! - `cargo bench --bench patterns`: what is planted in 10,000 runs with twelve parameters, the time for each, alarms
+//!   in 100 tables whose failures are drawn by lot, then 1,000,000 outcomes from the tables on disk to findings, with
+//!   the most memory that it took. Demanded: at most 5 alarms, under 10 s and under 1 GB on two cores.
+//! - `cargo bench --bench patterns -- tables DIR`: writes the planted tables as CSV for `patterns_peers.py`, which asks
+//!   pysubgroup and SliceLine the same and compares times.
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,8 +1,9 @@
 //! What does actcheck put on top of a physics step?
 //!
-//! The scene of the first run of `configs/clutter.toml` (a table, a dozen objects, the robot) is stepped by `World::step`, with the
-//! robot's controllers, the recorder and the search for faults, and beside it by `rapier3d` driven by hand at the same settings, with
-//! the same shapes, masses and motors. Both start when everything rests. The ratio should be at most 1.1.
+//! The scene of the first run of `configs/clutter.toml` (a table, a dozen objects, the robot) is stepped by
+//! `World::step`, with the robot's controllers, the recorder and the search for faults, and beside it by `rapier3d`
+//! driven by hand at the same settings, with the same shapes, masses and motors. Both start when everything rests. The
+//! ratio should be at most 1.1.
 //!
 //! `cargo bench --bench physics -- --scene FILE` writes the scene and the rates as JSON, for `physics_peers.py`.
 
@@ -288,7 +289,8 @@ fn real(value: f64) -> f32 {
     value as f32
 }
 
-/// The scene for engines of other languages: every solid with its place and mass. Units: metres, kilograms. Quaternions: w, x, y, z.
+/// The scene for engines of other languages: every solid with its place and mass. Units: metres, kilograms.
+/// Quaternions: w, x, y, z.
 fn written(scene: &Scene, rates: &[f64; 4]) -> Value {
     let objects = scene.objects.iter().map(|object| {
         let volume = object.model.volume();

@@ -1,7 +1,8 @@
 //! What does a pick run cost, by stage; how fast is simulation against real time; how large is its history?
 //!
 //! Shares and ratios of one process, because machines are noisy: everything but physics should take at most 15 % of the
-//! wall time, judging one action at most 2 ms, simulation at least 20 times real time on one core, a run at most 150 KB.
+//! wall time, judging one action at most 2 ms, simulation at least 20 times real time on one core, a run at most 150
+//! KB.
 
 use std::collections::BTreeMap;
 use std::path::Path;

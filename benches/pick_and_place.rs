@@ -1,14 +1,15 @@
-//! What does a run of several actions cost, by stage; how many times faster than real time is it on one core; and how much
-//! sooner are two workers done than one?
+//! What does a run of several actions cost, by stage; how many times faster than real time is it on one core; and how
+//! much sooner are two workers done than one?
 //!
 //! ```text
 //! cargo bench --bench pick_and_place [-- CONFIG [RUNS]]
 //! ```
 //!
-//! Without a configuration it is `configs/pick_and_place.toml`, or `configs/quick.toml` where there is no such file. Shares of
-//! the stages are by the clock, which others on the machine stretch evenly; what a run costs is time on the processor. Aims: at
-//! least 15 times real time a core, two workers at least 1.8 times as fast as one. The latter is of the clock, and holds on a machine with two free cores
-//! only; beside it stands what two workers take more of processors' time than one, which is what they cost each other.
+//! Without a configuration it is `configs/pick_and_place.toml`, or `configs/quick.toml` where there is no such file.
+//! Shares of the stages are by the clock, which others on the machine stretch evenly; what a run costs is time on the
+//! processor. Aims: at least 15 times real time a core, two workers at least 1.8 times as fast as one. The latter is of
+//! the clock, and holds on a machine with two free cores only; beside it stands what two workers take more of
+//! processors' time than one, which is what they cost each other.
 
 mod support;
 
@@ -149,8 +150,8 @@ fn by_workers(env: &Env, runs: u32) {
     println!("so fast they would be with a core each: {:.2} ×", 2.0 * one.1 / two.1);
 }
 
-/// Time that all threads of this program were on processors, by the system's ticks of a hundredth of a second; time on the
-/// clock where it does not tell.
+/// Time that all threads of this program were on processors, by the system's ticks of a hundredth of a second; time on
+/// the clock where it does not tell.
 fn process_secs() -> f64 {
     let told = std::fs::read_to_string("/proc/self/stat").ok();
     // The name in parentheses may hold spaces; user and system time are the 12th and 13th after it.

@@ -1,15 +1,15 @@
-//! What does the skill protocol cost? Exchanges of a command and an observation in a second, in lockstep and without images, from
-//! Rust and from Python; and a whole simulated run with a controller that does nothing, at every control tick, beside the same
-//! ticks asked for at once.
+//! What does the skill protocol cost? Exchanges of a command and an observation in a second, in lockstep and without
+//! images, from Rust and from Python; and a whole simulated run with a controller that does nothing, at every control
+//! tick, beside the same ticks asked for at once.
 //!
-//! Aims: 20,000 exchanges a second from Rust and 3,000 from Python, simulator and program sharing one core, to which `taskset`
-//! binds them: what counts is the time of both on the processor. On two cores that have nothing else to do an exchange costs up
-//! to four times as much, since each core falls asleep while the other one works, and has to be woken; `-- two-cores` measures
-//! that.
+//! Aims: 20,000 exchanges a second from Rust and 3,000 from Python, simulator and program sharing one core, to which
+//! `taskset` binds them: what counts is the time of both on the processor. On two cores that have nothing else to do an
+//! exchange costs up to four times as much, since each core falls asleep while the other one works, and has to be
+//! woken; `-- two-cores` measures that.
 //!
-//! What an exchange takes is that time of a run in which each tick is a command, less that of the same run in which one command
-//! asks for all, in the cheapest physics there is. Python's own package is measured where its one dependency, numpy, is
-//! installed; beside it stands what Python does with sockets and JSON alone.
+//! What an exchange takes is that time of a run in which each tick is a command, less that of the same run in which one
+//! command asks for all, in the cheapest physics there is. Python's own package is measured where its one dependency,
+//! numpy, is installed; beside it stands what Python does with sockets and JSON alone.
 
 #[path = "../clients/rust/link.rs"]
 mod link;

@@ -1,7 +1,8 @@
 //! What judging the past costs: one new property over 2,000 stored pick runs, beside simulating them.
 //!
-//! A few dozen runs are simulated and kept many times under new ids, so that the traces are real. Demanded: at least 1,000
-//! runs/s on two cores, everything that a user waits for included (finding the runs, traces, facts, rules, writing).
+//! A few dozen runs are simulated and kept many times under new ids, so that the traces are real. Demanded: at least
+//! 1,000 runs/s on two cores, everything that a user waits for included (finding the runs, traces, facts, rules,
+//! writing).
 
 use std::num::NonZero;
 use std::path::Path;

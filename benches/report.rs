@@ -1,8 +1,8 @@
 //! How large is the report of 10,000 runs, how long does it take to make, and how fast is it in a browser?
 //!
-//! `cargo bench --bench report`: made-up outcomes of five properties in tables on disk, replays of real runs that are simulated first, and
-//! Debian's Chromium without a window. Demanded: under 10 MB, made in under 5 s from the tables, first paint under 1 s, an answer to a
-//! filter under 100 ms. Every line tells its share of that.
+//! `cargo bench --bench report`: made-up outcomes of five properties in tables on disk, replays of real runs that are
+//! simulated first, and Debian's Chromium without a window. Demanded: under 10 MB, made in under 5 s from the tables,
+//! first paint under 1 s, an answer to a filter under 100 ms. Every line tells its share of that.
 
 use std::collections::BTreeMap;
 use std::path::Path;

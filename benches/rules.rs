@@ -1,4 +1,5 @@
-//! What does a rule engine for rules loaded at run time cost beside rules compiled by hand, and what does judging an action cost?
+//! What does a rule engine for rules loaded at run time cost beside rules compiled by hand, and what does judging an
+//! action cost?
 //!
 //! Printed as ratios, side by side in one run; absolute times depend on the machine.
 

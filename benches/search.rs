@@ -1,10 +1,10 @@
 //! How many samples does each strategy need to the first counterexample, and is the failure rate that it tells right?
 //!
 //! Failure regions of known volume are planted in 8 dimensions: one connected with a margin that leads to it, two
-//! disjoint ones, one with a margin that leads away from it (deceptive), and one with a margin that says nothing (flat).
-//! `benches/search_peers.py` runs VerifAI and Hypothesis on the same functions and prints the same columns. Run with
-//! `cargo bench --bench search -- 200` for 200 seeds; without a number it takes 60. `-- points` prints values of the
-//! functions, against which the script checks its own.
+//! disjoint ones, one with a margin that leads away from it (deceptive), and one with a margin that says nothing
+//! (flat). `benches/search_peers.py` runs VerifAI and Hypothesis on the same functions and prints the same columns. Run
+//! with `cargo bench --bench search -- 200` for 200 seeds; without a number it takes 60. `-- points` prints values of
+//! the functions, against which the script checks its own.
 
 use actcheck::search::{Dimension, GENERATION, Search, Space, Strategy, Told};
 

@@ -1,13 +1,14 @@
 //! In how many runs does a guided search find the commonest failure modes of a real pick, against random scenes?
 //!
-//! A failure mode is the set of properties that fail together. Random scenes are made first, and the three commonest modes of them
-//! are looked for. They are independent of each other, so that the waits from one find to the next are as many first finds. A
-//! guided search has to begin anew for each: it does so with many seeds, and ends when it has found all three. Told are the median
-//! of the first run that shows a mode, interpolated within its step, and its ratio to random's with an interval by bootstrap.
+//! A failure mode is the set of properties that fail together. Random scenes are made first, and the three commonest
+//! modes of them are looked for. They are independent of each other, so that the waits from one find to the next are as
+//! many first finds. A guided search has to begin anew for each: it does so with many seeds, and ends when it has found
+//! all three. Told are the median of the first run that shows a mode, interpolated within its step, and its ratio to
+//! random's with an interval by bootstrap.
 //!
-//! `cargo bench --bench search_pick` takes `configs/pick.toml`, 2,000 random scenes, 200 searches of 60 runs at most, and all guided
-//! strategies; `-- --config benches/quiet_pick.toml --random 500 --seeds 40 --runs 120 --strategies bandit,boundary
-//! --first-seed 7001` says otherwise.
+//! `cargo bench --bench search_pick` takes `configs/pick.toml`, 2,000 random scenes, 200 searches of 60 runs at most,
+//! and all guided strategies; `-- --config benches/quiet_pick.toml --random 500 --seeds 40 --runs 120 --strategies
+//! bandit,boundary --first-seed 7001` says otherwise.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! How small do failing runs on a crowded table become, and what does that cost?
 //!
-//! Takes the failing runs of `configs/clutter.toml` (eight to twelve other objects) in order, at most eight of each failure
-//! mode, and shrinks each with the noise as recorded. Wanted: at least 20 runs of three modes, in the median at most two
-//! other objects left and at most 60 simulations, and the same set of failed properties in all. `--runs N` takes fewer;
-//! `--pictures DIR` draws every small scene.
+//! Takes the failing runs of `configs/clutter.toml` (eight to twelve other objects) in order, at most eight of each
+//! failure mode, and shrinks each with the noise as recorded. Wanted: at least 20 runs of three modes, in the median at
+//! most two other objects left and at most 60 simulations, and the same set of failed properties in all. `--runs N`
+//! takes fewer; `--pictures DIR` draws every small scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -171,8 +171,8 @@ impl<'a> Hand<'a> {
         }
     }
 
-    /// What the object is to be put on: another surface of the world where there is one, or a second platform beside the
-    /// first.
+    /// What the object is to be put on: another surface of the world where there is one, or a second platform beside
+    /// the first.
     fn set_place(&mut self, world: Option<&'a Surroundings>) {
         let first = self.designators.get("objectSurface").and_then(|ids| ids.first()).cloned();
         let id = match world.filter(|world| world.surfaces().next().is_some()) {
@@ -255,8 +255,8 @@ impl<'a> Hand<'a> {
         strewn.map(|_| ())
     }
 
-    /// Some of the models that stand around, anywhere on a surface: their ids. Nominal is the fewest, on a ring around the
-    /// middle, the first at the far side.
+    /// Some of the models that stand around, anywhere on a surface: their ids. Nominal is the fewest, on a ring around
+    /// the middle, the first at the far side.
     fn strew(
         &mut self,
         kind: &str,

@@ -15,7 +15,8 @@ use crate::scenario::{Role, SceneObject};
 
 /// Gap between the surface's edge and the middle of the robot's base. Unit: metres. Shape: least, nominal, most.
 const BASE_GAP_M: [f64; 3] = [0.59, FRONT_GAP_M, 0.79];
-/// The same for an arm that stays where it is: near enough to reach to the far edge of a table, and a little in front of it.
+/// The same for an arm that stays where it is: near enough to reach to the far edge of a table, and a little in front
+/// of it.
 const FIXED_GAP_M: [f64; 3] = [0.18, 0.22, 0.26];
 /// The base stands at most this far beside the surface's middle. Unit: metres.
 const BASE_SIDE_M: f64 = 0.05;
@@ -32,18 +33,18 @@ const BASE_HEIGHT_M: f64 = 1.2;
 const DRIVE_M: f64 = 1.0;
 /// Nominal distance of such a start from the place. Unit: metres.
 const NOMINAL_DRIVE_M: f64 = 1.5;
-/// Where there are rooms a base starts at least this far from their ends. Unit: metres. Half a base, half a wall, and room for a
-/// leg between: nearer to an end, no robot was ever inside.
+/// Where there are rooms a base starts at least this far from their ends. Unit: metres. Half a base, half a wall, and
+/// room for a leg between: nearer to an end, no robot was ever inside.
 const OFF_END_M: f64 = 0.5;
-/// Without rooms a base that has to drive starts this far around the front of the surface. Unit: metres. Shape: back and
-/// forwards, to either side.
+/// Without rooms a base that has to drive starts this far around the front of the surface. Unit: metres. Shape: back
+/// and forwards, to either side.
 const ARENA_M: [[f64; 2]; 2] = [[-2.2, 1.2], [-2.2, 2.2]];
 /// Without rooms obstacles stand this far around the robot's side of the surface. Unit: metres.
 const FIELD_M: f64 = 2.0;
 
 impl Hand<'_> {
-    /// Where the base stands: nominal is straight in front of the surface's middle, facing it; or within the ranges of the
-    /// configuration, where it has some.
+    /// Where the base stands: nominal is straight in front of the surface's middle, facing it; or within the ranges of
+    /// the configuration, where it has some.
     pub(super) fn start_robot(&mut self, surface: Option<&Surface>) -> Result<[f64; 3], Discard> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);
@@ -102,8 +103,9 @@ impl Hand<'_> {
         Err(Discard { model: "robot".to_owned(), name: "robot".to_owned(), tries: TRIES })
     }
 
-    /// Where a base starts that has to drive first: anywhere in the world but near its goal, heading anywhere; within the
-    /// ranges of the configuration, where it has some. Nominal is a little way from the goal, facing as it shall there.
+    /// Where a base starts that has to drive first: anywhere in the world but near its goal, heading anywhere; within
+    /// the ranges of the configuration, where it has some. Nominal is a little way from the goal, facing as it shall
+    /// there.
     pub(super) fn start_elsewhere(&mut self, world: Option<&Surroundings>) -> Result<[f64; 3], Discard> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);

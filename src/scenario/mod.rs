@@ -2,8 +2,8 @@
 //!
 //! Simpler is closer to nominal: the first model of each list, in the middle, not turned, with the mass and friction of
 //! its model; the fewest other objects, each at its own place around the middle; the robot straight in front of the
-//! surface. A choice that a record lacks has its nominal value, so that a shorter record is a simpler scene. The nominal
-//! values stand where the choices are made, in `draw.rs`.
+//! surface. A choice that a record lacks has its nominal value, so that a shorter record is a simpler scene. The
+//! nominal values stand where the choices are made, in `draw.rs`.
 //!
 //! Never: simulates, knows a robot's reach or skill, or draws what a run's sensors get wrong.
 

@@ -19,8 +19,8 @@ pub struct Parameter {
 pub enum ParameterKind {
     /// A range of numbers.
     Range,
-    /// The range of where another object stands along one side of the surface; the target's place along the same side has
-    /// this name.
+    /// The range of where another object stands along one side of the surface; the target's place along the same side
+    /// has this name.
     Beside(&'static str),
     /// So many things, none nearer to another.
     OneOf(usize),
@@ -32,8 +32,8 @@ impl Space {
     /// The decisions that leave a choice, those that matter most first: how many objects there are, the target, the
     /// robot's place, and of each other object its model and where it stands.
     ///
-    /// What is left out (how the others are turned, their masses and friction) shapes a scene less than all the rest, and a
-    /// search learns faster without it. It is drawn like everything that nobody decides.
+    /// What is left out (how the others are turned, their masses and friction) shapes a scene less than all the rest,
+    /// and a search learns faster without it. It is drawn like everything that nobody decides.
     pub fn parameters(&self) -> Vec<Parameter> {
         let mut found = Vec::new();
         let mut add = |name: String, kind: ParameterKind| match kind {

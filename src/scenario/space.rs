@@ -296,7 +296,8 @@ fn check_tops(campaign: &Campaign, surfaces: &[Arc<ObjectModel>], worlds: &[Surr
     }
 }
 
-/// Surfaces that a designator may stand for, by name: of models where they are put into the scene, of worlds that have them.
+/// Surfaces that a designator may stand for, by name: of models where they are put into the scene, of worlds that have
+/// them.
 fn tops(
     campaign: &Campaign,
     designator: &str,

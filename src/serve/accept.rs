@@ -2,7 +2,8 @@
 
 use crate::history::WireSyntax;
 
-/// The form that a client likes best of those that there are; of those that it likes as much, the first. Nothing where it wants none.
+/// The form that a client likes best of those that there are; of those that it likes as much, the first. Nothing where
+/// it wants none.
 pub(super) fn choose(accept: &str, offered: &[WireSyntax]) -> Option<WireSyntax> {
     let wanted: Vec<(&str, f64)> = accept.split(',').filter_map(range).collect();
     if wanted.is_empty() {

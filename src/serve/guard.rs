@@ -6,8 +6,8 @@ use crate::serve::question::Refusal;
 
 /// Looks at the headers `Host` and `Origin`.
 ///
-/// A page of another site can let its own name point to this machine (DNS rebinding), and then read what it is sent. So the host must be
-/// an address, `localhost`, or a name that was allowed.
+/// A page of another site can let its own name point to this machine (DNS rebinding), and then read what it is sent. So
+/// the host must be an address, `localhost`, or a name that was allowed.
 pub(super) fn guard(host: Option<&str>, origin: Option<&str>, allowed: &[String]) -> Result<(), Refusal> {
     let Some(host) = host else { return Err(Refusal::new(400, "there is no header `Host`")) };
     if !is_known(name(host), allowed) {

@@ -1,4 +1,5 @@
-//! The report of the history as it is now. Making it takes seconds, so it is made anew only when the history has changed.
+//! The report of the history as it is now. Making it takes seconds, so it is made anew only when the history has
+//! changed.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -32,8 +32,8 @@ const TRIES: usize = 8;
 
 /// What our own page may do: load its script and its looks, and ask this server.
 const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
-/// The report is one file with scripts and pictures inside, and asks nobody. It names its scripts by their digests in a policy of
-/// its own, and both policies hold: this one adds what only a header can forbid, that other pages frame it.
+/// The report is one file with scripts and pictures inside, and asks nobody. It names its scripts by their digests in a
+/// policy of its own, and both policies hold: this one adds what only a header can forbid, that other pages frame it.
 const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 /// Answers are no pages.
 const NO_POLICY: &str = "default-src 'none'; frame-ancestors 'none'; sandbox";
