@@ -96,7 +96,7 @@ fn many_outcomes() {
         patterns += found.patterns.confirmed().count() + trend(&table, &of, 0.05).changes.len();
     }
     println!(
-        "{} outcomes ({:.0} MB on disk): {:.1} s ({read:.1} s of it reading), peak memory {} MB; {modes} failure modes, \
+        "{} outcomes ({:.0} MB on disk): {:.1} s ({read:.1} s for reading), peak memory {} MB; {modes} failure modes, \
          {cascades} cascades, {patterns} patterns",
         table.len(),
         bytes as f64 / 1e6,

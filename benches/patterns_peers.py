@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Compares pattern mining of pysubgroup and SliceLine with actcheck on planted patterns: findings and times.
 
-Run from the root of the checkout, with Cargo installed: `python3 benches/patterns_peers.py`. It creates a virtual environment in
-`target/patterns_peers`, installs both from PyPI, writes the planted tables with `cargo bench --bench patterns -- tables DIR`
-(10,000 runs, twelve parameters, superclasses as columns of their own), and searches for patterns of up to three conditions.
-Numbers are discretised into eight bins for both, as actcheck does at first; actcheck also tries all ranges of bins, refines
-bounds, cross-validates in folds, corrects and confirms, which the others leave to their users. SliceLine joins all pairs of
-slices in one matrix, which takes more than seven gigabytes at depth 3 for slices of 30 runs: its slices have at least 2 % of
-the runs, and it is stopped if it still takes more than MEMORY. `--tables DIR TIMES` uses existing tables and the saved output
-of the benchmark.
+Run from the root of the checkout, with Cargo installed: `python3 benches/patterns_peers.py`. It creates a virtual
+environment in `target/patterns_peers`, installs both from PyPI, writes the planted tables with `cargo bench --bench
+patterns -- tables DIR` (10,000 runs, twelve parameters, superclasses as columns of their own), and searches for
+patterns of up to three conditions. Numbers are discretised into eight bins for both, as actcheck does at first;
+actcheck also tries all ranges of bins, refines bounds, simplifies patterns, corrects and confirms, which the others
+leave to their users. SliceLine joins all pairs of slices in one matrix, which takes more than seven gigabytes at
+depth 3 for slices of 30 runs: its slices have at least 2 % of the runs, and it is stopped if it still takes more than
+MEMORY. `--tables DIR TIMES` uses existing tables and the saved output of the benchmark.
 """
 
 import resource

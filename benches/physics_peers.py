@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Compares physics steps per second of MuJoCo and PyBullet with actcheck, in the scene of `physics.rs`.
 
-Run from the root of the checkout, with Cargo installed: `python3 benches/physics_peers.py`. It creates a virtual environment in
-`target/physics_peers`, installs both from PyPI, gets the scene from `cargo bench --bench physics -- --scene FILE` (or from an
-existing file with `--scene FILE`), builds it in each engine from the same solids, masses, frictions and robot, with the same
-time step and with motors that hold every joint, and prints the rates. Each engine keeps its own defaults for solver and
-contacts: the solvers of MuJoCo and PyBullet stop early if they can, and MuJoCo's bodies never sleep here. PyBullet warns about
-massless links on standard error.
+Run from the root of the checkout, with Cargo installed: `python3 benches/physics_peers.py`. It creates a virtual
+environment in `target/physics_peers`, installs both from PyPI, gets the scene from `cargo bench --bench physics --
+--scene FILE` (or from an existing file with `--scene FILE`), builds it in each engine from the same solids, masses,
+frictions and robot, with the same time step and with motors that hold every joint, and prints the rates. Each engine
+keeps its own defaults for solver and contacts: the solvers of MuJoCo and PyBullet stop early if they can, and MuJoCo's
+bodies never sleep here. PyBullet warns about massless links on standard error.
 """
 
 import json
@@ -75,7 +75,7 @@ def mujoco_steps(scene):
 
     import mujoco
 
-    # Keep links fixed to the world as bodies, so that the robot can be moved. Massless links get the same masses as in actcheck.
+    # Keep links fixed to the world as bodies, so that the robot can be moved. Massless links get the same masses as ours.
     compiler = '<mujoco><compiler fusestatic="false" boundmass="0.01" boundinertia="4e-7"/></mujoco></robot>'
     urdf = scene["robot"].replace("</robot>", compiler)
     spec = mujoco.MjSpec.from_string(urdf)

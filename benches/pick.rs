@@ -129,7 +129,7 @@ fn print_costs(costs: &Costs, runs: u64, simulated_secs: f64, history_bytes: u64
         (costs.of("facts") + costs.of("rules")) * 1e3 / runs as f64
     );
     println!("simulation: {:.1} × real time (at least 20 ×)", simulated_secs / costs.of("simulation"));
-    println!("history: {:.1} KB per run of configs/pick.toml (at most 150 KB)", history_bytes as f64 / 1e3 / runs as f64);
+    println!("history: {:.1} KB/run of configs/pick.toml (at most 150 KB)", history_bytes as f64 / 1e3 / runs as f64);
 }
 
 fn folder_bytes(folder: &Path) -> u64 {

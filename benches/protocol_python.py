@@ -4,9 +4,9 @@
     pip install clients/python
     python benches/protocol_python.py
 
-The simulator is a process that answers every command with the same bytes, so that only the client is measured: a command for
-eight joints at each tick, and the parsed observation with arrays. The same exchange over bare sockets, without the client, is
-measured for comparison.
+The simulator is a process that answers every command with the same bytes, so that only the client is measured: a
+command for eight joints at each tick, and the parsed observation with arrays. The same exchange over bare sockets,
+without the client, is measured for comparison.
 """
 
 from __future__ import annotations

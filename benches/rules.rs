@@ -53,7 +53,7 @@ fn closure_program(edges: &[(u32, u32)]) -> Program {
     for (a, b) in edges {
         writeln!(text, "e({a}, {b}) .").expect("a string takes everything");
     }
-    Program::load(&Source::new("closure.rls", text), Path::new("")).expect("the program is right")
+    Program::load(&Source::new("closure.rls", text), Path::new("")).expect("the program is valid")
 }
 
 fn closure_by_hand(edges: &[(u32, u32)]) -> usize {
@@ -171,7 +171,7 @@ because(?t) :- groups(?a, ?n), ?n > 100, ?t = CONCAT(STR(?a), " touches all") .
 
 fn book(rules: Option<&str>) -> (RuleBook, Vec<String>) {
     let mut ontology =
-        ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).expect("the shipped ontology is right");
+        ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).expect("the shipped ontology is valid");
     if let Some(text) = rules {
         ontology.libraries.clear();
         let mut property = ontology.properties.values().next().expect("it has properties").clone();

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Counts the samples that VerifAI's cross-entropy and Hypothesis with `target()` need on the functions of `search.rs`.
 
-Run from the root of the checkout, with Cargo installed: `python3 benches/search_peers.py [seeds]` (20 by default). It creates
-a virtual environment in `target/search_peers`, installs both from PyPI, checks its functions against those of
-`cargo bench --bench search -- points`, and prints the same columns as the benchmark, except failure rates, which the two do
-not estimate. `--points FILE` reads the points from a file instead of running Cargo.
+Run from the root of the checkout, with Cargo installed: `python3 benches/search_peers.py [seeds]` (20 by default). It
+creates a virtual environment in `target/search_peers`, installs both from PyPI, checks its functions against those of
+`cargo bench --bench search -- points`, and prints the same columns as the benchmark, except failure rates, which the
+two do not estimate. `--points FILE` reads the points from a file instead of running Cargo.
 """
 
 import math
@@ -99,7 +99,7 @@ def first_of_random(planted):
 
 
 def first_of_verifai(planted, tuned):
-    """VerifAI's cross-entropy with its defaults; if tuned, its threshold is the 10 % quantile of 200 uncounted random samples."""
+    """VerifAI's cross-entropy with its defaults; tuned: threshold at the 10 % quantile of 200 uncounted samples."""
     import numpy
     from dotmap import DotMap
     from verifai.features import Box

@@ -3,13 +3,13 @@
 
     python3 benches/engines/compare.py [--actcheck PROGRAM] [--rounds N] [--by-hand]
 
-Makes a random graph of 2,000 nodes and 6,000 edges (as in benches/rules.rs; its closure has some 3.6 million tuples), runs
-each engine in a process of its own, checks that all count the same tuples, and prints seconds and ratios. Seconds are the
-wall time of the whole process, including parsing: the fastest of the rounds, in which the engines alternate.
+Makes a random graph of 2,000 nodes and 6,000 edges (as in benches/rules.rs; its closure has some 3.6 million tuples),
+runs each engine in a process of its own, checks that all count the same tuples, and prints seconds and ratios. Seconds
+are the wall time of the whole process, including parsing: the fastest of the rounds, in which the engines alternate.
 
-Engines: actcheck (`make`), SWI-Prolog with tabling (Debian: swi-prolog-nox), clingo (from PyPI, in a virtual environment in
-a temporary folder). `--by-hand` adds rules compiled by hand with datafrog, as measured by `cargo bench --bench rules`:
-evaluation only, without start and parsing.
+Engines: actcheck (`make`), SWI-Prolog with tabling (Debian: swi-prolog-nox), clingo (from PyPI, in a virtual
+environment in a temporary folder). `--by-hand` adds rules compiled by hand with datafrog, as measured by `cargo bench
+--bench rules`: evaluation only, without start and parsing.
 """
 
 import argparse

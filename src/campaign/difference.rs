@@ -91,7 +91,7 @@ fn moments(trace: &Trace) -> Vec<Moment<'_>> {
 fn parted(was: Option<&Moment<'_>>, is: Option<&Moment<'_>>) -> Difference {
     let words = |moment: Option<&Moment<'_>>| match moment {
         Some(Moment { time_secs, known: Known::State(_), .. }) => format!("ended at {time_secs:.3} s"),
-        Some(Moment { time_secs, .. }) => format!("still going on at {time_secs:.3} s"),
+        Some(Moment { time_secs, .. }) => format!("still running at {time_secs:.3} s"),
         None => "not reached".to_owned(),
     };
     let first = [was, is].into_iter().flatten().min_by(|a, b| a.time_secs.total_cmp(&b.time_secs));

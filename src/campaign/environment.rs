@@ -264,7 +264,7 @@ fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
             Some(class) => Arc::make_mut(model).category = class.to_owned(),
             None if used.contains(name) => campaign.warnings.push(
                 Diagnostic::warning("W039", format!("the model `{name}` has no category: it counts as `act:Object`"))
-                .help(format!("add it to `[categories]`, for example `{name} = \"act:Cup\"`")),
+                    .help(format!("add it to `[categories]`, for example `{name} = \"act:Cup\"`")),
             ),
             None => {}
         }

@@ -118,28 +118,28 @@ mod tests {
     /// Values are read back bit by bit, and a modified file is rejected.
     #[test]
     fn solids_come_back_as_they_were_or_not_at_all() {
-        let folder = tempfile::tempdir().expect("it is right");
+        let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("deep/key.hulls");
         let third = 1.0 / 3.0;
         let solids = vec![Shape::Hull {
             points: vec![[third, -0.0, 1e-300], [1.0, 0.1, 0.2], [f64::MAX, 0.3, 5e-324], [0.7, third / 7.0, 9.9]],
             volume: third,
         }];
-        write(&path, &solids).expect("it is right");
+        write(&path, &solids).expect("the cache can be written");
         let Some([Shape::Hull { points, volume }]) = read(&path).as_deref().map(|list| [list[0].clone()]) else {
-            panic!("it is there");
+            panic!("one hull is read");
         };
         let Shape::Hull { points: expected, .. } = &solids[0] else { unreachable!() };
         let bits = |list: &[[f64; 3]]| list.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
         assert_eq!((bits(&points), volume.to_bits()), (bits(expected), third.to_bits()));
-        let bytes = fs::read(&path).expect("it is right");
+        let bytes = fs::read(&path).expect("the cache can be read");
         for at in [0, bytes.len() / 2, bytes.len() - 1] {
             let mut other = bytes.clone();
             other[at] ^= 1;
-            fs::write(&path, other).expect("it is right");
+            fs::write(&path, other).expect("the cache can be written");
             assert!(read(&path).is_none(), "byte {at}");
         }
-        fs::write(&path, &bytes[..bytes.len() / 2]).expect("it is right");
+        fs::write(&path, &bytes[..bytes.len() / 2]).expect("the cache can be written");
         assert!(read(&path).is_none());
     }
 }

@@ -33,7 +33,7 @@ const DRIVE_M: f64 = 1.0;
 /// Nominal distance between that start and the goal. Unit: metres.
 const NOMINAL_DRIVE_M: f64 = 1.5;
 /// Minimum distance of the start from the ends of the rooms. Unit: metres. Half a base, half a wall, and a gap as wide
-/// as a leg.
+/// as a leg; no robot fits nearer to an end.
 const OFF_END_M: f64 = 0.5;
 /// Without rooms, a base that has to drive starts in this range around the front of the surface. Unit: metres. Shape:
 /// back and forwards, to either side.

@@ -161,12 +161,18 @@ impl Subject<'_> {
     fn check_property(&self) -> Result<(), Diagnostics> {
         let failed = || self.failed.iter().map(|iri| names::local(iri));
         match self.options.property {
-            _ if self.failed.is_empty() => Err(Diagnostic::error("S050", "no property fails in this run: there is nothing to shrink")
-                .help("rules or models may have changed since then; `actcheck list` shows scores")
-                .into()),
+            _ if self.failed.is_empty() => {
+                Err(Diagnostic::error("S050", "no property fails in this run: there is nothing to shrink")
+                    .help("rules or models may have changed since then; `actcheck list` shows scores")
+                    .into())
+            }
             Some(property) if !self.failed.iter().any(|iri| is_named(iri, property)) => {
                 let message = format!("the property `{property}` does not fail in this run");
-                let help = format!("{}; failing: {}", did_you_mean(property, failed()), failed().collect::<Vec<_>>().join(", "));
+                let help = format!(
+                    "{}; failing: {}",
+                    did_you_mean(property, failed()),
+                    failed().collect::<Vec<_>>().join(", ")
+                );
                 Err(Diagnostic::error("S050", message).help(help).into())
             }
             _ => Ok(()),
@@ -236,7 +242,7 @@ impl Subject<'_> {
 fn remake(env: &Env, index: u64, recorded: &[Choice], options: &ShrinkOptions<'_>) -> Result<RunRecord, Diagnostics> {
     run_line(env, "shrink", index, Choices::recorded(recorded), &options.manner).map_err(|failure| {
         Diagnostic::error("S051", format!("the run's scene can no longer be built: {failure}"))
-        .help("models, robot or program have changed since the run was made")
+            .help("models, robot or program have changed since the run was made")
             .into()
     })
 }
