@@ -19,7 +19,7 @@ const WIDTH_RESERVE: u64 = 4;
 pub enum Spent {
     /// The time limit. Unit: seconds.
     Time(f64),
-    /// The width that the interval of every property has reached.
+    /// The maximum interval width, which all properties have reached.
     Width(f64),
     /// The number of failed runs.
     Failures(u64),

@@ -199,7 +199,7 @@ fn perform(
     };
     let settling = world.settle();
     if !settling.left.is_empty() {
-        return Err(Failure::Discard(format!("fell from where it was put: {}", settling.left.join(", "))));
+        return Err(Failure::Discard(format!("fell from its initial position: {}", settling.left.join(", "))));
     }
     if !settling.settled {
         return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));

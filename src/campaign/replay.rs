@@ -180,7 +180,7 @@ pub(super) fn again(
     match catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, recorded()), manner, cut))) {
         Ok(Ok(record)) => Ok(record),
         Ok(Err(Failure::Interrupted)) => Err(Failure::Interrupted.to_string()),
-        Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can no longer be built:  {reason}")),
+        Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can no longer be built: {reason}")),
         Err(panic) => {
             let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
             let redone = catch_unwind(AssertUnwindSafe(|| crashed(env, campaign, index, recorded(), &reason)));
