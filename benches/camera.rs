@@ -1,9 +1,9 @@
-//! How many depth pictures of 320 × 240 does one core take in a second, and what is that beside a plain loop of ray casts?
+//! Depth camera: images of 320 × 240 per second on one core, compared with a plain loop of ray casts.
 //!
-//! The pictures are of a table with five things on it, of the shipped campaign of perception and of an apartment, as the
-//! robot sees them, in time on the processor. At least 60 pictures a second are the aim. The plain loop casts the same rays
-//! against each solid of the first scene with parry, and keeps the nearest; the robot's own links and the floor, which the
-//! pictures have besides, are left out of it.
+//! The scenes are a table with five objects, the shipped perception campaign, and an apartment, seen by the robot.
+//! Times are CPU times. The goal is at least 60 images per second. The plain loop casts the same rays against each
+//! solid of the first scene with parry and keeps the nearest hit; it leaves out the robot's own links and the floor,
+//! which the camera renders.
 
 mod support;
 
@@ -23,21 +23,21 @@ use parry3d::shape::{Ball, Cuboid, Cylinder, Shape as ParryShape};
 use support::thread_secs;
 
 const PICTURES: u32 = 100;
-/// The plain loop is slow.
+/// Fewer, because the plain loop is slow.
 const PLAIN_PICTURES: u32 = 5;
-/// Where the head looks: at the table.
+/// Tilt of the head towards the table.
 const TILT_RAD: f64 = -0.5;
 
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (scene, built) = measured("five things on a table", &root.join("benches/five_others.toml"), None);
+    let (scene, built) = measured("five objects on a table", &root.join("benches/five_others.toml"), None);
     let solids = solids(&scene);
     let image = built.look(&mut frame(0));
     let eye = built.kinematics().camera(&built.observe().positions);
     let plain = per_second(PLAIN_PICTURES, || plain_picture(&solids, &image, &eye));
     let noisy = per_second(PICTURES, || built.look(&mut frame(7)));
     println!(
-        "  plain loop of ray casts against {} solids {plain:6.1}; with noise over that {:.1}",
+        "  plain loop of ray casts against {} solids {plain:6.1}; camera with noise is {:.1} × as fast",
         solids.len(),
         noisy / plain
     );
@@ -47,14 +47,14 @@ fn main() {
     measured("the same in the apartment", &root.join("configs/perceive.toml"), Some([world, surfaces]));
 }
 
-/// Builds the first scene of a configuration, with some of its text replaced, and prints how fast pictures of it are taken.
+/// Builds the first scene of a configuration, after text replacements, and prints the image rate.
 fn measured(name: &str, config: &PathBuf, replaced: Option<[(&str, &str); 2]>) -> (Scene, World) {
     let mut text = std::fs::read_to_string(config).expect("the configuration is there");
     for (from, to) in replaced.into_iter().flatten() {
         assert!(text.contains(from), "{} has no {from}", config.display());
         text = text.replacen(from, to, 1);
     }
-    let folder = config.parent().expect("it lies in a folder");
+    let folder = config.parent().expect("it is in a folder");
     let source = Source::new(config.display().to_string(), text);
     let env = Env::prepare_text(source, folder, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"));
     let mut choices = Choices::random(env.campaign.seed, 0);
@@ -70,24 +70,24 @@ fn measured(name: &str, config: &PathBuf, replaced: Option<[(&str, &str); 2]>) -
     let seen = images[0].depths.iter().filter(|depth| **depth > 0.0).count();
     let pixels = images[0].depths.len();
     println!(
-        "{name}: {} × {} pixels, {:.0} % see something",
+        "{name}: {} × {} pixels, {:.0} % with depth",
         images[0].width,
         images[0].height,
         seen as f64 / pixels as f64 * 100.0
     );
-    println!("  pictures a second on one core (at least 60): without noise {exact:.1}, with noise {noisy:.1}");
-    println!("  digest of the pictures {}", digest(&images));
+    println!("  images per second on one core (at least 60): without noise {exact:.1}, with noise {noisy:.1}");
+    println!("  digest of the images {}", digest(&images));
     (scene, built)
 }
 
-/// Tells whether pictures are the same after the code has changed.
+/// Digest of images, to check that code changes do not alter them.
 fn digest(images: &[DepthImage]) -> String {
     let mut digest = Digest::new();
     images.iter().for_each(|image| digest.update_bits(&image.depths));
     digest.finish()
 }
 
-/// Choices of one picture, whose noise has this number.
+/// Choices of one image, with this noise seed.
 fn frame(number: u32) -> Choices {
     let kind = ChoiceKind::Index { of: 1 << 32 };
     Choices::recorded(&[Choice { name: "sense.camera.frame".to_owned(), kind, value: f64::from(number) }])
@@ -110,7 +110,7 @@ fn look_down(world: &mut World) {
     }
 }
 
-/// Every solid of the scene's objects, placed as parry wants it.
+/// All solids of the scene's objects as parry shapes with poses.
 fn solids(scene: &Scene) -> Vec<(parry3d::math::Pose, Box<dyn ParryShape>)> {
     let mut solids: Vec<(parry3d::math::Pose, Box<dyn ParryShape>)> = Vec::new();
     for object in &scene.objects {

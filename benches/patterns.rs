@@ -1,10 +1,11 @@
-//! How fast are patterns found, does chance look like one, and how much does a million outcomes take?
+//! Pattern mining: speed, false alarms, and time and memory for a million outcomes.
 //!
-//! - `cargo bench --bench patterns`: what is planted in 10,000 runs with twelve parameters, the time for each, alarms in 100 tables whose
-//!   failures are drawn by lot, then 1,000,000 outcomes from the tables on disk to findings, with the most memory that it took. Demanded:
-//!   at most 5 alarms, under 10 s and under 1 GB on two cores.
-//! - `cargo bench --bench patterns -- tables DIR`: writes the planted tables as CSV for `patterns_peers.py`, which asks pysubgroup and
-//!   SliceLine the same and compares times.
+//! - `cargo bench --bench patterns`: finds planted patterns in 10,000 runs with twelve parameters and prints the time
+//!   for each, counts false alarms in 100 tables with shuffled failures, then analyses 1,000,000 outcomes from the
+//!   tables on disk and prints time and peak memory. Required: at most 5 alarms, under 10 s and under 1 GB on two
+//!   cores.
+//! - `cargo bench --bench patterns -- tables DIR`: writes the planted tables as CSV for `patterns_peers.py`, which runs
+//!   pysubgroup and SliceLine on them and compares times.
 
 use std::path::Path;
 use std::time::Instant;
@@ -24,12 +25,12 @@ mod support {
 
 const RUNS: usize = 10_000;
 const SHUFFLES: u64 = 100;
-/// Five properties each.
+/// With five properties each.
 const MANY_RUNS: u64 = 200_000;
 const PROPERTIES: [&str; 5] = ["CloseObject", "MovedObject", "NoGraspCollisions", "ObjectGrasped", "ObjectInGripper"];
 
 fn main() {
-    // Cargo hands on `--bench`.
+    // Cargo passes `--bench`.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     match arguments.iter().map(String::as_str).collect::<Vec<&str>>().as_slice() {
         ["tables", folder] => write_tables(Path::new(folder)),
@@ -60,7 +61,7 @@ fn by_lot() {
     let alarms = (0..SHUFFLES)
         .filter(|seed| !mine(&planted::shuffled(&subject, *seed), &PatternOptions::default()).patterns.is_empty())
         .count();
-    println!("drawn by lot: patterns in {alarms} of {SHUFFLES} ({:.1} s)", start.elapsed().as_secs_f64());
+    println!("shuffled failures: patterns in {alarms} of {SHUFFLES} ({:.1} s)", start.elapsed().as_secs_f64());
 }
 
 fn many_outcomes() {
@@ -95,7 +96,7 @@ fn many_outcomes() {
         patterns += found.patterns.confirmed().count() + trend(&table, &of, 0.05).changes.len();
     }
     println!(
-        "{} outcomes ({:.0} MB on disk): {:.1} s ({read:.1} s of it reading), most memory {} MB; {modes} failure modes, \
+        "{} outcomes ({:.0} MB on disk): {:.1} s ({read:.1} s for reading), peak memory {} MB; {modes} failure modes, \
          {cascades} cascades, {patterns} patterns",
         table.len(),
         bytes as f64 / 1e6,
@@ -104,7 +105,7 @@ fn many_outcomes() {
     );
 }
 
-/// Makes the most memory count from here on; without effect where the system can't.
+/// Resets the peak memory counter; no effect if the system does not support it.
 fn reset_most_memory() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
@@ -116,7 +117,7 @@ fn most_memory_mb() -> u64 {
 }
 
 fn write_tables(folder: &Path) {
-    std::fs::create_dir_all(folder).expect("the folder can be made");
+    std::fs::create_dir_all(folder).expect("the folder can be created");
     for (name, planted) in planted::plantings() {
         let subject = planted::subject(RUNS, 1, &planted);
         let start = Instant::now();
@@ -128,7 +129,7 @@ fn write_tables(folder: &Path) {
     }
 }
 
-/// A table with a column for each parameter and each kind above, and the last for failures.
+/// A CSV table with a column for each parameter and each superclass; the last column is the failure.
 fn text(subject: &Subject) -> String {
     let mut columns: Vec<(String, Vec<String>)> = Vec::new();
     for parameter in &subject.parameters {

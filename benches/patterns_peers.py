@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Which of the planted patterns do pysubgroup and SliceLine find, and how long do they take beside actcheck?
+"""Compares pattern mining of pysubgroup and SliceLine with actcheck on planted patterns: findings and times.
 
-Run from the top of the checkout, with Cargo at hand: `python3 benches/patterns_peers.py`. It makes a virtual environment in
-`target/patterns_peers`, installs both from PyPI there, has `cargo bench --bench patterns -- tables DIR` write the planted tables
-(10,000 runs, twelve parameters, the classes above kinds as columns of their own), and asks each for patterns of up to three
-conditions. Numbers are cut into eight cells for both, as actcheck does to begin with; actcheck besides tries all ranges of
-cells, refines bounds, folds, corrects and confirms, which the others leave to their users. SliceLine joins all pairs of slices in
-one matrix, which takes more than seven gigabytes at depth 3 for slices of 30 runs: it is asked for slices of at least 2 % of the
-runs, and ended where it takes more than MEMORY all the same. `--tables DIR TIMES` takes tables and what the benchmark printed from
-elsewhere.
+Run from the root of the checkout, with Cargo installed: `python3 benches/patterns_peers.py`. It creates a virtual
+environment in `target/patterns_peers`, installs both from PyPI, writes the planted tables with `cargo bench --bench
+patterns -- tables DIR` (10,000 runs, twelve parameters, superclasses as columns of their own), and searches for
+patterns of up to three conditions. Numbers are discretised into eight bins for both, as actcheck does at first;
+actcheck also tries all ranges of bins, refines bounds, simplifies patterns, corrects and confirms, which the others
+leave to their users. SliceLine joins all pairs of slices in one matrix, which takes more than seven gigabytes at
+depth 3 for slices of 30 runs: its slices have at least 2 % of the runs, and it is stopped if it still takes more than
+MEMORY. `--tables DIR TIMES` uses existing tables and the saved output of the benchmark.
 """
 
 import resource
@@ -36,7 +36,7 @@ def main():
         folder = ENVIRONMENT / "tables"
         command = ["cargo", "bench", "--bench", "patterns", "--", "tables", str(folder)]
         times = subprocess.run(command, check=True, capture_output=True, text=True, cwd=HERE.parent).stdout
-    # Not before: the benchmark needs memory of its own.
+    # Set after the benchmark, which needs more memory.
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     ours = {line.split("\t")[0]: line.split("\t")[1:] for line in times.splitlines() if line.count("\t") == 2}
     for name, (secs, patterns) in ours.items():
@@ -50,7 +50,7 @@ def main():
                 print(f"  {peer}: took more than {MEMORY >> 30} GB")
                 continue
             took = time.perf_counter() - start
-            print(f"  {peer}: {took:.2f} s, {took / float(secs):.0f} times as long")
+            print(f"  {peer}: {took:.2f} s, {took / float(secs):.0f} times as long as actcheck")
             for pattern in found:
                 print(f"    {pattern}")
 
@@ -62,7 +62,7 @@ def read(file):
 
 
 def pysubgroup_finds(table):
-    """Best first by weighted relative accuracy, by its own exhaustive search with optimistic estimates."""
+    """Ranks by weighted relative accuracy, with pysubgroup's exhaustive search with optimistic estimates."""
     import pysubgroup
 
     target = pysubgroup.BinaryTarget("failed", 1)
@@ -71,7 +71,7 @@ def pysubgroup_finds(table):
         table, target, selectors, result_set_size=TOP, depth=DEPTH, qf=pysubgroup.WRAccQF()
     )
     with warnings.catch_warnings():
-        # It divides by the size of subgroups that have no runs.
+        # It divides by the size of empty subgroups.
         warnings.simplefilter("ignore", RuntimeWarning)
         result = pysubgroup.SimpleDFS().execute(task)
     return [f"{quality:.4f} {subgroup}" for quality, subgroup, *_ in result.results]

@@ -1,10 +1,10 @@
-//! What does actcheck put on top of a physics step?
+//! Overhead of actcheck over a bare physics step.
 //!
-//! The scene of the first run of `configs/clutter.toml` (a table, a dozen objects, the robot) is stepped by `World::step`, with the
-//! robot's controllers, the recorder and the search for faults, and beside it by `rapier3d` driven by hand at the same settings, with
-//! the same shapes, masses and motors. Both start when everything rests. The ratio should be at most 1.1.
+//! The scene of the first run of `configs/clutter.toml` (a table, a dozen objects, the robot) is stepped by
+//! `World::step`, with the robot's controllers, the recorder and fault detection, and by `rapier3d` used directly with
+//! the same settings, shapes, masses and motors. Both start with everything at rest. The ratio should be at most 1.1.
 //!
-//! `cargo bench --bench physics -- --scene FILE` writes the scene and the rates as JSON, for `physics_peers.py`.
+//! `cargo bench --bench physics -- --scene FILE` writes the scene and the rates as JSON for `physics_peers.py`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,7 +25,7 @@ mod fresh;
 
 /// Steps of one measurement: two seconds of simulated time.
 const STEPS: u32 = 480;
-/// Measurements of each kind, taken in turns; the fastest counts.
+/// Measurements of each kind, alternating; the fastest counts.
 const ROUNDS: usize = 15;
 /// Steps before the first measurement.
 const SETTLING: u32 = 480;
@@ -48,9 +48,9 @@ fn main() {
         }
     }
     let rates = fastest.map(|secs| f64::from(STEPS) / secs);
-    println!("steps a second, {} objects and the robot, everything at rest", scene.objects.len());
+    println!("steps per second, {} objects and the robot, everything at rest", scene.objects.len());
     for (name, rate) in
-        ["actcheck", "its engine alone", "rapier3d by hand", "the same, nothing sleeps"].iter().zip(rates)
+        ["actcheck", "its engine only", "rapier3d by hand", "the same without sleeping"].iter().zip(rates)
     {
         println!("  {name:<26}{rate:>9.0}  {:>6.2} x by hand", rates[2] / rate);
     }
@@ -61,7 +61,7 @@ fn main() {
     }
 }
 
-/// The scene as the tool steps it.
+/// The scene stepped by actcheck.
 struct Ours {
     world: world::World,
     command: Command,
@@ -82,7 +82,7 @@ impl Ours {
         Self { world, command, ticks: STEPS / steps_per_tick }
     }
 
-    /// Wall time of all, and of the engine's steps within. Unit: seconds.
+    /// Wall time of the steps, and of the engine within them. Unit: seconds.
     fn measure(&mut self) -> (f64, f64) {
         let (start, engine_start) = (now_secs(), self.world.watched_secs());
         for _ in 0..self.ticks {
@@ -98,7 +98,7 @@ fn now_secs() -> f64 {
     START.elapsed().as_secs_f64()
 }
 
-/// The same scene as somebody would write it with `rapier3d` alone.
+/// The same scene written directly with `rapier3d`.
 struct ByHand {
     world: engine::PhysicsWorld,
 }
@@ -119,7 +119,7 @@ impl ByHand {
         let mut world = engine::PhysicsWorld {
             gravity,
             integration_parameters: parameters,
-            // Somebody by hand has to forget old contacts in the same way.
+            // Contacts must be discarded in the same way as in actcheck.
             narrow_phase: fresh::narrow_phase(),
             ..engine::PhysicsWorld::default()
         };
@@ -159,20 +159,20 @@ impl ByHand {
     }
 }
 
-/// The robot's links as one multibody, fixed ones folded into those that carry them, all motors holding position 0.
+/// Inserts the robot as one multibody: fixed links are merged into their parents, and all motors hold position 0.
 fn insert_robot(world: &mut engine::PhysicsWorld, scene: &Scene) {
     let robot = urdf_rs::read_from_string(&scene.robot.profile.urdf.text).expect("the shipped robot");
     let links: BTreeMap<&str, &urdf_rs::Link> = robot.links.iter().map(|link| (link.name.as_str(), link)).collect();
     let root = robot.links.iter().find(|link| robot.joints.iter().all(|joint| joint.child.link != link.name));
     let root = root.expect("a tree has a root").name.as_str();
-    // Where the robot starts; its joints stay at 0.
+    // Start pose of the robot; its joints stay at 0.
     let [x, y, heading] = scene.robot.base;
     let start = Isometry3::from_parts(
         Translation3::new(x, y, 0.0),
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading),
     );
     let base = world.insert_body(engine::RigidBodyBuilder::fixed().pose(pose(&start)));
-    // Links to visit: name, body that carries it, place on that body, place of the body in the world.
+    // Links to visit: name, body of the link, pose on that body, pose of the body in the world.
     let mut open = vec![(root, base, Isometry3::identity(), start)];
     while let Some((name, body, at, body_at)) = open.pop() {
         add_link(world, links[name], body, &at);
@@ -235,7 +235,7 @@ fn add_link(
     }
     let matrix = rapier3d::math::Matrix::from_cols_array(&columns);
     let added = engine::MassProperties::with_inertia_matrix(vector(&inertial.translation.vector), real(mass), matrix);
-    // A collider that is not to be touched carries the mass, so that folded links add up.
+    // The mass is on a collider without contacts, so that the masses of merged links add up.
     let carrier = engine::ColliderBuilder::ball(1e-3)
         .sensor(true)
         .collision_groups(engine::InteractionGroups::none())
@@ -288,7 +288,8 @@ fn real(value: f64) -> f32 {
     value as f32
 }
 
-/// The scene for engines of other languages: every solid with its place and mass. Units: metres, kilograms. Quaternions: w, x, y, z.
+/// The scene as JSON for other engines: every solid with its pose and mass. Units: metres, kilograms. Quaternions: w,
+/// x, y, z.
 fn written(scene: &Scene, rates: &[f64; 4]) -> Value {
     let objects = scene.objects.iter().map(|object| {
         let volume = object.model.volume();

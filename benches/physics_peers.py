@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""How many physics steps a second do MuJoCo and PyBullet make in the scene of `physics.rs`?
+"""Compares physics steps per second of MuJoCo and PyBullet with actcheck, in the scene of `physics.rs`.
 
-Run from the top of the checkout, with Cargo at hand: `python3 benches/physics_peers.py`. It makes a virtual environment in
-`target/physics_peers`, installs both from PyPI there, takes the scene from `cargo bench --bench physics -- --scene FILE` (or from
-`--scene FILE`, written earlier), builds it in each engine from the same solids, masses, frictions and robot, with the same step,
-motors holding every joint, and prints the rates side by side. Each engine keeps its own defaults for solver and contacts:
-MuJoCo's and PyBullet's solvers stop early where they can, and MuJoCo's bodies never sleep here. PyBullet tells on standard error of links without mass.
+Run from the root of the checkout, with Cargo installed: `python3 benches/physics_peers.py`. It creates a virtual
+environment in `target/physics_peers`, installs both from PyPI, gets the scene from `cargo bench --bench physics --
+--scene FILE` (or from an existing file with `--scene FILE`), builds it in each engine from the same solids, masses,
+frictions and robot, with the same time step and with motors that hold every joint, and prints the rates. Each engine
+keeps its own defaults for solver and contacts: the solvers of MuJoCo and PyBullet stop early if they can, and MuJoCo's
+bodies never sleep here. PyBullet warns about massless links on standard error.
 """
 
 import json
@@ -48,7 +49,7 @@ def main():
 
 
 def enter():
-    """Goes on in an environment that holds the engines."""
+    """Restarts this script in a virtual environment with the engines."""
     if not (ENVIRONMENT / "bin" / "python").exists():
         venv.create(ENVIRONMENT, with_pip=True)
     python = ENVIRONMENT / "bin" / "python"
@@ -57,7 +58,7 @@ def enter():
 
 
 def rate(step):
-    """Steps a second: the fastest of several measurements."""
+    """Returns steps per second: the fastest of several measurements."""
     for _ in range(SETTLING):
         step()
     fastest = float("inf")
@@ -74,7 +75,7 @@ def mujoco_steps(scene):
 
     import mujoco
 
-    # Links that are fixed to the world stay bodies, so that the robot can be moved to its place; massless ones get the masses of ours.
+    # Keep links fixed to the world as bodies, so that the robot can be moved. Massless links get the same masses as ours.
     compiler = '<mujoco><compiler fusestatic="false" boundmass="0.01" boundinertia="4e-7"/></mujoco></robot>'
     urdf = scene["robot"].replace("</robot>", compiler)
     spec = mujoco.MjSpec.from_string(urdf)
@@ -83,7 +84,7 @@ def mujoco_steps(scene):
     root = spec.worldbody.bodies[0]
     root.pos = [x, y, 0.0]
     root.quat = [math.cos(heading / 2), 0, 0, math.sin(heading / 2)]
-    # The robot's own links do not collide with each other: they touch what has the other bit.
+    # The robot's links collide only with geoms of the other bit, not with each other.
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = 1, 2
     for joint in spec.joints:
@@ -163,7 +164,7 @@ def collision_shape(pybullet, solid, at):
 
 
 def compound(links):
-    """Several shapes as one array of each argument."""
+    """Combines several shapes into one array for each argument."""
     return {
         "shapeTypes": [kind for kind, _ in links],
         "halfExtents": [form.get("halfExtents", [1, 1, 1]) for _, form in links],

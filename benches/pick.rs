@@ -1,7 +1,8 @@
-//! What does a pick run cost, by stage; how fast is simulation against real time; how large is its history?
+//! Cost of a pick run by stage, simulation speed relative to real time, and size of the history.
 //!
-//! Shares and ratios of one process, because machines are noisy: everything but physics should take at most 15 % of the
-//! wall time, judging one action at most 2 ms, simulation at least 20 times real time on one core, a run at most 150 KB.
+//! Shares and ratios are within one process, because machines are noisy. Goals: everything but physics takes at most 15
+//! % of the wall time, judging one action at most 2 ms; simulation runs at 20 times real time or faster on one core; a
+//! run takes at most 150 KB.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,10 +25,10 @@ fn now_secs() -> f64 {
     START.elapsed().as_secs_f64()
 }
 
-/// Stages in the order of the line, with what each took in all. Unit: seconds.
+/// Total time of each stage, in the order of execution. Unit: seconds.
 #[derive(Default)]
 struct Costs {
-    /// The engine's steps alone: what of `simulation` is physics. The rest is perception, planning, control, recording.
+    /// The engine's part of `simulation`. The rest is perception, planning, control and recording.
     engine_secs: f64,
     stages: Vec<(&'static str, f64)>,
 }
@@ -55,7 +56,7 @@ fn main() {
     let history_dir = folder.path().join("history");
     let overrides = Overrides { history: Some(history_dir.clone()), ..Overrides::default() };
     let env = Env::prepare(&config, &overrides).expect("the benchmark's configuration is sound");
-    // What is kept is measured on the runs that people make first: one to five other objects.
+    // The size of the history is measured on the first shipped example: one to five other objects.
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/pick.toml");
     let kept =
         Env::prepare(&shipped, &Overrides { runs: Some(40), ..overrides }).expect("the shipped configuration is sound");
@@ -88,7 +89,8 @@ fn main() {
     print_costs(&costs, made, simulated_secs, folder_bytes(&history_dir));
 }
 
-/// Takes one run down the line by hand. Returns the simulated seconds of its actions.
+/// Makes one run stage by stage. Returns the simulated seconds of settling and actions, or `None` if the scene is
+/// discarded.
 fn by_stage(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
     let mut choices = Choices::random(env.campaign.seed, index);
     let scene = costs.time("scene", || scenario::draw(&env.space, 0, &mut choices)).ok()?;
@@ -111,7 +113,7 @@ fn by_stage(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
 fn print_costs(costs: &Costs, runs: u64, simulated_secs: f64, history_bytes: u64) {
     let total: f64 = costs.stages.iter().map(|(_, secs)| secs).sum();
     println!("{runs} pick runs with five other objects, one core");
-    println!("{:10} {:>12} {:>8}", "stage", "ms a run", "share");
+    println!("{:10} {:>12} {:>8}", "stage", "ms per run", "share");
     for (stage, secs) in &costs.stages {
         println!("{stage:10} {:12.3} {:7.2}%", secs * 1e3 / runs as f64, secs / total * 100.0);
     }
@@ -127,7 +129,7 @@ fn print_costs(costs: &Costs, runs: u64, simulated_secs: f64, history_bytes: u64
         (costs.of("facts") + costs.of("rules")) * 1e3 / runs as f64
     );
     println!("simulation: {:.1} × real time (at least 20 ×)", simulated_secs / costs.of("simulation"));
-    println!("history: {:.1} KB a run of configs/pick.toml (at most 150 KB)", history_bytes as f64 / 1e3 / runs as f64);
+    println!("history: {:.1} KB/run of configs/pick.toml (at most 150 KB)", history_bytes as f64 / 1e3 / runs as f64);
 }
 
 fn folder_bytes(folder: &Path) -> u64 {

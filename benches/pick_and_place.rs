@@ -1,14 +1,13 @@
-//! What does a run of several actions cost, by stage; how many times faster than real time is it on one core; and how much
-//! sooner are two workers done than one?
+//! Cost of a run with several actions by stage, speed relative to real time on one core, and speedup of two workers.
 //!
 //! ```text
 //! cargo bench --bench pick_and_place [-- CONFIG [RUNS]]
 //! ```
 //!
-//! Without a configuration it is `configs/pick_and_place.toml`, or `configs/quick.toml` where there is no such file. Shares of
-//! the stages are by the clock, which others on the machine stretch evenly; what a run costs is time on the processor. Aims: at
-//! least 15 times real time a core, two workers at least 1.8 times as fast as one. The latter is of the clock, and holds on a machine with two free cores
-//! only; beside it stands what two workers take more of processors' time than one, which is what they cost each other.
+//! The default configuration is `configs/pick_and_place.toml`, or `configs/quick.toml` if it does not exist. Shares of
+//! stages are wall time, which other load stretches evenly; the cost of a run is CPU time. Goals: at least 15 times
+//! real time per core, and two workers at least 1.8 times as fast as one. The latter is wall time and needs two free
+//! cores; the benchmark also prints the additional CPU time of two workers, which is their mutual slowdown.
 
 mod support;
 
@@ -25,12 +24,12 @@ use actcheck::{facts, scenario, world};
 
 use support::{thread_secs, wall_secs};
 
-/// Runs where nothing else is said.
+/// Default number of runs.
 const RUNS: u32 = 12;
 const CLOCK: Clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: wall_secs };
 const MANNER: Manner = Manner { clock: CLOCK, disturb: None };
 
-/// Stages in the order of the line, with what each took in all. Unit: seconds.
+/// Total time of each stage, in the order of execution. Unit: seconds.
 #[derive(Default)]
 struct Costs {
     stages: Vec<(&'static str, f64)>,
@@ -53,7 +52,7 @@ impl Costs {
 }
 
 fn main() {
-    // Cargo says `--bench` too.
+    // Cargo passes `--bench`.
     let mut arguments = std::env::args().skip(1).filter(|argument| !argument.starts_with("--"));
     let config = arguments.next().map_or_else(default_config, PathBuf::from);
     let runs = arguments.next().and_then(|runs| runs.parse().ok()).unwrap_or(RUNS);
@@ -87,19 +86,19 @@ fn by_stage(env: &Env, runs: u32) {
         costs.time("history", || history.commit(&record)).expect("room on the disk");
     }
     let total: f64 = costs.stages.iter().map(|(_, secs)| secs).sum();
-    println!("{:34} {:>12} {:>8}", "stage, by the clock", "ms a run", "share");
+    println!("{:34} {:>12} {:>8}", "stage, wall time", "ms per run", "share");
     for (stage, secs) in &costs.stages {
         println!("{stage:34} {:12.3} {:7.2}%", secs * 1e3 / f64::from(made), secs / total * 100.0);
     }
-    println!("{:34} {:12.3}", "all but history, on the processor", processor_secs * 1e3 / f64::from(made));
+    println!("{:34} {:12.3}", "all but history, CPU time", processor_secs * 1e3 / f64::from(made));
     println!(
-        "simulated: {:.1} s a run, {:.1} × real time a core (at least 15 ×)",
+        "simulated: {:.1} s per run, {:.1} × real time per core (at least 15 ×)",
         simulated_secs / f64::from(made),
         simulated_secs / processor_secs
     );
 }
 
-/// Takes one run down the line by hand. Returns the simulated seconds.
+/// Makes one run stage by stage. Returns the simulated seconds, or `None` if the scene is discarded.
 fn one_run(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
     let mut choices = Choices::random(env.campaign.seed, index);
     let number = env.test_of(index);
@@ -119,7 +118,7 @@ fn one_run(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
     let performed = wall_secs() - start;
     let (engine, pictures) = (built.watched_secs(), built.looked_secs());
     costs.add("actions: physics", engine);
-    costs.add("actions: pictures", pictures);
+    costs.add("actions: camera images", pictures);
     costs.add("actions: plans, control, recording", performed - engine - pictures);
     let run_facts = costs.time("facts", || facts::extract(&trace));
     costs.time("rules", || {
@@ -143,14 +142,13 @@ fn by_workers(env: &Env, runs: u32) {
         run_all(env, &history, "bench", &Options { jobs, manner: MANNER }, &AtomicBool::new(false), |_| {});
         (wall_secs() - wall, process_secs() - processors)
     });
-    println!("{runs} runs with one worker: {:.2} s by the clock, {:.2} s of processors", one.0, one.1);
-    println!("{runs} runs with two workers: {:.2} s by the clock, {:.2} s of processors", two.0, two.1);
-    println!("two workers are {:.2} × as fast by the clock (at least 1.8 × where two cores are free)", one.0 / two.0);
-    println!("so fast they would be with a core each: {:.2} ×", 2.0 * one.1 / two.1);
+    println!("{runs} runs with one worker: {:.2} s wall time, {:.2} s CPU time", one.0, one.1);
+    println!("{runs} runs with two workers: {:.2} s wall time, {:.2} s CPU time", two.0, two.1);
+    println!("two workers are {:.2} × as fast in wall time (at least 1.8 × with two free cores)", one.0 / two.0);
+    println!("speedup with a core each, from CPU time: {:.2} ×", 2.0 * one.1 / two.1);
 }
 
-/// Time that all threads of this program were on processors, by the system's ticks of a hundredth of a second; time on the
-/// clock where it does not tell.
+/// CPU time of all threads of this process, in the system's ticks of 10 ms; wall time if the system does not report it.
 fn process_secs() -> f64 {
     let told = std::fs::read_to_string("/proc/self/stat").ok();
     // The name in parentheses may hold spaces; user and system time are the 12th and 13th after it.

@@ -1,15 +1,14 @@
-//! What does the skill protocol cost? Exchanges of a command and an observation in a second, in lockstep and without images, from
-//! Rust and from Python; and a whole simulated run with a controller that does nothing, at every control tick, beside the same
-//! ticks asked for at once.
+//! Cost of the skill protocol: exchanges of a command and an observation per second, in lockstep and without images,
+//! from Rust and from Python; and a whole simulated run with an idle controller that sends a command at every control
+//! tick, compared with one command for all ticks.
 //!
-//! Aims: 20,000 exchanges a second from Rust and 3,000 from Python, simulator and program sharing one core, to which `taskset`
-//! binds them: what counts is the time of both on the processor. On two cores that have nothing else to do an exchange costs up
-//! to four times as much, since each core falls asleep while the other one works, and has to be woken; `-- two-cores` measures
-//! that.
+//! Goals: 20,000 exchanges per second from Rust and 3,000 from Python, in CPU time of simulator and program, which
+//! `taskset` binds to one core. On two idle cores an exchange costs up to four times as much, because each core sleeps
+//! while the other works and has to be woken; `-- two-cores` measures that.
 //!
-//! What an exchange takes is that time of a run in which each tick is a command, less that of the same run in which one command
-//! asks for all, in the cheapest physics there is. Python's own package is measured where its one dependency, numpy, is
-//! installed; beside it stands what Python does with sockets and JSON alone.
+//! The time of an exchange is the time of a run with a command for each tick, less that of the same run with one
+//! command for all ticks, with the cheapest physics. The Python package is measured if its only dependency, numpy, is
+//! installed, and compared with Python using only sockets and JSON.
 
 #[path = "../clients/rust/link.rs"]
 mod link;
@@ -27,13 +26,13 @@ use support::thread_secs;
 
 /// Ticks of a run.
 const TICKS: u32 = 6_000;
-/// The best of so many runs counts.
+/// Number of runs; the best counts.
 const REPEATS: usize = 3;
 
-/// What `taskset` ends with where it may not bind to that core; ours ends with 0, or 101 after a panic.
+/// Exit code of `taskset` if it can't bind to that core. This program exits with 0, or 101 after a panic.
 const CANNOT_BIND: i32 = 1;
 
-/// Physics that costs little: an arm before a table with one glass, a step for each tick.
+/// Cheap physics: an arm in front of a table with one glass, one step per tick.
 const CHEAP: &str = "
 [robot]
 profile = \"fixed_arm\"
@@ -52,13 +51,13 @@ fn main() {
     if wanted.is_none() {
         match Command::new("taskset").args(["-c", "0"]).arg(&itself).arg("bound").status() {
             Ok(status) if status.code() != Some(CANNOT_BIND) => std::process::exit(status.code().unwrap_or(1)),
-            _ => println!("not bound to one core: there is no `taskset`, or no core 0 for it"),
+            _ => println!("not bound to one core: `taskset` is missing, or core 0 is not available"),
         }
     }
     let programs = [
         ("Rust", format!("{} client", itself.display()), 20_000.0),
-        ("Python, sockets and JSON alone", format!("python3 {}", file("benches/protocol_plain.py")), 3_000.0),
-        ("Python, the package", format!("python3 {}", file("benches/protocol_package.py")), 3_000.0),
+        ("Python, sockets and JSON only", format!("python3 {}", file("benches/protocol_plain.py")), 3_000.0),
+        ("Python package", format!("python3 {}", file("benches/protocol_package.py")), 3_000.0),
     ];
     let mut first = None;
     for (name, launcher, aim) in programs {
@@ -70,7 +69,7 @@ fn main() {
         let rate = f64::from(TICKS) / (each - at_once);
         let over = first.get_or_insert(rate);
         println!(
-            "{name}: {rate:.0} exchanges a second, {:.1} × the aim of {aim}; over Rust {:.2}",
+            "{name}: {rate:.0} exchanges per second, {:.1} × the goal of {aim}; {:.2} × the rate of Rust",
             rate / aim,
             rate / *over
         );
@@ -78,7 +77,7 @@ fn main() {
         if let (Some(whole), Some(ticks)) = (whole, ticks) {
             let simulated = f64::from(TICKS) / 60.0;
             println!(
-                "  a command each tick in a usual scene: {:.0} × real time; physics alone {:.0} ×; ratio {:.2}",
+                "  a command each tick in a typical scene: {:.0} × real time; physics only {:.0} ×; ratio {:.2}",
                 simulated / whole,
                 simulated / ticks,
                 whole / ticks
@@ -91,7 +90,7 @@ fn file(path: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path).display().to_string()
 }
 
-/// The time on the processor of a run and of the program's part in it, at best; nothing if the program can't.
+/// The best CPU time of a run, simulator and program together; `None` if the program fails.
 fn secs(launcher: &str, more: &str, ticks: u32) -> Option<f64> {
     let text = format!(
         "tests = [[\"Pick\"]]\ntest_count = 1\ntest_launcher = {launcher:?}\n\
@@ -104,7 +103,7 @@ fn secs(launcher: &str, more: &str, ticks: u32) -> Option<f64> {
     let times = (0..REPEATS).map(|_| {
         let manner = Manner { clock, disturb: None };
         let began = thread_secs();
-        let run = run_line(&env, "bench", 0, Choices::recorded(&[]), &manner).expect("the nominal scene stands");
+        let run = run_line(&env, "bench", 0, Choices::recorded(&[]), &manner).expect("the nominal scene settles");
         let action = &run.trace.actions[0];
         let simulator = thread_secs() - began;
         action.report.as_ref().and_then(|report| report.message.parse::<f64>().ok()).map(|program| program + simulator)
@@ -117,7 +116,7 @@ fn now() -> f64 {
     START.get_or_init(Instant::now).elapsed().as_secs_f64()
 }
 
-/// Does nothing, tick by tick; tells how long that took on the processor.
+/// An idle controller that sends commands without targets and reports its CPU time.
 fn client() {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u32>().ok()).expect("it is set");
     let (ticks, total) = (number("TICKS"), number("TOTAL"));

@@ -1,4 +1,4 @@
-"""The controller of `benches/protocol.rs` that does nothing, with the package `clients/python`, which needs numpy."""
+"""The idle controller of `benches/protocol.rs` with the package `clients/python`, which needs numpy."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""The controller of `benches/protocol.rs` that does nothing, with Python's own library alone."""
+"""The idle controller of `benches/protocol.rs` with only Python's standard library."""
 
 import os
 import sys

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""How many lockstep exchanges a second does the Python client make?
+"""Measures the lockstep exchanges per second of the Python client.
 
     pip install clients/python
     python benches/protocol_python.py
 
-The simulation's side is a process that answers every command with the same bytes, so that what is measured is the client: a
-command for eight joints at each tick, and the observation that comes back as arrays. Beside it the same without the client: what
-sockets alone allow.
+The simulator is a process that answers every command with the same bytes, so that only the client is measured: a
+command for eight joints at each tick, and the parsed observation with arrays. The same exchange over bare sockets,
+without the client, is measured for comparison.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ EXCHANGES = 20_000
 
 
 def frame(message: dict[str, object]) -> bytes:
-    """A message as it goes over the wire."""
+    """Encodes a message for the wire."""
     payload = json.dumps(message).encode()
     return struct.pack("<IB", len(payload), ord("J")) + payload
 
 
 def answer(connection: socket.socket, greeting: bytes, reply: bytes) -> None:
-    """Begins an action, and then says the same to everything."""
+    """Begins an action, then sends the same reply to every message."""
     connection.sendall(greeting)
     connection.recv(65536)
     while connection.recv(65536):
@@ -44,7 +44,7 @@ def answer(connection: socket.socket, greeting: bytes, reply: bytes) -> None:
 
 
 def rate(work: Callable[[], object]) -> float:
-    """Times a second that something is done."""
+    """Returns calls of `work` per second."""
     began = time.perf_counter()
     for _ in range(EXCHANGES):
         work()
@@ -52,7 +52,7 @@ def rate(work: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    """Measures both, and prints them."""
+    """Measures and prints both rates."""
     observation = Simulation(lambda simulation: None).observation()
     begin = {"type": "begin", "action": "Pick", "parameters": {}, "budget_s": 60.0, "observation": observation}
     here, there = socket.socketpair()
@@ -73,8 +73,8 @@ def main() -> None:
             left -= len(here.recv(65536))
 
     sockets = rate(bare)
-    print(f"client   {client:8.0f} exchanges a second")
-    print(f"sockets  {sockets:8.0f} exchanges a second, {sockets / client:.1f} times as many")
+    print(f"client   {client:8.0f} exchanges per second")
+    print(f"sockets  {sockets:8.0f} exchanges per second, {sockets / client:.1f} times as many")
     simulation.kill()
 
 

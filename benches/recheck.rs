@@ -1,7 +1,7 @@
-//! What judging the past costs: one new property over 2,000 stored pick runs, beside simulating them.
+//! Cost of `recheck`: one new property over 2,000 stored pick runs, compared with simulating them.
 //!
-//! A few dozen runs are simulated and kept many times under new ids, so that the traces are real. Demanded: at least 1,000
-//! runs/s on two cores, everything that a user waits for included (finding the runs, traces, facts, rules, writing).
+//! A few dozen runs are simulated and stored many times under new ids, so that the traces are real. Required: at least
+//! 1,000 runs/s on two cores, end to end (finding the runs, traces, facts, rules, writing).
 
 use std::num::NonZero;
 use std::path::Path;
@@ -34,7 +34,7 @@ fn main() {
     let history = History::open_existing(&folder.path().join("history")).expect("it was just written");
     let ontology = with_new_property(folder.path());
     let jobs = std::thread::available_parallelism().map_or(1, NonZero::get);
-    println!("{STORED} stored pick runs, {jobs} cores; simulating makes {simulated_per_sec:.1} runs/s on one");
+    println!("{STORED} stored pick runs, {jobs} cores; simulation makes {simulated_per_sec:.1} runs/s on one core");
     println!("{:44} {:>8} {:>8} {:>22}", "", "runs/s", "written", "times as fast as simulating");
     let judge = |what: &str, jobs: usize, properties: &[String]| {
         let start = Instant::now();
@@ -46,12 +46,12 @@ fn main() {
     };
     let new = ["StaysUpright".to_owned()];
     judge("one new property (at least 1,000)", jobs, &new);
-    judge("the same again: nothing is news", jobs, &new);
-    judge("all six properties: nothing is news", jobs, &[]);
+    judge("the same again: nothing changes", jobs, &new);
+    judge("all six properties: nothing changes", jobs, &[]);
     judge("all six properties, one core", 1, &[]);
 }
 
-/// Simulates some runs and keeps them many times. Returns how many a second are simulated on one core.
+/// Simulates some runs and stores them many times. Returns the simulated runs per second on one core.
 fn fill(dir: &Path) -> f64 {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/pick.toml");
     let overrides = Overrides { history: Some(dir.to_owned()), runs: Some(2_000), ..Overrides::default() };
@@ -76,7 +76,7 @@ fn fill(dir: &Path) -> f64 {
     per_sec
 }
 
-/// A copy of the shipped ontology and rules with one property more.
+/// Copies the shipped ontology and rules and adds one property.
 fn with_new_property(folder: &Path) -> std::path::PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for (from, to) in [("ontology", "ontology"), ("rules", "rules"), ("rules/lib", "rules/lib")] {
@@ -93,7 +93,7 @@ fn with_new_property(folder: &Path) -> std::path::PathBuf {
     ontology
 }
 
-/// Judges everything. Returns how many judgements were news.
+/// Judges all runs. Returns the number of changed judgements.
 fn judge_all(history: &History, rules: &RuleSet, jobs: usize) -> usize {
     let runs = history.runs(&RunFilter::default()).expect("a whole history");
     let options = RecheckOptions { jobs, batch: RecheckOptions::BATCH, at: "2026-01-02T00:00:00Z".to_owned() };

@@ -1,8 +1,8 @@
-//! How large is the report of 10,000 runs, how long does it take to make, and how fast is it in a browser?
+//! The report of 10,000 runs: size, rendering time, and speed in a browser.
 //!
-//! `cargo bench --bench report`: made-up outcomes of five properties in tables on disk, replays of real runs that are simulated first, and
-//! Debian's Chromium without a window. Demanded: under 10 MB, made in under 5 s from the tables, first paint under 1 s, an answer to a
-//! filter under 100 ms. Every line tells its share of that.
+//! `cargo bench --bench report`: synthetic outcomes of five properties in tables on disk, replays of real runs that are
+//! simulated first, and Debian's headless Chromium. Required: under 10 MB, rendered from the tables in under 5 s, first
+//! paint under 1 s, filter response under 100 ms. Every line prints its share of the limit.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,17 +21,17 @@ mod support {
     pub mod chromium;
     pub mod made_up;
     pub mod paged;
-    #[expect(dead_code, reason = "only its dice are needed")]
+    #[expect(dead_code, reason = "only its random numbers are needed")]
     pub mod planted;
 }
 
 const RUNS: u64 = 10_000;
 const PROPERTIES: [&str; 5] = ["CloseObject", "MovedObject", "NoGraspCollisions", "ObjectGrasped", "ObjectInGripper"];
-/// Room for replays, as `actcheck report` has by default. Unit: bytes.
+/// Maximum size of replays, the default of `actcheck report`. Unit: bytes.
 const ROOM: usize = 5_000_000;
-/// Each filter is set so often; the median is told.
+/// Repetitions of each filter; the median is printed.
 const TIMES: usize = 5;
-/// Runs that are simulated to be replayed under many names.
+/// Number of simulated runs, which are replayed under many ids.
 const WATCHED: &str = "12";
 
 fn main() {
@@ -48,12 +48,12 @@ fn main() {
     std::fs::write(&file, &page).expect("the folder is there");
     println!("{RUNS} runs × {} properties, {embedded} of them replayed", PROPERTIES.len());
     tell("size", page.len() as f64 / 1e6, 10.0, "MB");
-    tell("to pack the replays", packed, 5.0, "s");
-    tell("from the tables to the page", secs, 5.0, "s");
+    tell("packing the replays", packed, 5.0, "s");
+    tell("rendering from the tables", secs, 5.0, "s");
     in_a_browser(&file);
 }
 
-/// Runs of which more fail where a bottle is slippery.
+/// Synthetic runs that fail more often if the target is a slippery bottle.
 fn made_up_runs() -> impl Iterator<Item = RunDetail> {
     let mut dice = planted::Dice::new(1);
     (0..RUNS).map(move |index| {
@@ -72,7 +72,7 @@ fn made_up_runs() -> impl Iterator<Item = RunDetail> {
     })
 }
 
-/// The same runs under many names, as many as there is room for.
+/// The same runs under many ids, up to the maximum size.
 fn replays(watched: &[(RunDetail, Trace)]) -> (Replays, usize) {
     let mut replays = Replays::default();
     let mut embedded = 0;
@@ -87,7 +87,7 @@ fn replays(watched: &[(RunDetail, Trace)]) -> (Replays, usize) {
 }
 
 fn tell(name: &str, value: f64, demanded: f64, unit: &str) {
-    println!("{name:28} {value:>9.2} {unit:3} {:>6.2} of the {demanded} {unit} demanded", value / demanded);
+    println!("{name:28} {value:>9.2} {unit:3} {:>6.2} of the limit of {demanded} {unit}", value / demanded);
 }
 
 /// Real runs with their traces.
@@ -110,7 +110,7 @@ fn simulated(folder: &Path) -> Vec<(RunDetail, Trace)> {
 fn in_a_browser(file: &Path) {
     let mut browser = Chromium::start();
     browser.size(1280, 860);
-    // What starting the browser itself takes is not the page's.
+    // Exclude the start of the browser itself.
     browser.call("Page.navigate", serde_json::json!({ "url": "data:text/html,begun" }));
     browser.picture();
     browser.open(file, "/");
@@ -119,9 +119,9 @@ fn in_a_browser(file: &Path) {
          if (it) done(it.startTime); else setTimeout(told, 10); }; told(); })",
     );
     tell("first paint", paint.as_f64().unwrap_or(f64::NAN) / 1e3, 1.0, "s");
-    // Paint comes before the numbers do.
+    // The first paint comes before the data.
     tell(
-        "the overview is there",
+        "overview ready",
         browser.value("Number(document.documentElement.dataset.ready)").as_f64().unwrap_or(f64::NAN) / 1e3,
         1.0,
         "s",
@@ -131,12 +131,12 @@ fn in_a_browser(file: &Path) {
         ("filter: failed", "outcome", "failed", "change"),
         ("filter: one property", "slot", "2", "change"),
         ("filter: any outcome", "outcome", "", "change"),
-        ("search, the first letter", "text", "b", "input"),
-        ("search, the next letters", "text", "bottle 77", "input"),
+        ("search, first letter", "text", "b", "input"),
+        ("search, more letters", "text", "bottle 77", "input"),
         ("worst first", "sort", "score", "change"),
-        ("nothing chosen", "text", "", "input"),
+        ("no filter", "text", "", "input"),
     ] {
-        // Until the next picture is on the screen.
+        // Measure until the next frame is painted.
         let ask = format!(
             "new Promise((done) => {{ const it = document.querySelector('[data-filter={control}]'); const start = performance.now(); \
              it.value = '{value}'; it.dispatchEvent(new Event('{event}')); \

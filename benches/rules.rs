@@ -1,6 +1,7 @@
-//! What does a rule engine for rules loaded at run time cost beside rules compiled by hand, and what does judging an action cost?
+//! Cost of the rule engine, which loads rules at run time, compared with rules compiled by hand; and cost of judging an
+//! action.
 //!
-//! Printed as ratios, side by side in one run; absolute times depend on the machine.
+//! Ratios are measured within one process, because absolute times depend on the machine.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -24,7 +25,7 @@ fn main() {
     shipped_properties();
 }
 
-/// Seconds of the fastest of some runs.
+/// Time of the fastest of several runs. Unit: seconds.
 fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
     (0..runs)
         .map(|_| {
@@ -35,7 +36,7 @@ fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Edges of a random graph, the same each time.
+/// Edges of a reproducible random graph.
 fn edges(nodes: u64, count: u64) -> Vec<(u32, u32)> {
     let mut state = 88_172_645_463_325_252u64;
     let mut next = move || {
@@ -52,12 +53,12 @@ fn closure_program(edges: &[(u32, u32)]) -> Program {
     for (a, b) in edges {
         writeln!(text, "e({a}, {b}) .").expect("a string takes everything");
     }
-    Program::load(&Source::new("closure.rls", text), Path::new("")).expect("the program is right")
+    Program::load(&Source::new("closure.rls", text), Path::new("")).expect("the program is valid")
 }
 
 fn closure_by_hand(edges: &[(u32, u32)]) -> usize {
     let mut iteration = Iteration::new();
-    // Keyed by the inner node: paths by their end, edges by their start.
+    // Keyed by the join node: paths by their end, edges by their start.
     let paths = iteration.variable::<(u32, u32)>("paths");
     let edges: Relation<(u32, u32)> = edges.iter().copied().collect();
     paths.extend(edges.iter().map(|(a, b)| (*b, *a)));
@@ -84,11 +85,11 @@ fn closure_against_datafrog() {
         ours / hand
     );
     if let Some(peak) = peak_bytes() {
-        println!("  peak memory of the process so far: {:.0} bytes a tuple (at most 100)", peak / tuples.0 as f64);
+        println!("  peak memory of the process so far: {:.0} bytes per tuple (at most 100)", peak / tuples.0 as f64);
     }
 }
 
-/// The most memory the process has had, where the system tells.
+/// Peak memory of the process; `None` if the system does not report it.
 fn peak_bytes() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
@@ -100,11 +101,11 @@ fn closure_grows_linearly() {
         let program = closure_program(&edges(nodes, nodes * 3));
         let mut tuples = 0;
         let secs = fastest(3, || tuples = program.close(Engine::Fast, &budget()).expect("in its budget").count("p"));
-        println!("  {tuples} tuples: {:.0} ns a tuple", secs / tuples as f64 * 1e9);
+        println!("  {tuples} tuples: {:.0} ns per tuple", secs / tuples as f64 * 1e9);
     }
 }
 
-/// A scene of some bodies, before and after.
+/// Facts of a scene with this number of bodies, before and after an action.
 fn facts(bodies: usize) -> RunFacts {
     let mut facts = RunFacts::default();
     for phase in 0..2 {
@@ -170,7 +171,7 @@ because(?t) :- groups(?a, ?n), ?n > 100, ?t = CONCAT(STR(?a), " touches all") .
 
 fn book(rules: Option<&str>) -> (RuleBook, Vec<String>) {
     let mut ontology =
-        ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).expect("the shipped ontology is right");
+        ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).expect("the shipped ontology is valid");
     if let Some(text) = rules {
         ontology.libraries.clear();
         let mut property = ontology.properties.values().next().expect("it has properties").clone();
@@ -197,7 +198,7 @@ fn twenty_rules() {
     let scene = facts(12);
     let action = scene.action(0).expect("there is one action");
     let found = book.judge(&action, &properties, &budget()).remove(&properties[0]).expect("it was judged");
-    // Something was derived: the margin comes through negation, arithmetic and two other rules.
+    // The margin depends on negation, arithmetic and two other rules, so it shows that the rules were evaluated.
     assert!(found.expect("in its budget").margin.is_some());
     measure("twenty rules", 0.3, &book, &properties, &facts(12));
 }

@@ -1,22 +1,23 @@
-//! How many samples does each strategy need to the first counterexample, and is the failure rate that it tells right?
+//! Search strategies: samples to the first counterexample, and accuracy of the estimated failure rate.
 //!
-//! Failure regions of known volume are planted in 8 dimensions: one connected with a margin that leads to it, two
-//! disjoint ones, one with a margin that leads away from it (deceptive), and one with a margin that says nothing (flat).
+//! Failure regions of known volume are planted in 8 dimensions: a connected one with a margin that leads to it, two
+//! disjoint ones, one with a margin that leads away from it (deceptive), and one with a constant margin (flat).
 //! `benches/search_peers.py` runs VerifAI and Hypothesis on the same functions and prints the same columns. Run with
-//! `cargo bench --bench search -- 200` for 200 seeds; without a number it takes 60. `-- points` prints values of the
-//! functions, against which the script checks its own.
+//! `cargo bench --bench search -- 200` for 200 seeds; the default is 60. `-- points` prints values of the functions,
+//! with which the script checks its own.
 
 use actcheck::search::{Dimension, GENERATION, Search, Space, Strategy, Told};
 
 const WIDTH: usize = 8;
 
-/// Samples after which a search counts as having found nothing yet: random needs more in 0.25 % of the seeds.
+/// Maximum number of samples of a search. Random sampling needs more for 0.25 % of the seeds.
 const MOST_SAMPLES: usize = 10_000;
 
-/// Samples after which the rate is compared with the volume.
+/// Number of samples after which the rate is compared with the volume.
 const RATE_SAMPLES: usize = 2_000;
 
-/// Powers of the inverse of the real root of x⁹ = x + 1, whose multiples fill a cube evenly (Roberts, 2018).
+/// Powers of the inverse of the real root of x⁹ = x + 1, whose multiples have low discrepancy in a cube (Roberts,
+/// 2018).
 const STEPS: [f64; WIDTH] = [
     0.921_599_319_633_983,
     0.849_345_305_949_820,
@@ -41,7 +42,7 @@ enum Shape {
 const SHAPES: [(Shape, &str); 4] =
     [(Shape::Smooth, "smooth"), (Shape::Disjoint, "disjoint"), (Shape::Deceptive, "deceptive"), (Shape::Flat, "flat")];
 
-/// A planted region: its shape, volume, and where a seed put it.
+/// A planted region: shape, volume, and the seed of its position.
 #[derive(Clone, Copy)]
 struct Planted {
     shape: Shape,
@@ -50,12 +51,12 @@ struct Planted {
 }
 
 impl Planted {
-    /// A number in [0, 1) for each axis.
+    /// A number in [0, 1) for an axis.
     fn placed(&self, axis: usize, which: u64) -> f64 {
         ((2 * self.seed + which + 1) as f64 * STEPS[axis]).fract()
     }
 
-    /// The margin, and which of the failing regions the point is in.
+    /// Returns the margin, and the failing region that contains the point, if any.
     fn margin(&self, point: &[f64]) -> (f64, Option<usize>) {
         if self.shape == Shape::Disjoint {
             let boxes = [self.box_margin(point, 0), self.box_margin(point, 1)];
@@ -75,13 +76,14 @@ impl Planted {
         (margin, (depth < 0.0).then_some(0))
     }
 
-    /// A ball of the volume that lies in the cube: the volume of the unit ball of 8 dimensions is π⁴/24.
+    /// Radius and centre of a ball of this volume inside the cube. The volume of the unit ball in 8 dimensions is
+    /// π⁴/24.
     fn ball(&self) -> (f64, [f64; WIDTH]) {
         let radius = (self.volume * 24.0 / std::f64::consts::PI.powi(4)).powf(1.0 / 8.0);
         (radius, std::array::from_fn(|axis| radius + (1.0 - 2.0 * radius) * self.placed(axis, 0)))
     }
 
-    /// Signed distance from one of two boxes of half the volume each, which the first axis keeps apart.
+    /// Signed distance from one of two boxes of half the volume each, separated along the first axis.
     fn box_margin(&self, point: &[f64], which: u64) -> f64 {
         let half = (self.volume / 2.0 / 0.4).powf(1.0 / 7.0) / 2.0;
         let (mut outside, mut inside) = (0.0, f64::NEG_INFINITY);
@@ -103,10 +105,10 @@ fn distance(a: &[f64], b: &[f64; WIDTH]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-/// What one search came to.
+/// The result of one search.
 struct Outcome {
     first: usize,
-    /// Regions in which at least one of the first samples failed.
+    /// Number of regions with at least one failing sample among the first [`RATE_SAMPLES`].
     regions: usize,
     covered: bool,
     rate: f64,
@@ -161,14 +163,14 @@ fn compare(shape: Shape, name: &str, volume: f64, seeds: u64) {
     }
 }
 
-/// Values of every function at some points, one line each, for whoever writes them in another language.
+/// Prints values of every function at some points, one per line, to check implementations in other languages.
 fn print_points() {
     for (shape, name) in SHAPES {
         for volume in VOLUMES {
             for seed in 0..20_u64 {
                 let planted = Planted { shape, volume, seed };
                 let (_, centre) = planted.ball();
-                // Half of the points near the middle of the ball, so that failing ones are among them.
+                // Half of the points are near the centre of the ball, so that some of them fail.
                 let near = |axis: usize| {
                     let random = ((seed + 3) as f64 * STEPS[axis] * 7.0).fract();
                     if seed % 2 == 0 { random } else { centre[axis] + 0.1 * (random - 0.5) }
@@ -182,13 +184,13 @@ fn print_points() {
 }
 
 fn main() {
-    // Cargo passes `--bench` too.
+    // Cargo passes `--bench`.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
     if arguments.iter().any(|argument| argument == "points") {
         return print_points();
     }
     let seeds = arguments.iter().find_map(|argument| argument.parse().ok()).unwrap_or(60);
-    println!("{seeds} seeds; the rate and the regions after {RATE_SAMPLES} samples");
+    println!("{seeds} seeds; rate and regions after {RATE_SAMPLES} samples");
     println!("function    volume  strategy          median  ratio  regions  in interval    mean rate");
     for (shape, name) in SHAPES {
         for volume in VOLUMES {

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""How many samples do VerifAI's cross-entropy and Hypothesis with `target()` need on the functions of `search.rs`?
+"""Counts the samples that VerifAI's cross-entropy and Hypothesis with `target()` need on the functions of `search.rs`.
 
-Run from the top of the checkout, with Cargo at hand: `python3 benches/search_peers.py [seeds]` (20 by default). It makes a
-virtual environment in `target/search_peers`, installs both from PyPI there, checks its functions against those of
-`cargo bench --bench search -- points`, and prints the same columns as the benchmark as far as they are known: the two
-tell no failure rate. `--points FILE` takes the points from a file instead of running Cargo.
+Run from the root of the checkout, with Cargo installed: `python3 benches/search_peers.py [seeds]` (20 by default). It
+creates a virtual environment in `target/search_peers`, installs both from PyPI, checks its functions against those of
+`cargo bench --bench search -- points`, and prints the same columns as the benchmark, except failure rates, which the
+two do not estimate. `--points FILE` reads the points from a file instead of running Cargo.
 """
 
 import math
@@ -48,7 +48,7 @@ class Planted:
         return math.fmod((2 * self.seed + which + 1) * STEPS[axis], 1.0)
 
     def margin(self, point):
-        """The margin, negative where the point fails."""
+        """Returns the margin; it is negative if the point fails."""
         if self.shape == "disjoint":
             return min(self.box_margin(point, 0), self.box_margin(point, 1))
         depth = math.dist(point, self.centre) - self.radius
@@ -73,7 +73,7 @@ class Planted:
 
 
 def check_points(lines):
-    """Both languages must give the same margins at the same points."""
+    """Checks that both implementations compute the same margins."""
     checked = failing = 0
     for line in lines:
         shape, volume, seed, margin, *point = line.split()
@@ -88,7 +88,7 @@ def check_points(lines):
 
 
 def first_of_random(planted):
-    """Plain random, to hold the two benchmarks against each other."""
+    """Random sampling, to make the two benchmarks comparable."""
     import numpy
 
     generator = numpy.random.default_rng(planted.seed)
@@ -99,7 +99,7 @@ def first_of_random(planted):
 
 
 def first_of_verifai(planted, tuned):
-    """VerifAI's cross-entropy with its defaults; tuned, its threshold is the 10 % quantile of 200 free random samples."""
+    """VerifAI's cross-entropy with its defaults; tuned: threshold at the 10 % quantile of 200 uncounted samples."""
     import numpy
     from dotmap import DotMap
     from verifai.features import Box
@@ -112,7 +112,7 @@ def first_of_verifai(planted, tuned):
         threshold = float(numpy.quantile(margins, 0.1))
     parameters = DotMap(alpha=0.9, thres=threshold)
     parameters.cont.buckets, parameters.cont.dist, parameters.disc.dist = 5, None, None
-    # Its axes are numbers in [-1, 1] on the inside; the box maps them.
+    # Its axes range over [-1, 1] internally; the box maps them.
     sampler = CrossEntropySampler(Box(*[(0.0, 1.0)] * WIDTH), parameters)
     for samples in range(1, MOST_SAMPLES + 1):
         sample, info = sampler.getSample()
@@ -124,7 +124,7 @@ def first_of_verifai(planted, tuned):
 
 
 def first_of_hypothesis(planted):
-    """Hypothesis, which is told to make the margin small."""
+    """Hypothesis, with `target()` set to minimise the margin."""
     from hypothesis import HealthCheck, Phase, given, seed, settings, target
     from hypothesis import strategies as st
 
@@ -180,7 +180,7 @@ def compare(seeds):
 
 
 def inside_environment():
-    """Goes on in an environment that has both; makes it where it is missing."""
+    """Restarts this script in a virtual environment with both packages, which it creates if necessary."""
     python = ENVIRONMENT / "bin" / "python"
     if Path(sys.prefix) == ENVIRONMENT:
         return

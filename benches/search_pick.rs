@@ -1,13 +1,14 @@
-//! In how many runs does a guided search find the commonest failure modes of a real pick, against random scenes?
+//! Runs until a guided search finds the most common failure modes of a real pick, compared with random scenes.
 //!
-//! A failure mode is the set of properties that fail together. Random scenes are made first, and the three commonest modes of them
-//! are looked for. They are independent of each other, so that the waits from one find to the next are as many first finds. A
-//! guided search has to begin anew for each: it does so with many seeds, and ends when it has found all three. Told are the median
-//! of the first run that shows a mode, interpolated within its step, and its ratio to random's with an interval by bootstrap.
+//! A failure mode is the set of properties that fail together. Random scenes are run first; their three most common
+//! modes are the goals. Random scenes are independent, so every gap between two finds is a sample of the time to the
+//! first find. A guided search is repeated with many seeds, and ends once it has found all three modes. The benchmark
+//! prints the median number of the first run with a mode, interpolated as for grouped data, and its ratio to that of
+//! random scenes with a bootstrap confidence interval.
 //!
-//! `cargo bench --bench search_pick` takes `configs/pick.toml`, 2,000 random scenes, 200 searches of 60 runs at most, and all guided
-//! strategies; `-- --config benches/quiet_pick.toml --random 500 --seeds 40 --runs 120 --strategies bandit,boundary
-//! --first-seed 7001` says otherwise.
+//! The defaults are `configs/pick.toml`, 2,000 random scenes, 200 searches of at most 60 runs, and all guided
+//! strategies. To change them: `cargo bench --bench search_pick -- --config benches/quiet_pick.toml --random 500
+//! --seeds 40 --runs 120 --strategies bandit,boundary --first-seed 7001`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -21,15 +22,15 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
-/// Failure modes that are looked for.
+/// Number of failure modes to find.
 const MODES: usize = 3;
 
-/// Resamplings for an interval of 95 %.
+/// Bootstrap samples for a 95 % interval.
 const RESAMPLED: usize = 2_000;
 
 type Signature = BTreeSet<String>;
 
-/// What a run of one seed came to, by what decides it: the scene, and the bits of what a search steered.
+/// Results of the runs of one seed, by scene number and the bits of the steered quantiles, which determine the run.
 type Known = BTreeMap<(u64, Vec<u64>), Told>;
 
 fn argument(name: &str) -> Option<String> {
@@ -53,13 +54,13 @@ fn make(env: &Env, planned: &Planned) -> Told {
         match run_line(env, "k", planned.index, planned.choices(env.campaign.seed, attempt), &manner) {
             Ok(record) => return Told { discards: attempt, ..Told::of(&record) },
             Err(Failure::Discard(_)) => {}
-            Err(failure) => panic!("nobody stops this benchmark: {failure}"),
+            Err(failure) => panic!("the benchmark is never interrupted: {failure}"),
         }
     }
     unreachable!("the shipped scenes can be built")
 }
 
-/// The signatures of a campaign's runs, in order, until `enough` says so.
+/// The signatures of a campaign's runs, in order, until `enough` returns `true`.
 fn campaign(
     config: &Path,
     (seed, runs): (u64, u32),
@@ -96,7 +97,7 @@ fn campaign(
     }
 }
 
-/// The commonest failure modes, and how many runs of these show each.
+/// The most common failure modes, with their numbers of runs.
 fn commonest(runs: &[Signature]) -> Vec<(Signature, usize)> {
     let mut counts: BTreeMap<&Signature, usize> = BTreeMap::new();
     for failed in runs.iter().filter(|failed| !failed.is_empty()) {
@@ -108,13 +109,13 @@ fn commonest(runs: &[Signature]) -> Vec<(Signature, usize)> {
     modes
 }
 
-/// How many runs it takes from each find to the next one.
+/// The number of runs from each find to the next.
 fn waits(runs: &[Signature], mode: &Signature) -> Vec<usize> {
     let finds = runs.iter().enumerate().filter(|(_, failed)| *failed == mode).map(|(at, _)| at + 1);
     finds.scan(0, |last, at| Some(at - std::mem::replace(last, at))).collect()
 }
 
-/// The median of numbers so small that many are equal: where within its step the half is passed, as of grouped data.
+/// The median of grouped data: interpolated within the middle value, because many of the small numbers are equal.
 fn median(values: &[usize]) -> f64 {
     let mut values = values.to_vec();
     values.sort_unstable();
@@ -125,7 +126,7 @@ fn median(values: &[usize]) -> f64 {
     middle as f64 - 1.0 + (half - below as f64) / equal as f64
 }
 
-/// The ratio of two medians, with what 95 % of resamplings lie between.
+/// The ratio of two medians with its 95 % bootstrap interval.
 fn ratio(guided: &[usize], random: &[usize]) -> [f64; 3] {
     let mut generator = ChaCha8Rng::seed_from_u64(1);
     let mut again = |values: &[usize]| {
@@ -145,12 +146,12 @@ fn main() {
     let guided: Vec<Strategy> =
         named.split(',').map(|name| Strategy::by_name(name).expect("the name of a strategy")).collect();
     let first = u64::from(number("--first-seed", 1));
-    // Seeds beyond those of the searches; a campaign for each, so that they can be made side by side.
+    // Seeds beyond those of the searches, with a campaign for each, so that they can run in parallel.
     let part = |at: u64| campaign(&config, (first + seeds + at, 50), Strategy::Random, &mut Known::new(), |_| false);
     let parts: Vec<Vec<Signature>> = (0..u64::from(scenes.div_ceil(50))).into_par_iter().map(part).collect();
     let random = parts.concat();
     let modes = commonest(&random);
-    println!("{}: {} random scenes, {seeds} searches of {runs} runs at most", config.display(), random.len());
+    println!("{}: {} random scenes, {seeds} searches of at most {runs} runs", config.display(), random.len());
     println!("strategy       finds  share of runs  median first  ratio [95 %]         mode");
     for (mode, count) in &modes {
         let share = 100.0 * *count as f64 / random.len() as f64;
@@ -167,7 +168,7 @@ fn main() {
         for (mode, _) in &modes {
             let of = |search: &Vec<Vec<Signature>>| search[at].iter().position(|failed| failed == mode);
             let found = searches.iter().filter(|search| of(search).is_some()).count();
-            // One that never found it counts as one run more.
+            // A search that never found the mode counts as one run more than its maximum.
             let firsts: Vec<usize> = searches.iter().map(|search| of(search).unwrap_or(runs as usize) + 1).collect();
             let made: usize = searches.iter().map(|search| search[at].len()).sum();
             let seen: usize =

@@ -1,9 +1,9 @@
-//! How small do failing runs on a crowded table become, and what does that cost?
+//! Shrinking of failing runs on a crowded table: size of the result, and cost.
 //!
-//! Takes the failing runs of `configs/clutter.toml` (eight to twelve other objects) in order, at most eight of each failure
-//! mode, and shrinks each with the noise as recorded. Wanted: at least 20 runs of three modes, in the median at most two
-//! other objects left and at most 60 simulations, and the same set of failed properties in all. `--runs N` takes fewer;
-//! `--pictures DIR` draws every small scene.
+//! Shrinks the failing runs of `configs/clutter.toml` (eight to twelve other objects) in order, at most eight of each
+//! failure mode, with the noise as recorded. Goals: at least 20 runs of three modes; medians of at most two other
+//! objects left and at most 60 simulations; the same set of failed properties in all. `--runs N` sets the number of
+//! runs; `--pictures DIR` draws every shrunk scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -16,16 +16,16 @@ use actcheck::history::{Role, RunRecord};
 use actcheck::report::{Caption, run_picture};
 use actcheck::verdict::Outcome;
 
-/// Failing runs that are shrunk unless the command line says otherwise.
+/// Default number of failing runs.
 const RUNS: usize = 24;
-/// Of one failure mode at most.
+/// Maximum number of runs of one failure mode.
 const OF_A_MODE: usize = 8;
-/// Scenes that are drawn at most.
+/// Maximum number of scenes.
 const SCENES: u64 = 400;
 
 type Signature = BTreeSet<String>;
 
-/// A shrunk run in numbers.
+/// Figures of a shrunk run.
 struct Line {
     index: u64,
     mode: Signature,
@@ -141,7 +141,7 @@ fn print_summary(lines: &[Line], drawn: u64, discarded: u64) {
         lines.len(),
         modes.len()
     );
-    println!("the same properties fail in {same} of {}", lines.len());
+    println!("same failed properties in {same} of {}", lines.len());
     println!("other objects left, median: {} (at most 2)", median(lines, |line| line.others.1 as u64));
     println!(
         "choices not nominal, median: {}, before {}",
@@ -152,7 +152,7 @@ fn print_summary(lines: &[Line], drawn: u64, discarded: u64) {
     println!("simulations with the explanation, median: {}", median(lines, |line| line.simulations + line.explaining));
 }
 
-/// The upper one of the two middle values, where there are two.
+/// The median; the upper one of two middle values.
 fn median(lines: &[Line], of: impl Fn(&Line) -> u64) -> u64 {
     let mut values: Vec<u64> = lines.iter().map(of).collect();
     values.sort_unstable();

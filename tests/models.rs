@@ -123,7 +123,7 @@ fn names_and_the_configuration_say_what_models_are() {
     };
     let (categories, said) = category("");
     assert_eq!(categories, "Cup Table Object");
-    assert!(said.contains("W039: nothing says what `cheese` is"), "{said}");
+    assert!(said.contains("W039: the model `cheese` has no category"), "{said}");
     let (categories, said) = category("[categories]\ncheese = \"act:Tableware\"\npaper_cup = \"act:Glass\"\n");
     assert_eq!(categories, "Glass Table Tableware");
     assert!(!said.contains("W039"), "{said}");

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""How fast is `actcheck datalog` beside engines that others use, on the same transitive closure?
+"""Compares `actcheck datalog` with other engines on the same transitive closure.
 
     python3 benches/engines/compare.py [--actcheck PROGRAM] [--rounds N] [--by-hand]
 
-Makes a random graph of 2,000 nodes and 6,000 edges (that of benches/rules.rs; its closure has some 3.6 million tuples), has each
-engine compute the closure in a process of its own, checks that all count the same tuples, and prints seconds and ratios.
-Seconds are those of the whole process, reading the program included: the fastest of the rounds, which take turns.
+Makes a random graph of 2,000 nodes and 6,000 edges (as in benches/rules.rs; its closure has some 3.6 million tuples),
+runs each engine in a process of its own, checks that all count the same tuples, and prints seconds and ratios. Seconds
+are the wall time of the whole process, including parsing: the fastest of the rounds, in which the engines alternate.
 
-Engines: actcheck (`make`), SWI-Prolog with tabling (Debian: swi-prolog-nox), clingo (from PyPI, in a virtual environment that
-this script makes in a temporary folder). `--by-hand` adds rules compiled by hand on datafrog, as `cargo bench --bench rules`
-measures them, without start and reading.
+Engines: actcheck (`make`), SWI-Prolog with tabling (Debian: swi-prolog-nox), clingo (from PyPI, in a virtual
+environment in a temporary folder). `--by-hand` adds rules compiled by hand with datafrog, as measured by `cargo bench
+--bench rules`: evaluation only, without start and parsing.
 """
 
 import argparse
@@ -26,7 +26,7 @@ NODES, EDGES = 2_000, 6_000
 
 
 def edges():
-    """Edges of a random graph, the same each time: xorshift64, as in benches/rules.rs."""
+    """Returns the edges of a reproducible random graph: xorshift64, as in benches/rules.rs."""
     state, mask = 88_172_645_463_325_252, (1 << 64) - 1
 
     def draw():
@@ -40,13 +40,13 @@ def edges():
 
 
 class Missing(Exception):
-    """An engine is not installed; the text says how to get it."""
+    """An engine is not installed; the message explains how to install it."""
 
 
 def actcheck(folder, graph, program):
     found = shutil.which(program)
     if not found:
-        raise Missing(f"no program `{program}`: `make` builds it, or name it with --actcheck")
+        raise Missing(f"no program `{program}`: build it with `make`, or name another with --actcheck")
     facts = "".join(f"e({a}, {b}) .\n" for a, b in graph)
     (folder / "closure.rls").write_text("p(?x, ?y) :- e(?x, ?y) .\np(?x, ?z) :- p(?x, ?y), e(?y, ?z) .\n" + facts)
     command = [str(Path(found).resolve()), "datalog", "closure.rls", "--max-tuples", "100000000", "--max-secs", "600"]
@@ -73,7 +73,7 @@ def clingo(folder, graph):
         made = subprocess.run([python, "-m", "pip", "install", "-q", "clingo"], capture_output=True, text=True)
     if made.returncode != 0:
         said = (made.stderr or made.stdout).strip().splitlines()
-        raise Missing("no clingo in a virtual environment: " + (said[-1] if said else "it could not be made"))
+        raise Missing("clingo could not be installed: " + (said[-1] if said else "no virtual environment"))
     facts = "".join(f"e({a},{b}).\n" for a, b in graph)
     (folder / "closure.lp").write_text("p(X,Y) :- e(X,Y).\np(X,Z) :- p(X,Y), e(Y,Z).\n" + facts)
     # Grounding alone computes the closure of a program without choices.
@@ -88,7 +88,7 @@ def clingo(folder, graph):
 
 
 def measured(command, pattern, folder):
-    """Seconds and tuples of one run."""
+    """Returns seconds and number of tuples of one run."""
     start = time.perf_counter()
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     seconds = time.perf_counter() - start
@@ -99,7 +99,7 @@ def measured(command, pattern, folder):
 
 
 def by_hand():
-    """Seconds and tuples of the rules compiled by hand."""
+    """Returns seconds and number of tuples of the rules compiled by hand."""
     command = ["cargo", "bench", "--locked", "--bench", "rules", "--", "closure"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     found = re.search(r"transitive closure, (\d+) tuples: .* by hand ([\d.]+) s", done.stdout)
@@ -135,19 +135,19 @@ def main():
                 best = min(seconds, results.get(title, (seconds, 0))[0])
                 results[title] = (best, tuples)
     if args.by_hand:
-        results["datafrog by hand, evaluation alone"] = by_hand()
+        results["datafrog by hand, evaluation only"] = by_hand()
     if len({tuples for _, tuples in results.values()}) > 1:
         sys.exit(f"the engines don't agree: {results}")
     ours = results.get("actcheck", (None,))[0]
     print(f"{'engine':<36} {'tuples':>9} {'seconds':>8} {'actcheck takes':>15}")
     for title, (seconds, tuples) in results.items():
-        ratio = f"{ours / seconds:.2f} of it" if ours else ""
+        ratio = f"{ours / seconds:.2f} ×" if ours else ""
         print(f"{title:<36} {tuples:>9} {seconds:>8.2f} {ratio:>15}")
     for reason in missing:
         print(reason)
     slow = [t for t in results if t.startswith(("SWI", "clingo")) and ours and ours > results[t][0] / 2]
     if slow:
-        sys.exit(f"more than half of what {' and '.join(slow)} take")
+        sys.exit(f"actcheck takes more than half the time of {' and '.join(slow)}")
     sys.exit(1 if missing else 0)
 
 

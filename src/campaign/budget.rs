@@ -1,4 +1,4 @@
-//! What ends a campaign before all its runs are made: time, an interval that is narrow enough, failures.
+//! Budgets that end a campaign before all its runs are made: time, interval width, failures.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -7,26 +7,26 @@ use crate::campaign::{Env, Told};
 use crate::config::{Limits, Overrides};
 use crate::verdict::{Outcome, trials_for_width, wilson_share};
 
-/// Runs of one test more than anybody waits for: the ceiling where only time ends a campaign.
+/// Runs per test of a campaign that only time ends: more than any campaign makes.
 const MOST_RUNS: u32 = 10_000_000;
 
-/// Without `--runs`, a campaign that waits for narrow intervals makes so many times the runs that a property needs which is
-/// decided in each: enough for those that are decided in every fourth.
+/// Without `--runs`, a campaign that waits for narrow intervals makes at most this many times the runs that a property
+/// decided in every run needs. That is enough for properties that are decided in every fourth run.
 const WIDTH_RESERVE: u64 = 4;
 
 /// The budget that ended a campaign.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Spent {
-    /// It took so long. Unit: seconds.
+    /// The time limit. Unit: seconds.
     Time(f64),
-    /// The interval of every property is at most so wide.
+    /// The maximum interval width, which all properties have reached.
     Width(f64),
-    /// In so many runs a property failed.
+    /// The number of failed runs.
     Failures(u64),
 }
 
 impl Spent {
-    /// The word that the history has for it.
+    /// Its name in the history.
     pub fn word(self) -> &'static str {
         match self {
             Self::Time(_) => "time",
@@ -49,8 +49,8 @@ impl fmt::Display for Spent {
     }
 }
 
-/// Runs of each test where the command line asks for a budget and not for a number of runs; nothing where it leaves that to
-/// the configuration.
+/// Returns the runs of each test if the command line sets a budget but no number of runs, and `None` if the
+/// configuration decides.
 pub(super) fn ceiling(overrides: &Overrides) -> Option<u32> {
     match (overrides.runs, overrides.until_width, overrides.time_secs) {
         (None, Some(width), _) => {
@@ -62,8 +62,8 @@ pub(super) fn ceiling(overrides: &Overrides) -> Option<u32> {
     }
 }
 
-/// What was counted of the runs that are kept. It sees them in the order of the schedule, so that the run at which it says
-/// stop is the same whatever the number of workers.
+/// Counts over the runs in the history. Runs are counted in the order of the schedule, so that a campaign stops at the
+/// same run whatever the number of workers.
 pub(super) struct Tally {
     limits: Limits,
     /// Runs of each scene.
@@ -74,7 +74,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Nothing counted yet, of all success properties of the campaign's actions.
+    /// Creates an empty tally for all success properties of the campaign's actions.
     pub(super) fn new(env: &Env) -> Self {
         let actions = env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name));
         let properties = actions.flat_map(|action| &action.success_properties);
@@ -86,7 +86,7 @@ impl Tally {
         }
     }
 
-    /// Counts one more run, and says which budget it has spent.
+    /// Counts a run. Returns the budget that it has spent, if any.
     pub(super) fn count(&mut self, told: &Told) -> Option<Spent> {
         self.failures += u64::from(told.outcomes.iter().any(|one| one.outcome == Outcome::Failed));
         for one in &told.outcomes {
@@ -103,8 +103,8 @@ impl Tally {
         self.limits.until_width.filter(|width| self.is_narrow(*width)).map(Spent::Width)
     }
 
-    /// Whether every property has been decided often enough for an interval of this width. The runs of one scene count as
-    /// one trial: how alike they are is not known beforehand.
+    /// Whether the interval of every property is at most this wide. The runs of one scene count as one trial, because
+    /// their correlation is not known beforehand.
     fn is_narrow(&self, width: f64) -> bool {
         let narrow = |[passed, decided]: &[u64; 2]| {
             let (passed, decided) = (*passed as f64, *decided as f64);

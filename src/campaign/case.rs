@@ -1,4 +1,4 @@
-//! A configuration's one scene: whether it can be as it is written, and its run.
+//! Cases: configurations with one fixed scene. Checks that the scene can be built as written, and runs it.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +13,8 @@ use crate::history::{CampaignEnd, History, RunRecord, RunStatus};
 use crate::scenario::{self, Scene, Space};
 use crate::verdict::{Counts, Outcome, Recurrence};
 
-/// What is asked for only during a run: what sensors get wrong, and which postures a planner tries. These are its names but
-/// for those that name an object.
+/// Names of the choices that are made only during a run: sensor noise, and the seeds of planner and skill. The choices
+/// of single objects are in `SENSES_OF_OBJECT`.
 const SENSES: [&str; 14] = [
     "sense.localisation.x",
     "sense.localisation.y",
@@ -31,25 +31,25 @@ const SENSES: [&str; 14] = [
     "motion.samples",
     "skill.seed",
 ];
-/// The same of one object.
+/// Sensor noise of one object.
 const SENSES_OF_OBJECT: [&str; 7] = ["x", "y", "z", "yaw", "width", "depth", "height"];
 
-/// What came of a case.
+/// The result of a case.
 #[derive(Debug, Clone)]
 pub struct CaseRun {
     /// The run.
     pub record: RunRecord,
-    /// Whether it fails as it did when it was taken.
+    /// Whether it fails as the case expects.
     pub recurrence: Recurrence,
-    /// Whether every bit of every state is the same; nothing where the case does not say what it was.
+    /// Whether all states are bitwise identical; `None` if the case has no trace digest.
     pub same_trace: Option<bool>,
 }
 
-/// Makes the runs of cases on several workers and keeps each, as a campaign of its own with the case's name. Tells of each
-/// in the order of `cases`, by its position.
+/// Runs cases on several workers and stores each run as a campaign of its own with the case's name. Calls `on_case` for
+/// each in the order of `cases`, with its position.
 ///
 /// # Errors
-/// `S064` a scene can't be made or does not stand still; or writing failed.
+/// `S064` if a scene can't be built or does not settle, `X010` if workers can't be started; or writing failed.
 pub fn run_cases(
     cases: &[(String, Env)],
     history: &History,
@@ -63,7 +63,7 @@ pub fn run_cases(
         .build()
         .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
     let mut faults = Diagnostics::new();
-    // No more traces at a time than there are workers.
+    // At most one trace for each worker is in memory.
     for (number, some) in cases.chunks(jobs).enumerate() {
         let made: Vec<_> = pool.install(|| some.par_iter().map(|(_, env)| make(env, manner)).collect());
         for (at, ((name, env), made)) in some.iter().zip(made).enumerate() {
@@ -81,8 +81,8 @@ fn make(env: &Env, manner: &Manner) -> Result<RunRecord, Diagnostics> {
     let choices = env.campaign.case.as_ref().map_or(&none, |case| &case.choices);
     again(env, "case", (0, &|| Choices::named(choices)), manner, cut_of(env, manner)).map_err(|why| {
         env.campaign
-            .fault("S064", "case", format!("the scene of this case can't be made: {why}"))
-            .help("models, robot or program may have changed, or a value was edited: move what stands in the way")
+            .fault("S064", "case", format!("the scene of this case can't be built: {why}"))
+            .help("models, robot or program may have changed, or a value was edited: move the objects in the way")
             .into()
     })
 }
@@ -97,7 +97,7 @@ fn keep(
     let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     record.id = format!("{id}-1");
     record.campaign.clone_from(&id);
-    // What stands for a crash has no beginning of its own.
+    // The record of a crash has no start time.
     let started = if record.started.is_empty() { (manner.clock.now)() } else { record.started.clone() };
     let mut campaign = env.record(id.clone(), name.to_owned(), started);
     campaign.planned_runs = 1;
@@ -124,8 +124,8 @@ pub(super) fn end_of(record: &RunRecord, ended: String) -> CampaignEnd {
     }
 }
 
-/// Every choice of a case that can't be what it is written to be: S061 it is not asked for, S062 it is out of bounds,
-/// S063 something else stands there, S060 the scene can't be made at all.
+/// Finds the choices of a case that can't have their written values: S061 the scene has no such choice, S062 the value
+/// is out of bounds, S063 another object is in the way, S060 the scene can't be built at all.
 pub(super) fn check_case(campaign: &Campaign, space: &Space) -> Diagnostics {
     let mut found = Diagnostics::new();
     let Some(case) = &campaign.case else { return found };
@@ -144,13 +144,13 @@ pub(super) fn check_case(campaign: &Campaign, space: &Space) -> Diagnostics {
         fault.into_iter().for_each(|fault| found.push(fault));
     }
     if let (Err(discard), false) = (drawn, found.has_errors()) {
-        let message = format!("the scene of this case can't be made: {discard}");
-        found.push(campaign.fault("S060", "case", message).help("move what stands in the way, or leave it out"));
+        let message = format!("the scene of this case can't be built: {discard}");
+        found.push(campaign.fault("S060", "case", message).help("move the objects in the way, or remove them"));
     }
     found
 }
 
-/// A choice that was made otherwise than it is written.
+/// Returns the fault of a choice whose value differs from the written one, or whose values are too many or too few.
 fn misplaced(campaign: &Campaign, name: &str, written: &[f64], made: &[&Choice]) -> Option<Diagnostic> {
     let place = Case::place_of(name);
     let moved = written.iter().zip(made).find(|(written, made)| written.to_bits() != made.value.to_bits());
@@ -164,21 +164,21 @@ fn misplaced(campaign: &Campaign, name: &str, written: &[f64], made: &[&Choice])
             ChoiceKind::Normal { .. } => return None,
         };
         let message = format!("`{name}` is {is}, which is out of bounds here");
-        return Some(campaign.fault("S062", &place, message).help(format!("it may be from {bounds}")));
+        return Some(campaign.fault("S062", &place, message).help(format!("allowed: {bounds}")));
     }
     if written.len() > made.len() {
-        let message = format!("`{name}` has {} values, and is asked for {} times", written.len(), made.len());
-        return Some(campaign.fault("S061", &place, message).help("leave out what is too many"));
+        let message = format!("`{name}` has {} values, but the scene needs {}", written.len(), made.len());
+        return Some(campaign.fault("S061", &place, message).help("remove the extra values"));
     }
     let thing = name.strip_suffix(".x")?;
     (made.len() > written.len()).then(|| {
         campaign
-            .fault("S063", &place, format!("`{thing}` can't stand there: something else does"))
-            .help("move one of the two, or leave one out")
+            .fault("S063", &place, format!("`{thing}` can't be placed there: another object is in the way"))
+            .help("move one of the two, or remove one")
     })
 }
 
-/// Whether it is what the sensors get wrong about a scene.
+/// Whether a choice is made only during the run of this scene.
 fn is_of_senses(name: &str, scene: Option<&Scene>) -> bool {
     let of_object = |rest: &str| {
         let (id, what) = rest.rsplit_once('.')?;
@@ -188,7 +188,7 @@ fn is_of_senses(name: &str, scene: Option<&Scene>) -> bool {
     SENSES.contains(&name) || name.strip_prefix("sense.").and_then(of_object).unwrap_or(false)
 }
 
-/// Whether it is of an object that the case leaves out.
+/// Whether a choice belongs to an object that the case leaves out.
 fn is_of_left_out(name: &str, case: &Case) -> bool {
     let of = name.rsplit_once('.').and_then(|(of, _)| case.choices.get(&format!("{of}.left_out")));
     of.is_some_and(|left_out| left_out.first().is_some_and(|value| *value != 0.0))
@@ -206,9 +206,9 @@ fn unknown<'a>(
     let known: Vec<String> = made.map(str::to_owned).chain(SENSES.map(str::to_owned)).chain(of_objects).collect();
     campaign
         .fault("S061", &Case::place_of(name), format!("the scene of this case has no choice `{name}`"))
-        // There are too many of them to be listed.
+        // There are too many choices to list.
         .help(match nearest(name, known.iter().map(String::as_str)) {
             Some(found) => format!("did you mean `{found}`?"),
-            None => "leave it out; `actcheck export` writes a case with every choice that its scene has".to_owned(),
+            None => "remove it; `actcheck export` writes a case with every choice of its scene".to_owned(),
         })
 }

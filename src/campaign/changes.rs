@@ -1,30 +1,30 @@
-//! What a campaign depended on and is no longer the same, by digest.
+//! Inputs of a campaign that have changed since it ran, by digest.
 
 use std::collections::BTreeMap;
 
 use crate::history::CampaignRecord;
 
-/// One thing that changed since a campaign ran.
+/// An input that changed since a campaign ran.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Change {
-    /// What kind of thing it is.
+    /// Its kind.
     pub kind: ChangeKind,
-    /// Its name: of a model or robot, of a rule file, or of the configuration.
+    /// Name of the model, robot, rule file or configuration.
     pub name: String,
-    /// Version or digest then; nothing where it was not there.
+    /// Version or digest then; `None` if it did not exist.
     pub was: Option<String>,
-    /// Version or digest now; nothing where it is gone.
+    /// Version or digest now; `None` if it no longer exists.
     pub is: Option<String>,
 }
 
-/// What can change.
+/// Kinds of inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChangeKind {
     /// This program, by its version and the digest of its sources.
     Program,
     /// The configuration's text.
     Config,
-    /// The program that performs actions: its command, or a file of it.
+    /// The program that performs actions: its command, or one of its files.
     Skill,
     /// The file of an object model or a robot.
     Model,
@@ -35,7 +35,7 @@ pub enum ChangeKind {
 }
 
 impl ChangeKind {
-    /// The word for it.
+    /// Its name in messages.
     pub fn word(self) -> &'static str {
         match self {
             Self::Program => "program",
@@ -48,8 +48,8 @@ impl ChangeKind {
     }
 }
 
-/// What differs between two campaigns' records, sorted by kind and name. What judges counts too: it changes outcomes,
-/// though no trace.
+/// Returns the differences between the records of two campaigns, sorted by kind and name. Ontology and rules are
+/// included: they change outcomes, though not traces.
 pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<Change> {
     let single = |kind, name: &str, was: &str, is: &str| Change {
         kind,
@@ -78,7 +78,7 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<Change> {
     all
 }
 
-/// Version and digest of both programs; the version alone where one of the records has no digest.
+/// Version and digest of both programs; only the versions if one of the records has no digest.
 fn programs(was: &CampaignRecord, is: &CampaignRecord) -> [String; 2] {
     let without = was.program_digest.is_empty() || is.program_digest.is_empty();
     [was, is].map(|record| match without {
@@ -87,7 +87,7 @@ fn programs(was: &CampaignRecord, is: &CampaignRecord) -> [String; 2] {
     })
 }
 
-/// One entry for every name that either side has.
+/// One entry for each name on either side.
 fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String, String>) -> Vec<Change> {
     let mut names: Vec<&String> = was.keys().chain(is.keys()).collect();
     names.sort();

@@ -1,11 +1,11 @@
-//! The first moment at which two traces part, and what parts there.
+//! The first moment at which two traces differ, and the quantity that differs.
 
 use std::collections::BTreeMap;
 
 use crate::actions::{BodyState, Frames, RobotState, Snapshot, Trace};
 use crate::base::Pose;
 
-/// Share of a frame's period that rounding may take from a time.
+/// Tolerance for rounding errors in times, as a share of the frame period.
 const SLACK: f64 = 1e-6;
 const AXES: [&str; 3] = ["x", "y", "z"];
 const PARTS: [&str; 4] = ["qx", "qy", "qz", "qw"];
@@ -15,31 +15,31 @@ const PARTS: [&str; 4] = ["qx", "qy", "qz", "qw"];
 pub struct Difference {
     /// Simulated time since the scene was built. Unit: seconds.
     ///
-    /// States are kept at the beginning and the end of every action with all their bits, and every tenth of a second in
-    /// between to a tenth of a millimetre: that is how well the moment is known.
+    /// A trace keeps exact states at the start and end of every action, and frames in between, every tenth of a second
+    /// and to a tenth of a millimetre. These limit how precisely the moment is known.
     pub time_secs: f64,
     /// Position of the action in the test, from 1; 0 before the first.
     pub step: usize,
     /// The object, `robot`, or `robot/LINK`.
     pub body: String,
-    /// Such as `position x`.
+    /// For example `position x`.
     pub quantity: String,
-    /// Unit of the quantity; empty for what has none.
+    /// Unit of the quantity; empty if it has none.
     pub unit: &'static str,
-    /// What the first trace has.
+    /// Value in the first trace.
     pub was: String,
-    /// What the second one has.
+    /// Value in the second trace.
     pub is: String,
-    /// By how much they differ, for numbers.
+    /// Absolute difference, if both values are numbers.
     pub by: Option<f64>,
-    /// How many more quantities differ at the same moment.
+    /// Number of other quantities that differ at the same moment.
     pub others: usize,
 }
 
-/// The first difference of two traces; nothing where all states that are kept are the same, bit by bit.
+/// Returns the first difference of two traces, or `None` if all stored states are bitwise identical.
 ///
-/// Of several at the same moment, parameters of bodies count before poses, and poses before velocities: what comes first is
-/// likelier to be the cause.
+/// Of several differences at the same moment, body parameters come before poses, and poses before velocities, because
+/// the earlier ones are likelier causes.
 pub fn first_difference(was: &Trace, is: &Trace) -> Option<Difference> {
     let (was, is) = (moments(was), moments(is));
     for (one, other) in was.iter().zip(&is) {
@@ -54,7 +54,7 @@ pub fn first_difference(was: &Trace, is: &Trace) -> Option<Difference> {
     (was.len() != is.len()).then(|| parted(was.get(shorter), is.get(shorter)))
 }
 
-/// What is known of one moment.
+/// The stored data of one moment.
 struct Moment<'a> {
     time_secs: f64,
     step: usize,
@@ -66,11 +66,11 @@ enum Known<'a> {
     Frame(&'a Frames, &'a [f32]),
 }
 
-/// All moments that a trace keeps, in order: a state, the frames of the action that follows, the next state.
+/// All moments of a trace in order: a state, the frames of the action that follows, the next state.
 fn moments(trace: &Trace) -> Vec<Moment<'_>> {
     let Some(first) = trace.snapshots.first() else { return Vec::new() };
     let mut all = vec![Moment { time_secs: first.time_secs, step: 0, known: Known::State(first) }];
-    // The first frame shows the same moment as the first state, in fewer bits.
+    // The first frame is the same moment as the first state, at lower precision.
     let mut rows = trace.frames.rows.iter().skip(1);
     let period = trace.frames.period_secs.max(f64::MIN_POSITIVE);
     for (idx, pair) in trace.snapshots.windows(2).enumerate() {
@@ -87,11 +87,11 @@ fn moments(trace: &Trace) -> Vec<Moment<'_>> {
     all
 }
 
-/// An action, or the whole trace, goes on where the other one has ended.
+/// The difference if an action, or the whole trace, is longer than its counterpart.
 fn parted(was: Option<&Moment<'_>>, is: Option<&Moment<'_>>) -> Difference {
     let words = |moment: Option<&Moment<'_>>| match moment {
         Some(Moment { time_secs, known: Known::State(_), .. }) => format!("ended at {time_secs:.3} s"),
-        Some(Moment { time_secs, .. }) => format!("still going on at {time_secs:.3} s"),
+        Some(Moment { time_secs, .. }) => format!("still running at {time_secs:.3} s"),
         None => "not reached".to_owned(),
     };
     let first = [was, is].into_iter().flatten().min_by(|a, b| a.time_secs.total_cmp(&b.time_secs));
@@ -108,7 +108,7 @@ fn parted(was: Option<&Moment<'_>>, is: Option<&Moment<'_>>) -> Difference {
     }
 }
 
-/// The first reading that differs, in the order of the first moment; then what only the second one has.
+/// Compares the readings of two moments in the order of the first one. Readings of the second one alone come last.
 fn compare(was: &Moment<'_>, is: &Moment<'_>) -> Option<Difference> {
     let was_readings = readings(was);
     let mut rest: BTreeMap<(String, String), Reading> =
@@ -150,9 +150,9 @@ struct Reading {
 }
 
 enum Value {
-    /// A number with all its bits.
+    /// A number at full precision, compared bit by bit.
     Exact(f64),
-    /// A number of a frame, of which only the value is kept.
+    /// A rounded number of a frame, compared by value.
     Rounded(f64),
     Words(String),
 }

@@ -1,4 +1,4 @@
-//! All that a campaign needs before its first run, checked.
+//! Prepares and checks everything that a campaign needs before its first run.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,15 +25,15 @@ pub struct Env {
     pub campaign: Campaign,
     /// Its ontology.
     pub ontology: Ontology,
-    /// The scenes that it describes.
+    /// The space of scenes that it describes.
     pub space: Space,
     /// The rules of all properties, ready to judge.
     pub rules: RuleBook,
-    /// What judging one property may cost.
+    /// Budget for judging one property.
     pub rule_budget: Budget,
-    /// What scenes have to satisfy, where the configuration asks for something.
+    /// The requirement on scenes, if the configuration has one.
     pub(super) requirement: Option<Requirement>,
-    /// Who performs actions instead of the reference skills, where the configuration names a program.
+    /// The program that performs actions instead of the reference skills, if the configuration names one.
     pub(super) programs: Option<Programs>,
 }
 
@@ -41,7 +41,7 @@ impl Env {
     /// Reads and checks everything that a campaign depends on.
     ///
     /// # Errors
-    /// All faults that can be found at once: first those of the configuration, then those of the ontology, then
+    /// Returns as many faults as can be found at once: those of the configuration, else those of the ontology, else
     /// those of scene space, rules, robot and skills together.
     pub fn prepare(config: &Path, overrides: &Overrides) -> Result<Self, Diagnostics> {
         Self::prepare_within(config, overrides, Budget::default())
@@ -50,18 +50,18 @@ impl Env {
     /// Prepares a campaign as [`Env::prepare`] does, with a budget for every evaluation of rules, now and in its runs.
     ///
     /// # Errors
-    /// All faults that can be found at once, and a budget that was spent.
+    /// As [`Env::prepare`], or if the budget is spent.
     pub fn prepare_within(config: &Path, overrides: &Overrides, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let mut campaign = config::load(config, overrides)?;
         campaign.test_count = ceiling(overrides).unwrap_or(campaign.test_count);
         Self::of(campaign, rule_budget)
     }
 
-    /// What a campaign of the history ran with: its configuration's text as it was then, with the ontology, rules and
-    /// models that lie there now. `config` names a configuration to take instead.
+    /// Prepares a campaign of the history again: with its configuration's text as it was then, and with the present
+    /// ontology, rules and models. If `config` is given, that configuration is used instead.
     ///
     /// # Errors
-    /// `H014` there is no such campaign; else as [`Env::prepare`].
+    /// `H014` if the history has no such campaign; else as [`Env::prepare`].
     pub fn recall(
         history: &History,
         campaign: &str,
@@ -75,10 +75,10 @@ impl Env {
                 let path = config::beside(history.dir(), &record.config_path);
                 let source = Source::new(path.display().to_string(), record.config_text.as_str());
                 config::load_text(source, path.parent().unwrap_or(Path::new("")), &overrides).map_err(|mut faults| {
-                    let message = format!("this is the configuration of campaign {campaign}, as the history keeps it");
+                    let message = format!("this is the configuration of campaign {campaign} as stored in the history");
                     faults.push(
                         Diagnostic::warning("H015", message)
-                            .help("where its files have moved, name the configuration's new place with `--config`"),
+                            .help("if its files have moved, name the configuration's new path with `--config`"),
                     );
                     faults
                 })
@@ -89,7 +89,7 @@ impl Env {
         Ok((Self::of(loaded, Budget::default())?, record))
     }
 
-    /// The same for a configuration's text that lies nowhere: paths in it are relative to `folder`.
+    /// Prepares a campaign from a configuration's text instead of a file. Its paths are relative to `folder`.
     ///
     /// # Errors
     /// As [`Env::prepare`].
@@ -97,11 +97,11 @@ impl Env {
         Self::of(config::load_text(source, folder, overrides)?, Budget::default())
     }
 
-    /// An index in this campaign whose run performs the actions of a stored run with this test and these decisions, those
-    /// included that the run leaves out.
+    /// Returns an index in this campaign whose test has the actions that a stored run performed, plus the last ones
+    /// that its choices left out.
     ///
     /// # Errors
-    /// `S040` the configuration has no such test.
+    /// `S040` if the configuration has no such test.
     pub fn index_of(&self, performed: &str, choices: &[Choice]) -> Result<u64, Diagnostics> {
         let left_out = choices.iter().find(|choice| choice.name == TEST_LEFT_OUT).map_or(0.0, |choice| choice.value);
         let fits = |test: &Vec<String>| {
@@ -118,7 +118,7 @@ impl Env {
         }
     }
 
-    /// How many scenes of each test a campaign of the history was asked for.
+    /// Number of scenes of each test that a campaign of the history planned.
     pub(super) fn scenes_of_a_test(campaign: &Campaign, record: &CampaignRecord) -> u32 {
         let runs_of_a_scene = campaign.tests.len().max(1) as u64 * u64::from(record.repeat.max(1));
         u32::try_from(record.planned_runs / runs_of_a_scene).unwrap_or(campaign.test_count).max(1)
@@ -149,14 +149,14 @@ impl Env {
         }
     }
 
-    /// What is left out, and what stands in the rules without effect.
+    /// Warnings of the configuration and of the rules, such as rules without effect.
     pub fn warnings(&self) -> Diagnostics {
         let mut warnings = self.campaign.warnings.clone();
         warnings.extend(self.rules.warnings().iter().cloned().collect());
         warnings
     }
 
-    /// What the history keeps of the campaign.
+    /// The campaign's record for the history.
     pub fn record(&self, id: String, name: String, started: String) -> CampaignRecord {
         let rules = self
             .ontology
@@ -206,7 +206,7 @@ impl Env {
         }
     }
 
-    /// Whether a program that performs actions is told the truth.
+    /// Whether the program that performs actions receives ground truth.
     pub fn is_privileged(&self) -> bool {
         self.skill().is_some_and(|skill| skill.privileged)
     }
@@ -216,26 +216,27 @@ impl Env {
         self.campaign.tests.len() as u64 * self.runs_of_a_test()
     }
 
-    /// Those of them that this part of the campaign makes.
+    /// Number of planned runs in this shard of the campaign.
     pub fn runs_to_make(&self) -> u64 {
         self.campaign.shard.map_or(self.planned_runs(), |shard| shard.share(self.planned_runs()))
     }
 
-    /// Which test a run performs: all runs of the first one come first. An index past the end means the last one.
+    /// Position of the test that a run performs. All runs of the first test come first; an index past the end gives the
+    /// last test.
     pub fn test_of(&self, index: u64) -> usize {
         let last = self.campaign.tests.len().saturating_sub(1);
         usize::try_from(index / self.runs_of_a_test().max(1)).map_or(last, |test| test.min(last))
     }
 
-    /// Every scene of a test, as often as it is run.
+    /// Runs of each test: scenes times repetitions.
     pub(super) fn runs_of_a_test(&self) -> u64 {
         u64::from(self.campaign.test_count) * u64::from(self.campaign.repeat)
     }
 }
 
-/// What the command line had asked for when a campaign of a history began, but for the number of its runs.
+/// The command-line overrides with which a campaign of a history began, except the number of runs.
 pub(super) fn asked_for(history: &History, record: &CampaignRecord) -> Overrides {
-    // Of several parts those that are missing belong to it too: it is taken as a whole.
+    // A campaign merged from several shards is treated as a whole, so its missing shards belong to it too.
     let shard = match record.shards.as_slice() {
         [only] => Some(*only),
         _ => None,
@@ -253,7 +254,8 @@ pub(super) fn asked_for(history: &History, record: &CampaignRecord) -> Overrides
     }
 }
 
-/// Other people's models say nothing of what they are: their names do, or else they are just objects.
+/// Sets the category of models that come without one, from their name if the ontology has such a class; else they stay
+/// `act:Object`.
 fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
     let used = campaign.used_models();
     for name in &campaign.uncategorised {
@@ -261,15 +263,15 @@ fn categorise(campaign: &mut Campaign, ontology: &Ontology) {
         match ontology.class_called(name) {
             Some(class) => Arc::make_mut(model).category = class.to_owned(),
             None if used.contains(name) => campaign.warnings.push(
-                Diagnostic::warning("W039", format!("nothing says what `{name}` is: it counts as `act:Object`"))
-                    .help(format!("add `[categories]` with `{name} = \"act:Cup\"`, or whatever it is")),
+                Diagnostic::warning("W039", format!("the model `{name}` has no category: it counts as `act:Object`"))
+                    .help(format!("add it to `[categories]`, for example `{name} = \"act:Cup\"`")),
             ),
             None => {}
         }
     }
 }
 
-/// A path as it is seen from a folder, so that both can move together; as it is where one of them is not there.
+/// Returns a path relative to a folder, so that both can be moved together; unchanged if one of them does not exist.
 fn path_from(folder: &Path, path: &Path) -> String {
     let absolute = |path: &Path| std::fs::canonicalize(path).ok();
     let seen = match (absolute(folder), absolute(path)) {
@@ -279,8 +281,8 @@ fn path_from(folder: &Path, path: &Path) -> String {
     seen.display().to_string()
 }
 
-/// What a search that looks for failures can't be: ended by the width of a raw rate's interval, or made in parts that don't
-/// hear of each other.
+/// Checks that a search for failures is neither ended by an interval width (its raw counts are biased) nor split into
+/// shards (each scene depends on earlier results).
 fn check_search(campaign: &Campaign, faults: &mut Diagnostics) {
     if !campaign.search.is_guided() {
         return;
@@ -291,14 +293,14 @@ fn check_search(campaign: &Campaign, faults: &mut Diagnostics) {
         faults.push(campaign.fault("S024", "search", format!("a {name} search looks for failures: {why}")).help(help));
     };
     if campaign.limits.until_width.is_some() {
-        refuse("counts of its runs are no rates, so that no width of their interval can end it");
+        refuse("its share of failed runs is biased, so the width of an interval can't end it");
     }
     if campaign.shard.is_some() {
-        refuse("each scene depends on what came of the ones before, so that it can't be made in parts");
+        refuse("each scene depends on the results of earlier ones, so it can't be split into shards");
     }
 }
 
-/// The program that performs actions, where there is one.
+/// The program that performs actions, if the configuration names one.
 fn programs(campaign: &Campaign) -> Option<Programs> {
     match &campaign.launcher {
         Launcher::Reference => None,
@@ -309,8 +311,8 @@ fn programs(campaign: &Campaign) -> Option<Programs> {
     }
 }
 
-/// An action that the ontology has and no skill performs; names that the ontology lacks are the scene space's matter. What a
-/// program performs only shows when it is started.
+/// Reports actions of the ontology that no reference skill performs. The scene space reports names that the ontology
+/// lacks, and a program names its skills only when it is started.
 fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnostics) {
     if campaign.launcher != Launcher::Reference {
         return;

@@ -1,4 +1,4 @@
-//! A stored run as a configuration of its own.
+//! Exports a stored run as a configuration of its own.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -14,14 +14,14 @@ use crate::verdict::Outcome;
 /// Name of the folder in which a project keeps its cases.
 const REGRESSIONS: &str = "regressions";
 
-/// A configuration that makes a stored run again, as it is to be written into `folder`.
+/// Returns the text of a configuration, for a file in `folder`, that runs a stored run again.
 ///
-/// Inside the project (the folder that holds the configuration, its ontology and its models) it names these by paths
-/// from there, so that it follows their edits. Elsewhere it leaves them out where the ones that the program carries are
-/// the same, and so runs anywhere.
+/// Inside the project (the folder that holds the configuration, its ontology and its models) it names these by relative
+/// paths, so that it follows their edits. Elsewhere it leaves them out if the built-in ones are the same, so that it
+/// runs anywhere.
 ///
 /// # Errors
-/// The trace can't be read, `S040` the configuration has no such test any more, or it is no longer TOML.
+/// The trace can't be read, `S040` the configuration no longer has the test, or it is no longer valid TOML.
 pub fn export(
     history: &History,
     (env, record): &Recalled,
@@ -31,7 +31,8 @@ pub fn export(
     let (choices, trace) = (history.choices(&run.row.run)?, history.trace(&run.row.run)?);
     let test = &env.campaign.tests[env.test_of(env.index_of(&run.row.test, &choices)?)];
     let performed = run.actions.len().min(test.len());
-    // What is not performed is not written, so nothing is left to leave out; of a place, only the try that was accepted.
+    // Only performed actions are written, so `test.left_out` is not needed. Of each placement, only the accepted try is
+    // kept.
     let choices: Vec<Choice> =
         accepted_places(&choices).into_iter().filter(|choice| choice.name != TEST_LEFT_OUT).collect();
     let failed = failed(run);
@@ -59,18 +60,19 @@ pub fn export(
     config::case_text(&env.campaign, &case)
 }
 
-/// How a configuration in a folder names the program that performs actions, and its working folder.
+/// The program that performs actions and its working folder, as a configuration in `folder` names them.
 fn skill_seen_from(folder: &Path, env: &Env) -> Option<(Option<String>, String)> {
     let Launcher::Program(skill) = &env.campaign.launcher else { return None };
     let seen = |path: &Path| seen_from(folder, &absolute(path));
     Some((skill.launcher(seen), seen(&skill.dir)))
 }
 
-/// The folder for a configuration's regressions: `regressions` beside it or in the folder above, whichever is there; where
-/// neither is, in the one of these two that holds all that the configuration names.
+/// Returns the folder for a configuration's regressions: `regressions` beside it or in its parent folder, whichever
+/// exists. If neither does, it is in the parent folder if the project is exactly that folder, else beside the
+/// configuration.
 ///
 /// # Errors
-/// The configuration is not TOML.
+/// The configuration is not valid TOML.
 pub fn regressions_folder(source: &Source) -> Result<PathBuf, Diagnostics> {
     let own = Path::new(&*source.name).parent().unwrap_or(Path::new(""));
     let (beside, above) = (own.join(REGRESSIONS), config::beside(own, &format!("../{REGRESSIONS}")));
@@ -82,18 +84,18 @@ pub fn regressions_folder(source: &Source) -> Result<PathBuf, Diagnostics> {
     Ok(if is_above { above } else { beside })
 }
 
-/// The folder of a configuration, from the root.
+/// The absolute path of a configuration's folder.
 fn home(source: &Source) -> PathBuf {
     absolute(Path::new(&*source.name).parent().unwrap_or(Path::new("")))
 }
 
-/// The smallest folder that holds a configuration and all that it names by paths.
+/// The smallest folder that holds a configuration and all files that it names.
 fn project(home: &Path, written: &[Option<String>; 3]) -> PathBuf {
     let named = written.iter().flatten().map(|path| absolute(&home.join(path)));
     named.fold(home.to_path_buf(), |common, path| common_folder(&common, &path))
 }
 
-/// Names of the properties that failed, each once.
+/// Names of the failed properties, without duplicates.
 fn failed(run: &RunDetail) -> Vec<String> {
     let judgements = run.actions.iter().flat_map(|action| &action.judgements);
     let failed = judgements.filter(|judgement| judgement.outcome == Outcome::Failed);
@@ -101,7 +103,7 @@ fn failed(run: &RunDetail) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Whether a text that names neither ontology nor models gets the same ones from the program.
+/// Whether the built-in ontology, rules and models, which `text` gets because it names none, are those of the campaign.
 fn carried_is_the_same(text: &str, folder: &Path, env: &Env, record: &CampaignRecord) -> bool {
     let overrides = Overrides { history: Some(env.campaign.history.clone()), ..Overrides::default() };
     let Ok(carried) = Env::prepare_text(Source::new("case", text), folder, &overrides) else { return false };
@@ -114,7 +116,7 @@ fn carried_is_the_same(text: &str, folder: &Path, env: &Env, record: &CampaignRe
     digests(&carried) == digests(&today)
 }
 
-/// The path without `.` and `..`, from the root.
+/// The absolute path, without `.` and `..`.
 fn absolute(path: &Path) -> PathBuf {
     let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
     let whole = std::fs::canonicalize(path).or_else(|_| std::path::absolute(path));
@@ -125,7 +127,7 @@ fn common_folder(one: &Path, other: &Path) -> PathBuf {
     one.components().zip(other.components()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
 }
 
-/// With slashes, which TOML needs no escapes for and every system understands.
+/// The path relative to `folder`, with forward slashes: TOML needs no escapes for them and every system accepts them.
 fn seen_from(folder: &Path, path: &Path) -> String {
     let seen = pathdiff::diff_paths(path, folder).unwrap_or_else(|| path.to_path_buf());
     seen.display().to_string().replace('\\', "/")

@@ -1,4 +1,4 @@
-//! One performed action judged, in a new run or in a stored one.
+//! Judges one performed action of a new or a stored run.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use crate::ontology::{Action, Ontology};
 use crate::rules::{Budget, Findings, RuleBook, RuleFault};
 use crate::verdict::{Fate, Judgement, Outcome, judge};
 
-/// Outcomes of an action's success properties. The rules are asked only of an action that came to its own end.
+/// Returns the outcomes of an action's success properties. Rules are evaluated only for completed actions.
 ///
 /// # Errors
-/// The budget's `stop` was set and a rule took long.
+/// [`Failure::Interrupted`] if the budget's `stop` is set during a long evaluation.
 pub(super) fn judge_action(
     ontology: &Ontology,
     rules: &RuleBook,
@@ -43,13 +43,13 @@ pub(super) fn judge_action(
 
 type Found = BTreeMap<String, Result<Findings, RuleFault>>;
 
-/// What was found, unless somebody interrupted it.
+/// Returns the findings, or [`Failure::Interrupted`] if an evaluation was interrupted.
 fn whole(found: Found) -> Result<Found, Failure> {
     let interrupted = found.values().any(|found| *found == Err(RuleFault::Interrupted));
     if interrupted { Err(Failure::Interrupted) } else { Ok(found) }
 }
 
-/// Notes, of what passed and states success, whether it had held before the action already.
+/// Sets `held_before` on the passed judgements whose property states success.
 fn note_held_before(
     rules: &RuleBook,
     facts: &ActionFacts<'_>,
@@ -66,7 +66,7 @@ fn note_held_before(
     }
     let before = whole(rules.held_before(facts, &asked, budget))?;
     for judgement in judgements {
-        // What could not be judged then says nothing either way.
+        // `held_before` stays unset if the state before the action could not be judged.
         if let Some(Ok(found)) = before.get(&judgement.property) {
             judgement.held_before = Some(found.applicable && found.holds);
         }

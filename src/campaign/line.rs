@@ -1,4 +1,4 @@
-//! The line, once, top to bottom: choices → scene → world → trace → facts → findings → verdict.
+//! One run from start to end: choices → scene → world → trace → facts → findings → verdict.
 
 use crate::actions::{self, ActionCall, ActionEnd, Cut, Interference, Outside, Quality, Saboteur, Trace};
 use crate::base::Choices;
@@ -11,16 +11,16 @@ use crate::scenario::{self, Scene};
 use crate::verdict::{Judgement, action_score, run_score};
 use crate::world::{self, World};
 
-/// Time as the caller measures it: the stages have no clock.
+/// The caller's clock: the stages have none of their own.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
     /// Now, as RFC 3339.
     pub now: fn() -> String,
-    /// Seconds since any fixed moment, never going back.
+    /// Seconds since an arbitrary fixed moment; monotonic.
     pub secs: fn() -> f64,
 }
 
-/// Puts a fault into the world of the run with this index, once it has settled. For tests of what notices faults.
+/// Injects a fault into the settled world of the run with this index. For tests of fault detection.
 pub type Disturbance = fn(u64, &mut World);
 
 /// How runs are made, apart from their choices.
@@ -28,28 +28,28 @@ pub type Disturbance = fn(u64, &mut World);
 pub struct Manner {
     /// The caller's clock.
     pub clock: Clock,
-    /// A fault to put into worlds.
+    /// A fault to inject into worlds.
     pub disturb: Option<Disturbance>,
 }
 
-/// Why a scene gave no run.
+/// The reason why a scene gave no run.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Failure {
-    /// The scene could not be generated, or does not stand still by itself; another one may.
+    /// The scene could not be generated or did not settle; another one may.
     #[error("{0}")]
     Discard(String),
-    /// Somebody asked for the end while its rules were judged.
+    /// The run was interrupted while rules were evaluated.
     #[error("interrupted")]
     Interrupted,
 }
 
-/// Takes one run down the line.
+/// Makes one run, from choices to verdict.
 ///
-/// The same `choices` give the same record but for times. `campaign` is the campaign's id.
+/// The same `choices` give the same record, except for its times. `campaign` is the campaign's id.
 ///
 /// # Errors
-/// A scene that could not be generated or did not settle; [`Env::rule_budget`] was stopped in the middle of a long rule. Faults of simulation are no error: they end the run as
-/// broken, as data.
+/// [`Failure::Discard`] if the scene could not be generated or did not settle, [`Failure::Interrupted`] if
+/// [`Env::rule_budget`] was stopped during a long rule. Simulation faults are not errors: the record is `broken`.
 pub fn run_line(
     env: &Env,
     campaign: &str,
@@ -60,7 +60,7 @@ pub fn run_line(
     run_line_with(env, campaign, (index, choices), manner, Interference::default())
 }
 
-/// The same, but that the run ends where it is cut off.
+/// As [`run_line`], but the run ends at `cut`.
 ///
 /// # Errors
 /// As [`run_line`].
@@ -74,9 +74,9 @@ pub(super) fn run_line_until(
     run_line_with(env, campaign, run, manner, Interference { cut, ..Interference::default() })
 }
 
-/// The same, while somebody makes things go wrong on purpose.
+/// As [`run_line`], with a fault injected on purpose.
 ///
-/// What comes of it is no run of the robot's and must not be kept among them.
+/// The record does not count as a run of the robot and must not be stored in a history.
 ///
 /// # Errors
 /// As [`run_line`].
@@ -125,23 +125,23 @@ fn run_line_with(
     Ok(record)
 }
 
-/// The choice that all randomness of a program's comes from, and how many there are: numbers that every language can hold.
+/// The choice that seeds all randomness of a program, and the number of seeds: every language can represent them.
 const SKILL_SEED: &str = "skill.seed";
 const SEEDS: usize = 1 << 32;
 
-/// The choice that leaves out so many of the last actions.
+/// The choice of how many of the last actions are left out.
 pub(super) const TEST_LEFT_OUT: &str = "test.left_out";
 
-/// The actions of a run. Only a shrunk record leaves the last ones out.
+/// The actions of a run. Only shrunk runs leave the last ones out.
 fn test_to_perform<'a>(env: &'a Env, index: u64, choices: &mut Choices) -> &'a [String] {
     let test = &env.campaign.tests[env.test_of(index)];
     let left_out = choices.exception(TEST_LEFT_OUT, test.len());
     &test[..test.len() - left_out]
 }
 
-/// The record of a run whose simulation crashed: every property is broken, for the reason given.
+/// Returns the record of a run whose simulation crashed: every property is `broken`, for the given reason.
 ///
-/// Nothing where the scene can't be drawn a second time.
+/// Returns `None` if the scene can't be drawn again.
 pub(super) fn crashed(env: &Env, campaign: &str, index: u64, mut choices: Choices, reason: &str) -> Option<RunRecord> {
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices).ok()?;
     let trace = never_performed(test_to_perform(env, index, &mut choices), &scene, reason);
@@ -150,7 +150,7 @@ pub(super) fn crashed(env: &Env, campaign: &str, index: u64, mut choices: Choice
     Some(record)
 }
 
-/// From a trace to the record: facts, findings, verdicts, scores. Choices and times are left to the caller.
+/// Computes facts, findings, verdicts and scores of a trace. The caller sets choices and times.
 fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> Result<RunRecord, Failure> {
     let facts = facts::extract(&trace);
     let judgements = judge_all(env, &trace, &facts)?;
@@ -184,7 +184,8 @@ fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> 
     })
 }
 
-/// Builds the scene, lets it settle and performs the test in it. With the trace comes what simulation got wrong.
+/// Builds the scene, lets it settle and performs the test in it. Returns the trace, and the simulation's quality
+/// figures if a world could be built.
 fn perform(
     (env, interference): (&Env, Interference<'_>),
     test: &[String],
@@ -198,7 +199,7 @@ fn perform(
     };
     let settling = world.settle();
     if !settling.left.is_empty() {
-        return Err(Failure::Discard(format!("fell from where it was put: {}", settling.left.join(", "))));
+        return Err(Failure::Discard(format!("fell from its initial position: {}", settling.left.join(", "))));
     }
     if !settling.settled {
         return Err(Failure::Discard(format!("did not come to rest: {}", settling.unsettled.join(", "))));
@@ -216,7 +217,7 @@ fn calls(test: &[String], scene: &Scene) -> Vec<ActionCall> {
     test.iter().map(|action| ActionCall { action: action.clone(), parameters: scene.designators.clone() }).collect()
 }
 
-/// The trace of a run that a fault ended before its first action.
+/// The trace of a run that ended with a fault before its first action.
 fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
     let actions = calls(test, scene)
         .into_iter()
@@ -236,7 +237,7 @@ fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
     }
 }
 
-/// Outcomes of every action of a trace: one list for each.
+/// Judges every action of a trace; one list for each.
 fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Result<Vec<Vec<Judgement>>, Failure> {
     trace
         .actions
@@ -250,7 +251,7 @@ fn judge_all(env: &Env, trace: &Trace, facts: &RunFacts) -> Result<Vec<Vec<Judge
         .collect()
 }
 
-/// The run's own status: the first action that did not complete decides.
+/// The status and its reason, from the first action that did not complete.
 fn status_of(trace: &Trace) -> (RunStatus, Option<String>) {
     for action in &trace.actions {
         match &action.end {

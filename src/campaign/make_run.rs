@@ -1,4 +1,4 @@
-//! One planned run, made: its attempts at a scene, and what stands for a crash of simulation.
+//! Makes one planned run: draws scenes until one can be built, and records simulation crashes.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -8,24 +8,24 @@ use crate::campaign::line::{crashed, run_line_until};
 use crate::campaign::{Env, Failure, Manner, Planned, Told};
 use crate::history::RunRecord;
 
-/// Scenes drawn for one run before the campaign is given up.
+/// Maximum number of scenes drawn for one run; then the campaign stops.
 ///
-/// A space of which one scene in five can be built leaves a run without one once in 70,000 runs.
+/// If one scene in five of a space can be built, one run in 70,000 is left without a scene.
 const SCENES_PER_RUN: u64 = 50;
 
-/// What came of a planned run.
+/// The result of a planned run.
 pub(super) enum Making {
-    /// The run, with the discards before it.
+    /// The run, with its discards.
     Run(Box<RunRecord>),
-    /// It is in the history: somebody resumed the campaign.
+    /// The run is in the history already: the campaign was resumed.
     Stored(Told),
-    /// Somebody asked for the end.
+    /// The campaign was interrupted.
     Interrupted,
-    /// There is no such run, and why.
+    /// The run can't be made, with the reason.
     Impossible(Diagnostics),
 }
 
-/// Makes a planned run, after the scenes that have to be discarded for it.
+/// Makes a planned run. Draws scenes until one can be built.
 pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, manner: &Manner) -> Making {
     let mut discards = Vec::new();
     for attempt in 0..SCENES_PER_RUN {
@@ -54,7 +54,7 @@ pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, manner: &Ma
     Making::Impossible(no_scene(env, planned, discards.last()).into())
 }
 
-/// The record with what its plan says of it. Discards are of a scene: its first run has them.
+/// Adds repetition and weight from the plan, and the discards, which only the first run of a scene has.
 fn kept(planned: &Planned, record: RunRecord, discards: Vec<String>) -> RunRecord {
     let first = planned.repetition.is_none_or(|number| number == 0);
     let weight = planned.steering.as_ref().and_then(|steering| steering.weight);
@@ -62,7 +62,7 @@ fn kept(planned: &Planned, record: RunRecord, discards: Vec<String>) -> RunRecor
     RunRecord { discards, repetition: planned.repetition(), weight, ..record }
 }
 
-/// When a run that begins now is cut off.
+/// The time limit of a run that starts now.
 pub(super) fn cut_of(env: &Env, manner: &Manner) -> Cut {
     let secs = manner.clock.secs;
     env.campaign.limits.run_secs.map_or(Cut::Never, |limit| Cut::Clock { secs, at_secs: secs() + limit })
@@ -72,7 +72,7 @@ fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {
     Diagnostic::error(
         "S030",
         format!(
-            "no scene could be built for run {} in {SCENES_PER_RUN} draws; the last one: {}",
+            "no scene could be built for run {} in {SCENES_PER_RUN} draws; the last failure: {}",
             planned.index + 1,
             last.map_or("", String::as_str)
         ),
@@ -81,7 +81,7 @@ fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {
     .help("put fewer objects on the surface (`[surfaceObjects] count`), smaller ones, or a larger surface")
 }
 
-/// What a panic said.
+/// The message of a panic.
 pub(super) fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     panic
         .downcast_ref::<&str>()

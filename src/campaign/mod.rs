@@ -1,7 +1,6 @@
-//! The conductor: prepares a campaign, takes each run down the line, and hands it to the history; judges
-//! stored runs anew.
+//! Prepares a campaign, makes its runs and writes them to the history; replays, shrinks and rechecks stored runs.
 //!
-//! Never: prints, reads the command line or a clock of its own, or knows how any stage does its work.
+//! Never: prints, reads the command line or a system clock, or depends on the internals of a stage.
 
 mod replay;
 

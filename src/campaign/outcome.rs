@@ -4,20 +4,21 @@ use crate::base::Diagnostics;
 use crate::campaign::Spent;
 use crate::search::Estimate;
 
-/// What there is to say when no more runs come.
+/// The result of a campaign.
 #[derive(Debug)]
 pub struct CampaignEnd {
-    /// Why there are no more.
+    /// Why it ended.
     pub ending: Ending,
-    /// Runs that are in the history.
+    /// Number of runs in the history.
     pub committed: u64,
-    /// Scenes that could not be used for the runs that are in the history, with the reason, by index of the run.
+    /// Scenes discarded for the runs in the history: index of the run, and the reason.
     pub discards: Vec<(u64, String)>,
-    /// Of a guided search: how often each property of each test fails.
+    /// Failure rates of each property of each test; empty if the search is not guided.
     pub rates: Vec<WeightedRate>,
 }
 
-/// How often a property fails in scenes as the configuration draws them, whichever a search looked at.
+/// Failure rate of a property over scenes as the configuration draws them, corrected for the scenes that the search
+/// chose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightedRate {
     /// Names of the test's actions, joined by a space.
@@ -26,7 +27,7 @@ pub struct WeightedRate {
     pub property: String,
     /// Share of the scenes in which it fails in at least one action of the test.
     pub failing: Estimate,
-    /// Scenes that this is known from.
+    /// Number of scenes in the estimate.
     pub scenes: u64,
 }
 
@@ -35,10 +36,10 @@ pub struct WeightedRate {
 pub enum Ending {
     /// Every planned run was made.
     Finished,
-    /// A budget was spent; its runs up to there are in the history.
+    /// A budget was spent; the runs up to then are in the history.
     Budget(Spent),
-    /// Somebody asked it to stop.
+    /// It was interrupted.
     Interrupted,
-    /// The history could not be written, or no scene could be built.
+    /// An error stopped it, for example a history that could not be written, or a scene that could not be built.
     Stopped(Diagnostics),
 }

@@ -1,4 +1,4 @@
-//! Judges stored runs by other rules than those of their time, with no simulation.
+//! Judges stored runs again by other rules, without simulation.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -12,43 +12,44 @@ use crate::facts::{self, RunFacts};
 use crate::history::{History, Recheck, RunRow, StoredJudgement};
 use crate::rules::Budget;
 
-/// How runs are judged anew. The number of workers changes nothing of what comes out.
+/// Options of [`recheck`]. The number of workers does not change the result.
 #[derive(Debug, Clone)]
 pub struct RecheckOptions {
     /// Workers.
     pub jobs: usize,
-    /// Runs whose judgements are written in one transaction.
+    /// Number of runs whose judgements are written in one transaction.
     pub batch: usize,
-    /// The time that the judgements get, as RFC 3339.
+    /// Timestamp of the judgements, as RFC 3339.
     pub at: String,
 }
 
 impl RecheckOptions {
-    /// A quarter of a second's work: soon enough for a progress bar and for Ctrl-C, and long enough that the transaction costs
-    /// nothing.
+    /// Default batch: a quarter of a second of work. This is short enough for a progress bar and Ctrl-C, and long
+    /// enough to make the cost of a transaction negligible.
     pub const BATCH: usize = 256;
 }
 
-/// What there is to say when no more runs are judged.
+/// The result of [`recheck`].
 #[derive(Debug)]
 pub struct RecheckEnd {
-    /// Why there are no more.
+    /// Why it ended.
     pub ending: Ending,
-    /// Runs that were judged; what is news of them is in the history.
+    /// Number of judged runs; their changed judgements are in the history.
     pub judged: u64,
-    /// Why the others could not be judged, in the order of the runs.
+    /// Faults of the runs that could not be judged, in the order of the runs.
     pub faults: Diagnostics,
 }
 
-/// One batch of judged runs.
+/// The results of one batch of runs.
 type Judged = Vec<Result<Vec<Recheck>, Diagnostics>>;
 
-/// Judges runs by the rules that `rules_of` gives for each, and keeps what is news, a batch in one transaction.
+/// Judges runs by the rules that `rules_of` returns for each, and stores changed judgements, one transaction for each
+/// batch.
 ///
-/// `on_batch` is told of every run's judgements (the old ones among them) in the order of the runs, once they are in the
-/// history. `stop` ends it after the runs in flight; what was judged is kept. A run that can't be judged (its trace is damaged,
-/// the rules' ontology lacks its action) is left as it is and does not stop the others. Actions that did not come to their own
-/// end keep the outcomes that they have.
+/// `on_batch` is called once a batch is in the history, with all judgements (unchanged ones too) in the order of the
+/// runs. When `stop` is set, it ends after the runs in flight; their judgements are stored. A run that can't be judged
+/// (its trace is corrupt, or the rules' ontology lacks its action) is left unchanged and does not stop the others.
+/// Actions that did not complete keep their outcomes.
 pub fn recheck<'a>(
     history: &History,
     runs: &[RunRow],
@@ -118,7 +119,7 @@ fn parted(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
     (rechecks, faults)
 }
 
-/// Every asked property of every action of a run. A run that can't be judged has exactly one fault.
+/// Judges all actions of a run. A run that can't be judged has exactly one fault.
 fn judge_run(history: &History, run: &RunRow, rules: &RuleSet) -> Result<Vec<Recheck>, Diagnostics> {
     let trace = history.states(&run.run)?;
     let facts = facts::extract(&trace);
@@ -141,14 +142,14 @@ fn judge_step(
         let message = format!("run {} performed `{}`, which the ontology does not have", run.run, performed.action);
         return Err(Diagnostic::error("X031", message)
             .help(
-                "name the ontology that has it with `--ontology FILE`, or leave its campaign out with `--campaign ID`",
+                "name the ontology that has it with `--ontology FILE`, or select other campaigns with `--campaign ID`",
             )
             .into());
     };
     if action.success_properties.is_empty() {
         return Ok(Vec::new());
     }
-    // A test has as many actions as somebody typed.
+    // The length of a test is not limited.
     let number = u32::try_from(step + 1).unwrap_or(u32::MAX);
     let mut stored = history.newest(&run.run, number, &action.success_properties)?;
     let (facts, budget) = (facts.action(step), Budget::default());

@@ -1,4 +1,4 @@
-//! Runs a stored run again from its recorded choices, and says whether it went the same way.
+//! Runs a stored run again from its recorded choices, and compares the two.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,74 +12,74 @@ use crate::campaign::make_run::panic_text;
 use crate::campaign::{Change, Difference, Env, Failure, Manner, changes, first_difference};
 use crate::history::{CampaignRecord, History, RunDetail, RunRecord};
 
-/// Names of choices in one message; more would not be read.
+/// Maximum number of choices named in a message.
 const MOST_NAMED: usize = 8;
 
-/// A run's campaign as it is today, and as it was.
+/// A run's campaign as prepared today, and its record.
 pub type Recalled = (Env, CampaignRecord);
 
-/// How well the recorded choices must fit.
+/// How exactly the recorded choices must fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fit {
-    /// Every choice must be there, of the same kind, and none be left over.
+    /// Every choice must be recorded and of the same kind, and none may be left over.
     Exact,
-    /// Values are brought into their bounds, and what is missing is nominal.
+    /// Values are clamped to their bounds, and missing choices are nominal.
     Nearest,
 }
 
-/// What came of running a run again.
+/// The result of replaying a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replay {
     /// Id of the stored run.
     pub run: String,
     /// Names of its actions.
     pub test: String,
-    /// Whether every bit of every state is the same.
+    /// Whether all states are bitwise identical.
     pub same: bool,
-    /// Simulated time at which the clock on the wall had cut the run off; it is compared up to there. Unit: seconds.
+    /// Simulated time at which the wall-clock limit cut the run off; runs are compared up to then. Unit: seconds.
     pub cut_secs: Option<f64>,
-    /// Digest over all states, then and now.
+    /// Digests of all states, then and now.
     pub hashes: [String; 2],
-    /// Why it did not complete, then and now.
+    /// Reasons why it did not complete, then and now.
     pub reasons: [Option<String>; 2],
-    /// Where the traces part first. Nothing where they are the same, or part by less than the stored states show.
+    /// The first difference of the traces; `None` if they are identical or differ by less than the stored precision.
     pub difference: Option<Difference>,
-    /// Choices that did not fit.
+    /// Recorded choices that did not fit.
     pub misfits: Vec<Misfit>,
-    /// Outcomes that are others by the rules of today.
+    /// Outcomes that differ under the present rules.
     pub outcomes: Vec<OutcomeChange>,
-    /// What changed since.
+    /// Inputs that changed since.
     pub changes: Vec<Change>,
 }
 
 /// A recorded choice that did not fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Misfit {
-    /// Name of the choice; the second and later ones of a name have their number.
+    /// Name of the choice; with a number if it is not the first one of that name.
     pub name: String,
-    /// What is wrong with it.
+    /// Why it does not fit.
     pub kind: MisfitKind,
 }
 
-/// How a recorded choice can fail to fit.
+/// Reasons why a recorded choice does not fit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MisfitKind {
-    /// It was asked for and is not recorded; the nominal value was taken.
+    /// It is needed but not recorded; the nominal value was used.
     Missing,
-    /// It is recorded and was not asked for.
+    /// It is recorded but not needed.
     LeftOver,
-    /// It is made from something else now: other bounds, another number of things, another spread.
+    /// Its kind changed: other bounds, another number of candidates, or another standard deviation.
     OtherKind,
-    /// Its value had to be changed.
+    /// Its value was changed.
     Moved {
         /// The recorded value.
         was: f64,
-        /// The value that was taken.
+        /// The value that was used.
         is: f64,
     },
 }
 
-/// A property's outcome that is another one now; nothing where it was not judged.
+/// A changed outcome of a property; `None` on the side where it was not judged.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OutcomeChange {
     /// Position of the action in the test, from 1.
@@ -92,9 +92,9 @@ pub struct OutcomeChange {
     pub is: Option<String>,
 }
 
-/// Runs stored runs again on several workers, and tells each as it comes. `runs` are ids; `campaigns` has theirs, by id.
+/// Replays stored runs on several workers and calls `on_done` after each. `campaigns` has their campaigns by id.
 ///
-/// The answers are in the order of `runs` and depend neither on the number of workers nor on the clock.
+/// The results are in the order of `runs`. They depend neither on the number of workers nor on the clock.
 pub fn replay_all(
     history: &History,
     campaigns: &BTreeMap<String, Recalled>,
@@ -118,11 +118,11 @@ pub fn replay_all(
     Ok(pool.install(|| runs.par_iter().map(one).collect()))
 }
 
-/// Runs one stored run again.
+/// Replays one stored run.
 ///
 /// # Errors
-/// `S040` the configuration has no such test, `S041` the scene can't be built any more, `S042` the choices don't fit
-/// exactly and have to; or the stored trace can't be read.
+/// `S040` if the configuration has no such test, `S041` if the scene can no longer be built, `S042` if the choices must
+/// fit exactly and do not; or the stored trace can't be read.
 fn replay(
     history: &History,
     (env, record): &Recalled,
@@ -133,7 +133,7 @@ fn replay(
     let run = &detail.row.run;
     let (choices, was) = (history.choices(run)?, history.trace(run)?);
     let index = env.index_of(&detail.row.test, &choices)?;
-    // What the clock on the wall did is no part of a run's decisions: it is cut off at the same moment of simulated time.
+    // The wall clock is not part of a run's choices: the replay is cut off at the same simulated time.
     let cut_secs = cut_secs(&was);
     let cut = cut_secs.map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
     let is = again(env, &record.id, (index, &|| Choices::recorded(&choices)), manner, cut).map_err(|why| {
@@ -159,7 +159,7 @@ fn replay(
     })
 }
 
-/// Simulated time at which the clock had cut a run off.
+/// Simulated time at which the wall-clock limit cut a run off.
 fn cut_secs(trace: &Trace) -> Option<f64> {
     let cut = trace.actions.iter().any(|action| matches!(action.end, ActionEnd::Cut(_)));
     trace.snapshots.last().filter(|_| cut).map(|last| last.time_secs)
@@ -169,7 +169,7 @@ fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
     Diagnostic::error("S041", format!("run {} can't be run again: {why}", detail.row.run))
 }
 
-/// The run, once more. A crash of simulation is a run too.
+/// Makes the run again. A simulation crash counts as a run too.
 pub(super) fn again(
     env: &Env,
     campaign: &str,
@@ -180,7 +180,7 @@ pub(super) fn again(
     match catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, recorded()), manner, cut))) {
         Ok(Ok(record)) => Ok(record),
         Ok(Err(Failure::Interrupted)) => Err(Failure::Interrupted.to_string()),
-        Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can't be built any more: {reason}")),
+        Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can no longer be built: {reason}")),
         Err(panic) => {
             let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
             let redone = catch_unwind(AssertUnwindSafe(|| crashed(env, campaign, index, recorded(), &reason)));
@@ -189,7 +189,7 @@ pub(super) fn again(
     }
 }
 
-/// What does not fit between recorded choices and those that were made from them.
+/// Compares the recorded choices with those made from them.
 fn misfits(recorded: &[Choice], made: &[Choice]) -> Vec<Misfit> {
     let (recorded, made) = (by_name(recorded), by_name(made));
     let mut names: Vec<&str> = recorded.keys().chain(made.keys()).copied().collect();
@@ -232,7 +232,7 @@ fn unfit(detail: &RunDetail, misfits: &[Misfit]) -> Diagnostic {
         "S042",
         format!("the choices of run {} don't fit exactly: {}{rest}", detail.row.run, named.join(", ")),
     )
-    .help("`--nearest` brings values into their bounds and takes nominal ones for what is missing")
+    .help("`--nearest` clamps values to their bounds and uses nominal values for missing choices")
 }
 
 impl std::fmt::Display for Misfit {
@@ -240,14 +240,14 @@ impl std::fmt::Display for Misfit {
         let name = &self.name;
         match self.kind {
             MisfitKind::Missing => write!(f, "`{name}` is missing"),
-            MisfitKind::LeftOver => write!(f, "`{name}` is not asked for any more"),
-            MisfitKind::OtherKind => write!(f, "`{name}` is made from something else now"),
+            MisfitKind::LeftOver => write!(f, "`{name}` is no longer needed"),
+            MisfitKind::OtherKind => write!(f, "`{name}` has another kind or range now"),
             MisfitKind::Moved { was, is } => write!(f, "`{name}` was {was}, is {is}"),
         }
     }
 }
 
-/// Outcomes then and now, by action and property; only those that are others.
+/// Changed outcomes, sorted by action and property.
 fn outcome_changes(was: &RunDetail, is: &RunRecord) -> Vec<OutcomeChange> {
     let mut both: BTreeMap<(usize, &str), [Option<&'static str>; 2]> = BTreeMap::new();
     for (idx, action) in was.actions.iter().enumerate() {
@@ -288,9 +288,9 @@ mod tests {
         assert_eq!(
             told,
             [
-                "`a` is made from something else now",
+                "`a` has another kind or range now",
                 "`b` was 0.9, is 0.8",
-                "`b (2)` is not asked for any more",
+                "`b (2)` is no longer needed",
                 "`d` is missing",
             ]
         );

@@ -1,4 +1,4 @@
-//! What a scene has to satisfy before anything happens in it: a rule file of the configuration.
+//! A rule file of the configuration that scenes must satisfy before a run begins.
 
 use crate::actions::{ActionTrace, Frames, Trace};
 use crate::base::{Diagnostics, digest_of, names};
@@ -10,20 +10,21 @@ use crate::rules::{Budget, RuleBook, RuleFault};
 use crate::scenario::Scene;
 use crate::world::World;
 
-/// The rules that `[scene] require` names, ready to be asked.
+/// The rules that `[scene] require` names, prepared for evaluation.
 pub(super) struct Requirement {
     rules: RuleBook,
-    /// The property that stands for them.
+    /// IRI of the property that represents them.
     iri: String,
-    /// The file, as the configuration names it.
+    /// Path of the file as written in the configuration.
     path: String,
 }
 
 impl Requirement {
-    /// Prepares the rules of a configuration, if it has some, with the ontology's libraries.
+    /// Prepares the rules of a configuration with the ontology's libraries. Returns `None` if it has no rules for
+    /// scenes.
     ///
     /// # Errors
-    /// All faults of the file, each with its place; a budget that was spent.
+    /// All faults of the file, each with its place; or the budget is spent.
     pub(super) fn prepare(
         campaign: &Campaign,
         ontology: &Ontology,
@@ -35,7 +36,7 @@ impl Requirement {
         let property = Property {
             iri: iri.clone(),
             name: "SceneRequirement".to_owned(),
-            label: "what a scene has to satisfy".to_owned(),
+            label: "the scene's requirement".to_owned(),
             comment: None,
             rule: RuleFile {
                 source: source.clone(),
@@ -44,7 +45,7 @@ impl Requirement {
                 digest: digest_of(&source.text),
                 linked_at: None,
             },
-            // It may speak of everything that scene generation sets.
+            // The rules may use everything that scene generation sets.
             needs: ontology.designators.clone(),
             unit: None,
         };
@@ -54,14 +55,15 @@ impl Requirement {
         Ok(Some(Self { rules: RuleBook::prepare_within(&alone, budget)?, iri, path }))
     }
 
-    /// Whether a scene that has settled satisfies the rules.
+    /// Checks that a settled scene satisfies the rules.
     ///
     /// # Errors
-    /// It does not, or the rules could not be asked: the scene is discarded. Somebody interrupted.
+    /// [`Failure::Discard`] if it does not, or if the rules can't be evaluated; [`Failure::Interrupted`] if the
+    /// evaluation was interrupted.
     pub(super) fn check(&self, scene: &Scene, world: &World, budget: &Budget) -> Result<(), Failure> {
         let trace = Trace {
             snapshots: vec![world.snapshot()],
-            // It only says what the designators stand for.
+            // Not performed: it only holds the values of the designators.
             actions: vec![ActionTrace::not_reached("", &scene.designators)],
             frames: Frames::default(),
             hash: String::new(),
@@ -82,7 +84,7 @@ impl Requirement {
         match self.rules.judge(&asked, std::slice::from_ref(&self.iri), budget).remove(&self.iri) {
             Some(Ok(found)) if found.holds => Ok(()),
             Some(Err(RuleFault::Interrupted)) => Err(Failure::Interrupted),
-            Some(Err(fault)) => Err(Failure::Discard(format!("{} can't be asked: {fault}", self.path))),
+            Some(Err(fault)) => Err(Failure::Discard(format!("{} can't be evaluated: {fault}", self.path))),
             _ => Err(Failure::Discard(format!("does not satisfy {}", self.path))),
         }
     }

@@ -1,7 +1,7 @@
-//! Goes on with a campaign that was ended from outside: which one, whether everything is still as it was, what is there.
+//! Resumes an interrupted campaign: finds it, checks that its inputs are unchanged, and reads its stored runs.
 //!
-//! A resumed campaign follows the schedule from its beginning. What is in the history is taken from there instead of being
-//! made, so that budgets and guided schedules see the same runs in the same order as if nobody had interrupted it.
+//! A resumed campaign follows the schedule from its beginning. Stored runs are read from the history instead of being
+//! made, so that budgets and guided schedules see the same runs in the same order as without the interruption.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,19 +14,19 @@ use crate::config;
 use crate::history::{CampaignRecord, CampaignRow, History, RunDetail};
 use crate::rules::Budget;
 
-/// What is in the history of a campaign that goes on.
+/// The stored part of a resumed campaign.
 #[derive(Debug, Clone, Default)]
 pub struct Kept {
-    /// Its runs by index.
+    /// Runs by index.
     pub(super) runs: BTreeMap<u64, Told>,
-    /// Scenes that were discarded for them, with the reason, by index.
+    /// Scenes discarded for them: index of the run, and the reason.
     pub(super) discards: Vec<(u64, String)>,
-    /// Time on the clock that it has taken. Unit: seconds.
+    /// Wall-clock time that the campaign has taken so far. Unit: seconds.
     pub(super) elapsed_secs: f64,
 }
 
 impl Kept {
-    /// From the runs as they are read from the history.
+    /// Creates it from the runs of the history.
     pub fn of(runs: &[RunDetail]) -> Self {
         let discards = runs.iter().flat_map(|run| run.discards.iter().map(|reason| (run.row.index, reason.clone())));
         Self {
@@ -37,10 +37,10 @@ impl Kept {
     }
 }
 
-/// The campaign to go on with: the one with an id, or the newest unfinished one, of a configuration where one is named.
+/// Returns the campaign to resume: the one with this id, or else the newest unfinished one, of `config` if given.
 ///
 /// # Errors
-/// `H014` there is no such campaign, `X050` none is unfinished, or that one is finished.
+/// `H014` if there is no such campaign, `X050` if it is finished or none is unfinished.
 pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) -> Result<CampaignRecord, Diagnostics> {
     if let Some(id) = id {
         let record = history.campaign(id)?;
@@ -58,7 +58,7 @@ pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) ->
     }
     let of = config.map_or_else(String::new, |config| format!(" of {}", config.display()));
     Err(Diagnostic::error("X050", format!("the history `{}` has no unfinished campaign{of}", history.dir().display()))
-        .help("`actcheck run CONFIG` begins one; `--history DIR` names another history")
+        .help("`actcheck run CONFIG` begins one; `--history DIR` selects another history")
         .into())
 }
 
@@ -67,12 +67,12 @@ fn is_finished(row: &CampaignRow) -> bool {
 }
 
 fn finished_already(id: &str) -> Diagnostics {
-    Diagnostic::error("X050", format!("campaign {id} is finished: there is nothing to go on with"))
+    Diagnostic::error("X050", format!("campaign {id} is finished and can't be resumed"))
         .help(format!("`actcheck list --campaign {id}` shows its runs"))
         .into()
 }
 
-/// Where the configuration of a campaign lies.
+/// The path of a campaign's configuration.
 fn config_of(history: &History, record: &CampaignRecord) -> PathBuf {
     config::beside(history.dir(), &record.config_path)
 }
@@ -85,11 +85,11 @@ fn is_same_file(one: &Path, other: &Path) -> bool {
 }
 
 impl Env {
-    /// What a campaign needs to go on: its configuration, ontology, rules and models as they lie there now, with what
-    /// the command line had asked for when it began.
+    /// Prepares a campaign for resumption: with the present configuration, ontology, rules and models, and the
+    /// command-line overrides with which it began.
     ///
     /// # Errors
-    /// As [`Env::prepare`]; `X051` something is no longer as it was when the campaign began.
+    /// As [`Env::prepare`]; `X051` if an input has changed since the campaign began.
     pub fn resume(history: &History, record: &CampaignRecord, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let mut campaign = config::load(&config_of(history, record), &asked_for(history, record))?;
         campaign.test_count = Self::scenes_of_a_test(&campaign, record);
@@ -110,9 +110,9 @@ fn changed_since(record: &CampaignRecord, changed: &[Change]) -> Diagnostics {
         faults.push(
             Diagnostic::error(
                 "X051",
-                format!("campaign {} can't go on: the {kind} `{name}` was {was}, is {is}", record.id),
+                format!("campaign {} can't be resumed: the {kind} `{name}` was {was}, is {is}", record.id),
             )
-            .help("bring back what it began with, or begin a new campaign: its runs stay in the history"),
+            .help("restore the original, or begin a new campaign: the runs so far stay in the history"),
         );
     }
     faults

@@ -1,4 +1,4 @@
-//! The rules that stored runs are judged by.
+//! The rules for judging stored runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -7,19 +7,19 @@ use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
 use crate::ontology::{self, Action, Ontology};
 use crate::rules::RuleBook;
 
-/// An ontology with its rules, prepared once, and which of its success properties are judged.
+/// A prepared ontology with its rules, and the success properties to judge.
 pub struct RuleSet {
     pub(super) ontology: Ontology,
     pub(super) rules: RuleBook,
-    /// Actions by local name, with the properties that are judged only.
+    /// Actions by local name, with only the properties to judge.
     pub(super) actions: BTreeMap<String, Action>,
 }
 
 impl RuleSet {
-    /// Reads, checks and plans everything that an ontology links. All success properties are judged.
+    /// Reads an ontology, and checks and plans its rules. All success properties are judged.
     ///
     /// # Errors
-    /// All faults of the ontology, or all of its rules, each with its place.
+    /// All faults of the ontology, or else all faults of its rules, each with its place.
     pub fn prepare(files: &Files, path: &Path) -> Result<Self, Diagnostics> {
         let ontology = ontology::load(files, path)?;
         let rules = RuleBook::prepare(&ontology)?;
@@ -27,10 +27,10 @@ impl RuleSet {
         Ok(Self { ontology, rules, actions })
     }
 
-    /// The same for some properties only, by local name or IRI; none means all.
+    /// Restricts it to some properties, given by local name or IRI. An empty list means all.
     ///
     /// # Errors
-    /// `X030` no action has such a success property: every such name.
+    /// `X030` for every name that is not a success property of any action.
     pub fn only(mut self, properties: &[String]) -> Result<Self, Diagnostics> {
         if properties.is_empty() {
             return Ok(self);

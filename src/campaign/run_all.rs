@@ -13,13 +13,13 @@ use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Planned, Schedule,
 use crate::config::Launcher;
 use crate::history::{History, RunRecord};
 
-/// The store is brought to the disk at least this often. Unit: seconds.
+/// Maximum time between flushes of the store to disk. Unit: seconds.
 const FLUSH_SECS: f64 = 1.0;
 
-/// Runs for each worker that may be ahead of the slowest one: made, and not yet kept because an earlier one is not.
+/// Maximum number of runs per worker that are made but not stored yet, because an earlier run is missing.
 const AHEAD: usize = 4;
 
-/// How a campaign is run. The number of workers and the clock change nothing of what comes out.
+/// Options of [`run_all`]. Neither the number of workers nor the clock changes the runs.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// Workers, one simulation each.
@@ -28,24 +28,24 @@ pub struct Options {
     pub manner: Manner,
 }
 
-/// A planned run and its place in the schedule, from 0.
+/// A planned run and its position in the schedule, from 0.
 struct Order {
     place: u64,
     planned: Planned,
 }
 
-/// What a worker made of an order.
+/// The result of an order.
 struct Made {
     place: u64,
     making: Making,
 }
 
-/// Makes every run of the schedule, commits each in a transaction of its own, and then tells `on_run` of it.
+/// Makes every run of the schedule, commits each in a transaction of its own, and then calls `on_run`.
 ///
-/// Runs are kept in the order of the schedule, whatever the number of workers: what is in the history is its beginning.
-/// Budgets that count runs are decided on them in the same order: what was made beyond is not kept.
-/// `stop`, and a campaign's time, end it after the runs in flight; where it is the stop of the environment's budget too, a run whose
-/// rules take long is given up. A run is told only when it is in the history.
+/// Runs are stored in the order of the schedule, whatever the number of workers: the history always has a prefix of the
+/// schedule. Budgets count the runs in the same order, and runs beyond a budget are discarded. `stop`, or the
+/// campaign's time limit, ends it after the runs in flight. If `stop` is also the stop flag of the environment's rule
+/// budget, long rule evaluations are interrupted too. `on_run` is called only for runs that are in the history.
 pub fn run_all(
     env: &Env,
     history: &History,
@@ -57,7 +57,8 @@ pub fn run_all(
     resume_all(env, (history, Kept::default()), campaign, options, stop, on_run)
 }
 
-/// The same for a campaign of which some runs are in the history: they count, but are neither made nor told again.
+/// As [`run_all`], for a campaign with runs in the history: these count, but are neither made nor passed to `on_run`
+/// again.
 pub fn resume_all(
     env: &Env,
     (history, mut kept): (&History, Kept),
@@ -99,7 +100,7 @@ pub fn resume_all(
         {
             keeper.end.ending = Ending::Budget(Spent::Time(limit));
         }
-        // What is still being made is not wanted any more; without orders the workers end.
+        // Runs still being made are no longer needed. Workers end when the channel of orders is closed.
         halt.store(true, Ordering::Relaxed);
         drop(orders);
     });
@@ -107,7 +108,7 @@ pub fn resume_all(
     keeper.finish()
 }
 
-/// One worker: takes orders until there are none.
+/// One worker: processes orders until the channel is closed.
 fn work(
     env: &Env,
     campaign: &str,
@@ -126,7 +127,7 @@ fn work(
     }
 }
 
-/// Hands out what the schedule plans and has kept what comes back, in order. `stored` is in the history already.
+/// Sends the planned runs to the workers and stores the results in order. `stored` are the runs in the history already.
 fn conduct(
     (schedule, mut stored): (&mut dyn Schedule, BTreeMap<u64, Told>),
     keeper: &mut Keeper<'_>,
@@ -134,7 +135,7 @@ fn conduct(
     ahead: usize,
 ) {
     let mut batch = VecDeque::new();
-    // Runs that came before one that the schedule has before them.
+    // Results that arrived before earlier ones of the schedule.
     let mut early = BTreeMap::new();
     let (mut ordered, mut kept) = (0, 0);
     loop {
@@ -166,20 +167,20 @@ fn conduct(
     }
 }
 
-/// The only place that writes runs.
+/// Writes the runs; nothing else does.
 struct Keeper<'a> {
     history: &'a History,
     manner: Manner,
-    /// When the campaign would have begun if nobody had interrupted it, by the manner's clock.
+    /// Start of the campaign on the manner's clock, less the time taken before it was interrupted.
     began_secs: f64,
     on_run: &'a mut dyn FnMut(&RunRecord),
     end: CampaignEnd,
     tally: Tally,
-    /// Runs in a row, up to now, that a program ended by a fault of its own.
+    /// Number of latest runs in a row that the program broke by a fault of its own.
     broken_in_a_row: u64,
-    /// So many of them are enough.
+    /// Limit on `broken_in_a_row`.
     most_broken: Option<u64>,
-    /// Runs of the batch, as the schedule is told of them.
+    /// Summaries of the batch's runs for the schedule.
     told: Vec<Told>,
     flushed_at: f64,
 }
@@ -212,7 +213,7 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// Keeps the schedule's next run, and says whether there may be another one.
+    /// Stores the next run of the schedule. Breaks if it is the last one.
     fn keep(&mut self, making: Making) -> ControlFlow<()> {
         match making {
             Making::Run(mut record) => {
@@ -238,8 +239,9 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// A program that breaks run after run breaks the next one, too. Runs are kept in the order of the schedule, so that the last
-    /// one is the same whatever the number of workers. Somebody who resumes the campaign gives the program another chance.
+    /// Stops the campaign if the program has broken too many runs in a row. Runs are counted in the order of the
+    /// schedule, so that the last one is the same whatever the number of workers. A resumed campaign starts counting
+    /// from 0.
     fn bear(&mut self, record: &RunRecord) -> ControlFlow<()> {
         self.broken_in_a_row = if record.program_output.is_some() { self.broken_in_a_row + 1 } else { 0 };
         match self.most_broken {
@@ -290,13 +292,13 @@ impl<'a> Keeper<'a> {
     }
 }
 
-/// Why a campaign stops whose program breaks so many runs in a row.
+/// The error of a campaign whose program broke `most` runs in a row.
 fn hopeless(most: u64, last: &RunRecord) -> Diagnostic {
     let reason = last.reason.as_deref().unwrap_or_default();
     let runs = if most == 1 { "a run was".to_owned() } else { format!("{most} runs in a row were") };
     let message = format!("{runs} broken by the program that performs actions; the last one, {}: {reason}", last.id);
     Diagnostic::error("S033", message).help(format!(
-        "`actcheck show {}` shows what it printed; `[skill] max_broken` says how many such runs are borne",
+        "`actcheck show {}` shows its output; `[skill] max_broken` is the allowed number of such runs in a row",
         last.id
     ))
 }

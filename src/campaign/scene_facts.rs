@@ -1,5 +1,5 @@
-//! What a scene itself says of its things and of what makes sensing wrong: facts for its requirement alone. No action has them, as
-//! no verdict may depend on what a thing is there for.
+//! Facts about a scene's objects and its sensor noise, only for the scene requirement. Actions don't have them, because
+//! no verdict may depend on the role of an object.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use crate::history;
 use crate::ontology::VocabularyTerm;
 use crate::scenario::Scene;
 
-/// Local names of what is said of things and worlds, as in histories.
+/// Local names of the terms for objects and worlds, as in histories.
 const NAMED: [&str; 3] = ["role", "model", "worldName"];
 
-/// The terms of these facts, all of the namespace `act:`, for the rules to use.
+/// The terms of these facts for rules; all are in the namespace `act:`.
 pub(super) fn vocabulary() -> BTreeMap<String, VocabularyTerm> {
     let term = || VocabularyTerm { is_property: true, ..VocabularyTerm::default() };
     NAMED.into_iter().chain(history::NOISE_TERMS).map(|local| (names::act(local), term())).collect()
 }
 
-/// Adds them to the facts of the scene's first moment: of each thing its role and its model, of the robot its world and its noise.
+/// Adds the facts to the first state: role and model of each object, world and noise of the robot.
 pub(super) fn add(scene: &Scene, facts: &mut RunFacts) {
     let RunFacts { terms, snapshots, .. } = facts;
     let Some(state) = snapshots.first_mut() else { return };

@@ -1,7 +1,7 @@
-//! Which runs a campaign makes, in which order, and from which decisions.
+//! Schedules: the runs of a campaign, their order, and their choices.
 //!
-//! A schedule depends on its configuration and on what came of earlier batches, and on nothing else: neither the number of
-//! workers nor the moment at which somebody stopped and resumed the campaign changes it.
+//! A schedule depends only on its configuration and on the results of earlier batches, neither on the number of workers
+//! nor on interruptions of the campaign.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,43 +13,43 @@ use crate::history::{Repetition, RunDetail, RunRecord};
 use crate::search::Strategy;
 use crate::verdict::{Judgement, Outcome};
 
-/// Runs of a plain campaign that are planned at a time. Workers wait for each other only between batches, so a large number
-/// costs nothing; it bounds the memory of a campaign of millions of runs.
+/// Runs in a batch of a campaign without a search. Workers wait for each other only between batches, so a large number
+/// costs nothing; the limit bounds the memory of a campaign of millions of runs.
 const BATCH: usize = 10_000;
 
-/// Sets streams of noise apart from those of scenes.
+/// Separates random streams of noise from those of scenes.
 const NOISE: u64 = 1 << 63;
 
-/// A run that is to be made.
+/// A planned run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
     /// Position in the campaign, from 0: the run's number is the index + 1.
     pub index: u64,
     /// Number of its scene in the campaign, from 0.
     pub scene: u64,
-    /// Number of the run among those of its scene, from 0; nothing where every scene is run once.
+    /// Number of the repetition of its scene, from 0; `None` if every scene is run once.
     pub repetition: Option<u64>,
-    /// What of its scene is not left to chance; nothing where all is.
+    /// The choices of its scene that a search made; `None` if all are random.
     pub steering: Option<Arc<Steering>>,
 }
 
-/// What a search decided of a scene.
+/// The choices of a scene that a search made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steering {
-    /// Quantiles of choices by their names.
+    /// Quantiles of choices by name.
     pub quantiles: BTreeMap<String, f64>,
-    /// Importance weight of the scene, where scenes are not drawn as the configuration's ranges say.
+    /// Importance weight of the scene, if scenes are not drawn from the configuration's distribution.
     pub weight: Option<f64>,
 }
 
 impl Planned {
-    /// The decisions of the run's `attempt`, from 0: the scenes of the attempts before had to be discarded.
+    /// Returns the choices of the run's `attempt`, from 0; the scenes of earlier attempts were discarded.
     ///
-    /// Attempts have streams of their own, so that a discard moves no other run's decisions; and so has the noise of each
-    /// repetition, whatever the number of repetitions.
+    /// Each attempt has its own random stream, so that a discard does not change the choices of other runs. The noise
+    /// of each repetition has its own stream too, whatever the number of repetitions.
     pub fn choices(&self, seed: u64, attempt: u64) -> Choices {
         let stream = self.scene | (attempt << 48);
-        // Where the steered scene can't be built, one that nobody steers stands in for it.
+        // If the steered scene can't be built, a random one replaces it.
         let scene = match self.steering.as_ref().filter(|_| attempt == 0) {
             Some(steering) => Choices::steered(&steering.quantiles, seed, stream),
             None => Choices::random(seed, stream),
@@ -60,42 +60,42 @@ impl Planned {
         }
     }
 
-    /// What the run's record says of it.
+    /// The repetition for the run's record.
     pub fn repetition(&self) -> Option<Repetition> {
         self.repetition.map(|number| Repetition { scene: self.scene, number })
     }
 }
 
-/// What a schedule is told of a run that is in the history.
+/// Summary of a stored run for the schedule.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Told {
     /// Position in the campaign, from 0.
     pub index: u64,
-    /// Scenes that were discarded before the one of the run.
+    /// Number of scenes discarded before the one of the run.
     pub discards: u64,
-    /// What came of each property of each action.
+    /// Outcome of each property of each action.
     pub outcomes: Vec<ToldOutcome>,
 }
 
-/// What came of a property in a run.
+/// Outcome of a property in a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToldOutcome {
-    /// IRI.
+    /// IRI of the property.
     pub property: String,
     /// The outcome.
     pub outcome: Outcome,
-    /// How far from flipping, in the property's unit; positive: passed.
+    /// Distance from the opposite outcome, in the property's unit; positive if it passed.
     pub margin: Option<f64>,
 }
 
 impl Told {
-    /// What there is to tell of a new run.
+    /// Summarises a new run.
     pub fn of(record: &RunRecord) -> Self {
         let outcomes = record.judgements.iter().flatten().map(ToldOutcome::of);
         Self { index: record.index, discards: record.discards.len() as u64, outcomes: outcomes.collect() }
     }
 
-    /// The same of a run that is read from the history.
+    /// Summarises a run of the history.
     pub fn again(run: &RunDetail) -> Self {
         let outcomes = run.actions.iter().flat_map(|action| &action.judgements).map(ToldOutcome::of);
         Self { index: run.row.index, discards: run.discards.len() as u64, outcomes: outcomes.collect() }
@@ -108,20 +108,20 @@ impl ToldOutcome {
     }
 }
 
-/// Says which runs come next.
+/// Plans the runs of a campaign in batches.
 pub trait Schedule {
-    /// The next runs, in the order in which they are kept; none when there are no more.
+    /// Returns the next runs, in the order in which they are stored; empty if the schedule is finished.
     ///
-    /// It is asked when every run of the batch before is in the history; `told` are those, in the same order.
+    /// It is called when all runs of the previous batch are in the history; `told` has these runs, in the same order.
     fn next_batch(&mut self, told: &[Told]) -> Vec<Planned>;
 
-    /// How often properties fail, where counts of runs don't tell: from the batches that it was told of as a whole.
+    /// Failure rates of properties, if the raw counts of runs are biased. They cover the complete batches so far.
     fn rates(&self) -> Vec<WeightedRate> {
         Vec::new()
     }
 }
 
-/// The schedule that a campaign's configuration asks for.
+/// Returns the schedule of a campaign's configuration.
 pub fn schedule_of(env: &Env) -> Box<dyn Schedule> {
     let all: Box<dyn Schedule> = if env.campaign.search == Strategy::Random {
         let tests = env.campaign.tests.len() as u64;
@@ -136,11 +136,11 @@ pub fn schedule_of(env: &Env) -> Box<dyn Schedule> {
     }
 }
 
-/// Every scene of every test, as often as it is run. Tests take turns, so that whatever ends a campaign early leaves as
-/// many scenes of each.
+/// All repetitions of all scenes of all tests. Tests alternate, so that a campaign that ends early has about the same
+/// number of scenes of each.
 struct InTurns {
     tests: u64,
-    /// Of each test.
+    /// Scenes of each test.
     scenes: u64,
     /// Runs of each scene.
     repeat: u64,
@@ -149,7 +149,7 @@ struct InTurns {
 }
 
 impl InTurns {
-    /// The run at a place of the schedule, from 0.
+    /// The run at a position of the schedule, from 0.
     fn planned(&self, place: u64) -> Planned {
         let (turn, repetition) = (place / self.repeat, place % self.repeat);
         let scene = turn % self.tests * self.scenes + turn / self.tests;
@@ -167,7 +167,7 @@ impl Schedule for InTurns {
     }
 }
 
-/// The runs of another schedule that belong to one part of the campaign. That schedule must not depend on what it is told.
+/// The runs of another schedule that belong to one shard. That schedule must not depend on the results of runs.
 struct OneShard {
     all: Box<dyn Schedule>,
     shard: Shard,
@@ -176,11 +176,11 @@ struct OneShard {
 impl Schedule for OneShard {
     fn next_batch(&mut self, _told: &[Told]) -> Vec<Planned> {
         loop {
-            // A part of what came of the runs would be no use to a schedule that goes by it.
+            // The results of one shard would mislead a schedule that uses them.
             let mut batch = self.all.next_batch(&[]);
             let last = batch.is_empty();
             batch.retain(|planned| self.shard.has(planned.index));
-            // A batch without a run of this part is not the end.
+            // A batch may have no run of this shard; that is not the end.
             if last || !batch.is_empty() {
                 return batch;
             }
@@ -216,7 +216,7 @@ mod tests {
         assert_eq!(batch[5].repetition(), Some(Repetition { scene: 2, number: 2 }));
     }
 
-    /// Repetitions share the scene, and keep their noise when there are more of them.
+    /// Repetitions share the scene, and their noise does not depend on their number.
     #[test]
     fn repetitions_differ_in_noise_alone() {
         let drawn = |scene, repetition| {

@@ -1,4 +1,4 @@
-//! The cube that a campaign's search looks through, and what a point of it decides in a run.
+//! The unit cube of a campaign's search, and the choices that its points determine.
 
 use std::collections::BTreeMap;
 
@@ -6,15 +6,15 @@ use crate::campaign::Env;
 use crate::scenario::ParameterKind;
 use crate::search::{Dimension, Space};
 
-/// The axes of a campaign's cube, each with the names of the choices that it decides.
+/// The axes of the cube, each with the names of the choices that it determines.
 #[derive(Debug, Clone)]
 pub(super) struct SearchSpace {
     axes: Vec<(Vec<String>, Dimension)>,
 }
 
 impl SearchSpace {
-    /// The scene's parameters, and how wrong the robot is about where things and itself are. Where scenes are repeated noise is
-    /// left alone: it is what the repetitions differ in.
+    /// Creates the cube from the scene's parameters and from the noise of object and robot poses. If scenes are
+    /// repeated, noise is not an axis, because repetitions differ in it.
     pub fn new(env: &Env) -> Self {
         let parameters = env.space.parameters();
         let index_of = |name: &str| parameters.iter().position(|parameter| parameter.name == name);
@@ -37,14 +37,14 @@ impl SearchSpace {
         Space::new(self.axes.iter().map(|(_, dimension)| *dimension))
     }
 
-    /// What a point decides: quantiles by the name of the choice.
+    /// Returns the quantiles of a point, by the name of the choice.
     pub fn quantiles(&self, point: &[f64]) -> BTreeMap<String, f64> {
         let pairs = self.axes.iter().zip(point);
         pairs.flat_map(|((names, _), value)| names.iter().map(|name| (name.clone(), *value))).collect()
     }
 }
 
-/// The noise of where things seem to be: of the target, of the robot itself, and of the first other thing of each model.
+/// Pose noise of the target, of the robot, and of the first other object of each model.
 fn noises(env: &Env) -> Vec<(Vec<String>, Dimension)> {
     let (sensing, targets) = (&env.campaign.sensing, env.space.target_ids());
     let (flat, turning) = (sensing.position_noise_m, sensing.heading_noise_rad);
@@ -55,7 +55,7 @@ fn noises(env: &Env) -> Vec<(Vec<String>, Dimension)> {
         }
     };
     for (side, sigma) in [("x", flat), ("y", flat), ("z", sensing.height_noise_m)] {
-        // Whichever model the target is of: one axis for the same noise.
+        // One axis for the target's noise, whatever its model.
         add(targets.iter().map(|id| format!("sense.{id}.{side}")).collect(), sigma, Dimension::Normal);
     }
     let itself = sensing.localisation_noise_m;

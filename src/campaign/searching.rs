@@ -1,4 +1,4 @@
-//! The schedule of a campaign whose scenes a search chooses.
+//! The schedule of a campaign with a search.
 
 use std::sync::Arc;
 
@@ -7,9 +7,9 @@ use crate::campaign::{Env, Planned, Schedule, Steering, Told, WeightedRate};
 use crate::search::{Ask, Search, Told as ToldOfOne};
 use crate::verdict::Outcome;
 
-/// Asks the search of one test after the other for a generation of scenes, and tells it what came of them.
+/// Asks the searches of the tests in turn for a generation of scenes, and returns the results to them.
 ///
-/// Which scenes are asked for depends on the seed and on what was told before, generation by generation: not on workers.
+/// The scenes depend on the seed and on the results of earlier generations, not on the number of workers.
 pub(super) struct Searching {
     space: SearchSpace,
     tests: Vec<SearchedTest>,
@@ -17,9 +17,9 @@ pub(super) struct Searching {
     scenes: u64,
     /// Runs of each scene.
     repeat: u64,
-    /// The test whose generation is being made.
+    /// Position of the test whose generation is being made.
     turn: usize,
-    /// Whether one is being made.
+    /// Whether a generation is being made.
     asked: bool,
 }
 
@@ -27,9 +27,9 @@ struct SearchedTest {
     /// Names of its actions, joined by a space.
     name: String,
     search: Search,
-    /// What it learns from, in this order: IRIs of the properties of its actions.
+    /// IRIs of the properties that it learns from, in this order.
     properties: Vec<String>,
-    /// Scenes that were asked for so far.
+    /// Number of scenes so far.
     made: u64,
 }
 
@@ -38,7 +38,7 @@ impl Searching {
         let campaign = &env.campaign;
         let space = SearchSpace::new(env);
         let search = |number: usize| {
-            // Of its own: the campaign's seed itself gives the decisions that no search makes.
+            // Not the campaign's seed itself, which drives the choices outside the search.
             let seed = campaign.seed.rotate_left(17) ^ (0x5eed_0000_0000_0001 + number as u64);
             Search::new(space.cube(), campaign.search, seed)
         };
@@ -54,7 +54,7 @@ impl Searching {
         Self { tests: tests.collect(), space, scenes, repeat, turn: 0, asked: false }
     }
 
-    /// All runs of the scenes that a generation asks for.
+    /// All runs of a generation's scenes.
     fn planned(&self, asked: &[Ask], first: u64) -> Vec<Planned> {
         let guided = self.tests[self.turn].search.strategy().is_guided();
         let of_scene = |(ask, scene): (&Ask, u64)| {
@@ -80,7 +80,7 @@ impl Schedule for Searching {
         let (turn, scenes) = (self.turn, self.scenes);
         self.asked = true;
         let Some(test) = self.tests.get_mut(turn) else { return Vec::new() };
-        // All tests have as many scenes, so that one is done only when they all are.
+        // All tests have the same number of scenes, so they finish in the same turn.
         let asked = test.search.ask(usize::try_from(scenes - test.made).unwrap_or(usize::MAX));
         let first = turn as u64 * scenes + test.made;
         test.made += asked.len() as u64;
@@ -94,14 +94,14 @@ impl Schedule for Searching {
 }
 
 impl SearchedTest {
-    /// Tells the first run of each scene: repetitions are of one scene, and an estimate must not count it twice.
+    /// Passes the first run of each scene to the search: an estimate must count each scene once, not its repetitions.
     fn tell(&mut self, told: &[Told], repeat: u64) {
         for run in told.iter().filter(|run| run.index % repeat == 0) {
             let said: Vec<ToldOfOne> = self.properties.iter().map(|property| said(run, property)).collect();
             if run.discards == 0 {
                 self.search.tell(said);
             } else {
-                // The scene that was asked for could not be built: the run's is one that could, drawn at random.
+                // The requested scene could not be built: the run has a random scene instead.
                 self.search.tell_stand_in(&said);
             }
         }
@@ -121,7 +121,7 @@ impl SearchedTest {
     }
 }
 
-/// What a run says of a property: over all actions that have it, the worst.
+/// The worst result of a property over all actions of a run.
 fn said(run: &Told, property: &str) -> ToldOfOne {
     let own = || run.outcomes.iter().filter(|outcome| outcome.property == property);
     let decided = own().filter(|outcome| matches!(outcome.outcome, Outcome::Passed | Outcome::Failed));

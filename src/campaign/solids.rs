@@ -1,5 +1,4 @@
-//! Meshes of models and of the robot taken apart before the first run, from files beside the history where it was done
-//! before.
+//! Decomposes the meshes of models and robot into convex hulls before the first run, with a cache beside the history.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,20 +9,20 @@ use crate::base::{Diagnostic, Diagnostics, Digest};
 use crate::config::{Campaign, Mesh, ObjectModel, Part, Shape};
 use crate::world;
 
-/// Folder of the files, in that of the history.
+/// Cache folder in the history's folder.
 const FOLDER: &str = "hulls";
-/// What each file begins with; another number means another format.
+/// The start of each file, with the format version.
 const TITLE: &str = "actcheck hulls 1";
 
-/// Solids by the key of their mesh, kept in memory and on disk.
+/// Convex decompositions by the key of their mesh, cached in memory and on disk.
 struct Kept {
     folder: PathBuf,
     known: BTreeMap<String, Result<Vec<Shape>, String>>,
 }
 
-/// Replaces the meshes of everything that the campaign can put into a scene by convex solids.
+/// Replaces the meshes of the robot and of all models that the campaign uses by convex hulls.
 ///
-/// Faults: a mesh of which nothing solid can be made (W037).
+/// Adds a fault (W037) for each mesh without a convex decomposition.
 pub(super) fn take_apart(campaign: &mut Campaign, faults: &mut Diagnostics) {
     let mut kept = Kept { folder: campaign.history.join(FOLDER), known: BTreeMap::new() };
     let used = campaign.used_models();
@@ -60,7 +59,7 @@ fn solid_parts(model: &ObjectModel, kept: &mut Kept) -> Result<Vec<Part>, String
 }
 
 impl Kept {
-    /// The solids of a mesh; any other shape as it is.
+    /// Returns the convex hulls of a mesh, or any other shape unchanged.
     fn solids(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
         let Shape::Mesh { mesh } = shape else { return Ok(vec![shape.clone()]) };
         let key = world::decomposition_key(mesh);
@@ -78,13 +77,13 @@ impl Kept {
             return Ok(solids);
         }
         let solids = world::decompose(mesh)?;
-        // A file that can't be written costs time the next time, and nothing else.
+        // If the cache can't be written, the mesh is decomposed again next time.
         let _ = write(&path, &solids);
         Ok(solids)
     }
 }
 
-/// The solids of a file; nothing where it is not there, of another format, or not as it was written.
+/// Reads a cache file. Returns `None` if it is missing, corrupt or in another format.
 fn read(path: &Path) -> Option<Vec<Shape>> {
     let bytes = fs::read(path).ok()?;
     let (head, body) = bytes.split_at_checked(bytes.iter().position(|byte| *byte == b'\n')? + 1)?;
@@ -94,7 +93,7 @@ fn read(path: &Path) -> Option<Vec<Shape>> {
     (!solids.is_empty() && solids.iter().all(is_solid)).then_some(solids)
 }
 
-/// Writes a file as a whole: a reader finds all of it or none.
+/// Writes a file atomically: a reader finds all of it or none.
 fn write(path: &Path, solids: &[Shape]) -> Result<(), String> {
     let body = postcard::to_stdvec(solids).map_err(|error| error.to_string())?;
     let unfinished = path.with_extension(format!("{}.tmp", std::process::id()));
@@ -105,7 +104,7 @@ fn write(path: &Path, solids: &[Shape]) -> Result<(), String> {
     written.map_err(|error| error.to_string())
 }
 
-/// The first line: the format, and a digest of the rest.
+/// The first line: the format and a digest of the rest.
 fn head_of(body: &[u8]) -> String {
     let mut digest = Digest::new();
     digest.update(body);
@@ -116,31 +115,31 @@ fn head_of(body: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    /// Every bit comes back from disk, and a file that was tampered with does not count.
+    /// Values are read back bit by bit, and a modified file is rejected.
     #[test]
     fn solids_come_back_as_they_were_or_not_at_all() {
-        let folder = tempfile::tempdir().expect("it is right");
+        let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("deep/key.hulls");
         let third = 1.0 / 3.0;
         let solids = vec![Shape::Hull {
             points: vec![[third, -0.0, 1e-300], [1.0, 0.1, 0.2], [f64::MAX, 0.3, 5e-324], [0.7, third / 7.0, 9.9]],
             volume: third,
         }];
-        write(&path, &solids).expect("it is right");
+        write(&path, &solids).expect("the cache can be written");
         let Some([Shape::Hull { points, volume }]) = read(&path).as_deref().map(|list| [list[0].clone()]) else {
-            panic!("it is there");
+            panic!("one hull is read");
         };
         let Shape::Hull { points: expected, .. } = &solids[0] else { unreachable!() };
         let bits = |list: &[[f64; 3]]| list.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
         assert_eq!((bits(&points), volume.to_bits()), (bits(expected), third.to_bits()));
-        let bytes = fs::read(&path).expect("it is right");
+        let bytes = fs::read(&path).expect("the cache can be read");
         for at in [0, bytes.len() / 2, bytes.len() - 1] {
             let mut other = bytes.clone();
             other[at] ^= 1;
-            fs::write(&path, other).expect("it is right");
+            fs::write(&path, other).expect("the cache can be written");
             assert!(read(&path).is_none(), "byte {at}");
         }
-        fs::write(&path, &bytes[..bytes.len() / 2]).expect("it is right");
+        fs::write(&path, &bytes[..bytes.len() / 2]).expect("the cache can be written");
         assert!(read(&path).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! One scene from a list of choices.
+//! Draws one scene from choices.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -10,34 +10,34 @@ use crate::scenario::overlap::Solid;
 use crate::scenario::surroundings::Surroundings;
 use crate::scenario::{RobotStart, Role, Scene, SceneMap, SceneObject, Space, placement};
 
-/// Places tried for one object before the scene is given up. On a table that is half full, about every second try finds
-/// a free place: fifty that fail mean that there is none worth looking for.
+/// Maximum number of tries to place one object; then the scene is discarded. On a half-full table about every second
+/// try succeeds, so after fifty failures further tries are not worthwhile.
 pub(super) const TRIES: u32 = 50;
-/// Gap between two platforms on an empty floor: a robot drives through. Unit: metres.
+/// Gap between two platforms on an empty floor, wide enough for a robot to drive through. Unit: metres.
 const PLACE_GAP_M: f64 = 1.2;
-/// World of a configuration that names none.
+/// Name of the world if the configuration names none.
 const DEFAULT_WORLD: &str = "empty";
 
-/// A scene that could not be made, as data: the campaign counts it.
+/// A scene that could not be generated. The campaign counts discards.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("found no free place for `{model}` ({name}) in {tries} tries")]
 pub struct Discard {
     /// Name of the model.
     pub model: String,
-    /// Under which its choices are recorded, such as `other.3`.
+    /// Prefix of its choices, such as `other.3`.
     pub name: String,
-    /// How many places were tried.
+    /// Number of tries.
     pub tries: u32,
 }
 
-/// One scene: a function of the choices alone.
+/// Draws one scene. It depends only on the choices.
 ///
-/// Where the world has no surfaces of its own, the platform's middle is its origin. The robot stands on the platform's
-/// negative x side; where the test begins with a drive, somewhere else. But for that, all tests of a configuration draw
-/// from the same space.
+/// If the world has no surfaces of its own, the centre of the platform is the origin. The robot starts on the
+/// platform's negative x side, or somewhere else if the test begins with a drive. Apart from that, all tests of a
+/// configuration draw from the same space.
 ///
 /// # Errors
-/// An object found no free place.
+/// No free place was found for an object or the robot.
 pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
     let mut hand = Hand {
         space,
@@ -87,7 +87,7 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
     })
 }
 
-/// A platform as its model is.
+/// Creates a platform with the mass, friction and restitution of its model.
 pub(super) fn platform(id: String, model: Arc<ObjectModel>, pose: Pose) -> SceneObject {
     SceneObject {
         id,
@@ -100,27 +100,27 @@ pub(super) fn platform(id: String, model: Arc<ObjectModel>, pose: Pose) -> Scene
     }
 }
 
-/// A scene in the making.
+/// A scene under construction.
 pub(super) struct Hand<'a> {
     pub(super) space: &'a Space,
     pub(super) choices: &'a mut Choices,
     pub(super) objects: Vec<SceneObject>,
-    /// Forms of the objects that stand on the surface.
+    /// Shapes of the objects placed so far.
     pub(super) solids: Vec<Solid>,
-    /// Models of the objects that a record leaves out.
+    /// Names of the models of left-out objects.
     left_out: Vec<String>,
     pub(super) designators: BTreeMap<String, Vec<String>>,
-    /// Where the platform stands that things are put on; nothing where that is the origin.
+    /// Pose of the platform on which objects are placed; `None` if it is at the origin.
     pub(super) platform: Option<Pose>,
-    /// The place in front of the platform, where it got its name from the configuration.
+    /// The location in front of the platform, if it is not one of the world's.
     pub(super) front: Option<Location>,
 }
 
 impl<'a> Hand<'a> {
-    /// Designators whose values are names: nominal is the first candidate.
+    /// Chooses values of designators that are names. Nominal: the first candidate.
     fn choose_names(&mut self) {
         for (designator, values) in &self.space.names {
-            // In a world, places follow from the surface.
+            // In a world, the location depends on the surface.
             let is_of_world =
                 !self.space.worlds.is_empty() && ["world", "objectLocation"].contains(&designator.as_str());
             if !values.is_empty() && !is_of_world {
@@ -130,7 +130,7 @@ impl<'a> Hand<'a> {
         }
     }
 
-    /// The world, where the configuration names some: nominal is the first.
+    /// Chooses a world, if the configuration names any. Nominal: the first.
     fn choose_world(&mut self) -> Option<&'a Surroundings> {
         let worlds = &self.space.worlds;
         if worlds.is_empty() {
@@ -141,7 +141,7 @@ impl<'a> Hand<'a> {
         Some(world)
     }
 
-    /// A surface that the world has, and a location in front of it.
+    /// Chooses one of the world's surfaces, and a location in front of it.
     fn take_platform(&mut self, world: &'a Surroundings) -> Option<Surface> {
         let there: Vec<&SceneObject> = self.space.surface_names.iter().filter_map(|name| world.surface(name)).collect();
         if there.is_empty() {
@@ -155,12 +155,13 @@ impl<'a> Hand<'a> {
         platform.model.surface
     }
 
-    /// One of the world's locations that the configuration names: in front of the surface, or of none.
+    /// Chooses one of the world's locations that the configuration names, either in front of the surface or of no
+    /// surface.
     fn choose_location(&mut self, world: &Surroundings, surface: Option<&str>) {
         let named = self.space.names.get("objectLocation").into_iter().flatten();
         let there = named.filter(|name| {
             let location = world.map.locations.iter().find(|location| location.name == **name);
-            // Where the world has no locations, the names are the robot's own.
+            // If the world has no locations, the names are the robot's own.
             world.map.locations.is_empty()
                 || location.is_some_and(|location| location.surface.as_deref().is_none_or(|of| Some(of) == surface))
         });
@@ -171,8 +172,8 @@ impl<'a> Hand<'a> {
         }
     }
 
-    /// What the object is to be put on: another surface of the world where there is one, or a second platform beside the
-    /// first.
+    /// Chooses the surface to place the object on: another surface of the world if it has one, or a second platform
+    /// beside the first.
     fn set_place(&mut self, world: Option<&'a Surroundings>) {
         let first = self.designators.get("objectSurface").and_then(|ids| ids.first()).cloned();
         let id = match world.filter(|world| world.surfaces().next().is_some()) {
@@ -199,7 +200,7 @@ impl<'a> Hand<'a> {
         self.designators.insert("placeSurface".to_owned(), vec![id]);
     }
 
-    /// Adds what else stands in the world, behind the platforms.
+    /// Adds the rest of the world's furniture and walls, after the platforms.
     fn surround(&mut self, world: &Surroundings) {
         let taken = self.objects.first().filter(|object| object.role == Role::Platform).map(|object| object.id.clone());
         let at = self.objects.iter().take_while(|object| object.role == Role::Platform).count();
@@ -219,7 +220,7 @@ impl<'a> Hand<'a> {
         surface
     }
 
-    /// The target may stand anywhere that the robot can be asked to reach into; nominal is the middle.
+    /// Places the target on the reachable part of the surface. Nominal: the centre.
     fn set_target(&mut self, surface: &Surface) -> Result<(), Discard> {
         if let Some(model) = self.choose("target.model", &self.space.targets) {
             let id = self.place("target", model, Role::Target, surface, [0.0, 0.0])?;
@@ -228,7 +229,7 @@ impl<'a> Hand<'a> {
         Ok(())
     }
 
-    /// What stands around the target.
+    /// Places the other objects around the target.
     fn set_others(&mut self, surface: &Surface) -> Result<(), Discard> {
         let counts = self.space.other_counts.beside_target;
         if !self.space.others.is_empty() && counts.1 > 0 {
@@ -238,7 +239,7 @@ impl<'a> Hand<'a> {
         Ok(())
     }
 
-    /// What stands already where the target is to be placed.
+    /// Places other objects on the surface where the target is to be placed.
     fn clutter_place(&mut self) -> Result<(), Discard> {
         let counts = self.space.other_counts.at_place;
         let id = self.designators.get("placeSurface").and_then(|ids| ids.first());
@@ -255,8 +256,8 @@ impl<'a> Hand<'a> {
         strewn.map(|_| ())
     }
 
-    /// Some of the models that stand around, anywhere on a surface: their ids. Nominal is the fewest, on a ring around the
-    /// middle, the first at the far side.
+    /// Places other objects anywhere on a surface and returns their ids. Nominal: the fewest, on a ring around the
+    /// centre, the first at the far side.
     fn strew(
         &mut self,
         kind: &str,
@@ -266,13 +267,13 @@ impl<'a> Hand<'a> {
     ) -> Result<Vec<String>, Discard> {
         let more = self.choices.index(&format!("{kind}.count"), (most - least + 1) as usize);
         let count = least as usize + more;
-        // Seven tenths of the way out, where the ring keeps clear of the middle and of the edge.
+        // Seven tenths of the distance from the centre to the edge: the ring is clear of both.
         let radius = 0.35 * surface.size_m[0].min(surface.size_m[1]);
         let mut ids = Vec::new();
         for number in 1..=count {
             let name = format!("{kind}.{number}");
             if let Some(model) = self.choose(&format!("{name}.model"), &self.space.others) {
-                // Only a shrunk record leaves one out; the ids of the others stay as they were.
+                // Only shrunk runs leave objects out; the ids of the others do not change.
                 if self.choices.exception(&format!("{name}.left_out"), 2) == 1 {
                     self.left_out.push(model.name.clone());
                     continue;
@@ -285,7 +286,7 @@ impl<'a> Hand<'a> {
         Ok(ids)
     }
 
-    /// One of some models: nominal is the first.
+    /// Chooses one of the models. Nominal: the first.
     pub(super) fn choose(&mut self, name: &str, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
         if models.is_empty() {
             return None;
@@ -293,8 +294,8 @@ impl<'a> Hand<'a> {
         models.get(self.choices.index(name, models.len())).cloned()
     }
 
-    /// Sets an object down where nothing is in its way, and gives its id. Nominal is `nominal`, not turned, and the
-    /// model's own mass, friction and restitution.
+    /// Places an object on a free part of the surface and returns its id. Nominal: the position `nominal`, yaw 0, and
+    /// the model's own mass, friction and restitution.
     fn place(
         &mut self,
         name: &str,
@@ -331,7 +332,7 @@ impl<'a> Hand<'a> {
         Err(Discard { model: model.name.clone(), name: name.to_owned(), tries: TRIES })
     }
 
-    /// A pose on the surface, or nothing where the object, turned as it was drawn, would stick out.
+    /// Draws a pose on the surface. Returns `None` if the object would overhang the edge at the drawn yaw.
     fn try_place(
         &mut self,
         name: &str,
@@ -352,7 +353,7 @@ impl<'a> Hand<'a> {
         Some(if lies { Pose::from_isometry(&(foot.to_isometry() * stance.foot_from_model)) } else { foot })
     }
 
-    /// A pose from the frame of the platform.
+    /// Transforms a pose from the platform's frame to the world.
     fn on_platform(&self, pose: Pose) -> Pose {
         match self.platform {
             None => pose,
@@ -360,7 +361,7 @@ impl<'a> Hand<'a> {
         }
     }
 
-    /// The model in the size that this one of its kind has.
+    /// Returns the model scaled by a drawn factor.
     fn sized(&mut self, name: &str, model: Arc<ObjectModel>) -> Arc<ObjectModel> {
         let (low, high) = self.space.physics.size_scale;
         if (low, high) == (1.0, 1.0) {
@@ -374,12 +375,12 @@ impl<'a> Hand<'a> {
         self.choices.real(name, low, high, nominal)
     }
 
-    /// The model's name and the first number that is free.
+    /// Returns an id: the model's name and the first free number.
     pub(super) fn free_id(&self, model: &ObjectModel) -> String {
         let standing = self.objects.iter().map(|object| &object.model.name);
         let taken = standing.chain(&self.left_out).filter(|name| **name == model.name).count();
         let ids = (taken + 1..).map(|number| format!("{}_{number}", model.name));
-        // Furniture of a world is called as it likes.
+        // Furniture of a world may have any name.
         ids.into_iter().find(|id| !self.objects.iter().any(|object| object.id == *id)).unwrap_or_default()
     }
 }

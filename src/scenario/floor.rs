@@ -1,4 +1,4 @@
-//! What is drawn on the floor: where the robot starts, and what stands in its way.
+//! Draws the robot's start and the obstacles on the floor.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -13,37 +13,37 @@ use crate::scenario::overlap::Solid;
 use crate::scenario::surroundings::Surroundings;
 use crate::scenario::{Role, SceneObject};
 
-/// Gap between the surface's edge and the middle of the robot's base. Unit: metres. Shape: least, nominal, most.
+/// Gap between the surface's edge and the centre of the robot's base. Unit: metres. Shape: minimum, nominal, maximum.
 const BASE_GAP_M: [f64; 3] = [0.59, FRONT_GAP_M, 0.79];
-/// The same for an arm that stays where it is: near enough to reach to the far edge of a table, and a little in front of it.
+/// The same for a fixed arm: near enough to reach the far edge of a table, with a small gap in front of it.
 const FIXED_GAP_M: [f64; 3] = [0.18, 0.22, 0.26];
-/// The base stands at most this far beside the surface's middle. Unit: metres.
+/// Maximum lateral offset of the base from the surface's centre. Unit: metres.
 const BASE_SIDE_M: f64 = 0.05;
-/// The base heads at most this far beside the surface's middle. Unit: radians.
+/// Maximum heading offset of the base from the surface's centre. Unit: radians.
 const BASE_HEADING_RAD: f64 = 0.05;
-/// Where a base stands or shall stand, nothing else does within this distance. Unit: metres. That of a slim mobile
-/// manipulator, with room to turn.
+/// Radius kept free around the start and goal of a base. Unit: metres. It fits a slim mobile manipulator, with room to
+/// turn.
 const BASE_ROOM_M: f64 = 0.4;
-/// The same for a base that stays where it is, which is as slim as its pedestal.
+/// The same for a fixed base, which is as slim as its pedestal.
 const FIXED_ROOM_M: f64 = 0.17;
-/// How high that room is. Unit: metres.
+/// Height of that free space. Unit: metres.
 const BASE_HEIGHT_M: f64 = 1.2;
-/// A base that has to drive to a place starts at least this far from it. Unit: metres.
+/// Minimum distance between start and goal of a base that has to drive. Unit: metres.
 const DRIVE_M: f64 = 1.0;
-/// Nominal distance of such a start from the place. Unit: metres.
+/// Nominal distance between that start and the goal. Unit: metres.
 const NOMINAL_DRIVE_M: f64 = 1.5;
-/// Where there are rooms a base starts at least this far from their ends. Unit: metres. Half a base, half a wall, and room for a
-/// leg between: nearer to an end, no robot was ever inside.
+/// Minimum distance of the start from the ends of the rooms. Unit: metres. Half a base, half a wall, and a gap as wide
+/// as a leg; no robot fits nearer to an end.
 const OFF_END_M: f64 = 0.5;
-/// Without rooms a base that has to drive starts this far around the front of the surface. Unit: metres. Shape: back and
-/// forwards, to either side.
+/// Without rooms, a base that has to drive starts in this range around the front of the surface. Unit: metres. Shape:
+/// back and forwards, to either side.
 const ARENA_M: [[f64; 2]; 2] = [[-2.2, 1.2], [-2.2, 2.2]];
-/// Without rooms obstacles stand this far around the robot's side of the surface. Unit: metres.
+/// Without rooms, obstacles are placed within this distance of the robot. Unit: metres.
 const FIELD_M: f64 = 2.0;
 
 impl Hand<'_> {
-    /// Where the base stands: nominal is straight in front of the surface's middle, facing it; or within the ranges of the
-    /// configuration, where it has some.
+    /// Draws the start of the base: in the ranges of the configuration if it has any, else in front of the surface.
+    /// Nominal: straight in front of the surface's centre, facing it.
     pub(super) fn start_robot(&mut self, surface: Option<&Surface>) -> Result<[f64; 3], Discard> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);
@@ -56,17 +56,17 @@ impl Hand<'_> {
         Ok(self.in_world([-edge - gap, side, heading]))
     }
 
-    /// Whether the robot stays where it is.
+    /// Whether the robot has no mobile base.
     fn is_fixed(&self) -> bool {
         self.space.robot.base_joints.is_none()
     }
 
-    /// The room that the robot takes at the start.
+    /// The space that the robot occupies at the start.
     fn own_room(&self, base: [f64; 3]) -> Solid {
         room_for_base(base, if self.is_fixed() { FIXED_ROOM_M } else { BASE_ROOM_M })
     }
 
-    /// A place of the floor, from the frame of the platform.
+    /// Transforms x, y and heading from the platform's frame to the world.
     fn in_world(&self, [x, y, heading]: [f64; 3]) -> [f64; 3] {
         match self.platform {
             None => [x, y, heading],
@@ -82,7 +82,7 @@ impl Hand<'_> {
         self.start_about(ranges, middles, |_| true)
     }
 
-    /// A free place within ranges that is as it should be.
+    /// Draws a free place within the ranges that satisfies `serves`.
     fn start_about(
         &mut self,
         ranges: [(f64, f64); 3],
@@ -102,8 +102,9 @@ impl Hand<'_> {
         Err(Discard { model: "robot".to_owned(), name: "robot".to_owned(), tries: TRIES })
     }
 
-    /// Where a base starts that has to drive first: anywhere in the world but near its goal, heading anywhere; within the
-    /// ranges of the configuration, where it has some. Nominal is a little way from the goal, facing as it shall there.
+    /// Draws the start of a base that has to drive first: in the ranges of the configuration if it has any, else
+    /// anywhere in the world except near the goal, with any heading. Nominal: a short distance from the goal, with the
+    /// heading of the goal.
     pub(super) fn start_elsewhere(&mut self, world: Option<&Surroundings>) -> Result<[f64; 3], Discard> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);
@@ -118,7 +119,7 @@ impl Hand<'_> {
         self.start_about(ranges, nominal, is_far)
     }
 
-    /// The first free place around the goal, from straight behind it on.
+    /// The first free place around the goal, beginning straight behind it.
     fn nominal_start(&self, goal: [f64; 3], (low, high): ([f64; 2], [f64; 2])) -> [f64; 3] {
         let around = [4.0, 3.0, 5.0, 2.0, 6.0, 1.0, 7.0, 0.0].map(|eighths: f64| {
             let angle = goal[2] + eighths * PI / 4.0;
@@ -132,7 +133,7 @@ impl Hand<'_> {
         around.iter().find(serves).copied().unwrap_or(around[0])
     }
 
-    /// The part of the floor in which a base that drives can be.
+    /// The part of the floor in which a mobile base can be.
     fn arena(&self, world: Option<&Surroundings>) -> ([f64; 2], [f64; 2]) {
         if let Some(world) = world {
             return world.extent();
@@ -142,15 +143,15 @@ impl Hand<'_> {
         ([x + along[0], y + beside[0]], [x + along[1], y + beside[1]])
     }
 
-    /// Where the robot is sent to.
+    /// The place to which the robot is sent.
     fn goal(&self, world: Option<&Surroundings>) -> Option<[f64; 3]> {
         let name = self.designators.get("objectLocation")?.first()?;
         let locations = world.into_iter().flat_map(|world| &world.map.locations).chain(&self.front);
         locations.into_iter().find(|location| location.name == *name).map(|location| location.at)
     }
 
-    /// Gives the front of the surface a name, where the robot is sent there and the world has none for it: the one that
-    /// the configuration has.
+    /// Names the place in front of the surface, with the configuration's name for it, if the robot is sent there and
+    /// the world has no location for it.
     pub(super) fn name_front(&mut self, world: Option<&Surroundings>) {
         let Some(platform) = self.objects.first().filter(|object| object.role == Role::Platform) else { return };
         if self.goal(world).is_some() || !self.designators.contains_key("objectSurface") {
@@ -163,8 +164,8 @@ impl Hand<'_> {
         self.designators.insert("objectLocation".to_owned(), vec![name]);
     }
 
-    /// Sets obstacles on the floor, clear of everything, of the robot, and of the places where it may have to go.
-    /// Where the robot has to drive first, such a place may be taken: that is what it has to find out.
+    /// Places obstacles on the floor, clear of all objects, of the robot, and of the places where it may have to go. If
+    /// the robot has to drive first, its goal may be occupied: it has to detect that.
     pub(super) fn set_obstacles(
         &mut self,
         base: [f64; 3],
@@ -224,12 +225,12 @@ impl Hand<'_> {
         Err(Discard { model: model.name.clone(), name: name.to_owned(), tries: TRIES })
     }
 
-    /// Places in front of the platforms.
+    /// The places in front of the platforms.
     fn fronts(&self) -> Vec<[f64; 3]> {
         self.objects.iter().filter(|object| object.role == Role::Platform).map(front_of).collect()
     }
 
-    /// Whether nothing that stands in the scene is in the way.
+    /// Whether a solid is clear of all platforms and placed objects.
     fn is_free(&self, solid: &Solid) -> bool {
         let standing = self.objects.iter().filter(|object| matches!(object.role, Role::Platform));
         let furniture = standing.map(|object| Solid::new(&object.model, &object.pose));
@@ -238,17 +239,17 @@ impl Hand<'_> {
     }
 }
 
-/// The part of some rooms in which a base starts: off their ends, of which not every one is a wall.
+/// Shrinks the extent of the rooms by the distance that a base keeps from their ends, walls or not.
 fn inside((low, high): ([f64; 2], [f64; 2])) -> ([f64; 2], [f64; 2]) {
     (low.map(|end| end + OFF_END_M), high.map(|end| end - OFF_END_M))
 }
 
-/// The part of an empty floor that the robot may cross.
+/// The part of an empty floor that the robot may cross, around its start.
 fn field([x, y, _]: [f64; 3]) -> ([f64; 2], [f64; 2]) {
     ([x - FIELD_M, y - FIELD_M], [x + FIELD_M / 2.0, y + FIELD_M])
 }
 
-/// The room that a base takes.
+/// The space that a base occupies: a cylinder.
 fn room_for_base([x, y, _]: [f64; 3], radius: f64) -> Solid {
     let room = Shape::Cylinder { radius, height: BASE_HEIGHT_M };
     let pose = Pose::upright([x, y, BASE_HEIGHT_M / 2.0 + 0.05], 0.0);

@@ -1,6 +1,6 @@
-//! The floor as a robot knows it from its map.
+//! The robot's map of the floor.
 //!
-//! Never: what a scene adds to its world. Obstacles and objects are for the robot's eyes.
+//! Never: contains what a scene adds to its world. The robot perceives obstacles and objects with its sensors.
 
 use nalgebra::Point3;
 
@@ -8,26 +8,26 @@ use crate::base::Pose;
 use crate::config::{Location, ObjectModel, Room};
 use crate::scenario::{Role, Scene, SceneObject};
 
-/// Gap between a surface's edge and the middle of a base that stands in front of it. Unit: metres.
+/// Gap between a surface's edge and the centre of a base in front of it. Unit: metres.
 pub(super) const FRONT_GAP_M: f64 = 0.69;
 
-/// Walls, furniture and named places. Frame: world.
+/// Walls, furniture and named locations. Frame: world.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FloorPlan {
-    /// Where no robot can go.
+    /// Areas that no robot can enter.
     pub outlines: Vec<Outline>,
-    /// Places with names.
+    /// Named locations.
     pub locations: Vec<Location>,
-    /// Rooms; none where the floor has no bounds.
+    /// Rooms; empty if the floor is unbounded.
     pub rooms: Vec<Room>,
-    /// Where a robot stands that has to do with a surface. Units: metres, metres, radians. Shape: id and x, y, heading.
+    /// Poses of the base for working at a surface. Units: metres, metres, radians. Shape: id and x, y, heading.
     pub fronts: Vec<(String, [f64; 3])>,
 }
 
-/// A rectangle of the floor below a wall or a piece of furniture.
+/// The bounding rectangle of a wall or a piece of furniture on the floor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outline {
-    /// Middle of the rectangle, upright.
+    /// Centre of the rectangle, upright.
     pub pose: Pose,
     /// Lengths of the sides along the pose's axes. Unit: metres.
     pub size_m: [f64; 2],
@@ -46,7 +46,7 @@ impl FloorPlan {
         }
     }
 
-    /// Where a robot stands that is sent to a location, or to a surface by its name.
+    /// Returns the pose of the base at a location, or in front of a surface, by name.
     pub fn place(&self, name: &str) -> Option<[f64; 3]> {
         let location = self.locations.iter().find(|location| location.name == name).map(|location| location.at);
         location.or_else(|| self.fronts.iter().find(|(id, _)| id == name).map(|(_, at)| *at))
@@ -70,7 +70,7 @@ impl Outline {
     }
 }
 
-/// The place in front of a platform, on its negative x side and facing it.
+/// The pose of the base in front of a platform, on its negative x side and facing it.
 pub(super) fn front_of(platform: &SceneObject) -> [f64; 3] {
     let edge = platform.model.surface.map_or(0.0, |surface| surface.size_m[0] / 2.0);
     let at = platform.pose.to_isometry() * Point3::new(-edge - FRONT_GAP_M, 0.0, 0.0);

@@ -1,11 +1,11 @@
-//! A recorded list of choices to one concrete `Scene`, and what "simpler" means.
+//! Turns a list of choices into one concrete `Scene`, and defines which scenes are simpler.
 //!
-//! Simpler is closer to nominal: the first model of each list, in the middle, not turned, with the mass and friction of
-//! its model; the fewest other objects, each at its own place around the middle; the robot straight in front of the
-//! surface. A choice that a record lacks has its nominal value, so that a shorter record is a simpler scene. The nominal
-//! values stand where the choices are made, in `draw.rs`.
+//! Simpler is closer to nominal: the first model of each list, in the centre, with yaw 0 and the mass and friction of
+//! its model; the fewest other objects, each at its own place around the centre; the robot straight in front of the
+//! surface. A choice missing from a record has its nominal value, so that a shorter record is a simpler scene. The
+//! nominal values are set where the choices are made, in `draw.rs`.
 //!
-//! Never: simulates, knows a robot's reach or skill, or draws what a run's sensors get wrong.
+//! Never: simulates, depends on a robot's reach or skill, or draws sensor noise.
 
 mod draw;
 mod floor;
@@ -26,12 +26,12 @@ pub use scene::{KnownKind, RobotStart, Role, Scene, SceneObject};
 pub use scene_map::{NamedSurface, SceneMap};
 pub use space::Space;
 
-// What a scene is made of: its readers meet it here.
+// The parts of a scene, re-exported for the stages that read scenes.
 pub use crate::config::{
     Budget, CONTROL_HZ, Camera, Inertia, Location, Mesh, ObjectModel, Odometry, Part, Physics, RobotProfile, Room,
     Sensing, Shape, Surface,
 };
 
-// Tests of the stages that follow begin with a robot as a configuration reads it.
+// For tests of later stages, which need a robot read from a configuration.
 #[cfg(test)]
 pub(crate) use crate::config::robot::read as read_robot;

@@ -1,4 +1,4 @@
-//! Whether two objects are in each other's way: boxes first, exact shapes where the boxes touch.
+//! Checks two objects for overlap: first their bounding boxes, then their exact shapes.
 
 use std::sync::Arc;
 
@@ -11,22 +11,23 @@ use parry3d::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Cylinder, Shape as
 use crate::base::Pose;
 use crate::config::{ObjectModel, Part, Shape};
 
-/// Objects keep at least this distance. Twice what contact detection sees ahead, so that nothing touches at the start.
+/// Minimum distance between objects. It is twice the prediction distance of contact detection, so that nothing touches
+/// at the start. Unit: metres.
 pub const CLEARANCE_M: f64 = 0.004;
 
-/// An object's exact form at a place of the scene.
+/// The exact shape of an object at a pose in the scene.
 pub struct Solid {
     parts: Vec<(ParryPose, Arc<dyn ParryShape>, Aabb)>,
     around: Aabb,
 }
 
 impl Solid {
-    /// The form of a model whose origin has this pose. Frame: world.
+    /// Creates the solid of a model whose origin has this pose. Frame: world.
     pub fn new(model: &ObjectModel, pose: &Pose) -> Self {
         Self::of_parts(&model.solids(), pose)
     }
 
-    /// The form of some convex parts whose frame has this pose. Frame: world.
+    /// Creates the solid of convex parts whose frame has this pose. Frame: world.
     pub(super) fn of_parts(parts: &[Part], pose: &Pose) -> Self {
         let world_from_model = pose.to_isometry();
         let parts: Vec<(ParryPose, Arc<dyn ParryShape>, Aabb)> = parts
@@ -43,7 +44,7 @@ impl Solid {
         Self { parts, around }
     }
 
-    /// Whether the other object is nearer than the clearance.
+    /// Whether the other solid is nearer than the clearance.
     pub fn is_in_the_way_of(&self, other: &Self) -> bool {
         let clearance = to_real(CLEARANCE_M);
         if !self.around.loosened(clearance).intersects(&other.around) {
@@ -52,7 +53,7 @@ impl Solid {
         self.parts.iter().any(|(at, shape, around)| {
             let around = around.loosened(clearance);
             other.parts.iter().filter(|(.., theirs)| around.intersects(theirs)).any(|(other_at, other_shape, _)| {
-                // Convex shapes of these kinds are always supported; were one not, it would be kept away from.
+                // All these convex shapes are supported; an unsupported one would count as overlapping.
                 !query::distance(at, shape.as_ref(), other_at, other_shape.as_ref())
                     .is_ok_and(|gap| gap.distance >= clearance)
             })
@@ -60,7 +61,8 @@ impl Solid {
     }
 }
 
-/// The engine's shape, and its pose in our shape's frame (its cylinders stand along y). A tube is not one shape.
+/// Returns the engine's shape and its pose in our shape's frame (the engine's cylinders are along y). Returns `None`
+/// for a tube, which is not a single convex shape.
 fn parry_shape(shape: &Shape) -> Option<(Arc<dyn ParryShape>, Isometry3<f64>)> {
     let upright = Isometry3::identity();
     Some(match shape {
@@ -83,7 +85,7 @@ fn parry_shape(shape: &Shape) -> Option<(Arc<dyn ParryShape>, Isometry3<f64>)> {
     })
 }
 
-/// The convex hull of some points; nothing where they lie in a plane.
+/// Computes the convex hull of points. Returns `None` if they are coplanar.
 fn hull(points: &[[f64; 3]]) -> Option<Arc<dyn ParryShape>> {
     let points: Vec<Vector> =
         points.iter().map(|[x, y, z]| Vector::new(to_real(*x), to_real(*y), to_real(*z))).collect();

@@ -1,39 +1,39 @@
-//! The decisions that shape a scene most, as a list that a search can be given.
+//! The scene parameters that a search varies: the choices with the largest effect.
 
 use std::f64::consts::PI;
 
 use crate::config::Range;
 use crate::scenario::Space;
 
-/// One decision of a scene.
+/// A parameter of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Parameter {
-    /// The name of its choice, as [`crate::scenario::draw`] makes it.
+    /// The name of its choice in [`crate::scenario::draw`].
     pub name: String,
-    /// What is chosen from.
+    /// Its values.
     pub kind: ParameterKind,
 }
 
-/// What a decision chooses from.
+/// The values of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterKind {
     /// A range of numbers.
     Range,
-    /// The range of where another object stands along one side of the surface; the target's place along the same side has
-    /// this name.
+    /// A range for the position of another object along one axis of the surface. Holds the name of the target's
+    /// position along the same axis.
     Beside(&'static str),
-    /// So many things, none nearer to another.
+    /// This many unordered alternatives.
     OneOf(usize),
-    /// So many counts, smallest first.
+    /// This many counts in rising order.
     Count(usize),
 }
 
 impl Space {
-    /// The decisions that leave a choice, those that matter most first: how many objects there are, the target, the
-    /// robot's place, and of each other object its model and where it stands.
+    /// Returns the parameters with more than one value, the most important ones first: the number of objects, the
+    /// target, the robot's start, and the model and position of each other object.
     ///
-    /// What is left out (how the others are turned, their masses and friction) shapes a scene less than all the rest, and a
-    /// search learns faster without it. It is drawn like everything that nobody decides.
+    /// Yaw, mass and friction of the other objects are left out: they affect a scene least, and a search learns faster
+    /// without them. They are drawn at random.
     pub fn parameters(&self) -> Vec<Parameter> {
         let mut found = Vec::new();
         let mut add = |name: String, kind: ParameterKind| match kind {
@@ -72,7 +72,7 @@ impl Space {
         found
     }
 
-    /// Ids that another object may have, the first of each model.
+    /// Possible ids of other objects: the first id of each model.
     pub fn other_ids(&self) -> Vec<String> {
         let targets = self.target_ids();
         let mut ids: Vec<String> = self.others.iter().map(|model| format!("{}_1", model.name)).collect();
@@ -80,7 +80,7 @@ impl Space {
         ids
     }
 
-    /// Ids that the target may have, one for each model that it may be of.
+    /// Possible ids of the target, one for each model.
     pub fn target_ids(&self) -> Vec<String> {
         self.targets.iter().map(|model| format!("{}_1", model.name)).collect()
     }

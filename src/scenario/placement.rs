@@ -1,4 +1,4 @@
-//! Where on a surface an object may stand.
+//! The part of a surface on which an object may be placed.
 
 use std::sync::Arc;
 
@@ -6,35 +6,35 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::config::{ObjectModel, Surface};
 
-/// Distance that every object keeps from the edge: what is nearer falls when it is brushed.
+/// Minimum distance of objects from the edge: a nearer one falls off when it is touched. Unit: metres.
 const EDGE_MARGIN_M: f64 = 0.01;
-/// The target stands no further than this behind the edge that the robot faces. Arms of mobile manipulators reach about
-/// 0.6 m beyond their base.
+/// Maximum distance of the target from the edge that the robot faces. Arms of mobile manipulators reach about 0.6 m
+/// beyond their base. Unit: metres.
 const REACH_M: f64 = 0.6;
-/// The target stands no further than this to the side: beyond, the robot would have to start somewhere else.
+/// Maximum lateral offset of the target: beyond it, the robot would need another start. Unit: metres.
 const SIDE_M: f64 = 0.35;
 
-/// A rectangle for the origin of an object. Frame: world, with the surface's middle at the origin. Unit: metres.
+/// A rectangle for the origin of an object. Frame: world, with the surface's centre at the origin. Unit: metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Area {
     pub(super) x: (f64, f64),
     pub(super) y: (f64, f64),
 }
 
-/// How an object is set down.
+/// The stance of an object: upright or on its side.
 pub(super) struct Stance {
-    /// Extent on the surface, not turned. Unit: metres. Shape: x, y.
+    /// Extent on the surface at yaw 0. Unit: metres. Shape: x, y.
     size_m: [f64; 2],
-    /// Pose of the model's origin. Frame: its foot, on the surface below its middle.
+    /// Pose of the model's origin. Frame: its foot, on the surface below its centre.
     pub(super) foot_from_model: Isometry3<f64>,
 }
 
-/// Upright, as its model is.
+/// The upright stance of a model.
 pub(super) fn standing(model: &ObjectModel) -> Stance {
     Stance { size_m: [model.size_m[0], model.size_m[1]], foot_from_model: Isometry3::identity() }
 }
 
-/// On its side: what points up upright points along y.
+/// The stance of a model on its side: its z axis along y.
 pub(super) fn lying(model: &ObjectModel) -> Stance {
     let [length, width, height] = model.size_m;
     // A quarter turn about x brings z to −y and y to z.
@@ -43,7 +43,7 @@ pub(super) fn lying(model: &ObjectModel) -> Stance {
     Stance { size_m: [length, height], foot_from_model: Isometry3::from_parts(shift, turn) }
 }
 
-/// Where an object turned by `yaw` can be wholly on a surface; nothing where it can't.
+/// Returns the area in which an object with this yaw does not overhang the surface, or `None` if it is too large.
 pub(super) fn area(surface: &Surface, stance: &Stance, yaw: f64) -> Option<Area> {
     let [length, width] = stance.size_m;
     let (sin, cos) = (libm::sin(yaw).abs(), libm::cos(yaw).abs());
@@ -53,14 +53,14 @@ pub(super) fn area(surface: &Surface, stance: &Stance, yaw: f64) -> Option<Area>
     Some(Area { x: (-x, x), y: (-y, y) })
 }
 
-/// The part of an area that the robot, which stands on the negative x side, can be asked to reach into.
+/// The part of an area within reach of the robot, which is on the negative x side.
 pub(super) fn reachable(area: Area, surface: &Surface) -> Area {
     let farthest = -surface.size_m[0] / 2.0 + REACH_M;
     let nearest = area.x.0;
     Area { x: (nearest, area.x.1.min(farthest).max(nearest)), y: (area.y.0.max(-SIDE_M), area.y.1.min(SIDE_M)) }
 }
 
-/// Whether an object fits on a surface at all, along the edges or across.
+/// Whether an object fits on a surface at yaw 0 or 90°.
 pub(super) fn fits(surface: &Surface, model: &Arc<ObjectModel>) -> bool {
     let stance = standing(model);
     area(surface, &stance, 0.0).is_some() || area(surface, &stance, std::f64::consts::FRAC_PI_2).is_some()

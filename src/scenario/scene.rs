@@ -1,4 +1,4 @@
-//! One concrete scene: everything that the simulation needs to know, as plain data.
+//! One concrete scene: all input of the simulation, as plain data.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,19 +10,19 @@ use crate::scenario::SceneMap;
 /// A sampled scene. Frame of all poses: world; z up; the floor at 0.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// Name of the world that it lies in (`[world] worlds`).
+    /// Name of its world (`[world] worlds`).
     pub world: String,
-    /// The names of its places.
+    /// Its named places.
     pub map: SceneMap,
-    /// Platforms, the grasp target and the others; platforms first.
+    /// Platforms, the target and the other objects; platforms first.
     pub objects: Vec<SceneObject>,
     /// The robot and where it starts.
     pub robot: RobotStart,
     /// Values of the designators: ids of objects, or names of locations.
     pub designators: BTreeMap<String, Vec<String>>,
-    /// What sensors get wrong in this run.
+    /// Sensor noise of the run.
     pub sensing: Sensing,
-    /// What physics is stepped with.
+    /// Parameters of the physics engine.
     pub physics: Physics,
 }
 
@@ -31,9 +31,9 @@ pub struct Scene {
 pub struct SceneObject {
     /// Unique in the scene: the model's name and a number, such as `glass_1`.
     pub id: String,
-    /// Its form and class.
+    /// Its model: shape and class.
     pub model: Arc<ObjectModel>,
-    /// What it is there for.
+    /// Its role in the scene.
     pub role: Role,
     /// Pose of the model's origin.
     pub pose: Pose,
@@ -46,31 +46,31 @@ pub struct SceneObject {
 }
 
 impl SceneObject {
-    /// Whether nothing moves it: a platform, and what its model says is fixed.
+    /// Whether it can't move: it is a platform, or its model is fixed.
     pub fn is_fixed(&self) -> bool {
         self.role == Role::Platform || self.model.fixed
     }
 }
 
-/// What an object is there for.
+/// The role of an object in a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// Carries others and never moves.
+    /// Carries other objects and never moves.
     Platform,
-    /// What the robot is asked to handle.
+    /// The object that the robot is asked to handle.
     Target,
-    /// Stands around, where the target does.
+    /// Another object on the surface of the target.
     Other,
-    /// Stands on the surface that the target is to be placed on.
+    /// Another object on the surface where the target is to be placed.
     PlaceOther,
-    /// Stands in the way of the base.
+    /// An obstacle for the base.
     Obstacle,
 }
 
 impl Role {
     const ALL: [Self; 5] = [Self::Platform, Self::Target, Self::Other, Self::PlaceOther, Self::Obstacle];
 
-    /// The word for it, for people and in histories.
+    /// Its name in messages and histories.
     pub fn word(self) -> &'static str {
         match self {
             Self::Platform => "platform",
@@ -81,35 +81,35 @@ impl Role {
         }
     }
 
-    /// Whether it only stands around: neither handled nor furniture.
+    /// Whether it is neither the target nor furniture.
     pub fn is_bystander(self) -> bool {
         matches!(self, Self::Other | Self::PlaceOther | Self::Obstacle)
     }
 
-    /// The role of a word.
+    /// Returns the role with this name, or `None`.
     pub fn from_word(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|role| role.word() == word)
     }
 }
 
-/// The robot at the beginning.
+/// The robot at the start of a run.
 #[derive(Debug, Clone)]
 pub struct RobotStart {
-    /// Which robot.
+    /// The robot.
     pub profile: Arc<RobotProfile>,
-    /// Where its base stands. Units: metres, metres, radians. Shape: x, y, heading.
+    /// Pose of its base. Units: metres, metres, radians. Shape: x, y, heading.
     pub base: [f64; 3],
-    /// The kinds of things that it can tell apart: all that there are models of, whatever stands in the scene.
+    /// The kinds of objects that it can recognise: all models of the campaign, in this scene or not.
     pub knows: Arc<[KnownKind]>,
 }
 
-/// A kind of thing that can be handled, as a robot knows it: by its size.
+/// A kind of object that the robot recognises by its size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownKind {
     /// Name of the model.
     pub name: String,
     /// Its class in the ontology: an IRI.
     pub category: String,
-    /// Outer dimensions as it stands. Unit: metres. Shape: x, y, z.
+    /// Outer dimensions when upright. Unit: metres. Shape: x, y, z.
     pub size_m: [f64; 3],
 }

@@ -1,29 +1,29 @@
-//! The names of a scene's places: what a robot's map of its world would have.
+//! The named places of a scene, as on a robot's map of its world.
 
 use serde::{Deserialize, Serialize};
 
 use crate::config::{Location, Room};
 use crate::scenario::surroundings::Surroundings;
 
-/// Named places of a world; empty where a scene lies on a floor with nothing else. Frame: world.
+/// Named places of a world; empty for a scene on an empty floor. Frame: world.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SceneMap {
-    /// Places where a robot can be sent.
+    /// Locations to which a robot can be sent.
     pub locations: Vec<Location>,
     /// Rooms.
     pub rooms: Vec<Room>,
-    /// Tops of furniture.
+    /// Surfaces of furniture.
     pub surfaces: Vec<NamedSurface>,
 }
 
-/// A level rectangle on furniture, about the middle of it.
+/// A horizontal rectangle centred on a piece of furniture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NamedSurface {
     /// Id of the furniture.
     pub id: String,
-    /// Middle. Unit: metres. Shape: x, y, z.
+    /// Centre. Unit: metres. Shape: x, y, z.
     pub at: [f64; 3],
-    /// Unit: metres. Shape: along the furniture's x, along its y.
+    /// Size along the furniture's axes. Unit: metres. Shape: x, y.
     pub size_m: [f64; 2],
 }
 
@@ -38,12 +38,12 @@ impl SceneMap {
         Self { locations: world.map.locations.clone(), rooms: world.map.rooms.clone(), surfaces: surfaces.collect() }
     }
 
-    /// Whether there is nothing to tell.
+    /// Whether the map has no named places.
     pub fn is_empty(&self) -> bool {
         self.locations.is_empty() && self.rooms.is_empty() && self.surfaces.is_empty()
     }
 
-    /// The first room that holds a point of the floor.
+    /// Returns the first room that contains a point of the floor, or `None`.
     pub fn room_of(&self, x: f64, y: f64) -> Option<&Room> {
         self.rooms
             .iter()

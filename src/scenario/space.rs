@@ -11,37 +11,37 @@ use crate::ontology::Ontology;
 use crate::scenario::surroundings::Surroundings;
 use crate::scenario::{KnownKind, placement};
 
-/// Designators that scene generation gives a meaning, whether an ontology declares them or not.
+/// Designators with a meaning for scene generation, whether or not an ontology declares them.
 const SPECIAL: [&str; 6] = ["world", "objectLocation", "objectSurface", "placeSurface", "pickObject", "surfaceObjects"];
 
-/// The action that drives to a place: a test that begins with it has its robot start somewhere else.
+/// The action that drives to a location: in tests that begin with it, the robot starts somewhere else.
 const DRIVING: &str = "MoveTo";
 
-/// Everything that scenes are drawn from, with nothing left to check.
+/// The validated space from which scenes are drawn.
 #[derive(Debug, Clone)]
 pub struct Space {
     pub(super) tests: usize,
-    /// For each test its first action that drives to a place, counted from 0; nothing where there is none.
+    /// For each test, the position of its first driving action, from 0; `None` if it has none.
     pub(super) drives: Vec<Option<usize>>,
     pub(super) surfaces: Vec<Arc<ObjectModel>>,
     pub(super) targets: Vec<Arc<ObjectModel>>,
     pub(super) others: Vec<Arc<ObjectModel>>,
     pub(super) other_counts: OtherCounts,
-    /// Worlds; none where scenes lie on a floor with nothing else.
+    /// Worlds; empty if scenes are on an empty floor.
     pub(super) worlds: Vec<Surroundings>,
-    /// Names of the surfaces of worlds on which the target may stand.
+    /// Names of the worlds' surfaces that may carry the target.
     pub(super) surface_names: Vec<String>,
-    /// What the target may be put on: names of the worlds' surfaces, and models.
+    /// Surfaces on which the target may be placed: names of the worlds' surfaces, and models.
     pub(super) place_names: Vec<String>,
     pub(super) places: Vec<Arc<ObjectModel>>,
-    /// What may stand in the way of the base, and how many of them do.
+    /// Models of obstacles for the base, and their number.
     pub(super) obstacles: Vec<Arc<ObjectModel>>,
     pub(super) obstacle_count: u32,
-    /// Ranges of x, y and heading in which the base starts; nothing where it starts in front of the surface.
+    /// Ranges of x, y and heading for the start of the base; `None` if it starts in front of the surface.
     pub(super) start: Option<[(f64, f64); 3]>,
-    /// Shares of targets and of other objects that lie on their side.
+    /// Shares of targets and of other objects that are placed on their side.
     pub(super) lying: (f64, f64),
-    /// Candidates of designators that are names and not objects.
+    /// Candidates of designators whose values are names instead of objects.
     pub(super) names: BTreeMap<String, Vec<String>>,
     pub(super) robot: Arc<RobotProfile>,
     pub(super) knows: Arc<[KnownKind]>,
@@ -50,13 +50,14 @@ pub struct Space {
 }
 
 impl Space {
-    /// The space of a configuration's scenes.
+    /// Creates the space of a configuration's scenes.
     ///
     /// # Errors
-    /// Every fault at once, at its place in the configuration: a test names no action of the ontology (S001) or one
-    /// without success properties (S002), a needed designator has no candidates (S003), a table is named after no
-    /// designator (S004), a model's category is no class of the ontology (S005), a surface is none (S006), or an object
-    /// can't stand on a surface (S007, S008), or a world has none of the surfaces or locations (S009).
+    /// All faults at once, each with its place in the configuration: a test names an action that the ontology lacks
+    /// (S001) or that has no success properties (S002), a required designator has no candidates (S003), a table has no
+    /// designator of its name (S004), a model's category is not a class of the ontology (S005), a model has no surface
+    /// (S006), an object does not fit on a surface (S007), objects have no surface (S008), or a world lacks all named
+    /// surfaces or locations (S009).
     pub fn new(campaign: &Campaign, ontology: &Ontology) -> Result<Self, Diagnostics> {
         let mut found = Diagnostics::new();
         check_tests(campaign, ontology, &mut found);
@@ -70,7 +71,7 @@ impl Space {
         let has_objects = !targets.is_empty() || !others.is_empty();
         if has_objects && !has_platform {
             let key = if targets.is_empty() { "surfaceObjects" } else { "pickObject" };
-            let message = "there are objects, but no surface that they could stand on";
+            let message = "there are objects, but no surface to place them on";
             found.push(
                 campaign
                     .fault("S008", key, message)
@@ -108,20 +109,20 @@ impl Space {
         })
     }
 
-    /// How many tests there are.
+    /// Number of tests.
     pub fn tests(&self) -> usize {
         self.tests
     }
 }
 
-/// The first action of each test that drives to a place, where the robot can drive.
+/// Position of the first driving action of each test, if the robot can drive.
 fn drives(campaign: &Campaign) -> Vec<Option<usize>> {
     let mobile = campaign.robot.base_joints.is_some();
     let first = |test: &Vec<String>| test.iter().position(|action| mobile && action == DRIVING);
     campaign.tests.iter().map(first).collect()
 }
 
-/// All models but platforms, sorted by name.
+/// All models except platforms, sorted by name.
 fn known_kinds(campaign: &Campaign) -> Arc<[KnownKind]> {
     let models = campaign.models.values().filter(|model| model.surface.is_none());
     let kinds = models.map(|model| KnownKind {
@@ -136,7 +137,7 @@ fn is_of_objects(designator: &str) -> bool {
     ["objectSurface", "placeSurface", "pickObject", "surfaceObjects"].contains(&designator)
 }
 
-/// The models that a designator's candidates name. The configuration has been checked, so none is missing.
+/// The models of a designator's candidates. The configuration has been checked, so no model is missing.
 fn models(campaign: &Campaign, designator: &str) -> Vec<Arc<ObjectModel>> {
     let names = campaign.candidates.get(designator).into_iter().flatten();
     names.filter_map(|name| campaign.models.get(name).cloned()).collect()
@@ -146,7 +147,7 @@ fn candidates(campaign: &Campaign, designator: &str) -> Vec<String> {
     campaign.candidates.get(designator).cloned().unwrap_or_default()
 }
 
-/// Every world has a surface for the objects and a location in front of it, where the configuration names some (S009).
+/// Checks that every world has one of the configuration's surfaces, and one of its locations in front of it (S009).
 fn check_worlds(campaign: &Campaign, worlds: &[Surroundings], found: &mut Diagnostics) {
     let surfaces = candidates(campaign, "objectSurface");
     for world in worlds.iter().filter(|world| world.surfaces().next().is_some()) {
@@ -154,7 +155,7 @@ fn check_worlds(campaign: &Campaign, worlds: &[Surroundings], found: &mut Diagno
         let key = format!("world.{idx}");
         let there: Vec<&str> = world.surfaces().map(|surface| surface.id.as_str()).collect();
         for (designator, what) in
-            [("objectSurface", "the objects may stand on"), ("placeSurface", "the object may be placed on")]
+            [("objectSurface", "objects may be on"), ("placeSurface", "the object may be placed on")]
         {
             let wanted = candidates(campaign, designator);
             if !wanted.is_empty() && !wanted.iter().any(|name| there.contains(&name.as_str())) {
@@ -170,7 +171,7 @@ fn check_worlds(campaign: &Campaign, worlds: &[Surroundings], found: &mut Diagno
     }
 }
 
-/// Where the configuration names locations, one of them is in front of the surface, or of none.
+/// Checks that one of the configuration's locations, if it names any, is in front of the surface or of no surface.
 fn check_location(campaign: &Campaign, world: &WorldMap, surface: &str, found: &mut Diagnostics) {
     let named = candidates(campaign, "objectLocation");
     let is_of = |location: &&Location| location.surface.as_deref() == Some(surface);
@@ -184,7 +185,7 @@ fn check_location(campaign: &Campaign, world: &WorldMap, surface: &str, found: &
     found.push(campaign.fault("S009", "objectLocation", message).help(help));
 }
 
-/// Candidates of a designator with the keys of their places and their models.
+/// The candidates of a designator: key in the configuration, and model.
 fn placed_models<'a>(
     campaign: &'a Campaign,
     designator: &'a str,
@@ -193,7 +194,7 @@ fn placed_models<'a>(
     names.filter_map(move |(idx, name)| Some((format!("{designator}.{idx}"), campaign.models.get(name)?)))
 }
 
-/// Tests name actions that have success properties, and what these need can be drawn.
+/// Checks that tests name actions with success properties, and that the required designators have candidates.
 fn check_tests(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
     let mut told: BTreeSet<String> = BTreeSet::new();
     for (idx, test) in campaign.tests.iter().enumerate() {
@@ -216,7 +217,7 @@ fn check_tests(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics
             let needs: BTreeSet<&String> =
                 needs.filter_map(|iri| ontology.properties.get(iri)).flat_map(|property| &property.needs).collect();
             for designator in needs.into_iter().filter(|name| !campaign.candidates.contains_key(*name)) {
-                let message = format!("`{name}` needs a value for `{designator}`, and there are none to choose from");
+                let message = format!("`{name}` needs a value for `{designator}`, which has no candidates");
                 let help = format!("add a table with candidates: {}", example(designator));
                 found.push(campaign.fault("S003", &key, message).help(help));
             }
@@ -236,7 +237,7 @@ fn example(designator: &str) -> String {
     format!("`[{designator}]` with `{key} = [\"…\"]`")
 }
 
-/// Tables are named after designators.
+/// Checks that tables are named after designators.
 fn check_tables(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
     let known: BTreeSet<&str> = ontology.designators.iter().map(String::as_str).chain(SPECIAL).collect();
     let tables = ["physics", "sensing", "camera", "robot", "budget", "history", "categories", "scene"];
@@ -250,7 +251,7 @@ fn check_tables(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostic
     }
 }
 
-/// Rules and analysis know objects by their classes.
+/// Checks that the categories of models are classes, which rules and analysis need.
 fn check_categories(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
     let mut told: BTreeSet<&str> = BTreeSet::new();
     for designator in SPECIAL.iter().filter(|name| is_of_objects(name)) {
@@ -260,10 +261,10 @@ fn check_categories(campaign: &Campaign, ontology: &Ontology, found: &mut Diagno
             }
             let short = names::shorten(&model.category);
             let message =
-                format!("the model `{}` is of the category `{short}`, which the ontology does not have", model.name);
+                format!("the model `{}` has the category `{short}`, which the ontology does not have", model.name);
             let classes: BTreeSet<&str> = ontology.superclasses.keys().map(|class| names::local(class)).collect();
             let help = match nearest(names::local(&model.category), classes) {
-                Some(near) => format!("did you mean `{near}`? the category stands in the model's file"),
+                Some(near) => format!("did you mean `{near}`? the category is set in the model's file"),
                 None => format!("state it in the ontology: `{short} a owl:Class ; rdfs:subClassOf act:Graspable`"),
             };
             found.push(campaign.fault("S005", &key, message).help(help));
@@ -276,14 +277,14 @@ fn check_surfaces(campaign: &Campaign, found: &mut Diagnostics) {
         campaign.models.values().filter(|model| model.surface.is_some()).map(|model| model.name.as_str()).collect();
     for designator in ["objectSurface", "placeSurface"] {
         for (key, model) in placed_models(campaign, designator).filter(|(_, model)| model.surface.is_none()) {
-            let message = format!("nothing can stand on the model `{}`: it has no `[surface]`", model.name);
+            let message = format!("the model `{}` can't carry objects: it has no `[surface]`", model.name);
             let help = format!("models that have one: {}", platforms.join(", "));
             found.push(campaign.fault("S006", &key, message).help(help));
         }
     }
 }
 
-/// Whether everything can stand wherever it may be put.
+/// Checks that every object fits on every surface on which it may be placed.
 fn check_tops(campaign: &Campaign, surfaces: &[Arc<ObjectModel>], worlds: &[Surroundings], found: &mut Diagnostics) {
     let first = tops(campaign, "objectSurface", surfaces, worlds);
     for key in ["pickObject", "surfaceObjects"] {
@@ -296,7 +297,8 @@ fn check_tops(campaign: &Campaign, surfaces: &[Arc<ObjectModel>], worlds: &[Surr
     }
 }
 
-/// Surfaces that a designator may stand for, by name: of models where they are put into the scene, of worlds that have them.
+/// The possible surfaces of a designator, by name: those of models that are added to the scene, and those of the
+/// worlds.
 fn tops(
     campaign: &Campaign,
     designator: &str,
@@ -312,7 +314,7 @@ fn tops(
 fn check_fit(campaign: &Campaign, designator: &str, surfaces: &[(String, Surface)], found: &mut Diagnostics) {
     for (key, model) in placed_models(campaign, designator) {
         for (platform, surface) in surfaces.iter().filter(|(_, surface)| !placement::fits(surface, model)) {
-            let message = format!("the model `{}` can't stand on `{platform}`", model.name);
+            let message = format!("the model `{}` does not fit on `{platform}`", model.name);
             let [x, y] = surface.size_m;
             let help = format!("it is {} × {} m, and the surface is {x} × {y} m", model.size_m[0], model.size_m[1]);
             found.push(campaign.fault("S007", &key, message).help(help));

@@ -1,4 +1,4 @@
-//! A world as scenes are drawn in it: what stands there already.
+//! The furniture and walls of a world, for drawing scenes in it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -29,28 +29,28 @@ impl Surroundings {
         Self { map: Arc::clone(map), standing: furniture.chain(walls).collect() }
     }
 
-    /// Furniture on which things can stand.
+    /// Furniture with a surface.
     pub(super) fn surfaces(&self) -> impl Iterator<Item = &SceneObject> {
         self.standing.iter().filter(|object| object.model.surface.is_some())
     }
 
-    /// The piece of furniture of a name that things can stand on.
+    /// The piece of furniture with this name, if it has a surface.
     pub(super) fn surface(&self, name: &str) -> Option<&SceneObject> {
         self.surfaces().find(|object| object.id == name)
     }
 
-    /// Everything but one thing.
+    /// All furniture and walls except one.
     pub(super) fn others(&self, but: Option<&str>) -> impl Iterator<Item = &SceneObject> {
         self.standing.iter().filter(move |object| Some(object.id.as_str()) != but)
     }
 
-    /// The rectangle around everything: lowest and highest x and y. Unit: metres.
+    /// The bounding rectangle of furniture and rooms: minimum and maximum x and y. Unit: metres.
     pub(super) fn extent(&self) -> ([f64; 2], [f64; 2]) {
         let middles = self.standing.iter().map(|object| [object.pose.position[0], object.pose.position[1]]);
         around(self.corners().chain(middles))
     }
 
-    /// Where its rooms begin and end, seen from above; nothing where it has none. Unit: metres. Frame: world.
+    /// The bounding rectangle of the rooms; `None` if the world has none. Unit: metres. Frame: world.
     pub(super) fn rooms(&self) -> Option<([f64; 2], [f64; 2])> {
         (!self.map.rooms.is_empty()).then(|| around(self.corners()))
     }
@@ -60,7 +60,7 @@ impl Surroundings {
     }
 }
 
-/// The least and the greatest coordinates of some points.
+/// Minimum and maximum coordinates of points.
 fn around(points: impl Iterator<Item = [f64; 2]>) -> ([f64; 2], [f64; 2]) {
     points.fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), at| {
         ([low[0].min(at[0]), low[1].min(at[1])], [high[0].max(at[0]), high[1].max(at[1])])

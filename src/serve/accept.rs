@@ -2,7 +2,8 @@
 
 use crate::history::WireSyntax;
 
-/// The form that a client likes best of those that there are; of those that it likes as much, the first. Nothing where it wants none.
+/// Returns the offered format with the highest quality; of equal ones, the first. Returns `None` if the client accepts
+/// none.
 pub(super) fn choose(accept: &str, offered: &[WireSyntax]) -> Option<WireSyntax> {
     let wanted: Vec<(&str, f64)> = accept.split(',').filter_map(range).collect();
     if wanted.is_empty() {
@@ -18,17 +19,17 @@ pub(super) fn choose(accept: &str, offered: &[WireSyntax]) -> Option<WireSyntax>
     best.map(|(_, syntax)| syntax)
 }
 
-/// A media range with its quality; nothing for what is none.
+/// Parses a media range and its quality. Returns `None` if it is not a media range.
 fn range(item: &str) -> Option<(&str, f64)> {
     let mut parts = item.split(';').map(str::trim);
     let range = parts.next().filter(|range| range.contains('/'))?;
     let quality = parts.find_map(|part| part.strip_prefix("q=").or_else(|| part.strip_prefix("Q=")));
-    // A quality that is no number counts as none given.
+    // An invalid quality is ignored.
     let quality = quality.and_then(|text| text.trim().parse::<f64>().ok()).filter(|q| (0.0..=1.0).contains(q));
     Some((range, quality.unwrap_or(1.0)))
 }
 
-/// How much a media type is liked: by the most specific range that it is in.
+/// The quality of a media type, from the most specific matching range.
 fn quality(media_type: &str, wanted: &[(&str, f64)]) -> f64 {
     let (kind, _) = media_type.split_once('/').unwrap_or((media_type, ""));
     let fits = |range: &str| match range.split_once('/') {
@@ -38,7 +39,7 @@ fn quality(media_type: &str, wanted: &[(&str, f64)]) -> f64 {
         _ => 0,
     };
     let found = wanted.iter().map(|(range, quality)| (fits(range), *quality)).filter(|(fit, _)| *fit > 0);
-    // Of ranges that are as specific the first counts.
+    // Of equally specific ranges, the first counts.
     found.fold((0, 0.0), |best, next| if next.0 > best.0 { next } else { best }).1
 }
 

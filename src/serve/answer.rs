@@ -1,4 +1,4 @@
-//! The process that answers one query: the question comes on its input stream, the answer goes to its output stream.
+//! The worker process that answers one query: it reads the question from stdin and writes the answer to stdout.
 
 use std::io::{Read, Write};
 use std::path::Path;
@@ -9,11 +9,11 @@ use crate::base::{Diagnostics, Source};
 use crate::history::{History, WireFault};
 use crate::serve::{accept, watch};
 
-/// What the process is told.
+/// The input of the worker process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Question {
     pub query: String,
-    /// The client's header.
+    /// The client's `Accept` header.
     pub accept: String,
     pub most_rows: u64,
     /// Unit: seconds.
@@ -22,17 +22,18 @@ pub(super) struct Question {
     pub most_memory: u64,
 }
 
-/// What goes back before the body, on a line of its own.
+/// Status and media type, as one line of JSON before the body.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Head {
     pub status: u16,
     pub media_type: String,
 }
 
-/// Answers the question that comes from `input`. Ends the process when its time or memory is spent.
+/// Reads a question from `input` and writes the answer to `output`. Exits the process when the time or memory limit is
+/// exceeded.
 ///
 /// # Errors
-/// The streams fail: then there is nobody left to tell.
+/// Reading or writing the streams fails.
 pub fn answer(history: &Path, mut input: impl Read, mut output: impl Write) -> std::io::Result<()> {
     let mut bytes = Vec::new();
     input.read_to_end(&mut bytes)?;
@@ -49,7 +50,7 @@ fn answered(history: &Path, question: &Question) -> (u16, &'static str, Vec<u8>)
     let source = Source::new("query", question.query.as_str());
     let history = match History::open_to_read(history) {
         Ok(history) => history,
-        // A campaign is running: it can be asked again soon.
+        // A campaign is writing: the client can retry soon.
         Err(faults) => return told(503, &faults),
     };
     let choose = |offered: &[_]| accept::choose(&question.accept, offered);
@@ -59,13 +60,13 @@ fn answered(history: &Path, question: &Question) -> (u16, &'static str, Vec<u8>)
         Err(WireFault::Refused(faults)) => told(403, &faults),
         Err(WireFault::Failed(faults)) => told(500, &faults),
         Err(WireFault::NotAcceptable) => {
-            let why = format!("no form of the answer is among `{}`\n", question.accept);
+            let why = format!("the answer has no format that `Accept: {}` allows\n", question.accept);
             (406, "text/plain", why.into_bytes())
         }
     }
 }
 
-/// Faults as lines, with their places.
+/// Formats diagnostics as lines with their places.
 fn told(status: u16, faults: &Diagnostics) -> (u16, &'static str, Vec<u8>) {
     let mut text = String::new();
     for fault in faults.iter() {

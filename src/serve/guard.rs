@@ -1,23 +1,23 @@
-//! Who may ask: pages of other sites may not, whatever name they give to this machine.
+//! Access control: rejects requests from pages of other sites, and under unknown host names.
 
 use std::net::IpAddr;
 
 use crate::serve::question::Refusal;
 
-/// Looks at the headers `Host` and `Origin`.
+/// Checks the headers `Host` and `Origin`.
 ///
-/// A page of another site can let its own name point to this machine (DNS rebinding), and then read what it is sent. So the host must be
-/// an address, `localhost`, or a name that was allowed.
+/// The page of another site could make its own name resolve to this machine (DNS rebinding) and then read the
+/// responses. Therefore the host must be an IP address, `localhost`, or an allowed name.
 pub(super) fn guard(host: Option<&str>, origin: Option<&str>, allowed: &[String]) -> Result<(), Refusal> {
-    let Some(host) = host else { return Err(Refusal::new(400, "there is no header `Host`")) };
+    let Some(host) = host else { return Err(Refusal::new(400, "the header `Host` is missing")) };
     if !is_known(name(host), allowed) {
-        let why = format!("`{}` is no name of this server; `--allow-host` makes it one", name(host));
+        let why = format!("`{}` is not a name of this server; `--allow-host` adds one", name(host));
         return Err(Refusal::new(421, why));
     }
     match origin {
         None => Ok(()),
         Some(origin) if origin.split_once("://").is_some_and(|(_, of)| of.eq_ignore_ascii_case(host)) => Ok(()),
-        Some(_) => Err(Refusal::new(403, "pages of another origin may not ask")),
+        Some(_) => Err(Refusal::new(403, "requests from pages of another origin are forbidden")),
     }
 }
 

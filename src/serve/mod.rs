@@ -1,9 +1,10 @@
-//! A history over HTTP: a read-only SPARQL 1.1 endpoint, a page to ask from, and the report.
+//! Serves a history over HTTP: a read-only SPARQL 1.1 endpoint, a query page, and the report.
 //!
-//! Each query is answered by a process of its own, which is ended when its time, its memory or the room for its answer is
-//! spent: so no query can hold up, fill or crash the server, and other commands have the history whenever nobody asks.
+//! Each query is answered by a process of its own with limits on time, memory and size of the answer. So no query can
+//! block or crash the server or exhaust its memory, and other commands can use the history between queries.
 //!
-//! Never: writes to a history, reads a file that a request names, asks another host, or answers a page of another origin.
+//! Never: writes to a history, reads a file named in a request, connects to another host, or answers a page of another
+//! origin.
 
 mod accept;
 mod answer;

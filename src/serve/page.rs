@@ -1,32 +1,32 @@
-//! The page to ask from. It works without scripts too: then the form leads to the endpoint.
+//! The query page. It works without scripts too: then the form is sent to the endpoint.
 
 use std::fmt::Write as _;
 
 use crate::base::names;
 
-/// Its looks.
+/// The stylesheet.
 pub(super) const STYLE: &str = include_str!("web/style.css");
-/// What shows answers as tables and downloads them.
+/// The script that shows answers as tables and downloads them.
 pub(super) const SCRIPT: &str = include_str!("web/query.js");
 
-/// A query that can be chosen.
+/// An example query of the page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Example {
     /// Its name.
     pub name: String,
-    /// What it is, in a line.
+    /// Title, one line.
     pub title: String,
-    /// What it answers.
+    /// Description of its answer.
     pub description: String,
     /// Its text.
     pub query: String,
 }
 
-/// The whole page.
+/// Renders the page.
 pub(super) fn page(history: &str, examples: &[Example]) -> String {
     let mut options = String::new();
     for example in examples {
-        // Writing to a text does not fail.
+        // Writing to a string does not fail.
         let _ = write!(
             options,
             "<option value=\"{}\" data-about=\"{}\" data-query=\"{}\">{}</option>",
@@ -49,20 +49,20 @@ pub(super) fn page(history: &str, examples: &[Example]) -> String {
     let (history, first) = (escape(history), escape(first));
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <title>Ask {history}</title><link rel=\"stylesheet\" href=\"/style.css\"><script src=\"/query.js\" defer></script></head><body>\
-         <header><h1>Ask the history <code>{history}</code></h1><a href=\"/report\">Report</a></header>\
-         <p>SPARQL 1.1, for reading. Programs ask at <code>/sparql</code>. The prefixes below need no declaration.</p>\
+         <title>Query {history}</title><link rel=\"stylesheet\" href=\"/style.css\"><script src=\"/query.js\" defer></script></head><body>\
+         <header><h1>Query the history <code>{history}</code></h1><a href=\"/report\">Report</a></header>\
+         <p>Read-only SPARQL 1.1; endpoint: <code>/sparql</code>. The prefixes below are predefined.</p>\
          <form id=\"form\" action=\"/sparql\" method=\"post\">\
-         <label for=\"example\">Examples</label><select id=\"example\"><option value=\"\">choose a question …</option>{options}</select>\
+         <label for=\"example\">Examples</label><select id=\"example\"><option value=\"\">choose an example …</option>{options}</select>\
          <p id=\"about\" aria-live=\"polite\"></p>\
          <label for=\"query\">Query</label><textarea id=\"query\" name=\"query\" spellcheck=\"false\" required>{first}</textarea>\
-         <div class=\"row\"><button type=\"submit\">Ask</button><span class=\"faint\">or Ctrl+Enter</span></div></form>\
+         <div class=\"row\"><button type=\"submit\">Run</button><span class=\"faint\">or Ctrl+Enter</span></div></form>\
          <div id=\"said\" role=\"status\"></div><div class=\"row\" id=\"downloads\"></div><div class=\"wide\" id=\"answer\"></div>\
          <details><summary>Prefixes</summary><ul id=\"prefixes\">{prefixes}</ul></details></body></html>\n"
     )
 }
 
-/// Text in which nothing is markup, in attributes too.
+/// Escapes text for HTML elements and attributes.
 pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
 }

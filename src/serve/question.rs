@@ -1,16 +1,16 @@
-//! What a request to the endpoint asks: the three ways of the SPARQL 1.1 protocol (2.1) in which a query comes.
+//! Parses requests to the endpoint: the three query operations of the SPARQL 1.1 Protocol (2.1).
 
-/// A request as far as it matters here.
+/// The relevant parts of a request.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Parts<'a> {
     pub method: &'a str,
-    /// The part of the target behind `?`.
+    /// The part of the request target after `?`.
     pub query: Option<&'a str>,
     pub content_type: Option<&'a str>,
     pub body: &'a [u8],
 }
 
-/// Why it asks nothing that can be answered, with the status that says so.
+/// An error response: status and reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Refusal {
     pub status: u16,
@@ -23,7 +23,7 @@ impl Refusal {
     }
 }
 
-/// The text of the query.
+/// Returns the text of the query.
 pub(super) fn question(parts: &Parts<'_>) -> Result<String, Refusal> {
     let in_target = || pairs(parts.query.unwrap_or_default().as_bytes());
     match (parts.method, media_type(parts.content_type).as_str()) {
@@ -33,15 +33,15 @@ pub(super) fn question(parts: &Parts<'_>) -> Result<String, Refusal> {
         }
         ("POST", "application/sparql-query") => {
             unknown(&in_target())?;
-            let text = std::str::from_utf8(parts.body).map_err(|_| Refusal::new(400, "the query is no UTF-8"))?;
+            let text = std::str::from_utf8(parts.body).map_err(|_| Refusal::new(400, "the query is not UTF-8"))?;
             Ok(text.to_owned())
         }
         ("POST", "application/sparql-update") => Err(update()),
         ("POST", other) => Err(Refusal::new(
             415,
-            format!("a query comes as application/x-www-form-urlencoded or application/sparql-query, not as `{other}`"),
+            format!("send queries as application/x-www-form-urlencoded or application/sparql-query, not as `{other}`"),
         )),
-        _ => Err(Refusal::new(405, "a query comes by GET or POST")),
+        _ => Err(Refusal::new(405, "send queries by GET or POST")),
     }
 }
 
@@ -59,12 +59,12 @@ fn only_query(pairs: Vec<(String, String)>) -> Result<String, Refusal> {
     let mut queries = pairs.into_iter().filter(|(name, _)| name == "query").map(|(_, value)| value);
     match (queries.next(), queries.next()) {
         (Some(query), None) => Ok(query),
-        (None, _) => Err(Refusal::new(400, "there is no parameter `query`")),
-        (Some(_), Some(_)) => Err(Refusal::new(400, "there is more than one parameter `query`")),
+        (None, _) => Err(Refusal::new(400, "the parameter `query` is missing")),
+        (Some(_), Some(_)) => Err(Refusal::new(400, "the parameter `query` must occur once")),
     }
 }
 
-/// What changes the meaning of a query must not be passed over; what clients add beside it may.
+/// Rejects unsupported parameters that would change the meaning of a query. Others are ignored.
 fn unknown(pairs: &[(String, String)]) -> Result<(), Refusal> {
     for (name, _) in pairs {
         match name.as_str() {
@@ -82,7 +82,7 @@ fn unknown(pairs: &[(String, String)]) -> Result<(), Refusal> {
 }
 
 fn update() -> Refusal {
-    Refusal::new(403, "the history can only be asked: there are no updates")
+    Refusal::new(403, "the history is read-only: updates are not supported")
 }
 
 #[cfg(test)]

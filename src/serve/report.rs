@@ -1,4 +1,4 @@
-//! The report of the history as it is now. Making it takes seconds, so it is made anew only when the history has changed.
+//! The report of the present history. Rendering it takes seconds, so it is cached until the history changes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,15 +8,15 @@ use std::time::{Duration, SystemTime};
 use crate::serve::question::Refusal;
 use crate::serve::worker::{Ended, Worker};
 
-/// A report takes longer than a query may.
+/// Time limit; a report takes longer than a query.
 const MOST_TIME: Duration = Duration::from_secs(300);
-/// Room for the page. Unit: bytes.
+/// Maximum size of the page. Unit: bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// The names, sizes and times of a history's files.
+/// Paths, sizes and modification times of a history's files.
 type State = BTreeMap<PathBuf, (u64, Option<SystemTime>)>;
 
-/// Makes the report, and keeps the last one.
+/// Renders the report and caches the last one.
 #[derive(Debug)]
 pub(super) struct LiveReport {
     pub worker: Worker,
@@ -25,9 +25,9 @@ pub(super) struct LiveReport {
 }
 
 impl LiveReport {
-    /// The page. `history` is held while it is made.
+    /// Returns the page. `history` is locked while it is rendered.
     pub fn page(&self, history: &RwLock<()>) -> Result<Vec<u8>, Refusal> {
-        // Whoever comes meanwhile waits for the same page.
+        // Concurrent requests wait for the same page.
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((of, page)) = &*kept
             && *of == state(&self.history)
@@ -40,27 +40,27 @@ impl LiveReport {
         };
         match ended {
             Ended::Itself { code: Some(0), output, .. } => {
-                // Making it updates the tables beside the history.
+                // Rendering updates the tables beside the history.
                 *kept = Some((state(&self.history), output.clone()));
                 Ok(output)
             }
             Ended::Itself { errors, .. } => {
                 let why = String::from_utf8_lossy(&errors).into_owned();
-                // An older page is better than none while a campaign has the history.
+                // While a campaign locks the history, the previous page is served.
                 match &*kept {
                     Some((_, page)) => Ok(page.clone()),
                     None => Err(Refusal::new(503, why)),
                 }
             }
             Ended::Late => Err(Refusal::new(504, "the report took too long")),
-            Ended::TooMuch => Err(Refusal::new(500, "the report is too large to be sent")),
-            Ended::NotStarted(why) => Err(Refusal::new(500, format!("the report could not be made: {why}"))),
+            Ended::TooMuch => Err(Refusal::new(500, "the report is too large to send")),
+            Ended::NotStarted(why) => Err(Refusal::new(500, format!("the report process could not be started: {why}"))),
         }
     }
 }
 
 fn state(history: &Path) -> State {
-    // The log that the store writes for its own developers changes with every look.
+    // The store's log files change with every access.
     let files = ["store", "tables", "traces"]
         .iter()
         .flat_map(|part| std::fs::read_dir(history.join(part)).into_iter().flatten());

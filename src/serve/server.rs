@@ -1,4 +1,4 @@
-//! Requests to answers.
+//! The HTTP server: routes requests and runs worker processes.
 
 use std::io::{Error, ErrorKind, Read as _};
 use std::net::{IpAddr, SocketAddr, TcpListener};
@@ -19,74 +19,75 @@ use crate::serve::report::LiveReport;
 use crate::serve::watch;
 use crate::serve::worker::{Ended, Worker};
 
-/// A query is shorter. Unit: bytes.
+/// Maximum size of a request body. Unit: bytes.
 const MOST_BODY: u64 = 1 << 20;
-/// A client that takes longer to say what it wants is not served.
+/// Time limit for a client to send its request.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Connections at a time; others wait.
+/// Maximum number of concurrent connections; others wait.
 const MOST_CONNECTIONS: usize = 64;
-/// A process has so much time to start and to open the history beside the time of its query.
+/// Additional time for a process to start and open the history.
 const START: Duration = Duration::from_secs(5);
-/// Ports are tried so often, where any will do and another program takes the one that was free.
+/// Maximum number of tries for a free port, because another program may take it in between.
 const TRIES: usize = 8;
 
-/// What our own page may do: load its script and its looks, and ask this server.
+/// Policy of the query page: load its script and stylesheet, and connect to this server.
 const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
-/// The report is one file with scripts and pictures inside, and asks nobody. It names its scripts by their digests in a policy of
-/// its own, and both policies hold: this one adds what only a header can forbid, that other pages frame it.
+/// Policy of the report, a single file with inline scripts and images that connects to no server. The file also has a
+/// policy of its own, which names its scripts by digest; both apply. This one adds `frame-ancestors`, which only a
+/// header can set.
 const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-/// Answers are no pages.
+/// Policy of answers, which are not pages.
 const NO_POLICY: &str = "default-src 'none'; frame-ancestors 'none'; sandbox";
 
-/// How to serve.
+/// Options of [`serve`].
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Folder of the history.
     pub history: PathBuf,
-    /// This program, which is started for each query.
+    /// Path of this program, which is started for each query.
     pub program: PathBuf,
-    /// Its arguments that make it answer a query ([`crate::serve::answer()`]).
+    /// Arguments with which it answers a query ([`crate::serve::answer()`]).
     pub query_arguments: Vec<String>,
-    /// Its arguments that make it print the report.
+    /// Arguments with which it prints the report.
     pub report_arguments: Vec<String>,
-    /// Where to listen.
+    /// Address to listen on.
     pub address: IpAddr,
-    /// The port; 0 takes a free one.
+    /// Port; 0 selects a free one.
     pub port: u16,
-    /// Names of this server beside addresses and `localhost`.
+    /// Host names of this server besides IP addresses and `localhost`.
     pub hosts: Vec<String>,
-    /// Time for a query. Unit: seconds.
+    /// Time limit of a query. Unit: seconds.
     pub most_secs: f64,
-    /// Rows or triples of an answer.
+    /// Maximum number of rows or triples in an answer.
     pub most_rows: u64,
-    /// Size of an answer. Unit: bytes.
+    /// Maximum size of an answer. Unit: bytes.
     pub most_bytes: u64,
-    /// Memory for a query. Unit: bytes.
+    /// Memory limit of a query. Unit: bytes.
     pub most_memory: u64,
-    /// Queries at a time.
+    /// Maximum number of concurrent queries.
     pub most_queries: usize,
-    /// Queries to choose from.
+    /// Example queries.
     pub examples: Vec<Example>,
 }
 
 /// A server that runs until the process ends.
 #[derive(Debug)]
 pub struct Serving {
-    /// Where it listens.
+    /// Address on which it listens.
     pub address: SocketAddr,
 }
 
-/// Begins to serve.
+/// Starts the server.
 ///
 /// # Errors
-/// The address can't be listened at.
+/// The address can't be bound.
 pub fn serve(options: Options) -> std::io::Result<Serving> {
     let (ip, wanted) = (options.address, options.port);
     let desk = std::sync::Arc::new(Desk::new(options));
     let mut last = Error::from(ErrorKind::AddrInUse);
     for _ in 0..if wanted == 0 { TRIES } else { 1 } {
         let address = match wanted {
-            // The library does not say which port it was given: take one that was free a moment ago.
+            // The library does not report its port, so bind a free one first and reuse it.
             0 => TcpListener::bind((ip, 0))?.local_addr()?,
             port => SocketAddr::new(ip, port),
         };
@@ -96,7 +97,7 @@ pub fn serve(options: Options) -> std::io::Result<Serving> {
             .with_global_timeout(PATIENCE)
             .with_max_concurrent_connections(MOST_CONNECTIONS);
         match server.spawn() {
-            // Its threads go on without the handle.
+            // Its threads continue without the handle.
             Ok(_) => return Ok(Serving { address }),
             Err(error) => last = error,
         }
@@ -104,18 +105,18 @@ pub fn serve(options: Options) -> std::io::Result<Serving> {
     Err(last)
 }
 
-/// What all requests share.
+/// State shared by all requests.
 struct Desk {
     options: Options,
     query: Worker,
     report: LiveReport,
     page: String,
     running: AtomicUsize,
-    /// Queries hold it to read, the report to write: it needs the history for itself.
+    /// Queries take the read lock, the report the write lock, because it needs exclusive access.
     history: RwLock<()>,
 }
 
-/// An answer before it is one of the library's.
+/// A response before conversion to the library's type.
 struct Reply {
     status: u16,
     media_type: String,
@@ -152,7 +153,7 @@ impl Desk {
     fn respond(&self, request: &mut Request<Body>) -> Response<Body> {
         let reply = self.reply(request).unwrap_or_else(Reply::from);
         let head = request.method().as_str() == "HEAD";
-        // Whatever of the request was not read stays unread: nothing else comes over this connection.
+        // The rest of the request is not read, so the connection can't be reused.
         *request.body_mut() = Body::empty();
         request.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
         response(reply, head)
@@ -165,7 +166,7 @@ impl Desk {
         let reads = matches!(method, "GET" | "HEAD");
         match path {
             "/sparql" => self.sparql(request),
-            "/" | "/style.css" | "/query.js" | "/report" if !reads => Err(Refusal::new(405, "this can only be read")),
+            "/" | "/style.css" | "/query.js" | "/report" if !reads => Err(Refusal::new(405, "use GET or HEAD")),
             "/" => Ok(Reply::page("text/html; charset=utf-8", PAGE_POLICY, self.page.as_str())),
             "/style.css" => Ok(Reply::page("text/css; charset=utf-8", NO_POLICY, page::STYLE)),
             "/query.js" => Ok(Reply::page("text/javascript; charset=utf-8", NO_POLICY, page::SCRIPT)),
@@ -173,7 +174,7 @@ impl Desk {
                 let page = self.report.page(&self.history)?;
                 Ok(Reply::page("text/html; charset=utf-8", REPORT_POLICY, page))
             }
-            _ => Err(Refusal::new(404, "there is nothing here: see /, /report and /sparql")),
+            _ => Err(Refusal::new(404, "not found: see /, /report and /sparql")),
         }
     }
 
@@ -189,7 +190,7 @@ impl Desk {
         let query = question(&parts)?;
         let accepts = request.headers().get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
         let accept = accepts.collect::<Vec<&str>>().join(",");
-        let _place = self.place().ok_or_else(|| Refusal::new(503, "too many queries are running: ask again soon"))?;
+        let _place = self.place().ok_or_else(|| Refusal::new(503, "too many queries are running: try again soon"))?;
         self.ask(query, accept)
     }
 
@@ -207,17 +208,17 @@ impl Desk {
             Ended::Itself { code: Some(0), output, .. } => answered(output),
             Ended::Itself { code: Some(watch::TIME_SPENT), .. } | Ended::Late => Err(late()),
             Ended::Itself { code: Some(watch::MEMORY_SPENT), .. } => {
-                Err(Refusal::new(500, format!("the query took more memory than {} MB", most_memory / 1_000_000)))
+                Err(Refusal::new(500, format!("the query took more than {} MB of memory", most_memory / 1_000_000)))
             }
-            Ended::Itself { .. } => Err(Refusal::new(500, "the query made the evaluator crash")),
+            Ended::Itself { .. } => Err(Refusal::new(500, "the query crashed the evaluator")),
             Ended::TooMuch => {
-                Err(Refusal::new(500, format!("the answer is larger than {} MB: ask for less", most_bytes / 1_000_000)))
+                Err(Refusal::new(500, format!("the answer is larger than {} MB: use `LIMIT`", most_bytes / 1_000_000)))
             }
-            Ended::NotStarted(why) => Err(Refusal::new(500, format!("the query could not be asked: {why}"))),
+            Ended::NotStarted(why) => Err(Refusal::new(500, format!("the query process could not be started: {why}"))),
         }
     }
 
-    /// A place among the queries that run; none where all are taken.
+    /// Reserves a slot for a query. Returns `None` if all slots are in use.
     fn place(&self) -> Option<Place<'_>> {
         let taken = self.running.fetch_add(1, Ordering::AcqRel);
         let place = Place(&self.running);
@@ -225,7 +226,7 @@ impl Desk {
     }
 }
 
-/// Given back when it is dropped.
+/// A slot for a running query; dropping it frees the slot.
 struct Place<'a>(&'a AtomicUsize);
 
 impl Drop for Place<'_> {
@@ -234,9 +235,9 @@ impl Drop for Place<'_> {
     }
 }
 
-/// The head and the body that the process wrote.
+/// Splits the output of the process into head and body.
 fn answered(output: Vec<u8>) -> Result<Reply, Refusal> {
-    let crashed = || Refusal::new(500, "the query made the evaluator crash");
+    let crashed = || Refusal::new(500, "the query crashed the evaluator");
     let end = output.iter().position(|byte| *byte == b'\n').ok_or_else(crashed)?;
     let head: Head = serde_json::from_slice(&output[..end]).map_err(|_| crashed())?;
     let text = head.media_type.starts_with("text/");
@@ -244,10 +245,10 @@ fn answered(output: Vec<u8>) -> Result<Reply, Refusal> {
     Ok(Reply { status: head.status, media_type, policy: NO_POLICY, body: output[end + 1..].to_vec() })
 }
 
-/// The body of a request, as far as it is not too long and does not come too slowly.
+/// Reads the body of a request. Fails if it is too long or arrives too slowly.
 fn body(request: &mut Request<Body>) -> Result<Vec<u8>, Refusal> {
-    let too_long = || Refusal::new(413, format!("a request holds at most {MOST_BODY} bytes"));
-    let slow = || Refusal::new(408, format!("the request took longer than {} s to come", PATIENCE.as_secs()));
+    let too_long = || Refusal::new(413, format!("a request may have at most {MOST_BODY} bytes"));
+    let slow = || Refusal::new(408, format!("the request took longer than {} s to arrive", PATIENCE.as_secs()));
     if request.body().len().is_some_and(|length| length > MOST_BODY) {
         return Err(too_long());
     }
@@ -276,7 +277,7 @@ fn response(reply: Reply, head: bool) -> Response<Body> {
     *response.status_mut() = status;
     let headers = response.headers_mut();
     let mut set = |name: HeaderName, value: &str| {
-        // Media types and policies are ours, and have no line ends.
+        // Media types and policies come from this program and contain no line breaks.
         if let Ok(value) = HeaderValue::from_str(value) {
             headers.insert(name, value);
         }

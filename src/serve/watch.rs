@@ -1,18 +1,18 @@
-//! A process that ends itself: nothing that a query makes the evaluator do can keep it from that.
+//! Limits on the own process, enforced from a separate thread, whatever the evaluator does.
 
 use std::time::{Duration, Instant};
 
-/// Exit code of a process whose time is spent.
+/// Exit code if the time limit is exceeded.
 pub(super) const TIME_SPENT: i32 = 124;
-/// Exit code of a process whose memory is spent.
+/// Exit code if the memory limit is exceeded.
 pub(super) const MEMORY_SPENT: i32 = 125;
 
-/// Between two looks: at a gigabyte a second that is 20 MB more than allowed.
+/// Interval between checks. A process that allocates 1 GB/s exceeds its limit by 20 MB.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// Ends this process when so much time has passed, or it has so much memory.
+/// Exits this process after `secs`, or once it uses more than `memory`.
 ///
-/// Units: seconds, bytes. Where the system does not tell memory (Linux does), only time counts.
+/// Units: seconds, bytes. The memory limit works only on systems that report memory in `/proc`, such as Linux.
 pub(super) fn limit(secs: f64, memory: u64) {
     let until = Duration::try_from_secs_f64(secs).ok().and_then(|secs| Instant::now().checked_add(secs));
     std::thread::spawn(move || {
@@ -28,7 +28,7 @@ pub(super) fn limit(secs: f64, memory: u64) {
     });
 }
 
-/// Memory that this process has. Unit: bytes.
+/// Resident memory of this process; `None` if the system does not report it. Unit: bytes.
 fn resident() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

@@ -1,4 +1,4 @@
-//! A process of our own program, started for one piece of work, and ended when that takes too long or gives too much.
+//! A child process of this program for one task, killed if it takes too long or writes too much.
 
 use std::io::{Read, Write};
 use std::path::PathBuf;
@@ -6,31 +6,32 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-/// How to start it.
+/// The command of a worker process.
 #[derive(Debug, Clone)]
 pub(super) struct Worker {
     pub program: PathBuf,
     pub arguments: Vec<String>,
 }
 
-/// How it ended.
+/// The end of a worker process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Ended {
-    /// By itself, with its exit code (none: a signal ended it) and what it wrote to both streams.
+    /// It exited, with its exit code (`None` if a signal killed it) and the contents of stdout and stderr.
     Itself { code: Option<i32>, output: Vec<u8>, errors: Vec<u8> },
-    /// Its time was spent.
+    /// It exceeded its time limit.
     Late,
-    /// It wrote more than there is room for.
+    /// It wrote more than allowed.
     TooMuch,
     /// It could not be started.
     NotStarted(String),
 }
 
-/// What its error stream may hold: a few diagnostics.
+/// Maximum length of stderr: a few diagnostics. Unit: bytes.
 const MOST_ERRORS: u64 = 64 * 1024;
 
 impl Worker {
-    /// Starts it, gives it `input`, and waits until it ends or is ended. Units: bytes.
+    /// Starts the process, writes `input` to its stdin, and waits until it exits or is killed. `room` is the maximum
+    /// length of stdout. Unit: bytes.
     pub fn run(&self, input: &[u8], time: Duration, room: u64) -> Ended {
         let mut command = Command::new(&self.program);
         let command = command.args(&self.arguments).env("NO_COLOR", "1");
@@ -44,10 +45,10 @@ impl Worker {
 
 fn watched(mut child: Child, input: Vec<u8>, time: Duration, room: u64) -> Ended {
     let until = Instant::now().checked_add(time);
-    // Each stream has a thread, so that none is held up by another that nobody reads.
+    // Each stream has its own thread, so that a full pipe can't block the others.
     let stdin = child.stdin.take();
     std::thread::spawn(move || {
-        // A process that ends before it has read everything says why itself.
+        // If the process exits before it has read everything, its output has the reason.
         let _ = stdin.map(|mut stdin| stdin.write_all(&input));
     });
     let errors = child.stderr.take().map(|stream| reading(stream, MOST_ERRORS));
@@ -61,7 +62,7 @@ fn watched(mut child: Child, input: Vec<u8>, time: Duration, room: u64) -> Ended
         return end(child, Ended::TooMuch);
     }
     let errors = errors.and_then(|receiver| receiver.recv_timeout(left(until)).ok()).unwrap_or_default();
-    // Its streams are closed: it has ended, or does at once.
+    // Its streams are closed, so it has exited or is about to.
     let patience = Instant::now() + Duration::from_secs(1);
     loop {
         match child.try_wait() {
@@ -76,21 +77,21 @@ fn reading(stream: impl Read + Send + 'static, most: u64) -> std::sync::mpsc::Re
     let (sender, receiver) = sync_channel(1);
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
-        // What was read before a fault is all there is.
+        // After a read error, the bytes so far are used.
         let _ = stream.take(most).read_to_end(&mut bytes);
-        // Nobody listens any more when the time was spent.
+        // The receiver is gone if the time limit was exceeded.
         let _ = sender.send(bytes);
     });
     receiver
 }
 
 fn left(until: Option<Instant>) -> Duration {
-    // A moment that no clock can tell never comes.
+    // `None` is a deadline beyond the range of the clock: it is never reached.
     until.map_or(Duration::from_secs(u64::from(u32::MAX)), |until| until.saturating_duration_since(Instant::now()))
 }
 
 fn end(mut child: Child, how: Ended) -> Ended {
-    // It may have ended meanwhile.
+    // It may have exited in the meantime.
     let _ = child.kill();
     let _ = child.wait();
     how

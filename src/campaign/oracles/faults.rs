@@ -1,26 +1,26 @@
-//! The faults, as data.
+//! The table of faults.
 
 use crate::actions::{Accident, Defect, Moment, Sabotage};
 
-/// A fault that properties have to notice.
+/// A fault that properties should detect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fault {
-    /// What it is called in results.
+    /// Its name in results.
     pub name: &'static str,
-    /// What happens, in words.
+    /// Description.
     pub what: &'static str,
-    /// How it is done.
+    /// The change to robot, world or report.
     pub sabotage: Sabotage,
 }
 
 impl Fault {
-    /// Whether it can come about in a test of some actions.
+    /// Whether it can occur in a test with these actions.
     pub fn concerns(&self, test: &[String]) -> bool {
         self.sabotage.action.is_none_or(|action| test.iter().any(|name| name == action))
     }
 }
 
-/// Nothing goes wrong: the rest of a fault that is one thing.
+/// No fault: the default for the other fields.
 const NONE: Sabotage = Sabotage { action: None, robot: None, world: None, report: None };
 
 /// The actions that a fault may be confined to.
@@ -32,7 +32,7 @@ const PLACE: Option<&str> = Some("Place");
 pub const FAULTS: [Fault; 16] = [
     Fault {
         name: "no-op",
-        what: "the robot does nothing and says that it succeeded",
+        what: "the robot does nothing and reports success",
         sabotage: Sabotage { robot: Some(Defect::Idle), report: Some(true), ..NONE },
     },
     Fault {
@@ -47,12 +47,12 @@ pub const FAULTS: [Fault; 16] = [
     },
     Fault {
         name: "wrong-object",
-        what: "the robot takes the nearest other object for the one that was named",
+        what: "the robot mistakes the nearest other object for the requested one",
         sabotage: Sabotage { action: PICK, robot: Some(Defect::WrongObject), ..NONE },
     },
     Fault {
         name: "teleport",
-        what: "the object is half a metre farther away from one moment to the next while it is carried",
+        what: "the object jumps half a metre away while it is carried",
         sabotage: Sabotage { action: PICK, world: Some((Moment::Carrying, Accident::Teleport)), ..NONE },
     },
     Fault {
@@ -62,7 +62,7 @@ pub const FAULTS: [Fault; 16] = [
     },
     Fault {
         name: "false-success",
-        what: "the hand drops the object, and the action says that it succeeded",
+        what: "the hand drops the object, and the action reports success",
         sabotage: Sabotage {
             action: PICK,
             world: Some((Moment::Carrying, Accident::HandOpens)),
@@ -72,27 +72,27 @@ pub const FAULTS: [Fault; 16] = [
     },
     Fault {
         name: "false-failure",
-        what: "the action succeeds and says that it failed",
+        what: "the action succeeds and reports failure",
         sabotage: Sabotage { report: Some(false), ..NONE },
     },
     Fault {
         name: "frozen-sensors",
-        what: "what the robot senses stays as it was when the action began",
+        what: "all sensor readings stay as they were when the action began",
         sabotage: Sabotage { robot: Some(Defect::FrozenSensors), ..NONE },
     },
     Fault {
         name: "obstacle",
-        what: "something stands right before the base from one moment to the next while it drives",
+        what: "an obstacle appears right in front of the base while it drives",
         sabotage: Sabotage { action: MOVE_TO, world: Some((Moment::Driving, Accident::InTheWay)), ..NONE },
     },
     Fault {
         name: "carried-off",
-        what: "the driving robot is carried out of its rooms, and neither wheels nor landmarks tell it at once",
+        what: "the robot is moved out of its rooms while it drives; odometry and landmarks don't show it at once",
         sabotage: Sabotage { action: MOVE_TO, world: Some((Moment::Driving, Accident::CarriedOff)), ..NONE },
     },
     Fault {
         name: "dropped-on-the-way",
-        what: "the hand opens while the robot drives to the place, and the action says that it succeeded",
+        what: "the hand opens while the robot drives to the place, and the action reports success",
         sabotage: Sabotage {
             action: PLACE,
             world: Some((Moment::Driving, Accident::HandOpens)),
@@ -102,17 +102,17 @@ pub const FAULTS: [Fault; 16] = [
     },
     Fault {
         name: "placed-and-gone",
-        what: "the object is half a metre farther away from one moment to the next once it is let go",
+        what: "the object jumps half a metre away once it is released",
         sabotage: Sabotage { action: PLACE, world: Some((Moment::LetGo, Accident::Teleport)), ..NONE },
     },
     Fault {
         name: "placed-and-fallen",
-        what: "the object falls over once it is let go",
+        what: "the object falls over once it is released",
         sabotage: Sabotage { action: PLACE, world: Some((Moment::LetGo, Accident::Falls)), ..NONE },
     },
     Fault {
         name: "hand-jams",
-        what: "the hand does not open any more when the object is to be let go",
+        what: "the hand no longer opens when it should release the object",
         sabotage: Sabotage { action: PLACE, world: Some((Moment::Lowering, Accident::HandJams)), ..NONE },
     },
     Fault {

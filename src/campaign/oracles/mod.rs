@@ -1,6 +1,7 @@
-//! Tests of the oracles: runs with faults put in on purpose, to see which properties notice.
+//! Tests the oracles: runs with injected faults show which properties detect them.
 //!
-//! Never: keeps such a run in a history, where it would count as the robot's, or decides what noticing is.
+//! Never: stores these runs in a history, where they would count as the robot's, or decides when a fault counts as
+//! detected.
 
 mod faults;
 mod trials;

@@ -1,4 +1,4 @@
-//! Every scene of a campaign without a fault and with each of them, from the same choices.
+//! Runs every scene of a campaign without a fault and with each fault, from the same choices.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,12 +13,12 @@ use crate::campaign::{Env, Manner, Planned, run_line, run_sabotaged};
 use crate::history::{RunRecord, RunStatus};
 use crate::verdict::{Judgement, Outcome};
 
-/// Scenes drawn for one run before it is left out: as many as a campaign draws.
+/// Maximum number of scenes drawn for one run, as in a campaign; then the run is left out.
 const SCENES_PER_RUN: u64 = 50;
-/// Campaign of the records, which are never kept.
+/// Campaign id of the records, which are never stored.
 const NO_CAMPAIGN: &str = "check-oracles";
 
-/// How faults are tried.
+/// Options of [`try_faults`].
 #[derive(Debug, Clone, Copy)]
 pub struct TrialOptions {
     /// Workers, one simulation each.
@@ -27,33 +27,34 @@ pub struct TrialOptions {
     pub manner: Manner,
 }
 
-/// One scene with one fault, or with none.
+/// One scene with one fault or without a fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Position of the run in the campaign, from 0.
     pub index: u64,
-    /// Name of the fault; none: the scene as it is.
+    /// Name of the fault; `None` for the run without a fault.
     pub fault: Option<&'static str>,
-    /// Whether the fault came about.
+    /// Whether the fault occurred.
     pub came_about: bool,
-    /// Outcome of each property, by IRI: that of the action which fared worst where several have it. Empty where there was
-    /// no judgement: no scene, a crash of simulation, or a spent budget.
+    /// Outcome of each property by IRI; the worst one if several actions have the property. Empty if the run was not
+    /// judged: no scene, a simulation crash, or a spent budget.
     pub outcomes: BTreeMap<String, Outcome>,
 }
 
-/// A scene that can be run again.
+/// A scene with the choices to run it again.
 struct Scene {
     index: u64,
     choices: Vec<Choice>,
 }
 
-/// Runs every planned scene without a fault, and then with each that concerns its test, on several workers. Tells `on_done` after each.
+/// Runs every planned scene without a fault, and then with each fault that concerns its test, on several workers. Calls
+/// `on_done` after each.
 ///
-/// The answers are in the order of the indices, that of no fault before the others; they depend neither on the number of
-/// workers nor on the clock. `stop` leaves out what has not begun yet.
+/// The results are sorted by index, the run without a fault first. They depend neither on the number of workers nor on
+/// the clock. Runs that have not begun when `stop` is set are left out.
 ///
 /// # Errors
-/// `X010` workers can't be started.
+/// `X010` if workers can't be started.
 pub fn try_faults(
     env: &Env,
     faults: &[Fault],
@@ -92,7 +93,7 @@ pub fn try_faults(
     }))
 }
 
-/// The scene of an index as a campaign would run it; nothing where there is none.
+/// Runs the scene of an index as a campaign would. Returns `None` if no scene can be built.
 fn without_fault(env: &Env, index: u64, manner: &Manner) -> Option<(Scene, Trial)> {
     let repeat = u64::from(env.campaign.repeat);
     let repetition = (repeat > 1).then_some(index % repeat);
@@ -106,7 +107,7 @@ fn without_fault(env: &Env, index: u64, manner: &Manner) -> Option<(Scene, Trial
     })
 }
 
-/// The same scene with a fault. What the fault makes the robot decide anew is drawn anew.
+/// Runs the same scene with a fault. Choices that only arise because of the fault are drawn anew.
 fn with_fault(env: &Env, scene: &Scene, fault: &Fault, manner: &Manner) -> Option<Trial> {
     let index = scene.index;
     let choices = Choices::partly_recorded(&scene.choices, env.campaign.seed, index);
@@ -116,7 +117,7 @@ fn with_fault(env: &Env, scene: &Scene, fault: &Fault, manner: &Manner) -> Optio
     Some(Trial { index, fault: Some(fault.name), came_about: saboteur.came_about(), outcomes })
 }
 
-/// One run; nothing where the scene was discarded or simulation crashed.
+/// Makes one run. Returns `None` if the scene was discarded or the simulation crashed.
 fn run(env: &Env, index: u64, choices: Choices, manner: &Manner, saboteur: Option<&mut Saboteur>) -> Option<RunRecord> {
     let line = || match saboteur {
         None => run_line(env, NO_CAMPAIGN, index, choices, manner),
@@ -125,7 +126,7 @@ fn run(env: &Env, index: u64, choices: Choices, manner: &Manner, saboteur: Optio
     catch_unwind(AssertUnwindSafe(line)).ok()?.ok()
 }
 
-/// The worst outcome of each property over the actions of a completed run.
+/// The worst outcome of each property over all actions; empty if the run did not complete.
 fn outcomes(record: &RunRecord) -> BTreeMap<String, Outcome> {
     let mut worst: BTreeMap<String, Outcome> = BTreeMap::new();
     if record.status != RunStatus::Completed {
@@ -140,7 +141,7 @@ fn outcomes(record: &RunRecord) -> BTreeMap<String, Outcome> {
     worst
 }
 
-/// What counts most where a property is judged for several actions.
+/// Rank of outcomes; the highest one counts if a property is judged for several actions.
 fn severity(outcome: Outcome) -> u8 {
     match outcome {
         Outcome::Failed => 3,

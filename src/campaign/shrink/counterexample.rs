@@ -1,4 +1,4 @@
-//! Shrinks a failing run: the line is the test, and a scene's choices are the list.
+//! Shrinks a failing run: a list of a scene's choices is tested by running it.
 
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,69 +13,71 @@ use crate::history::{History, RunRecord, RunStatus};
 use crate::scenario::Role;
 use crate::verdict::Outcome;
 
-/// Prefix of the choices that are what sensors get wrong.
+/// Prefix of the choices of sensor noise.
 const NOISE: &str = "sense.";
-/// Fresh noise for the small scene, to say how often it fails.
+/// Repetitions of the shrunk scene with fresh noise, to estimate how often it fails.
 const FRESH: u32 = 5;
-/// Movements under this are settling and rounding. Unit: metres.
+/// Smaller movements come from settling and rounding. Unit: metres.
 const MOVED_M: f64 = 1e-3;
 
-/// How often a scene must fail with fresh noise.
+/// The share of repetitions with fresh noise that must fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Repeat {
-    /// At least so many times.
+    /// Minimum number of failures.
     pub least: u32,
-    /// Of so many repetitions.
+    /// Number of repetitions.
     pub of: u32,
 }
 
-/// How a run is shrunk.
+/// Options of [`shrink`].
 pub struct ShrinkOptions<'a> {
-    /// This property must still fail; without one, exactly those that failed in the run.
+    /// The property that must still fail; `None`: exactly the properties that failed in the run.
     pub property: Option<&'a str>,
-    /// Simulations, those of the explanation included.
+    /// Maximum number of simulations, including those of the explanation.
     pub trials: u64,
-    /// Workers; what is found does not depend on it.
+    /// Workers; the result does not depend on their number.
     pub jobs: usize,
-    /// With fresh noise; without, the noise is as recorded, and shrinks like everything else.
+    /// Test with fresh noise; `None`: the noise is as recorded, and is shrunk like the other choices.
     pub repeat: Option<Repeat>,
     /// How runs are made.
     pub manner: Manner,
-    /// Whether time is up or somebody asked to stop.
+    /// Whether the time is up or the user has interrupted.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// The smallest scene that was found.
+/// The smallest failing scene found.
 #[derive(Debug, Clone)]
 pub struct Shrunk {
-    /// Its choices, those of noise among them.
+    /// Its choices, including noise.
     pub choices: Vec<Choice>,
-    /// IRIs of the properties that failed in the run; all of them, or the one that was asked for, fail still.
+    /// IRIs of the properties that failed in the run. All of them, or the requested one, still fail.
     pub failed: BTreeSet<String>,
-    /// Other objects in the run that was shrunk.
+    /// Number of other objects in the original run.
     pub others_before: usize,
-    /// Choices that were not nominal in it.
+    /// Number of its choices that were not nominal.
     pub special_before: usize,
-    /// Whether nothing more can be taken away; otherwise limits ended it.
+    /// Whether nothing more can be removed; `false` if limits ended the search.
     pub minimal: bool,
-    /// Simulations that shrinking took.
+    /// Number of simulations for shrinking.
     pub simulations: u64,
-    /// Simulations that the explanation took.
+    /// Number of simulations for the explanation.
     pub explaining: u64,
-    /// What matters.
+    /// The choices that matter.
     pub explained: Explained,
-    /// How often it fails with fresh noise, and of how many repetitions; nothing without noise or time.
+    /// Number of failures with fresh noise, and of repetitions; `None` if there is no noise or the time is up.
     pub fresh: Option<(u32, u32)>,
-    /// Whether noise had to stay as recorded, because with fresh noise the run does not fail often enough.
+    /// Whether recorded noise was used, because with fresh noise the run does not fail often enough.
     pub noise_kept: bool,
 }
 
-/// Finds the smallest scene that fails as a run did. `recorded` are the run's choices, `index` its place in its campaign.
+/// Finds the smallest scene that fails as a run did. `recorded` are the run's choices, `index` is its position in its
+/// campaign.
 ///
-/// The number of workers changes nothing of what is found; a limit on time may. `on_better` hears of each smaller scene.
+/// The result does not depend on the number of workers, but may depend on a time limit. `on_better` is called with each
+/// smaller scene.
 ///
 /// # Errors
-/// `S050` nothing fails when the run is made again, or not the property that was asked for.
+/// `S050` if nothing fails when the run is repeated, or not the requested property; `S051` if its scene can't be built.
 pub fn shrink(
     env: &Env,
     index: u64,
@@ -119,14 +121,14 @@ pub fn shrink(
     })
 }
 
-/// What the names of campaigns begin with that keep a shrunk run.
+/// Name prefix of campaigns that hold a shrunk run.
 pub(in crate::campaign) const SHRUNK: &str = "shrunk ";
 
-/// Runs the small scene once more and keeps it in the history: a campaign of its own, whose run says what it was shrunk
-/// from. Returns the run.
+/// Runs the shrunk scene again and stores it in the history, in a campaign of its own. Returns the run, which names the
+/// run it was shrunk from.
 ///
 /// # Errors
-/// Writing failed; or the scene can't be made any more, which a changed program explains.
+/// Writing failed; or `S051` if the scene can't be built, for example because the program changed.
 pub fn keep(
     env: &Env,
     history: &History,
@@ -139,7 +141,7 @@ pub fn keep(
     (campaign.planned_runs, campaign.repeat) = (1, 1);
     campaign.shards.clear();
     let mut record = run_line(env, &id, index, Choices::recorded(&shrunk.choices), manner)
-        .map_err(|failure| Diagnostic::error("S051", format!("the shrunk scene can't be made again: {failure}")))?;
+        .map_err(|failure| Diagnostic::error("S051", format!("the shrunk scene can't be built again: {failure}")))?;
     record.shrunk_from = Some(original.to_owned());
     history.begin_campaign(&campaign)?;
     history.commit(&record)?;
@@ -147,7 +149,7 @@ pub fn keep(
     Ok(record)
 }
 
-/// The run to shrink and what must stay of it.
+/// The run to shrink, and the properties that must still fail.
 struct Subject<'a> {
     env: &'a Env,
     index: u64,
@@ -159,19 +161,25 @@ impl Subject<'_> {
     fn check_property(&self) -> Result<(), Diagnostics> {
         let failed = || self.failed.iter().map(|iri| names::local(iri));
         match self.options.property {
-            _ if self.failed.is_empty() => Err(Diagnostic::error("S050", "no property fails in this run: there is nothing to shrink")
-                .help("rules or models may have changed since it was made; `actcheck list` shows runs that failed by their score")
-                .into()),
+            _ if self.failed.is_empty() => {
+                Err(Diagnostic::error("S050", "no property fails in this run: there is nothing to shrink")
+                    .help("rules or models may have changed since then; `actcheck list` shows scores")
+                    .into())
+            }
             Some(property) if !self.failed.iter().any(|iri| is_named(iri, property)) => {
                 let message = format!("the property `{property}` does not fail in this run");
-                let help = format!("{}; those that fail: {}", did_you_mean(property, failed()), failed().collect::<Vec<_>>().join(", "));
+                let help = format!(
+                    "{}; failing: {}",
+                    did_you_mean(property, failed()),
+                    failed().collect::<Vec<_>>().join(", ")
+                );
                 Err(Diagnostic::error("S050", message).help(help).into())
             }
             _ => Ok(()),
         }
     }
 
-    /// One run. What can't be drawn, does not settle, breaks or runs out of time does not fail as it should.
+    /// Makes one run. Returns `None` unless it completes and fails as required.
     fn run(&self, choices: Choices) -> Option<RunRecord> {
         let run = || run_line(self.env, "shrink", self.index, choices, &self.options.manner).ok();
         let record = catch_unwind(AssertUnwindSafe(run)).ok().flatten()?;
@@ -188,10 +196,10 @@ impl Subject<'_> {
         Tried { made, simulations: 1 }
     }
 
-    /// The scene of a list with the noise of a repetition. The noise does not depend on the scene.
+    /// Runs the scene of a list with the noise of a repetition. The noise does not depend on the scene.
     fn repetition(&self, list: &[Choice], number: u32) -> Option<RunRecord> {
         let scene: Vec<Choice> = list.iter().filter(|choice| !is_noise(&choice.name)).cloned().collect();
-        // Streams from the end: those from the beginning are the campaign's own.
+        // The campaign uses the streams from 0 up; these count down from the maximum.
         self.run(Choices::partly_recorded(&scene, self.env.campaign.seed, u64::MAX - u64::from(number)))
     }
 
@@ -222,7 +230,7 @@ impl Subject<'_> {
         (u32::try_from(failures).unwrap_or(of), of)
     }
 
-    /// The first noise with which a scene fails, written into its choices, so that one run shows it.
+    /// Adds the first noise with which the scene fails to its choices, so that a single run reproduces the failure.
     fn with_failing_noise(&self, list: &[Choice]) -> Vec<Choice> {
         let of = self.options.repeat.map_or(1, |repeat| repeat.of);
         let failing = (0..of).find_map(|number| self.repetition(list, number));
@@ -230,11 +238,11 @@ impl Subject<'_> {
     }
 }
 
-/// The run made again.
+/// Makes the run again.
 fn remake(env: &Env, index: u64, recorded: &[Choice], options: &ShrinkOptions<'_>) -> Result<RunRecord, Diagnostics> {
     run_line(env, "shrink", index, Choices::recorded(recorded), &options.manner).map_err(|failure| {
-        Diagnostic::error("S051", format!("the run's scene can't be made any more: {failure}"))
-            .help("models, robot or program have changed since it was made")
+        Diagnostic::error("S051", format!("the run's scene can no longer be built: {failure}"))
+            .help("models, robot or program have changed since the run was made")
             .into()
     })
 }
@@ -252,12 +260,12 @@ fn is_noise(name: &str) -> bool {
     name.starts_with(NOISE)
 }
 
-/// Choices of a list that are not nominal, those that only say how many objects there are left out.
+/// Number of choices that are not nominal, without those that only set the number of objects.
 fn special(list: &[Choice]) -> usize {
     list.iter().filter(|choice| choice.value != choice.kind.nominal() && group(list, &choice.name).is_some()).count()
 }
 
-/// The thing of many that a choice is of, such as `other.3`.
+/// The numbered object of a choice, such as `other.3`.
 fn thing_of(name: &str) -> Option<&str> {
     let (thing, _) = name.rsplit_once('.')?;
     let (kind, number) = thing.split_once('.')?;
@@ -268,7 +276,8 @@ fn left_out(thing: &str) -> Choice {
     Choice { name: format!("{thing}.left_out"), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
 }
 
-/// One for each object but target and platform: first those that moved, the farthest first, then those that stand nearest to the target.
+/// Removals of each object except target and platform: first the objects that moved, farthest first, then those nearest
+/// to the target.
 fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
     let things = recorded.iter().filter(|choice| choice.name.ends_with(".model"));
     let things = things.filter_map(|choice| thing_of(&choice.name));
@@ -291,7 +300,7 @@ fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
     ranked.into_iter().map(|(.., removal)| removal).collect()
 }
 
-/// Leaves out as many of the last actions as possible.
+/// Choices that leave out the last actions, most actions first.
 fn ends(env: &Env, index: u64) -> Vec<Choice> {
     let of = env.campaign.tests[env.test_of(index)].len();
     let end = |left_out: usize| Choice {
@@ -302,8 +311,8 @@ fn ends(env: &Env, index: u64) -> Vec<Choice> {
     (1..of).rev().map(end).collect()
 }
 
-/// What becomes nominal together: noise, physics, the robot's start, where others stand, where the target does, and what
-/// things are. How many things there are is not for this.
+/// Group of choices that become nominal together: noise, physics, the robot's start, positions of other objects, the
+/// target's position, and models. Returns `None` for numbers of objects.
 fn group(list: &[Choice], name: &str) -> Option<u8> {
     let behind = name.rsplit('.').next().unwrap_or(name);
     let thing = thing_of(name);

@@ -1,58 +1,58 @@
-//! Which choices of a failing list matter, how far each can go, and the nearest list that passes.
+//! Explains a failing list: the choices that matter, the failing range of each, and the nearest passing list.
 
 use crate::base::{Choice, ChoiceKind};
 use crate::campaign::shrink::list::{ids, is_nominal, spread, with_value};
 use crate::campaign::shrink::{Id, Plan, Search};
 
-/// Halvings of the gap between a failing and a passing value: it shrinks to an eighth.
+/// Bisections between a failing and a passing value: the gap shrinks to an eighth.
 const HALVINGS: usize = 3;
-/// Noise is drawn at most so many standard deviations from 0.
+/// Noise is drawn within this many standard deviations of 0.
 const FARTHEST_SIGMAS: f64 = 4.0;
 
-/// What one choice does, all others as they are.
+/// The influence of one choice with all others fixed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Influence {
-    /// Which choice.
+    /// The choice.
     pub id: Id,
     /// Its kind and its value in the failing list.
     pub choice: Choice,
-    /// Whether it passes with the nominal value; nothing where limits ended the search before.
+    /// Whether the list passes with the nominal value; `None` if limits ended the search first.
     pub matters: Option<bool>,
-    /// It fails at both of these and at every value that was tried between. In the unit of the choice.
+    /// The list fails at both of these values and at every tried value in between. In the unit of the choice.
     pub fails: (f64, f64),
-    /// The nearest values at which it passes, below and above; nothing where none was found.
+    /// The nearest passing values below and above; `None` if none was found.
     pub passes: (Option<f64>, Option<f64>),
 }
 
-/// The list that passes and differs least: in one choice.
+/// The nearest passing list, which differs in one choice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Neighbour {
-    /// Which choice.
+    /// The choice.
     pub id: Id,
-    /// The value with which it passes.
+    /// Its passing value.
     pub value: f64,
-    /// How far that is from the failing value, as a share of the choice's spread.
+    /// Distance from the failing value, as a share of the choice's spread.
     pub distance: f64,
 }
 
-/// What is known of a failing list.
+/// The explanation of a failing list.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Explained {
     /// Choices that are not nominal, in order.
     pub influences: Vec<Influence>,
-    /// The nearest list that passes.
+    /// The nearest passing list.
     pub neighbour: Option<Neighbour>,
 }
 
-/// Values between a failing one and one that passes, or the end of what can be drawn.
+/// An interval between a failing value and a passing one, or the end of the choice's range.
 struct Bracket {
-    /// Which influence.
+    /// Position of the influence.
     of: usize,
     fails: f64,
-    /// Nothing until the end was tried.
+    /// `None` until the end was tried.
     passes: Option<f64>,
     end: f64,
-    /// Whether there are values between.
+    /// Whether the choice has values in between.
     continuous: bool,
     open: bool,
 }
@@ -93,7 +93,8 @@ pub fn explain(search: &mut Search<'_>, list: &[Choice], plan: &Plan<'_>) -> Exp
     Explained { influences, neighbour }
 }
 
-/// Towards nominal first, so that whether a choice matters is known before limits end it; then away from it.
+/// Brackets towards nominal come first, so that the influences are known before limits end the search; then those away
+/// from nominal.
 fn brackets(influences: &[Influence]) -> Vec<Bracket> {
     let towards = influences.iter().enumerate().map(|(of, influence)| (of, influence.choice.kind.nominal()));
     let away = influences.iter().enumerate().filter_map(|(of, influence)| {
@@ -135,7 +136,7 @@ impl Bracket {
         match fails {
             Some(true) => {
                 self.fails = point;
-                // Failing at the very end leaves nothing to look for.
+                // If the list fails at the end, there is no boundary to bisect.
                 self.open = self.continuous && self.passes.is_some();
             }
             Some(false) => {

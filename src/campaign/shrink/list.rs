@@ -1,13 +1,13 @@
-//! Lists of named choices, and edits of them.
+//! Edits lists of named choices.
 
 use crate::base::{Choice, ChoiceKind};
 
-/// One choice of a list: names may repeat.
+/// Identifies a choice of a list: names may repeat.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Id {
     /// Name of the choice.
     pub name: String,
-    /// How many of this name stand before it.
+    /// Number of choices of this name before it.
     pub nth: usize,
 }
 
@@ -22,17 +22,17 @@ pub fn ids(list: &[Choice]) -> Vec<(Id, &Choice)> {
         .collect()
 }
 
-/// Whether nothing is special about it.
+/// Whether a choice has its nominal value.
 pub(super) fn is_nominal(choice: &Choice) -> bool {
     choice.value == choice.kind.nominal()
 }
 
-/// The choice of an id.
+/// Returns the choice with an id.
 pub(super) fn find<'a>(list: &'a [Choice], id: &Id) -> Option<&'a Choice> {
     list.iter().filter(|choice| choice.name == id.name).nth(id.nth)
 }
 
-/// The list with another value for one choice.
+/// Returns the list with another value for one choice.
 pub(super) fn with_value(mut list: Vec<Choice>, id: &Id, value: f64) -> Vec<Choice> {
     if let Some(choice) = list.iter_mut().filter(|choice| choice.name == id.name).nth(id.nth) {
         choice.value = value;
@@ -40,7 +40,7 @@ pub(super) fn with_value(mut list: Vec<Choice>, id: &Id, value: f64) -> Vec<Choi
     list
 }
 
-/// The list with some choices at their nominal values.
+/// Returns the list with some choices at their nominal values.
 pub(super) fn with_nominal(mut list: Vec<Choice>, ids: &[Id]) -> Vec<Choice> {
     for id in ids {
         if let Some(choice) = list.iter_mut().filter(|choice| choice.name == id.name).nth(id.nth) {
@@ -50,7 +50,7 @@ pub(super) fn with_nominal(mut list: Vec<Choice>, ids: &[Id]) -> Vec<Choice> {
     list
 }
 
-/// The list with a choice set, whether it was there or not.
+/// Returns the list with a choice replaced or added.
 pub(super) fn with_choice(mut list: Vec<Choice>, set: &Choice) -> Vec<Choice> {
     match list.iter_mut().find(|choice| choice.name == set.name) {
         Some(choice) => *choice = set.clone(),
@@ -59,12 +59,12 @@ pub(super) fn with_choice(mut list: Vec<Choice>, set: &Choice) -> Vec<Choice> {
     list
 }
 
-/// Whether a list says the same of a choice.
+/// Whether the list has a choice with this name and value.
 pub(super) fn has(list: &[Choice], set: &Choice) -> bool {
     list.iter().any(|choice| choice.name == set.name && choice.value == set.value)
 }
 
-/// How far values of a kind lie apart, in the unit of the choice: the width of its range, or eight standard deviations.
+/// The spread of a kind's values, in the unit of the choice: the width of its range, or eight standard deviations.
 pub(super) fn spread(kind: &ChoiceKind) -> f64 {
     match kind {
         ChoiceKind::Index { of } => *of as f64,
@@ -73,9 +73,9 @@ pub(super) fn spread(kind: &ChoiceKind) -> f64 {
     }
 }
 
-/// Of a place that was tried several times, only the last try: the one that was accepted.
+/// Drops the rejected tries of placements: only the last one, which was accepted, stays.
 pub(in crate::campaign) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
-    // What sensors get wrong is asked for again and again, and counts each time.
+    // Sensor noise is drawn repeatedly, and every draw counts.
     let placed = |name: &str| !name.starts_with("sense.");
     let kept = list
         .iter()
@@ -84,7 +84,7 @@ pub(in crate::campaign) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
     kept.map(|(_, choice)| choice.clone()).collect()
 }
 
-/// Unit of a choice of a scene or of noise, by the end of its name; empty for names, counts and factors.
+/// The unit of a choice, from the last part of its name; empty for names, counts and factors.
 pub fn unit_of(name: &str) -> &'static str {
     match name.rsplit('.').next().unwrap_or(name) {
         "x" | "y" | "z" | "gap" | "side" | "width" | "depth" | "height" | "gripper" => "m",

@@ -1,10 +1,10 @@
-//! Makes a failing run small, and says what of it matters.
+//! Shrinks a failing run and explains which of its choices matter.
 //!
-//! Three layers: `list` edits lists of named choices; `search`, `reduce` and `explain` know choices and a test function,
-//! and nothing of robots; `counterexample` runs the line as that test and knows which choices place objects, set physics
-//! and make noise.
+//! Three layers: `list` edits lists of named choices; `search`, `reduce` and `explain` work on choices and a test
+//! function, independent of robots; `counterexample` supplies the test function, which makes a run, and the meaning of
+//! the choices: placement, physics, noise.
 //!
-//! Never: lets a run fail otherwise than it did, or does other things at another number of workers.
+//! Never: accepts a run that fails in another way, or depends on the number of workers.
 
 mod counterexample;
 mod explain;

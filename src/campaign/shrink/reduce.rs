@@ -1,4 +1,4 @@
-//! From a failing list of choices to a smaller one: fewer things first, then values nearer to nominal.
+//! Reduces a failing list of choices: first fewer objects, then values nearer to nominal.
 
 use std::collections::BTreeMap;
 
@@ -6,24 +6,24 @@ use crate::base::{Choice, ChoiceKind};
 use crate::campaign::shrink::list::{find, has, ids, is_nominal, spread, with_choice, with_nominal, with_value};
 use crate::campaign::shrink::{Id, Search};
 
-/// A value is halved towards nominal at most so often: what a quarter does not need is not worth more tries.
+/// Maximum number of halvings of a value towards nominal; below a quarter, further tries are not worthwhile.
 const HALVINGS: usize = 2;
 
-/// What the shrinker is told of the choices.
+/// The meaning of the choices for the shrinker.
 pub struct Plan<'a> {
-    /// Choices that each take one thing away, the thing that is most likely needed first.
+    /// Choices that each remove one object; the object most likely to be needed comes first.
     pub removals: Vec<Choice>,
-    /// Choices of which each takes more of an end away than the next.
+    /// Choices that remove the last actions; each removes more than the next.
     pub ends: Vec<Choice>,
-    /// Group of a choice of a list: choices of a group become nominal together if they can, the lowest group first.
-    /// Nothing for those that are left as they are.
+    /// Group of a choice. The choices of a group become nominal together if possible, the lowest group first. `None`
+    /// for choices that stay unchanged.
     pub group: &'a dyn Fn(&[Choice], &str) -> Option<u8>,
 }
 
-/// The smallest list that is found within the search's limits, and whether nothing can be taken from it: no thing, and
-/// no value back to nominal.
+/// Returns the smallest failing list found within the search's limits, and whether it is minimal: no object can be
+/// removed and no value made nominal.
 ///
-/// `list` must fail. `on_better` hears of each smaller list.
+/// `list` must fail. `on_better` is called with each smaller list.
 pub fn reduce(
     search: &mut Search<'_>,
     list: Vec<Choice>,
@@ -48,7 +48,7 @@ struct Reducer<'a, 's> {
 }
 
 impl Reducer<'_, '_> {
-    /// Takes over the first list that fails.
+    /// Adopts the first failing list and returns its position.
     fn first(&mut self, lists: &[Vec<Choice>]) -> Option<usize> {
         let (at, made) = self.search.first(lists)?;
         self.best = made;
@@ -56,7 +56,7 @@ impl Reducer<'_, '_> {
         Some(at)
     }
 
-    /// Choices that are not nominal and may become so.
+    /// Choices that are not nominal and may become nominal, with their groups.
     fn special(&self) -> Vec<(u8, Id)> {
         let choices = ids(&self.best).into_iter().filter(|(_, choice)| !is_nominal(choice));
         choices.filter_map(|(id, _)| Some(((self.plan.group)(&self.best, &id.name)?, id))).collect()
@@ -67,7 +67,7 @@ impl Reducer<'_, '_> {
         self.first(&lists);
     }
 
-    /// Keeps the fewest of the most important things, doubling their number until it fails; then one by one.
+    /// Keeps only the most important objects, doubling their number until the list fails; then removes single objects.
     fn take_away(&mut self) {
         let there: Vec<&Choice> = self.plan.removals.iter().filter(|removal| !has(&self.best, removal)).collect();
         let mut kept = vec![0];
@@ -94,7 +94,7 @@ impl Reducer<'_, '_> {
         }
     }
 
-    /// Everything nominal at once, or group by group, or half by half.
+    /// Makes all choices nominal at once, else group by group, else by halves.
     fn normalise(&mut self) {
         let mut groups: BTreeMap<u8, Vec<Id>> = BTreeMap::new();
         for (group, id) in self.special() {
@@ -117,7 +117,7 @@ impl Reducer<'_, '_> {
         self.normalise_some(back);
     }
 
-    /// What has to be special need not be as special as it is.
+    /// Moves the remaining values towards nominal.
     fn lower(&mut self) {
         for (_, id) in self.special() {
             for _ in 0..HALVINGS {
@@ -130,7 +130,7 @@ impl Reducer<'_, '_> {
         }
     }
 
-    /// Numbers that people can read, if it fails with them as well.
+    /// Rounds the values to readable numbers if the list still fails.
     fn round(&mut self) {
         let special = self.special();
         let rounded = special.iter().fold(self.best.clone(), |list, (_, id)| match find(&list, id) {
@@ -145,7 +145,7 @@ impl Reducer<'_, '_> {
         }
     }
 
-    /// Takes away and normalises single choices until none is left that is not needed. False where limits ended it.
+    /// Removes objects and normalises choices one at a time until all are needed. Returns `false` if limits ended it.
     fn one_by_one(&mut self) -> bool {
         let mut from = 0;
         let mut size = usize::MAX;
@@ -154,12 +154,12 @@ impl Reducer<'_, '_> {
             let mut lists: Vec<Vec<Choice>> = removals.map(|removal| with_choice(self.best.clone(), removal)).collect();
             lists.extend(self.special().into_iter().map(|(_, id)| with_nominal(self.best.clone(), &[id])));
             if lists.len() >= size {
-                // What was made is not smaller than what it was made from: going on could turn in a circle.
+                // The adopted list is not smaller than its predecessor: continuing might never end.
                 return true;
             }
             size = lists.len();
             from = from.min(size);
-            // After a success those behind it come first: those before it have just been tried.
+            // After a success, continue behind it: the candidates before it have just been tried.
             lists.rotate_left(from);
             match self.first(&lists) {
                 Some(at) => from = (from + at) % lists.len().max(1),
@@ -173,7 +173,7 @@ fn is_index(choice: &Choice) -> bool {
     matches!(choice.kind, ChoiceKind::Index { .. })
 }
 
-/// The value to a hundredth of its spread or finer, in decimal digits.
+/// Rounds the value to a power of ten that is at most a hundredth of its spread.
 fn readable(choice: &Choice) -> f64 {
     let spread = spread(&choice.kind);
     if spread <= 0.0 {

@@ -1,4 +1,4 @@
-//! Tries lists of choices: each one once, within limits, on several workers.
+//! Tries lists of choices within limits, on several workers, each list once.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,29 +7,30 @@ use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
 use crate::base::Choice;
 
-/// What came of one try.
+/// The result of a try.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tried {
-    /// Where it failed as it should: the choices that were made, those that nobody asked for left out.
+    /// The choices that the run made, without unused ones; `None` if it did not fail as required.
     pub made: Option<Vec<Choice>>,
-    /// What it cost.
+    /// Number of simulations.
     pub simulations: u64,
 }
 
-/// When to stop.
+/// Limits of a search.
 pub struct Limits<'a> {
-    /// Simulations, the last try's excess aside.
+    /// Maximum number of simulations; the last try may exceed it.
     pub simulations: u64,
-    /// Workers; what is found does not depend on it.
+    /// Workers; the result does not depend on their number.
     pub jobs: usize,
-    /// Whether time is up or somebody asked to stop.
+    /// Whether the time is up or the user has interrupted.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Names and bits of the values of a list.
+/// Names and value bits of a list.
 type Key = Vec<(String, u64)>;
 
-/// Tries and remembers. Tries that a single worker would not have made are kept for later, and count only then.
+/// Tries lists and caches the results. Results that a single worker would not have computed count only once they are
+/// used.
 pub struct Search<'a> {
     test: &'a (dyn Fn(&[Choice]) -> Tried + Sync),
     limits: Limits<'a>,
@@ -40,25 +41,26 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search that has tried nothing yet.
+    /// Creates a search with an empty cache.
     pub fn new(test: &'a (dyn Fn(&[Choice]) -> Tried + Sync), limits: Limits<'a>) -> Self {
         let several = limits.jobs > 1;
-        // Where no workers can be started, the work is done here: only slower.
+        // Without a thread pool, this thread does the work: slower, but with the same result.
         let workers = several.then(|| rayon::ThreadPoolBuilder::new().num_threads(limits.jobs).build().ok()).flatten();
         Self { test, limits, workers, known: BTreeMap::new(), counted: BTreeSet::new(), simulations: 0 }
     }
 
-    /// What all tries have cost.
+    /// Number of simulations so far.
     pub fn simulations(&self) -> u64 {
         self.simulations
     }
 
-    /// Whether nothing more may be tried.
+    /// Whether a limit is reached.
     pub fn spent(&self) -> bool {
         self.simulations >= self.limits.simulations || (self.limits.stop)()
     }
 
-    /// The first list, in order, that fails, with the choices that it made. Nothing where none does or limits end it.
+    /// Returns the position of the first failing list and the choices that its run made, or `None` if no list fails or
+    /// a limit is reached.
     pub fn first(&mut self, lists: &[Vec<Choice>]) -> Option<(usize, Vec<Choice>)> {
         for (number, batch) in lists.chunks(self.limits.jobs.max(1)).enumerate() {
             if !self.learn(batch) {
@@ -73,7 +75,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// For each list whether it fails; nothing for those that limits left out.
+    /// Returns for each list whether it fails; `None` for lists beyond the limits.
     pub fn each(&mut self, lists: &[Vec<Choice>]) -> Vec<Option<bool>> {
         let mut answers = Vec::with_capacity(lists.len());
         for batch in lists.chunks(self.limits.jobs.max(1)) {
@@ -85,7 +87,7 @@ impl<'a> Search<'a> {
         answers
     }
 
-    /// Tries what is not known of a batch. False where limits forbid it.
+    /// Tries the unknown lists of a batch. Returns `false` if a limit is reached.
     fn learn(&mut self, batch: &[Vec<Choice>]) -> bool {
         let unknown: BTreeMap<Key, &Vec<Choice>> =
             batch.iter().map(|list| (key(list), list)).filter(|(key, _)| !self.known.contains_key(key)).collect();
@@ -105,7 +107,7 @@ impl<'a> Search<'a> {
         true
     }
 
-    /// What a known list did, counted as tried. Nothing where the limit was reached before it.
+    /// Returns the result of a known list and counts it. Returns `None` if the limit was reached before.
     fn count(&mut self, list: &[Choice]) -> Option<Option<Vec<Choice>>> {
         let key = key(list);
         let tried = self.known.get(&key)?;

@@ -72,7 +72,7 @@ const show = (type, body) => {
   }
   answer.replaceChildren(table(results));
   const rows = results.results.bindings.length;
-  return rows + (rows === 1 ? " row" : " rows") + (rows > MOST_ROWS ? ", the first " + MOST_ROWS + " are shown; a download has all" : "");
+  return rows + (rows === 1 ? " row" : " rows") + (rows > MOST_ROWS ? " (showing the first " + MOST_ROWS + "; download to get all)" : "");
 };
 
 const offer = (query, forms) => {
@@ -97,7 +97,7 @@ form.addEventListener("submit", async (event) => {
   event.preventDefault();
   const query = text.value;
   said.className = "";
-  said.textContent = "asking …";
+  said.textContent = "running …";
   answer.replaceChildren();
   downloads.replaceChildren();
   const began = performance.now();
@@ -111,7 +111,7 @@ form.addEventListener("submit", async (event) => {
     offer(query, type.includes("json") ? TABLES : GRAPHS);
   } catch (error) {
     said.className = "bad";
-    said.textContent = "the server does not answer: " + error.message;
+    said.textContent = "no response from the server: " + error.message;
   }
 });
 
