@@ -169,7 +169,7 @@ pub struct RunRecord {
     pub actions: Vec<String>,
     /// One list for each action, in the order of its success properties.
     pub judgements: Vec<Vec<Judgement>>,
-    /// Errors of the simulation; `None` if it did not start.
+    /// Errors of the simulation; `None` if the scene could not be simulated.
     pub quality: Option<Quality>,
     /// RFC 3339.
     pub started: String,
