@@ -535,7 +535,7 @@ fn folders_that_are_no_histories_are_refused() {
     assert!(code(History::open(folder.path())).contains("it holds other files"));
     assert!(code(History::open_existing(folder.path())).contains("it holds other files"));
     let file = code(History::open(&folder.path().join("thesis.tex")));
-    assert!(file.starts_with("H001") && file.contains("a file is in its place"), "{file}");
+    assert!(file.starts_with("H001") && file.contains("a file exists at its path"), "{file}");
     let below = code(History::open(&folder.path().join("thesis.tex/history")));
     assert!(below.starts_with("H001"), "{below}");
 }

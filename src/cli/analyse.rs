@@ -232,12 +232,12 @@ fn rule(summary: &FindingsSummary, number: usize) -> Result<String, Diagnostics>
         .iter()
         .flat_map(|report| report.findings.patterns.confirmed().map(move |pattern| (report, pattern)));
     let Some((report, pattern)) = number.checked_sub(1).and_then(|before| patterns.nth(before)) else {
-        return Err(Diagnostic::error("X049", format!("there is no pattern {number}: {known} were found"))
+        return Err(Diagnostic::error("X049", format!("there is no pattern {number}: the analysis found {known}"))
             .help("`actcheck analyse` with the same options lists them with their numbers")
             .into());
     };
     scene_rule(&pattern.conditions, &report.findings.subject.parameters, &report.sentence(pattern)).map_err(|unknown| {
-        let message = format!("no rule about a scene can ask for {}", unknown.join(", "));
+        let message = format!("a scene rule can't constrain {}", unknown.join(", "));
         Diagnostic::error("X049", message).help("narrow the configuration's own ranges and lists instead").into()
     })
 }

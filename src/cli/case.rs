@@ -12,7 +12,7 @@ use crate::cli::{clock, output, show};
 use crate::history::History;
 use crate::report::{CaseSummary, case_json, case_text, run_json, run_text};
 
-/// Runs a case and prints whether it fails as it did. Returns the exit code.
+/// Runs a case and prints whether it still fails in the same way. Returns the exit code.
 pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     refuse_campaign_options(args, &env.campaign.source.name)?;
     let history = History::open(&env.campaign.history)?;

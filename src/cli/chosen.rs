@@ -84,8 +84,8 @@ pub(super) fn hierarchy(ontology: &Ontology) -> Hierarchy {
 
 /// X044: the chosen campaigns and times have no runs.
 pub(super) fn none_of(history: &History) -> Diagnostic {
-    Diagnostic::error("X044", format!("the history `{}` has no such runs", history.dir().display()))
-        .help("`actcheck list` shows the runs that it has; `actcheck run CONFIG` makes some")
+    Diagnostic::error("X044", format!("the history `{}` has no matching runs", history.dir().display()))
+        .help("`actcheck list` shows its runs; `actcheck run CONFIG` creates some")
 }
 
 /// Whether a name or IRI denotes the property with an IRI.

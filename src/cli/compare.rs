@@ -173,7 +173,7 @@ pub(super) fn newest(history: &History) -> Result<String, Diagnostics> {
     let mut ids = history.campaigns()?.into_iter().map(|row| row.id).rev();
     ids.find(|id| !shrunk.contains(id)).ok_or_else(|| {
         Diagnostic::error("X070", format!("the history `{}` has no campaign", history.dir().display()))
-            .help("`actcheck run CONFIG` makes one")
+            .help("`actcheck run CONFIG` creates one")
             .into()
     })
 }

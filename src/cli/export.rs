@@ -39,7 +39,7 @@ pub struct ExportArgs {
     /// the columns
     #[arg(long, value_name = "DIR")]
     pub dataset: Option<PathBuf>,
-    /// Write the whole history as RDF, facts in their named graphs (N-Quads)
+    /// Write the whole history as RDF, with facts in their named graphs (N-Quads)
     #[arg(long, value_name = "FILE.nq")]
     pub nquads: Option<PathBuf>,
     /// Write campaigns, runs, scenes and outcomes as RDF, without the facts in named graphs (Turtle)

@@ -47,7 +47,7 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
 /// Examines the health of a campaign.
 ///
 /// # Errors
-/// `H014` there is no such campaign; the history can't be read.
+/// `H014` the campaign does not exist; or the history can't be read.
 pub(super) fn examine(history: &History, campaign: &str) -> Result<HealthSummary, Diagnostics> {
     let mut meter = HealthMeter::default();
     history.each_vitals(campaign, |run| meter.add(run))?;

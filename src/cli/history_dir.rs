@@ -6,7 +6,7 @@ use crate::base::{Diagnostic, Diagnostics};
 use crate::cli::args::HistoryArgs;
 use crate::history::History;
 
-/// Code of the fault that there is no history.
+/// Code of the fault for a missing history.
 const NONE_FOUND: &str = "X002";
 
 /// Opens the named history, or the one that is found.

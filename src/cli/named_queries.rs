@@ -29,7 +29,7 @@ pub fn all() -> Result<Vec<NamedQuery>, Diagnostics> {
     sources()?.into_iter().map(|(name, source)| Ok(described(name, &source.text))).collect()
 }
 
-/// The query with a name.
+/// Returns the query with a name.
 ///
 /// # Errors
 /// `X048` there is no such query.

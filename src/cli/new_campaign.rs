@@ -87,7 +87,7 @@ fn check_name(name: &str) -> Result<(), Diagnostics> {
         return Ok(());
     }
     Err(Diagnostic::error("X011", format!("`{name}` can't be the name of a campaign"))
-        .help("use letters, digits, `_` and `-`, such as `actcheck new campaign my_pick`; the file gets the ending `.toml`")
+        .help("use letters, digits, `_` and `-`, such as `actcheck new campaign my_pick`; the file gets the extension `.toml`")
         .into())
 }
 

@@ -101,7 +101,7 @@ mod tests {
         files.add(at("a/b/one.txt"), "1");
         files.add(at("a/two.txt"), "2");
         files.add(at("taken/three.txt"), "3");
-        let faults = files.write("").expect_err("a file is no folder");
+        let faults = files.write("").expect_err("a file is not a folder");
         assert!(faults.iter().all(|fault| fault.code == "X007"), "{faults}");
         assert!(!at("a").exists(), "what was written is removed");
         fs::remove_file(at("taken")).expect("it can be removed");

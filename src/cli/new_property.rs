@@ -61,7 +61,7 @@ fn template(args: &NewPropertyArgs, known: &Ontology, path: &Path) -> Result<Tem
             .into());
     }
     if known.vocabulary.terms.contains_key(&names::act(&args.name)) {
-        return Err(Diagnostic::error("X011", format!("the ontology already has a `{}`", args.name))
+        return Err(Diagnostic::error("X011", format!("the ontology already has a term `{}`", args.name))
             .help("choose another name, or edit the existing entry")
             .into());
     }

@@ -24,9 +24,8 @@ impl<'a> Picture<'a> {
             "png" => Ok(Self { file, render: Drawing::to_png }),
             "svg" => Ok(Self { file, render: |drawing| Ok(drawing.to_svg().into_bytes()) }),
             _ => {
-                let message = format!("a picture can't be written as {}", file.display());
-                let help =
-                    format!("end the file's name in .png or .svg, such as {}", file.with_extension("png").display());
+                let message = format!("no picture format is known for {}", file.display());
+                let help = format!("use the extension .png or .svg, such as {}", file.with_extension("png").display());
                 Err(Diagnostic::error("X012", message).help(help).into())
             }
         }
@@ -40,7 +39,7 @@ impl<'a> Picture<'a> {
         let trace = history.trace(&run.row.run)?;
         let drawing = run_picture(&Caption::of(run), &trace).ok_or_else(|| {
             Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
-                .help("it broke before its first action; `actcheck show` says why")
+                .help("it broke before its first action; `actcheck show` shows the reason")
         })?;
         self.write(&drawing)
     }

@@ -115,7 +115,7 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
             "X034",
             format!("the history `{}` has no runs to judge", history.dir().display()),
         )
-        .help("`actcheck run CONFIG` makes some")
+        .help("`actcheck run CONFIG` creates some")
         .into());
     }
     Ok(runs)

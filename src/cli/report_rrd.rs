@@ -41,7 +41,7 @@ pub(super) fn write(
     }
     written::write(file, &bytes)?;
     let (name, all, size) = (file.display(), order.len(), bytes.len() as f64 / 1e6);
-    let more = if runs < all { "; `--replay-mb` makes room for more" } else { "" };
+    let more = if runs < all { "; a higher `--replay-mb` includes more" } else { "" };
     Ok(Some(format!("{name} holds {runs} of {all} runs ({size:.1} MB{more}): rerun {name}")))
 }
 

@@ -94,7 +94,7 @@ pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
 fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
     let program = std::env::current_exe().map_err(|error| {
         Diagnostic::error("X052", format!("the path of this program can't be found: {error}"))
-            .help("start it by its path")
+            .help("start actcheck by its full path")
     })?;
     let history = folder.display().to_string();
     let with_history = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).chain([history.clone()]).collect();

@@ -208,6 +208,6 @@ fn repeat(text: &str) -> Result<Repeat, String> {
     let parts = text.split_once('/').and_then(|(least, of)| Some((least.parse().ok()?, of.parse().ok()?)));
     match parts {
         Some((least, of)) if 1 <= least && least <= of && of <= 1000 => Ok(Repeat { least, of }),
-        _ => Err("must be like 3/5: at least 3 failures in 5 repetitions".to_owned()),
+        _ => Err("must be K/N, such as 3/5: at least 3 failures in 5 repetitions".to_owned()),
     }
 }

@@ -66,6 +66,6 @@ fn nothing_to_tell(run: &RunDetail, named: Option<&str>) -> Diagnostic {
                 .help(did_you_mean(named, judged))
         }
         _ => Diagnostic::error("X009", format!("run {} has no facts to explain", run.row.run))
-            .help("it broke before its first action; `actcheck show` says why"),
+            .help("it broke before its first action; `actcheck show` shows the reason"),
     }
 }

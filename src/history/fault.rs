@@ -88,7 +88,7 @@ fn failed(dir: &Path, doing: &str, kind: ErrorKind, text: &str) -> Diagnostics {
         _ if has(&["Permission denied"]) => unusable(dir, "writing there is not permitted"),
         _ if has(&["Read-only file system"]) => unusable(dir, "it is on a read-only file system"),
         ErrorKind::NotFound => unusable(dir, "a part of its path is missing and can't be created"),
-        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => unusable(dir, "a file is in its place"),
+        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => unusable(dir, "a file exists at its path"),
         _ => Diagnostic::error("H006", format!("{doing} failed in the history `{}`: {}", dir.display(), lower(text)))
             .help("check the disk and run again: data stored before is complete")
             .into(),

@@ -27,7 +27,7 @@ impl Folder {
     /// Locks a folder for writing. Creates it if it is missing and `create` is `true`.
     pub(super) fn take(dir: &Path, create: bool) -> Result<Self, Diagnostics> {
         if dir.is_file() {
-            return Err(fault::unusable(dir, "a file is in its place"));
+            return Err(fault::unusable(dir, "a file exists at its path"));
         }
         let known = has_version(dir)?;
         if !known && !create {
@@ -37,14 +37,14 @@ impl Folder {
             if holds_other_things(dir) {
                 return Err(fault::foreign(dir));
             }
-            fs::create_dir_all(dir).map_err(|error| fault::io(dir, "making the folder", &error))?;
+            fs::create_dir_all(dir).map_err(|error| fault::io(dir, "creating the folder", &error))?;
         }
         let folder = Self { dir: dir.to_path_buf(), _lock: lock(dir, File::try_lock)? };
         if !known {
             write_whole(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
                 .map_err(|error| fault::io(dir, "writing its version", &error))?;
         }
-        fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "making the folder of traces", &error))?;
+        fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;
         Ok(folder)
     }
 

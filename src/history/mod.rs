@@ -1,4 +1,4 @@
-//! The memory: campaigns, runs, scenes, facts and outcomes in an RDF store on disk, traces in files beside it.
+//! The history: campaigns, runs, scenes, facts and outcomes in an RDF store on disk, with traces in files beside it.
 //!
 //! Never: judges, simulates, changes stored runs, or reads a clock.
 

@@ -105,7 +105,7 @@ fn newest(store: &Store, execution: &NamedNode, properties: &[String]) -> Result
 fn write(recheck: &Recheck, at: &str, statements: &mut Statements) {
     let execution = execution(&recheck.run, recheck.step);
     let supersedes = recheck.before.as_ref().map(|before| before.assertion.clone());
-    // Each has another predecessor, so that no two get the same node, however fast they follow each other.
+    // Two rechecks within the same second have different predecessors, so they get different nodes.
     let predecessor = supersedes.as_ref().map(ToString::to_string).unwrap_or_default();
     let of = |part| unique(&[execution.as_str(), &recheck.now.property, part, at, &predecessor]);
     let assertion = of("recheck");
