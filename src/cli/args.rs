@@ -241,7 +241,8 @@ pub struct RunArgs {
     /// Scenes for each test, instead of the configuration's `test_count`; an upper limit if a budget ends the campaign
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
-    /// End after this time, such as 90s, 10m or 2h; runs in flight are finished. Without `--runs`, as many runs as fit
+    /// End after this time, such as 90s, 10m or 2h; runs in flight are completed and kept. Without `--runs`, as many
+    /// runs as fit
     #[arg(long, value_name = "DURATION", value_parser = duration_secs)]
     pub time: Option<f64>,
     /// End when the 95 % confidence interval of every property's pass rate is at most this wide, such as 0.05. Without
