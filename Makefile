@@ -1,10 +1,10 @@
-# make             builds ./actcheck; on Debian and Ubuntu it installs first what the build needs from the system
-# make test        builds and passes all tests
-# make bench       what things cost, as ratios
-# make wheel       a wheel of the program and its Python package, and a source distribution, in dist
-# make notebooks   runs the notebooks on fresh campaigns and keeps their outputs (RUNS=200)
+# make             builds ./actcheck; on Debian and Ubuntu it first installs missing system packages
+# make test        builds and runs all tests
+# make bench       runs the benchmarks, which print ratios
+# make wheel       builds a wheel of the program and its Python package, and a source distribution, in dist
+# make notebooks   runs the notebooks on new campaigns and saves their outputs (RUNS=200)
 #
-# RocksDB and polars are compiled once, in one profile, into a folder that outlives this checkout (`.ci/env`).
+# RocksDB and polars are compiled once, in one profile, into a folder outside this checkout (`.ci/env`).
 
 .PHONY: build test bench wheel notebooks
 

@@ -1,10 +1,11 @@
-/* Does bindgen's libclang work here? Looks where bindgen looks, loads what it would load, and lets it read what RocksDB's header reads.
+/* Checks that libclang works for bindgen: searches like bindgen, loads the same library, and parses the headers that
+   RocksDB includes.
 
-   Prints nothing and exits with 0 where it works; else prints why not and exits with 1.
-   With a folder as its argument, that is looked at in place of the root (for tests).
+   If it works, prints nothing and exits with 0; otherwise prints the reason and exits with 1.
+   A folder as the argument replaces the root folder of the search (for tests).
 
-   The order of the search is that of clang-sys 1.9 (its build/common.rs and build/dynamic.rs): LIBCLANG_PATH alone, if it is set; else
-   what llvm-config names, LD_LIBRARY_PATH, LIBRARY_PATH and the usual folders; of all files the one with the highest version. */
+   The order of the search is that of clang-sys 1.9 (its build/common.rs and build/dynamic.rs): only LIBCLANG_PATH, if it is set; otherwise
+   the folder from llvm-config, LD_LIBRARY_PATH, LIBRARY_PATH and the usual folders; the file with the highest version wins. */
 
 #include <dlfcn.h>
 #include <glob.h>
@@ -15,7 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* The folders in which clang-sys looks on Linux, and the names of files that it takes. */
+/* The folders that clang-sys searches on Linux, and the file names that it accepts. */
 static const char *const FOLDERS[] = {
     "/usr/local/llvm*/lib*", "/usr/local/lib*/*/*", "/usr/local/lib*/*", "/usr/local/lib*", "/usr/lib*/*/*", "/usr/lib*/*", "/usr/lib*",
 };
@@ -25,7 +26,7 @@ static const char *const NAMES[] = {"libclang.so", "libclang-*.so", "libclang.so
 static char best[PATH_MAX];
 static char best_version[NAME_MAX + 1];
 
-/* The version in a file's name, as clang-sys reads it: "" in `libclang.so`, "14" in `libclang-14.so`, "1" in `libclang.so.1`. */
+/* The version in a file name, as clang-sys parses it: "" in `libclang.so`, "14" in `libclang-14.so`, "1" in `libclang.so.1`. */
 static void version_of(const char *name, char *version) {
     version[0] = '\0';
     if (strncmp(name, "libclang.so.", 12) == 0) {
@@ -50,7 +51,7 @@ static int is_higher(const char *one, const char *other) {
     return *one != '\0' && *other == '\0';
 }
 
-/* Only libraries for this machine's word size count. */
+/* Whether the file is a library of this machine's word size. */
 static int is_library(const char *path) {
     unsigned char head[5] = {0};
     FILE *file = fopen(path, "rb");
@@ -63,7 +64,7 @@ static int is_library(const char *path) {
 static void consider(const char *path) {
     const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
     char version[NAME_MAX + 1];
-    /* libclang-cpp is another library. */
+    /* libclang-cpp is a different library. */
     if (strstr(name, "-cpp.") || strlen(path) >= sizeof best || strlen(name) > NAME_MAX || !is_library(path)) return;
     version_of(name, version);
     if (!best[0] || is_higher(version, best_version)) {
@@ -121,7 +122,7 @@ static void look_everywhere(const char *root) {
     }
 }
 
-/* Lets a library read the headers that RocksDB's C interface includes: without clang's own headers it can't. */
+/* Lets a library parse the headers that RocksDB's C interface includes; this fails without clang's own headers. */
 static int reads_headers(const char *path) {
     static const char HEADERS[] = "/tmp/actcheck-libclang-XXXXXX";
     static const char TEXT[] = "#include <stdarg.h>\n#include <stdbool.h>\n#include <stddef.h>\n#include <stdint.h>\n";
@@ -153,11 +154,11 @@ static int reads_headers(const char *path) {
 int main(int count, char **words) {
     const char *named = getenv("LIBCLANG_PATH");
     if (named) {
-        /* A file, or a folder. */
+        /* A file or a folder. */
         struct stat found;
         if (stat(named, &found) == 0 && !S_ISDIR(found.st_mode)) consider(named);
         else look_in(named);
-        if (!best[0]) return printf("LIBCLANG_PATH leads nowhere: there is no libclang at %s\n", named), 1;
+        if (!best[0]) return printf("LIBCLANG_PATH is wrong: there is no libclang at %s\n", named), 1;
     } else {
         look_everywhere(count > 1 ? words[1] : "");
         if (!best[0]) return printf("there is no libclang\n"), 1;

@@ -86,7 +86,7 @@ fn a_run_that_takes_too_long_on_the_clock_is_a_timeout_and_can_be_replayed() {
     let text = stdout(&output);
     assert_eq!(output.status.code(), Some(0), "{text}{}", stderr(&output));
     assert!(
-        text.contains("2 of 2 runs are the same") && text.contains("the clock on the wall had cut it off"),
+        text.contains("2 of 2 runs are the same") && text.contains("the wall-clock limit had ended the run"),
         "{text}"
     );
 }

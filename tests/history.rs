@@ -376,7 +376,7 @@ fn a_run_is_found_by_what_people_type() {
         assert_eq!(history.resolve(name).unwrap(), "z2-4", "{name}");
     }
     let several = history.run("a1").unwrap_err().to_string();
-    assert!(several.contains("H008: `a1` can be any of 2 runs") && several.contains("a1-1, a1-2"), "{several}");
+    assert!(several.contains("H008: `a1` matches 2 runs") && several.contains("a1-1, a1-2"), "{several}");
     let none = history.run("zz-4").unwrap_err().to_string();
     assert!(none.contains("has no run `zz-4`") && none.contains("did you mean `z2-4`?"), "{none}");
     assert!(history.run("").is_err());
@@ -466,24 +466,18 @@ fn a_query_that_is_none_is_told_where() {
         let fault = fault(text);
         assert!(fault.starts_with(expected) && fault.contains("help: "), "{fault}");
     };
-    starts(
-        "SELECT ?r\nWHER { ?r a act:Run }",
-        "H010 query:2:1: this is no SPARQL query: it can't be understood at `WHER`",
-    );
-    starts(
-        "SELEC ?r WHERE { ?r a act:Run }",
-        "H010 query:1:1: this is no SPARQL query: it can't be understood at `SELEC",
-    );
+    starts("SELECT ?r\nWHER { ?r a act:Run }", "H010 query:2:1: this is not a SPARQL query: unexpected `WHER`");
+    starts("SELEC ?r WHERE { ?r a act:Run }", "H010 query:1:1: this is not a SPARQL query: unexpected `SELEC");
     starts("SELECT ?r WHERE { ?r a act:Run ", "H010 query:1:32: the query ends too early");
     starts("", "H010 query:1:1: the query ends too early");
-    starts("SELECT (COUNT(?r) AS ?n WHERE { ?r ?p ?o }", "H010 query:1:25: this is no SPARQL query");
-    starts("SELECT ?r WHERE { ?r a foo:Run }", "H010 query:1:24: the prefix of `foo:Run` is not known");
+    starts("SELECT (COUNT(?r) AS ?n WHERE { ?r ?p ?o }", "H010 query:1:25: this is not a SPARQL query");
+    starts("SELECT ?r WHERE { ?r a foo:Run }", "H010 query:1:24: the prefix of `foo:Run` is unknown");
     starts(
         "SELECT ?x (COUNT(?r) AS ?n) WHERE { ?x ?p ?r }",
         "H010 query:1:46: the SELECT contains a variable that is unbound",
     );
     let update = fault("PREFIX a: <http://a#>\n  insert data { a:b a:c a:d }");
-    assert!(update.starts_with("H011 query:2:3: `INSERT` changes what it finds"), "{update}");
+    assert!(update.starts_with("H011 query:2:3: `INSERT` is an update"), "{update}");
     let service = fault("SELECT * WHERE { SERVICE <http://localhost/> { ?s ?p ?o } }");
     assert!(service.starts_with("H012"), "{service}");
 }
@@ -538,10 +532,10 @@ fn folders_that_are_no_histories_are_refused() {
     assert!(code(History::open_existing(&none)).starts_with("H003: there is no history"));
     assert!(!none.exists());
     std::fs::write(folder.path().join("thesis.tex"), "").unwrap();
-    assert!(code(History::open(folder.path())).contains("it holds other things"));
-    assert!(code(History::open_existing(folder.path())).contains("it holds other things"));
+    assert!(code(History::open(folder.path())).contains("it holds other files"));
+    assert!(code(History::open_existing(folder.path())).contains("it holds other files"));
     let file = code(History::open(&folder.path().join("thesis.tex")));
-    assert!(file.starts_with("H001") && file.contains("a file stands in its place"), "{file}");
+    assert!(file.starts_with("H001") && file.contains("a file exists at its path"), "{file}");
     let below = code(History::open(&folder.path().join("thesis.tex/history")));
     assert!(below.starts_with("H001"), "{below}");
 }

@@ -226,7 +226,7 @@ fn conflicts_are_told_with_the_way_out_and_write_nothing() {
     fails(folder, &["a", "nowhere", "--into", "new"], &["H003", "nowhere"]);
     std::fs::create_dir(folder.join("full")).unwrap();
     std::fs::write(folder.join("full/thing"), "").unwrap();
-    fails(folder, &["a", "--into", "full"], &["H003", "holds other things"]);
+    fails(folder, &["a", "--into", "full"], &["H003", "holds other files"]);
     fails(folder, &["--into", "new"], &["<DIR>"]);
     assert!(!folder.join("new").exists());
     drop(part(folder, "together", "k", "1/2", |_| ()));
@@ -405,5 +405,5 @@ fn one_history_alone_is_copied_whole() {
     std::fs::remove_file(folder.join("b/traces/z2-1.trace")).unwrap();
     let output = actcheck(folder, &["merge", "b", "--into", "lossy"]);
     assert_eq!(output.status.code(), Some(0));
-    assert!(stderr(&output).contains("1 runs have lost their traces before, the first is z2-1"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("1 runs had no trace before the merge, the first is z2-1"), "{}", stderr(&output));
 }

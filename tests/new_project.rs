@@ -42,7 +42,7 @@ fn a_new_campaign_runs_and_a_new_property_is_judged_in_an_empty_folder() {
     std::fs::copy(folder.join("pick.toml"), folder.join("configs/copy.toml")).unwrap();
     let told = done(folder, &["new", "property", "StaysUpright", "--for", "Pick"]);
     for line in [
-        "the ontology and the rules that actcheck carries",
+        "the shipped ontology and rules",
         "pick.toml uses ontology/actions.ttl from now on",
         "other.toml uses the shipped ontology: add `ontology = \"ontology/actions.ttl\"`",
         "configs/copy.toml uses the shipped ontology: add `ontology = \"../ontology/actions.ttl\"`",
@@ -58,7 +58,7 @@ fn a_new_campaign_runs_and_a_new_property_is_judged_in_an_empty_folder() {
     let told = done(folder, &["new", "property", "StaysLow", "--for", "Pick"]);
     assert!(told.contains("wrote rules/stays_low.rls and an entry in ontology/actions.ttl"), "{told}");
     let told = done(folder, &["new", "campaign", "second"]);
-    assert!(told.contains("second.toml uses ontology/actions.ttl, which was here already"), "{told}");
+    assert!(told.contains("second.toml uses ontology/actions.ttl, which already existed"), "{told}");
     let checked = done(folder, &["check", "second.toml"]);
     assert!(checked.contains("in ontology/actions.ttl"), "{checked}");
 }
@@ -113,7 +113,7 @@ fn nothing_is_overwritten_and_nothing_is_written_by_halves() {
     std::fs::write(folder.join("pick.toml"), "mine").unwrap();
     let said = refused(folder, &["new", "campaign"]);
     assert!(
-        said.contains("X015") && said.contains("pick.toml exists already") && said.contains("another name"),
+        said.contains("X015") && said.contains("pick.toml already exists") && said.contains("another name"),
         "{said}"
     );
     assert_eq!(std::fs::read_to_string(folder.join("pick.toml")).unwrap(), "mine");
@@ -124,7 +124,7 @@ fn nothing_is_overwritten_and_nothing_is_written_by_halves() {
         &["new", "property", "StaysUpright", "--for", "Pick"][..],
     ] {
         let said = refused(folder, arguments);
-        assert!(said.contains("X015") && said.contains("rules/moved_object.rls exists already"), "{said}");
+        assert!(said.contains("X015") && said.contains("rules/moved_object.rls already exists"), "{said}");
         assert_eq!(names(folder), ["pick.toml", "rules"]);
     }
     for name in ["a/b", "a.toml", "", "two words", ".."] {

@@ -139,9 +139,9 @@ fn the_truth_is_told_only_where_a_campaign_asks_for_it_and_then_everybody_hears_
         let told = if privileged { "told of coffee_table_1, glass_1" } else { "told nothing" };
         assert_eq!((message.as_str(), json["privileged"].as_bool()), (told, Some(privileged)), "{complaints}");
         let report = |format: &str| stdout(&actcheck(folder.path(), &["report", format, "--history", ".actcheck"]));
-        assert_eq!(report("--markdown").contains("where everything truly is"), privileged);
+        assert_eq!(report("--markdown").contains("the ground truth"), privileged);
         let text = stdout(&actcheck(folder.path(), &["run", "c.toml"]));
-        assert_eq!(text.contains("where everything truly is"), privileged, "{text}");
+        assert_eq!(text.contains("the ground truth"), privileged, "{text}");
     }
 }
 

@@ -182,7 +182,7 @@ fn what_can_not_go_on_is_refused_with_the_reason() {
             assert!(text.contains(word), "{arguments:?}: no `{word}` in {text}");
         }
     };
-    refused(&["run", "--resume"], &["X002", "there is none in this folder"]);
+    refused(&["run", "--resume"], &["X002", "this folder has none"]);
     refused(&["run"], &["X014", "needs a configuration"]);
     refused(&["run", "configs/pick.toml", "--resume", "--runs", "3"], &["--runs"]);
     let done = json(folder, &["run", "configs/pick.toml", "--runs", "1", "--history", "h"]);

@@ -119,7 +119,7 @@ fn libclang_cpp_is_not_taken_for_libclang() {
     let (code, told) = machine.run("system", &[]);
     assert_eq!(code, 2, "{told}");
     assert!(machine.installed().contains("install -y -qq --no-install-recommends clang\n"), "{}", machine.installed());
-    assert!(told.contains("'clang' is installed, and still there is no libclang"), "{told}");
+    assert!(told.contains("'clang' is installed, but there is no libclang"), "{told}");
 
     // The same, where apt-get brings it.
     let brings = format!(
@@ -158,7 +158,7 @@ fn a_libclang_path_that_leads_nowhere_is_named() {
     machine.library("libclang.so.1", &real);
     let (code, told) = machine.run("system", &[("LIBCLANG_PATH", "/nowhere")]);
     assert_eq!(code, 2);
-    let expected = "actcheck needs libclang. LIBCLANG_PATH leads nowhere: there is no libclang at /nowhere. Unset LIBCLANG_PATH, or set \
+    let expected = "actcheck needs libclang. LIBCLANG_PATH is wrong: there is no libclang at /nowhere. Unset LIBCLANG_PATH, or set \
                     it to the folder that has it\n";
     assert_eq!(told, expected);
     assert_eq!(machine.installed(), "", "installing would not change it");
@@ -183,7 +183,7 @@ fn without_a_compiler_one_is_installed() {
         "{}",
         machine.installed()
     );
-    assert!(told.contains("actcheck needs g++ clang: 'g++ clang' is installed, and still"), "{told}");
+    assert!(told.contains("actcheck needs g++ clang: 'g++ clang' is installed, but"), "{told}");
 }
 
 #[test]
@@ -205,7 +205,7 @@ fn packages_that_are_not_necessary_may_be_missing() {
     machine.command("apt-get", "echo 'E: Unable to locate package' >&2; exit 100");
     let (code, told) = machine.run("system", &[]);
     assert_eq!(code, 0, "{told}");
-    assert!(told.contains("missing, and not necessary: clang (apt-get could not install it)"), "{told}");
+    assert!(told.contains("missing, but optional: clang (apt-get could not install it)"), "{told}");
 }
 
 #[test]
@@ -214,12 +214,12 @@ fn rust_is_asked_for_before_anything_else() {
     machine.command("rustc", "echo 'rustc 1.70.0 (90c541806 2023-05-31)'");
     let wanted = env!("CARGO_PKG_RUST_VERSION");
     let (code, told) = machine.run("system", &[]);
-    let expected = format!("actcheck needs Rust {wanted} or later, and this is 1.70.0: run 'rustup update stable'\n");
+    let expected = format!("actcheck needs Rust {wanted} or later, but this is 1.70.0: run 'rustup update stable'\n");
     assert_eq!((code, told), (2, expected));
     machine.lacks("cargo");
     let (code, told) = machine.run("system", &[]);
     assert_eq!(code, 2);
-    assert!(told.starts_with(&format!("actcheck needs Rust's toolchain, version {wanted} or later")), "{told}");
+    assert!(told.starts_with(&format!("actcheck needs the Rust toolchain, version {wanted} or later")), "{told}");
 }
 
 #[test]
@@ -238,7 +238,7 @@ fn a_full_disk_is_named_before_and_after() {
     assert_eq!(code, 2);
     assert!(told.contains("actcheck was not built: it needs 3000 MB in "), "{told}");
     assert!(
-        told.contains("and 200 MB are free; make room, or set CARGO_TARGET_DIR to a folder on another disk"),
+        told.contains("but only 200 MB are free; free some space, or set CARGO_TARGET_DIR to a folder on another disk"),
         "{told}"
     );
     // It fills up while crates compile.

@@ -21,35 +21,35 @@ use crate::report::{
 };
 use crate::verdict::Counts;
 
-/// Heat maps that are made of a property that was asked for: where on its surface the target stood, and what it was and how it was turned.
+/// Default heat maps of a requested property: the target's position on its surface, and its category and orientation.
 const USUAL_MAPS: [[&str; 2]; 2] = [["surface_y_m", "surface_x_m"], ["target_category", "target_turned_rad"]];
 
-/// Conditions that a pattern has at most, by default and at all.
+/// Maximum number of conditions of a pattern, also the default.
 const MOST_CONDITIONS: u8 = 3;
 
 /// `actcheck analyse`
 #[derive(Debug, Args)]
 pub struct AnalyseArgs {
-    /// Only this property, by its name in the ontology (may be given several times); tells heat maps too
+    /// Only this property, by its name in the ontology (may be given several times); also prints heat maps
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
     /// Failures by one or two parameters, such as `target_category,target_turned_rad`, instead of the usual heat maps
     #[arg(long, value_name = "DOWN[,ACROSS]", value_delimiter = ',', num_args = 1..=2)]
     pub by: Vec<String>,
-    /// Draw where the patterns lie into this file, as pixels (.png) or lines (.svg)
+    /// Draw the patterns into this file, as a raster (.png) or vector image (.svg)
     #[arg(long, value_name = "FILE.png", conflicts_with = "by")]
     pub picture: Option<PathBuf>,
-    /// Print the pattern of this number of the one property that was asked for as a rule: `[scene] require` in a configuration
-    /// names the file, and every scene is of that kind
+    /// Print the N-th pattern of the requested property as a rule: if `[scene] require` in a configuration names the
+    /// file, every scene matches the pattern
     #[arg(long, value_name = "N", requires = "property", conflicts_with = "by")]
     pub scene_rule: Option<usize>,
-    /// Conditions of a pattern at most
+    /// Maximum number of conditions of a pattern
     #[arg(long, value_name = "N", default_value_t = MOST_CONDITIONS, value_parser = clap::value_parser!(u8).range(1..=3))]
     pub depth: u8,
-    /// Share of false patterns that is bearable on average, after correction for everything that was tried
+    /// Accepted false discovery rate of patterns, after correction for multiple testing
     #[arg(long, value_name = "LEVEL", default_value_t = 0.05, value_parser = level)]
     pub level: f64,
-    /// Of which runs, and where the history lies.
+    /// The runs to analyse, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
     /// How it is printed (csv: the patterns, or with --by the cells of the map; json: everything)
@@ -60,21 +60,21 @@ pub struct AnalyseArgs {
 fn level(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(level) if level > 0.0 && level < 1.0 => Ok(level),
-        _ => Err("a probability above 0 and below 1 is needed, such as 0.05".to_owned()),
+        _ => Err("must be a probability above 0 and below 1, such as 0.05".to_owned()),
     }
 }
 
-/// What was asked of a history, answered.
+/// The result of an analysis.
 pub(super) struct Analysed {
-    /// The rows that were asked for.
+    /// The rows of the chosen runs.
     pub table: OutcomeTable,
-    /// What they say.
+    /// The findings.
     pub summary: FindingsSummary,
-    /// What properties are called.
+    /// The ontology, with the names of properties.
     pub ontology: Ontology,
 }
 
-/// Looks for what goes with failures and prints it.
+/// Finds conditions that go with failures and prints them.
 pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     check_parameters(&args.by)?;
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
@@ -83,7 +83,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         chosen: &args.chosen,
         property: &args.property,
         by: &args.by,
-        // In a text about all properties they would be too much to read.
+        // In a text about all properties they would be too long.
         usual_maps: !args.property.is_empty() || args.format != Format::Table,
         depth: args.depth,
         level: args.level,
@@ -92,7 +92,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     if let Some(picture) = picture {
         picture.write(&patterns_picture(&summary).ok_or_else(|| {
             Diagnostic::error("X013", "there is no pattern to draw".to_owned())
-                .help("none was found that holds on the runs kept aside; more runs may show one")
+                .help("no pattern was confirmed on the held-out runs; more runs may show one")
         })?)?;
     }
     if let Some(number) = args.scene_rule {
@@ -108,19 +108,19 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// What is asked of the chosen runs.
+/// The parameters of an analysis.
 pub(super) struct Question<'a> {
-    /// Of which runs.
+    /// The runs to analyse.
     pub chosen: &'a ChosenRuns,
-    /// Of which properties, by their names; none: of all.
+    /// Names of the properties to analyse; empty: all.
     pub property: &'a [String],
-    /// Parameters of the one heat map that is wanted; none: the usual ones.
+    /// Parameters of the requested heat map; empty: the default heat maps.
     pub by: &'a [String],
-    /// Whether heat maps are wanted that were not asked for.
+    /// Whether to compute the default heat maps.
     pub usual_maps: bool,
-    /// Conditions of a pattern at most.
+    /// Maximum number of conditions of a pattern.
     pub depth: u8,
-    /// Share of false patterns that is bearable.
+    /// Accepted false discovery rate of patterns.
     pub level: f64,
 }
 
@@ -132,7 +132,8 @@ impl Question<'_> {
     }
 }
 
-/// Brings the tables beside a history up to date and looks for what goes with failures; the table has some further columns.
+/// Updates the tables beside a history and finds conditions that go with failures; reads the `further` columns into the
+/// table too.
 pub(super) fn analysed(
     asked: &Question<'_>,
     history: &History,
@@ -166,7 +167,7 @@ pub(super) fn analysed(
     Ok(Analysed { table, summary, ontology })
 }
 
-/// A report of each property, in their order: as many at once as there are cores, so that what a report needs is not there for all.
+/// A report of each property, in order. Computes as many at once as there are cores, which limits the memory in use.
 fn reports(
     properties: &[JudgedProperty],
     report: impl Fn(&JudgedProperty) -> PropertyReport + Sync,
@@ -215,14 +216,14 @@ fn report(
     }
 }
 
-/// The properties that were asked for; all where none was.
+/// The requested properties, or all if none is named.
 fn wanted(all: Vec<JudgedProperty>, names: &[String]) -> Result<Vec<JudgedProperty>, Diagnostics> {
     chosen::all_judged(names, all.iter().map(|of| of.property.as_str()))?;
     let is_wanted = |of: &JudgedProperty| names.is_empty() || names.iter().any(|name| is_meant(&of.property, name));
     Ok(all.into_iter().filter(is_wanted).collect())
 }
 
-/// A pattern as the rule of a scene; patterns are counted over all properties that were asked for, as the text tells them.
+/// A pattern as a rule about scenes. Patterns are numbered over all requested properties, as in the text.
 fn rule(summary: &FindingsSummary, number: usize) -> Result<String, Diagnostics> {
     let told = |report: &PropertyReport| report.findings.patterns.confirmed().count();
     let known: usize = summary.properties.iter().map(told).sum();
@@ -231,12 +232,12 @@ fn rule(summary: &FindingsSummary, number: usize) -> Result<String, Diagnostics>
         .iter()
         .flat_map(|report| report.findings.patterns.confirmed().map(move |pattern| (report, pattern)));
     let Some((report, pattern)) = number.checked_sub(1).and_then(|before| patterns.nth(before)) else {
-        return Err(Diagnostic::error("X049", format!("there is no pattern {number}: {known} were found"))
-            .help("`actcheck analyse` with the same options tells them with their numbers")
+        return Err(Diagnostic::error("X049", format!("there is no pattern {number}: the analysis found {known}"))
+            .help("`actcheck analyse` with the same options lists them with their numbers")
             .into());
     };
     scene_rule(&pattern.conditions, &report.findings.subject.parameters, &report.sentence(pattern)).map_err(|unknown| {
-        let message = format!("no rule about a scene can ask for {}", unknown.join(", "));
+        let message = format!("a scene rule can't constrain {}", unknown.join(", "));
         Diagnostic::error("X049", message).help("narrow the configuration's own ranges and lists instead").into()
     })
 }

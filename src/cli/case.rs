@@ -12,7 +12,7 @@ use crate::cli::{clock, output, show};
 use crate::history::History;
 use crate::report::{CaseSummary, case_json, case_text, run_json, run_text};
 
-/// Runs a case and prints whether it fails as it did. Returns the exit code.
+/// Runs a case and prints whether it still fails in the same way. Returns the exit code.
 pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     refuse_campaign_options(args, &env.campaign.source.name)?;
     let history = History::open(&env.campaign.history)?;
@@ -40,7 +40,7 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     Ok(summary.exit_code())
 }
 
-/// A case in short.
+/// Summarises the run of a case.
 pub(super) fn summarise(file: &str, env: &Env, made: CaseRun) -> CaseSummary {
     CaseSummary {
         file: file.to_owned(),
@@ -52,7 +52,7 @@ pub(super) fn summarise(file: &str, env: &Env, made: CaseRun) -> CaseSummary {
     }
 }
 
-/// A case has one scene and draws nothing: what asks for more of it is a mistake.
+/// Rejects the options of whole campaigns: a case has one scene and samples nothing.
 fn refuse_campaign_options(args: &RunArgs, file: &str) -> Result<(), Diagnostics> {
     let given = [
         ("--runs", args.runs.is_some()),
@@ -67,9 +67,9 @@ fn refuse_campaign_options(args: &RunArgs, file: &str) -> Result<(), Diagnostics
     ];
     let mut found = Diagnostics::new();
     for (option, _) in given.into_iter().filter(|(_, given)| *given) {
-        let message = format!("`{option}` means nothing for {file}: it is a case, which has one scene");
+        let message = format!("`{option}` can't be used with {file}: it is a case, which has one scene");
         found.push(Diagnostic::error("X040", message).help(
-            "take the option away; `actcheck shrink` and `actcheck replay` take the id of the run that it makes",
+            "remove the option; `actcheck shrink` and `actcheck replay` accept the id of the run that the case makes",
         ));
     }
     found.or(())

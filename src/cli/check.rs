@@ -11,7 +11,7 @@ use crate::cli::{configurations, output, regressions};
 use crate::config::Overrides;
 use crate::rules::Budget;
 
-/// Says what a campaign would use, or everything that is wrong with it, unless somebody stops it.
+/// Prints what a campaign would use, or returns everything that is wrong with it. `stop` interrupts it.
 pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let usual = Path::new("configs/pick.toml");
     let config = match &args.config {

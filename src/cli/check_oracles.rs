@@ -23,13 +23,14 @@ use crate::rules::Budget;
 pub struct CheckOraclesArgs {
     /// The campaign's configuration (TOML)
     pub config: PathBuf,
-    /// Scenes of each test, instead of the configuration's `test_count`; each is run once without a fault and once with each
+    /// Scenes for each test, instead of the configuration's `test_count`; each runs once without a fault and once with
+    /// each fault
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
     /// Seed of all randomness, instead of the configuration's `seed`
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
-    /// Workers, one simulation each; results don't depend on it [default: all cores]
+    /// Number of workers, each with one simulation; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
     /// How the matrix is printed
@@ -37,10 +38,10 @@ pub struct CheckOraclesArgs {
     pub format: Format,
 }
 
-/// Runs every scene with every fault and prints which properties notice. Returns the exit code.
+/// Runs every scene with every fault and prints which properties detect it. Returns the exit code.
 pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     let overrides = Overrides { runs: args.runs, seed: args.seed, ..Overrides::default() };
-    // Nothing is kept, so that there is nothing to bring to an end.
+    // No runs are stored, so an interrupt needs no cleanup.
     let stop = stop::on_interrupt(|| {});
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
     let env = Env::prepare_within(&args.config, &overrides, budget)?;
@@ -56,8 +57,8 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
         return Ok(stop::INTERRUPTED);
     }
     if trials.iter().all(|trial| trial.outcomes.is_empty()) {
-        return Err(Diagnostic::error("V010", "no scene could be judged, so nothing is known of the properties")
-            .help("`actcheck run` with the same configuration says why")
+        return Err(Diagnostic::error("V010", "no scene could be judged, so the properties could not be tested")
+            .help("`actcheck run` with the same configuration shows why")
             .into());
     }
     let summary = summarise(args, &env, &faults, &trials);
@@ -89,7 +90,7 @@ fn summarise(args: &CheckOraclesArgs, env: &Env, faults: &[Fault], trials: &[Tri
         planned: env.planned_runs(),
         faults: faults.iter().map(|fault| (fault.name.to_owned(), fault.what.to_owned())).collect(),
         names: properties.iter().map(name).collect(),
-        // The first fault is that of a robot which does nothing.
+        // The first fault is a robot that does nothing.
         gaps: matrix.gaps(FAULTS[0].name),
         matrix,
     }

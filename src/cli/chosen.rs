@@ -1,4 +1,4 @@
-//! Which runs of a history a command is about.
+//! The runs of a history that a command uses.
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
@@ -13,34 +13,34 @@ use crate::cli::{history_dir, since, why};
 use crate::history::History;
 use crate::ontology::{self, Ontology};
 
-/// Runs of a history, and what explains them.
+/// Runs of a history, and the ontology that explains them.
 #[derive(Debug, Args)]
 pub struct ChosenRuns {
-    /// Only runs of this campaign (may be given several times) [default: all but the smaller forms of runs]
+    /// Only runs of this campaign (may be given several times) [default: all but shrunk runs]
     #[arg(long, value_name = "ID")]
     pub campaign: Vec<String>,
-    /// Only runs since then, such as 2026-11-21, 2026-11-21T18:00:00Z or 12h ago as 12h
+    /// Only runs since this time, such as 2026-11-21, 2026-11-21T18:00:00Z, or 12h for 12 hours ago
     #[arg(long, value_name = "WHEN", value_parser = since::moment)]
     pub since: Option<String>,
-    /// The ontology that explains outcomes and says which kinds belong to which [default: ontology/actions.ttl here, or the one
-    /// that the program carries]
+    /// The ontology with the rules and the hierarchy of object categories [default: ontology/actions.ttl here, or the
+    /// shipped one]
     #[arg(long, value_name = "FILE")]
     pub ontology: Option<PathBuf>,
-    /// Where the history lies.
+    /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
 }
 
 impl ChosenRuns {
-    /// The history that they are of.
+    /// Opens the history of the runs.
     pub(super) fn open(&self) -> Result<History, Diagnostics> {
         history_dir::open(&self.history)
     }
 
-    /// Their rows in tables.
+    /// Returns the filter that selects their rows in tables.
     ///
     /// # Errors
-    /// A campaign is not there.
+    /// A campaign does not exist.
     pub(super) fn filter(&self, history: &History) -> Result<TableFilter, Diagnostics> {
         for campaign in &self.campaign {
             history.campaign(campaign)?;
@@ -49,7 +49,7 @@ impl ChosenRuns {
         Ok(TableFilter { campaigns, since: self.since.clone() })
     }
 
-    /// The ontology.
+    /// Loads the ontology.
     ///
     /// # Errors
     /// It can't be read.
@@ -58,7 +58,7 @@ impl ChosenRuns {
         ontology::load(&files, &path)
     }
 
-    /// The options that choose them, as they were typed.
+    /// The options that choose the runs, as they were typed.
     pub(super) fn typed(&self) -> String {
         let mut typed = String::new();
         let mut add = |name: &str, value: String| typed.push_str(&format!(" --{name} {value}"));
@@ -70,7 +70,7 @@ impl ChosenRuns {
     }
 }
 
-/// The classes above each class of an ontology, the nearest first: the more classes are above one, the nearer it is.
+/// The superclasses of each class of an ontology, nearest first: a class with more superclasses is nearer.
 pub(super) fn hierarchy(ontology: &Ontology) -> Hierarchy {
     let classes = &ontology.superclasses;
     let depth = |class: &String| classes.get(class).map_or(0, BTreeSet::len);
@@ -82,18 +82,18 @@ pub(super) fn hierarchy(ontology: &Ontology) -> Hierarchy {
     classes.iter().map(|(class, above)| (class.clone(), nearest_first(above))).collect()
 }
 
-/// No run was chosen.
+/// X044: the chosen campaigns and times have no runs.
 pub(super) fn none_of(history: &History) -> Diagnostic {
-    Diagnostic::error("X044", format!("the history `{}` has no such runs", history.dir().display()))
-        .help("`actcheck list` shows the runs that it has; `actcheck run CONFIG` makes some")
+    Diagnostic::error("X044", format!("the history `{}` has no matching runs", history.dir().display()))
+        .help("`actcheck list` shows its runs; `actcheck run CONFIG` creates some")
 }
 
-/// Whether a property, by its IRI, is meant by a name or IRI.
+/// Whether a name or IRI denotes the property with an IRI.
 pub(super) fn is_meant(property: &str, name: &str) -> bool {
     name == property || name == names::local(property)
 }
 
-/// A property that was never judged was misspelt (X045).
+/// Checks that every named property was judged (X045): a property that was never judged is probably misspelt.
 pub(super) fn all_judged<'a>(
     names: &[String],
     judged: impl Iterator<Item = &'a str> + Clone,

@@ -1,4 +1,4 @@
-//! The clock that the campaign is given.
+//! The clock that campaigns use.
 
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -11,7 +11,7 @@ pub fn system() -> Clock {
 }
 
 fn now() -> String {
-    // Seconds are enough for people, and shorter in the history.
+    // Whole seconds are precise enough for readers, and shorter in the history.
     let now = jiff::Timestamp::now();
     now.round(jiff::Unit::Second).unwrap_or(now).to_string()
 }

@@ -4,7 +4,7 @@ use clap::{Command, CommandFactory as _};
 
 use crate::cli::Arguments;
 
-/// The program with all commands but the hidden ones.
+/// The program with all commands except the hidden ones.
 pub(super) fn command_tree() -> Command {
     let all = Arguments::command();
     let shown: Vec<Command> = all.get_subcommands().filter(|command| !command.is_hide_set()).cloned().collect();

@@ -13,24 +13,25 @@ use crate::cli::{history_dir, output};
 use crate::history::{CampaignRecord, History, RunFilter, RunRow, SceneDigest};
 use crate::report::{CompareSummary, ComparedSide, SideChange, compare_json, compare_table, compare_text};
 
-/// Behind a campaign: its outcomes as they were last judged.
+/// Suffix of a campaign: use its newest judgements.
 const RECHECKED: &str = "@rechecked";
 
 /// `actcheck compare`
 #[derive(Debug, Args)]
 pub struct CompareArgs {
-    /// The campaign to compare with: ID, DIR#ID for one of another history, or DIR for the newest there; with @rechecked behind
-    /// it by its newest judgements (see `actcheck recheck`)
+    /// The baseline campaign: ID, DIR#ID for one of another history, or DIR for the newest there; the suffix @rechecked
+    /// selects its newest judgements (see `actcheck recheck`)
     #[arg(value_name = "A")]
     pub first: String,
-    /// The campaign to judge, named the same way
+    /// The campaign to compare with it, named the same way
     #[arg(value_name = "B")]
     pub second: String,
-    /// Exit with 1 where B is worse than A: where, in any line, as many scenes that only A passes would come up with at most this
-    /// probability if B were no worse. The chance of a false alarm is at most LEVEL (usually 0.05), for all lines together
+    /// Exit with 1 if B is worse than A: if, in any line, so many scenes that only A passes would occur with at most
+    /// this probability if B were not worse. The probability of a false alarm is at most LEVEL (usually 0.05), over all
+    /// lines together
     #[arg(long, value_name = "LEVEL", value_parser = level)]
     pub fail_if_worse: Option<f64>,
-    /// Where the history of an ID without DIR lies.
+    /// The folder of the history for an ID without DIR.
     #[command(flatten)]
     pub history: HistoryArgs,
     /// How it is printed (csv: one line for each property; json: everything)
@@ -39,12 +40,12 @@ pub struct CompareArgs {
 }
 
 fn level(text: &str) -> Result<f64, String> {
-    let wrong = || "a probability above 0 and below 1 is needed, such as 0.05".to_owned();
+    let wrong = || "must be a probability above 0 and below 1, such as 0.05".to_owned();
     let level: f64 = text.parse().map_err(|_| wrong())?;
     if level > 0.0 && level < 1.0 { Ok(level) } else { Err(wrong()) }
 }
 
-/// Compares two campaigns and prints what came of it. Returns the exit code.
+/// Compares two campaigns and prints the result. Returns the exit code.
 pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     let mut histories = Histories::default();
     let first = Side::read(&args.first, &args.history, &mut histories)?;
@@ -72,7 +73,7 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     Ok(summary.exit_code())
 }
 
-/// The histories that were opened, each once: a second opening would find the first one's lock.
+/// The open histories. Each is opened only once, because it is locked while open.
 #[derive(Default)]
 struct Histories {
     open: BTreeMap<PathBuf, History>,
@@ -92,7 +93,7 @@ impl Histories {
     }
 }
 
-/// What was typed for one side.
+/// The argument for one side.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Name<'a> {
     dir: Option<&'a Path>,
@@ -163,21 +164,21 @@ impl Side {
     }
 }
 
-/// The newest campaign of a history that is no smaller form of a run.
+/// Returns the newest campaign of a history that does not hold a shrunk run.
 ///
 /// # Errors
-/// `X070` there is none.
+/// `X070` there is no such campaign.
 pub(super) fn newest(history: &History) -> Result<String, Diagnostics> {
     let shrunk = history.shrunk_campaigns()?;
     let mut ids = history.campaigns()?.into_iter().map(|row| row.id).rev();
     ids.find(|id| !shrunk.contains(id)).ok_or_else(|| {
         Diagnostic::error("X070", format!("the history `{}` has no campaign", history.dir().display()))
-            .help("`actcheck run CONFIG` makes one")
+            .help("`actcheck run CONFIG` creates one")
             .into()
     })
 }
 
-/// Puts the rules of later judgements in the place of the campaign's own.
+/// Replaces the campaign's own rules by those of later judgements.
 fn judged_by(record: &mut CampaignRecord, rules: &BTreeMap<String, std::collections::BTreeSet<String>>) {
     for (property, digests) in rules {
         let digest = digests.iter().cloned().collect::<Vec<_>>().join(" and ");
@@ -200,7 +201,7 @@ fn nothing_shared(first: &Side, second: &Side, comparison: &Comparison) -> Diagn
     } else if comparison.other_scene.is_empty() {
         "they have no run numbers in common".to_owned()
     } else {
-        "scenes are the same where seed, tests, objects and surfaces of the configurations are; sensing, skill, robot and rules may differ"
+        "scenes are the same if seed, tests, objects and surfaces of the configurations are; sensing, skill, robot and rules may differ"
             .to_owned()
     })
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::base::{Diagnostic, Files};
 use crate::config::Table;
 
-/// More names than this are counted instead of listed.
+/// Names beyond this number are counted instead of listed.
 const MOST_LISTED: usize = 12;
 
 /// The configurations in this folder and in its folder `configs`: TOML files with a key `tests`.
@@ -25,12 +25,12 @@ fn has_tests(path: &Path) -> bool {
     table.is_some_and(|table| table.has("tests"))
 }
 
-/// X014: a command that needs a configuration was given none. Names those that are here, or the way to a first one.
+/// X014: a command lacks its configuration. Lists those in this folder, or explains how to create the first one.
 pub(super) fn none_given(command: &str) -> Diagnostic {
     let here = here();
     let help = match here.iter().find(|path| path.ends_with("pick.toml")).or(here.first()) {
         None => format!(
-            "there is none in this folder: `actcheck new campaign` writes pick.toml; then `actcheck {command} pick.toml`"
+            "this folder has none: `actcheck new campaign` writes pick.toml; then `actcheck {command} pick.toml`"
         ),
         Some(first) => format!("write `actcheck {command} {}`{}", first.display(), others(&here, first)),
     };

@@ -12,7 +12,7 @@ use crate::rules::Budget;
 use crate::rules::explain::Explanation;
 use crate::rules::standalone::{self, Program};
 
-/// Runs a program of its own, or says why one statement of it holds or does not.
+/// Runs a standalone program, or explains why one of its facts holds or does not.
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let budget = Budget { tuples: args.max_tuples, secs: args.max_secs, stop: Arc::clone(stop) };
     if let Some(statement) = &args.trace {
@@ -39,7 +39,7 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnos
     Ok(())
 }
 
-/// An explanation in a format.
+/// Renders an explanation in a format.
 pub(super) fn rendered(explanation: &Explanation, format: ProofFormat) -> String {
     match format {
         ProofFormat::Text => explanation.to_text(),

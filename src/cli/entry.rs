@@ -11,11 +11,12 @@ use crate::cli::{
 };
 use crate::config::SCHEMA;
 
-/// Parses the process's arguments and does what they ask.
+/// Parses the process's arguments and runs the command.
 ///
-/// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed, 2 it could not be done, 130 interrupted.
+/// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed, 2 the command failed, 130
+/// interrupted.
 pub fn run() -> ExitCode {
-    // clap prints help, version and its own errors; for the last it exits with 2.
+    // clap prints help, version and usage errors itself; after a usage error it exits with 2.
     let arguments = Arguments::parse();
     let done = match arguments.command {
         Command::Analyse(args) => crate::cli::analyse::analyse(&args).map(|()| 0),

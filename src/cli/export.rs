@@ -14,45 +14,46 @@ use crate::history::History;
 /// `actcheck export`
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// Id of the run to write as a configuration, or its beginning
+    /// Id of the run to write as a configuration, or a unique prefix
     #[arg(required_unless_present_any = ["parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
     pub run: Option<String>,
     /// The file to write (TOML); `-` prints it
     #[arg(short, long, value_name = "FILE.toml", conflicts_with = "regression", requires = "run")]
     #[arg(required_unless_present_any = ["regression", "parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
     pub output: Option<PathBuf>,
-    /// Put it, under the run's id, into the project's folder `regressions`, which every campaign runs first
+    /// Write it into the project's folder `regressions`, named after the run; every campaign runs these files first
     #[arg(long, requires = "run")]
     pub regression: bool,
-    /// Take everything but the choices from this configuration instead of the one that the history keeps
+    /// Take everything but the choices from this configuration instead of the one in the history
     #[arg(long, value_name = "FILE", requires = "run")]
     pub config: Option<PathBuf>,
-    /// Write the table of outcomes, one row for each run, action and property with the scene's parameters, into this folder:
-    /// `outcomes.parquet`, and `schema.json`, which says what each column means
+    /// Write the table of outcomes, one row for each run, action and property with the scene's parameters, into this
+    /// folder: `outcomes.parquet`, and `schema.json`, which describes the columns
     #[arg(long, value_name = "DIR")]
     pub parquet: Option<PathBuf>,
-    /// The same as CSV: `outcomes.csv` and `schema.json`
+    /// Write the same table as CSV: `outcomes.csv` and `schema.json`
     #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
-    /// Write runs as data for learning into this folder, in Parquet: `joints` and `robot` (observations and commands over time),
-    /// `objects` (the truth), `percepts`, `actions` and `outcomes`, and `schema.json`, which says what each column means
+    /// Write runs as a learning dataset into this folder, in Parquet: `joints` and `robot` (observations and commands
+    /// over time), `objects` (ground truth), `percepts`, `actions` and `outcomes`, and `schema.json`, which describes
+    /// the columns
     #[arg(long, value_name = "DIR")]
     pub dataset: Option<PathBuf>,
-    /// Write the whole history as RDF, facts in their named graphs (N-Quads)
+    /// Write the whole history as RDF, with facts in their named graphs (N-Quads)
     #[arg(long, value_name = "FILE.nq")]
     pub nquads: Option<PathBuf>,
     /// Write campaigns, runs, scenes and outcomes as RDF, without the facts in named graphs (Turtle)
     #[arg(long, value_name = "FILE.ttl")]
     pub turtle: Option<PathBuf>,
-    /// Make the tables beside the history anew, from its store
+    /// Rebuild the tables beside the history from its store
     #[arg(long)]
     pub rebuild_mirror: bool,
-    /// Of which runs the tables are, and where the history lies.
+    /// The runs in the tables, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
 }
 
-/// Writes a stored run as a configuration of its own, or the history as tables or RDF.
+/// Writes a stored run as a configuration, or the history as tables or RDF.
 pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
     let history = args.chosen.open()?;
     if let Some(run) = &args.run {
@@ -88,7 +89,7 @@ fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics
         let Some(folder) = folder else { continue };
         let (files, rows): (Vec<PathBuf>, usize) = write(&mirror, &filter, &hierarchy, folder.as_path())?;
         let [table, schema] = files.as_slice() else { continue };
-        let told = format!("{} holds {rows} rows, {} what their columns mean\n", table.display(), schema.display());
+        let told = format!("{} holds {rows} rows, {} describes their columns\n", table.display(), schema.display());
         output::print(&told);
     }
     if let Some(folder) = &args.dataset {
@@ -102,29 +103,26 @@ fn print_dataset(dataset: &Dataset) {
         output::print(&format!("{} holds {rows} rows\n", table.display()));
     }
     let runs = dataset.runs;
-    output::print(&format!("{} says what the columns of these tables of {runs} runs mean\n", dataset.schema.display()));
+    output::print(&format!("{} describes the columns of these tables of {runs} runs\n", dataset.schema.display()));
     if dataset.without_course > 0 {
         let note = Diagnostic::warning(
             "X054",
-            format!(
-                "{} of {runs} runs hold no course of the robot: an earlier version kept them",
-                dataset.without_course
-            ),
+            format!("{} of {runs} runs have no robot motion: an earlier version stored them", dataset.without_course),
         );
-        output::print_diagnostics(&note.help("`actcheck run` keeps it today").into());
+        output::print_diagnostics(&note.help("run the campaign again to record it").into());
     }
 }
 
-/// Writes a stored run as a configuration of its own.
+/// Writes a stored run as a configuration.
 fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Diagnostics> {
     let run = history.run(run)?;
     let recalled = Env::recall(history, &run.row.campaign, args.config.as_deref())?;
     let file = match &args.output {
         Some(file) => file.clone(),
         None if args.regression => new_regression(&recalled.0, &run.row.run)?,
-        // Only tables were asked for beside it.
+        // The other options write only tables.
         None => {
-            return Err(Diagnostic::error("X043", format!("where run {} is to be written was not said", run.row.run))
+            return Err(Diagnostic::error("X043", format!("run {} needs an output file", run.row.run))
                 .help("name a file with `-o FILE.toml`, or use `--regression`")
                 .into());
         }
@@ -140,13 +138,13 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
     Ok(())
 }
 
-/// A new file in the folder of regressions, which is there afterwards.
+/// Returns the path of a new file in the folder of regressions, which is created if missing.
 fn new_regression(env: &Env, run: &str) -> Result<PathBuf, Diagnostics> {
     let folder = campaign::regressions_folder(&env.campaign.source)?;
     std::fs::create_dir_all(&folder).map_err(|error| written::unwritten(&folder, error))?;
     let file = folder.join(format!("{run}.toml"));
     if file.exists() {
-        let fault = Diagnostic::error("X042", format!("{} is there already", file.display()));
+        let fault = Diagnostic::error("X042", format!("{} already exists", file.display()));
         return Err(fault.help("it may have been edited: move it away, or name another file with `-o`").into());
     }
     Ok(file)

@@ -14,7 +14,7 @@ use crate::report::{HealthSummary, health_json, health_table, health_text};
 pub struct HealthArgs {
     /// Id of the campaign [default: the newest]
     pub campaign: Option<String>,
-    /// Where the history lies.
+    /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
     /// How it is printed (csv: the table of parameters)
@@ -22,7 +22,7 @@ pub struct HealthArgs {
     pub format: Format,
 }
 
-/// Prints how healthy a campaign is. Returns the exit code.
+/// Prints the health of a campaign. Returns the exit code.
 pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
     let history = history_dir::open_to_read(&args.history)?;
     let campaign = match &args.campaign {
@@ -31,7 +31,7 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
     };
     let summary = examine(&history, &campaign)?;
     if summary.health.runs == 0 {
-        return Err(Diagnostic::error("X041", format!("campaign {campaign} has no runs, so nothing is known of it"))
+        return Err(Diagnostic::error("X041", format!("campaign {campaign} has no runs to examine"))
             .help("`actcheck list` shows the runs of all campaigns")
             .into());
     }
@@ -44,10 +44,10 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
     Ok(summary.exit_code())
 }
 
-/// How healthy a campaign of the history is.
+/// Examines the health of a campaign.
 ///
 /// # Errors
-/// `H014` there is no such campaign; the history can't be read.
+/// `H014` the campaign does not exist; or the history can't be read.
 pub(super) fn examine(history: &History, campaign: &str) -> Result<HealthSummary, Diagnostics> {
     let mut meter = HealthMeter::default();
     history.each_vitals(campaign, |run| meter.add(run))?;

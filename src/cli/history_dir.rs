@@ -1,4 +1,4 @@
-//! Which history is meant when none is named.
+//! Finds the history if none is named.
 
 use std::path::{Path, PathBuf};
 
@@ -6,18 +6,18 @@ use crate::base::{Diagnostic, Diagnostics};
 use crate::cli::args::HistoryArgs;
 use crate::history::History;
 
-/// Code of the fault that there is no history.
+/// Code of the fault for a missing history.
 const NONE_FOUND: &str = "X002";
 
-/// Opens the history that was named, or the one that is found.
+/// Opens the named history, or the one that is found.
 ///
 /// # Errors
-/// None is found, several are, or it can't be opened.
+/// No history or several are found, or the history can't be opened.
 pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
     History::open_existing(&folder(args)?)
 }
 
-/// The same for reading alone, beside others that do so.
+/// Like [`open`], but read-only: other processes may read the history at the same time.
 ///
 /// # Errors
 /// As [`open`].
@@ -25,10 +25,10 @@ pub fn open_to_read(args: &HistoryArgs) -> Result<History, Diagnostics> {
     History::open_to_read(&folder(args)?)
 }
 
-/// The folder of the history that was named, or of the one that is found.
+/// Returns the folder of the named history, or of the one that is found.
 ///
 /// # Errors
-/// None is found, or several are.
+/// No history or several are found.
 pub fn folder(args: &HistoryArgs) -> Result<PathBuf, Diagnostics> {
     match &args.history {
         Some(folder) => Ok(folder.clone()),
@@ -36,10 +36,10 @@ pub fn folder(args: &HistoryArgs) -> Result<PathBuf, Diagnostics> {
     }
 }
 
-/// Opens the history that was named, or the one that is found; nothing where none was named and there is none.
+/// Opens the named history, or the one that is found. Returns `None` if none is named and none is found.
 ///
 /// # Errors
-/// Several are found, or it can't be opened.
+/// Several histories are found, or the history can't be opened.
 pub fn open_if_any(args: &HistoryArgs) -> Result<Option<History>, Diagnostics> {
     match (&args.history, find(Path::new("."))) {
         (None, Err(faults)) if faults.iter().all(|fault| fault.code == NONE_FOUND) => Ok(None),
@@ -62,12 +62,12 @@ fn find(here: &Path) -> Result<PathBuf, Diagnostics> {
     found.sort();
     match found.as_slice() {
         [only] => Ok(only.clone()),
-        [] => Err(Diagnostic::error(NONE_FOUND, "no history was named, and there is none in this folder")
+        [] => Err(Diagnostic::error(NONE_FOUND, "no history was named, and this folder has none")
             .help("name one with `--history DIR`; a campaign writes `.actcheck` beside its configuration")
             .into()),
         several => {
             let names: Vec<String> = several.iter().map(|path| path.display().to_string()).collect();
-            Err(Diagnostic::error("X003", "no history was named, and there are several")
+            Err(Diagnostic::error("X003", "no history was named, and this folder has several")
                 .help(format!("name one with `--history DIR`: {}", names.join(", ")))
                 .into())
         }

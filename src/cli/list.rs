@@ -8,14 +8,14 @@ use crate::cli::{history_dir, output};
 use crate::history::{RunFilter, RunRow};
 use crate::report::Table;
 
-/// What a column shows of a run.
+/// Returns a run's value in a column.
 type Cell = fn(&RunRow) -> Value;
 
 /// Prints one line for each run.
 pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
     let history = history_dir::open_to_read(&args.history)?;
     let runs = history.runs(&RunFilter { campaign: args.campaign.clone(), ..RunFilter::default() })?;
-    // Most campaigns have neither: columns of nothing would only be in the way.
+    // Most campaigns have neither, so empty columns are hidden.
     let repeated = runs.iter().any(|row| row.repetition.is_some());
     let weighted = runs.iter().any(|row| row.weight.is_some());
     let columns: [(&str, bool, Cell); 9] = [

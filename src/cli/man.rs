@@ -13,7 +13,8 @@ use crate::cli::{output, written};
 /// `actcheck man`
 #[derive(Debug, Args)]
 pub struct ManArgs {
-    /// Write a page for each command into this folder, such as `actcheck-run.1`, instead of printing one with all of them
+    /// Write a page for each command into this folder, such as `actcheck-run.1`, instead of printing one with all of
+    /// them
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -60,7 +61,7 @@ fn section_of(command: &Command) -> io::Result<Vec<u8>> {
     Ok(format!("\n{}", with_examples(&page)).replace("\n.SH ", "\n.SS ").into_bytes())
 }
 
-/// A page in which the section after the options is named for its examples.
+/// Renames the section after the options to EXAMPLES.
 fn with_examples(page: &[u8]) -> String {
     let page = String::from_utf8_lossy(page);
     page.replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n").replace(".SH EXTRA\nExample:\n", ".SH EXAMPLES\n")
@@ -84,7 +85,7 @@ fn manual(command: &Command) -> Man {
     Man::new(command.clone()).manual("actcheck").source(concat!("actcheck ", env!("CARGO_PKG_VERSION")))
 }
 
-/// All commands below one, each before those below it.
+/// All subcommands of a command, each before its own subcommands.
 fn below(command: &Command) -> Vec<&Command> {
     let each = command.get_subcommands().map(|command| std::iter::once(command).chain(below(command)));
     each.flatten().collect()
@@ -92,6 +93,6 @@ fn below(command: &Command) -> Vec<&Command> {
 
 fn unrendered(error: io::Error) -> Diagnostics {
     Diagnostic::error("X001", format!("the manual could not be written: {error}"))
-        .help("report this: the manual is made in memory")
+        .help("report this bug: the manual is rendered in memory")
         .into()
 }

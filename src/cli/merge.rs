@@ -13,30 +13,30 @@ use crate::history::History;
 use crate::history::merge::{MergeOptions, MergePlan, PlannedMerge, carry_out, plan};
 use crate::report::Table;
 
-/// Run numbers that a message tells; the table in JSON has all.
+/// Maximum number of run numbers in a message; the JSON table has all.
 const TOLD: usize = 10;
 
 /// `actcheck merge`
 #[derive(Debug, Args)]
 pub struct MergeArgs {
-    /// The histories to merge, in any order; they stay as they are
+    /// The histories to merge, in any order; they are not changed
     #[arg(value_name = "DIR", required = true)]
     pub dirs: Vec<PathBuf>,
-    /// The history that gets all of them: a new folder, or one that is added to
+    /// The destination: a new folder, or an existing history to add to
     #[arg(long, value_name = "DIR")]
     pub into: PathBuf,
-    /// Give a campaign a new id where another campaign has its id (parts of one campaign need none)
+    /// Give a campaign a new id if another campaign has the same one (not needed for parts of one campaign)
     #[arg(long)]
     pub rename: bool,
     /// Leave this campaign out: ID, or DIR#ID as messages name it; may be given several times
     #[arg(long, value_name = "CAMPAIGN")]
     pub leave_out: Vec<String>,
-    /// How the campaigns that are then there are printed
+    /// How the resulting campaigns are printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
 }
 
-/// Merges histories and prints which campaigns they gave. Returns the exit code.
+/// Merges histories and prints the resulting campaigns. Returns the exit code.
 pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
     let sources = open_all(args)?;
     let known = is_there(&args.into).then(|| History::open_existing(&args.into)).transpose()?;
@@ -48,13 +48,13 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
     };
     let progress = Progress::new(plan.campaigns.iter().map(|campaign| campaign.added).sum(), None);
     let bar = progress.bar();
-    let stop = stop::on_interrupt(move || bar.println("stopping after this run; merging again goes on"));
+    let stop = stop::on_interrupt(move || bar.println("stopping after this run; merge again to continue"));
     let merged = carry_out(&plan, &sources, &into, &stop, || progress.judged(1, 0));
     progress.finish();
     let merged = merged?;
     if merged.interrupted {
         let fault = Diagnostic::error("X030", "interrupted");
-        return Err(fault.help("what was written is whole; merge again to add the rest").into()).or_else(|faults| {
+        return Err(fault.help("written runs are complete; merge again to add the rest").into()).or_else(|faults| {
             output::print_diagnostics(&faults);
             Ok(stop::INTERRUPTED)
         });
@@ -69,7 +69,7 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
     Ok(u8::from(plan.campaigns.iter().any(|campaign| !campaign.missing.is_empty())))
 }
 
-/// Opens each history once, and leaves the destination out: what it has is there already.
+/// Opens each history once, except the destination: its runs need no copying.
 fn open_all(args: &MergeArgs) -> Result<Vec<History>, Diagnostics> {
     let same = |dir: &Path| std::fs::canonicalize(dir).unwrap_or_else(|_| dir.to_path_buf());
     let (mut seen, mut sources, mut faults) = (vec![same(&args.into)], Vec::new(), Diagnostics::new());
@@ -86,7 +86,7 @@ fn open_all(args: &MergeArgs) -> Result<Vec<History>, Diagnostics> {
     faults.or(sources)
 }
 
-/// Whether there is something that has to be a history.
+/// Whether the folder has a version file, and so must be a history.
 fn is_there(dir: &Path) -> bool {
     dir.join("VERSION").exists()
 }
@@ -123,7 +123,7 @@ fn campaign_json(campaign: &PlannedMerge) -> Value {
     })
 }
 
-/// The runs that no part of a campaign has.
+/// Returns a warning if no part of a campaign has some of its runs.
 fn lacking(campaign: &PlannedMerge) -> Option<Diagnostic> {
     let missing = &campaign.missing;
     let mut numbers: Vec<String> = missing.iter().take(TOLD).map(|index| (index + 1).to_string()).collect();
@@ -138,5 +138,5 @@ fn lacking(campaign: &PlannedMerge) -> Option<Diagnostic> {
         numbers.join(", ")
     );
     (!missing.is_empty())
-        .then(|| Diagnostic::warning("X080", message).help("merge the parts that are missing into the same folder"))
+        .then(|| Diagnostic::warning("X080", message).help("merge the missing parts into the same folder"))
 }

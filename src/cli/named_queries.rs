@@ -1,27 +1,27 @@
-//! Queries that have names: those that the program carries, and those of the project.
+//! Named queries: the shipped ones, and those of the project.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
 
-/// Where they lie, in the project and in what the program carries.
+/// Their folder, in the project and in the shipped files.
 const FOLDER: &str = "ontology/queries";
 
-/// A query, and what it answers.
+/// A query with its description.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedQuery {
-    /// The file's name without its ending.
+    /// The file's name without its extension.
     pub name: String,
     /// The first line of the comment that it begins with.
     pub title: String,
     /// The rest of that comment.
     pub description: String,
-    /// The whole of it.
+    /// The whole text.
     pub text: String,
 }
 
-/// All of them by name; one of the project stands before a carried one of the same name.
+/// All named queries. A query of the project replaces a shipped one of the same name.
 ///
 /// # Errors
 /// `X047` a file of the project can't be read.
@@ -29,18 +29,18 @@ pub fn all() -> Result<Vec<NamedQuery>, Diagnostics> {
     sources()?.into_iter().map(|(name, source)| Ok(described(name, &source.text))).collect()
 }
 
-/// The query with a name.
+/// Returns the query with a name.
 ///
 /// # Errors
-/// `X048` there is none.
+/// `X048` there is no such query.
 pub fn named(name: &str) -> Result<Source, Diagnostics> {
     let mut known = sources()?;
     match known.remove(name) {
         Some(source) => Ok(source),
         None => {
-            let fault = Diagnostic::error("X048", format!("no query is named `{name}`"));
+            let fault = Diagnostic::error("X048", format!("there is no query `{name}`"));
             let help = did_you_mean(name, known.keys().map(String::as_str));
-            Err(fault.help(format!("{help}; `actcheck query --list-named` says what each answers")).into())
+            Err(fault.help(format!("{help}; `actcheck query --list-named` describes all of them")).into())
         }
     }
 }

@@ -9,31 +9,31 @@ use crate::cli::new_property::{self, NewPropertyArgs};
 /// `actcheck new`
 #[derive(Debug, Args)]
 pub struct NewArgs {
-    /// What is new.
+    /// The kind of thing to create.
     #[command(subcommand)]
     pub kind: NewKind,
 }
 
-/// What can be new.
+/// Things that can be created.
 #[derive(Debug, Subcommand)]
 pub enum NewKind {
-    /// A configuration of a campaign, explained line by line, which runs as it is
+    /// A campaign configuration that runs as it is, explained line by line
     ///
-    /// It uses the ontology, the rules and the models that the program carries, and needs no other file. With `--with` they are copied
-    /// into this folder, to be edited, and the configuration uses the copies. Existing files are never overwritten.
+    /// It uses the shipped ontology, rules and models, and needs no other file. `--with` copies them into this folder
+    /// for editing, and the configuration uses the copies. Existing files are never overwritten.
     #[command(
         after_help = "Examples:\n  actcheck new campaign\n  actcheck new campaign crowded --with ontology,skill,model"
     )]
     Campaign(NewCampaignArgs),
     /// A success property: its rule file and its entry in the ontology
     ///
-    /// If this folder has no ontology, the one that the program carries is written first, with its rules, and configurations from
+    /// If this folder has no ontology, the shipped one is written first, with its rules, and configurations from
     /// `actcheck new campaign` use it from then on.
     #[command(after_help = "Example:\n  actcheck new property StaysUpright --for Pick")]
     Property(NewPropertyArgs),
 }
 
-/// Writes what is new.
+/// Creates a configuration or a property.
 pub fn new(args: &NewArgs) -> Result<(), Diagnostics> {
     match &args.kind {
         NewKind::Campaign(args) => new_campaign::campaign(args),

@@ -23,17 +23,17 @@ pub struct NewCampaignArgs {
     /// Name of the configuration: letters, digits, `_` and `-`. The file is NAME.toml in this folder
     #[arg(default_value = "pick")]
     pub name: String,
-    /// Write these too, and make the configuration use them
+    /// Also write these, and make the configuration use them
     #[arg(long, value_name = "PART", value_enum, value_delimiter = ',')]
     pub with: Vec<Part>,
 }
 
-/// Parts of a project beside its configuration.
+/// Parts of a project besides its configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Part {
-    /// Folder `ontology`: actions, properties, kinds of objects. Brings `rules`, which it links
+    /// Folder `ontology`: actions, properties, object categories. Includes `rules`, which it links
     Ontology,
-    /// Folder `rules`: a file for each property. Brings `ontology`, which links them
+    /// Folder `rules`: a file for each property. Includes `ontology`, which links them
     Rules,
     /// `skills/pick.py`: a skill in Python that performs the pick
     Skill,
@@ -41,7 +41,7 @@ pub enum Part {
     Model,
 }
 
-/// Writes a configuration and the parts that it is to use.
+/// Writes a configuration and the parts that it uses.
 pub fn campaign(args: &NewCampaignArgs) -> Result<(), Diagnostics> {
     check_name(&args.name)?;
     let has = |part: Part| args.with.contains(&part);
@@ -66,11 +66,11 @@ pub fn campaign(args: &NewCampaignArgs) -> Result<(), Diagnostics> {
     }
     let config = format!("{}.toml", args.name);
     files.add(&config, campaign_template(&template));
-    files.write("give the campaign another name, or leave the parts that exist out of `--with`")?;
+    files.write("give the campaign another name, or omit existing parts from `--with`")?;
 
     let mut text = format!("wrote {}\n", files.in_words());
     if finds_ontology {
-        text.push_str(&format!("{config} uses {ONTOLOGY}, which was here already\n"));
+        text.push_str(&format!("{config} uses {ONTOLOGY}, which already existed\n"));
     }
     if has(Part::Skill) {
         text.push_str(&format!("{SKILL_FILE} needs Python with the package `actcheck` (in actcheck's wheel, and in its sources in clients/python)\n"));
@@ -80,18 +80,18 @@ pub fn campaign(args: &NewCampaignArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// X011 unless a name can be the name of a file without quotation marks or folders.
+/// Returns X011 unless a name is valid as a file name without quotation marks or folders.
 fn check_name(name: &str) -> Result<(), Diagnostics> {
     let fits = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
     if !name.is_empty() && name.chars().all(fits) {
         return Ok(());
     }
     Err(Diagnostic::error("X011", format!("`{name}` can't be the name of a campaign"))
-        .help("use letters, digits, `_` and `-`, such as `actcheck new campaign my_pick`; the file gets the ending `.toml`")
+        .help("use letters, digits, `_` and `-`, such as `actcheck new campaign my_pick`; the file gets the extension `.toml`")
         .into())
 }
 
-/// Whether the template can use an ontology: it is there, is well-formed, and has the template's action.
+/// Whether the template can use an ontology: it exists, is well-formed, and has the template's action.
 fn is_usable(ontology: &Path) -> bool {
     ontology::load(&Files::Disk, ontology).is_ok_and(|known| known.actions.contains_key("Pick"))
 }

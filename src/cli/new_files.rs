@@ -1,4 +1,4 @@
-//! Files of a new project: all of them are written, or none is.
+//! Files of a new project: either all of them are written, or none.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,12 +22,12 @@ impl NewFiles {
     /// Adds all files of a shipped folder, such as `rules`.
     ///
     /// # Errors
-    /// X016: the program does not hold one of them, which is a fault of the program.
+    /// X016: the program lacks one of them, which is a bug.
     pub(super) fn add_shipped(&mut self, folder: &str) -> Result<(), Diagnostics> {
         for file in Files::all_shipped(Path::new(folder)) {
             let bytes = Files::Shipped.read_bytes(&file).map_err(|why| {
                 Diagnostic::error("X016", format!("{} can't be copied: {why}", file.display()))
-                    .help("report this: the file is part of the program")
+                    .help("report this bug: the file is part of the program")
             })?;
             self.add(file, bytes);
         }
@@ -39,9 +39,9 @@ impl NewFiles {
     /// # Errors
     /// X015: one of the files exists. X007: one can't be written.
     pub(super) fn write(&self, help: &str) -> Result<(), Diagnostics> {
-        // A link that leads nowhere exists, too.
+        // A dangling symbolic link counts as existing.
         if let Some(file) = self.files.keys().find(|file| fs::symlink_metadata(file).is_ok()) {
-            return Err(Diagnostic::error("X015", format!("{} exists already", file.display())).help(help).into());
+            return Err(Diagnostic::error("X015", format!("{} already exists", file.display())).help(help).into());
         }
         let mut made = Vec::new();
         for (file, bytes) in &self.files {
@@ -54,7 +54,7 @@ impl NewFiles {
         Ok(())
     }
 
-    /// The files in words: `pick.toml, rules/ (27 files)`.
+    /// Summarises the files: `pick.toml, rules/ (27 files)`.
     pub(super) fn in_words(&self) -> String {
         let mut folders: BTreeMap<&Path, Vec<&Path>> = BTreeMap::new();
         for file in self.files.keys() {
@@ -69,7 +69,7 @@ impl NewFiles {
     }
 }
 
-/// Makes the folders that a file needs, outermost first.
+/// Creates the folders that a file needs, outermost first.
 fn make_folders(file: &Path, made: &mut Vec<PathBuf>) -> Result<(), Diagnostics> {
     let mut missing: Vec<&Path> =
         file.ancestors().skip(1).take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists()).collect();
@@ -101,7 +101,7 @@ mod tests {
         files.add(at("a/b/one.txt"), "1");
         files.add(at("a/two.txt"), "2");
         files.add(at("taken/three.txt"), "3");
-        let faults = files.write("").expect_err("a file is no folder");
+        let faults = files.write("").expect_err("a file is not a folder");
         assert!(faults.iter().all(|fault| fault.code == "X007"), "{faults}");
         assert!(!at("a").exists(), "what was written is removed");
         fs::remove_file(at("taken")).expect("it can be removed");

@@ -13,13 +13,13 @@ use crate::ontology::{self, Ontology, Template, property_template};
 /// `actcheck new property`
 #[derive(Debug, Args)]
 pub struct NewPropertyArgs {
-    /// Its name, such as StaysUpright
+    /// Name of the property, such as StaysUpright
     pub name: String,
-    /// The action that it is a success property of
+    /// The action that gets it as a success property
     #[arg(long = "for", value_name = "ACTION")]
     pub action: String,
-    /// The ontology that gets the entry; the rule file goes to `rules` beside its folder [default: ontology/actions.ttl here, which
-    /// is written if it does not exist]
+    /// The ontology that gets the entry; the rule file goes into `rules` beside its folder [default:
+    /// ontology/actions.ttl here, which is created if missing]
     #[arg(long, value_name = "FILE")]
     pub ontology: Option<PathBuf>,
 }
@@ -46,7 +46,7 @@ pub fn property(args: &NewPropertyArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// The texts of the property, if its name and its action fit the ontology.
+/// Creates the texts of the property, if its name and action are valid in the ontology.
 fn template(args: &NewPropertyArgs, known: &Ontology, path: &Path) -> Result<Template, Diagnostics> {
     let Some(action) = known.actions.get(&args.action) else {
         let names = known.actions.keys().map(String::as_str);
@@ -56,29 +56,29 @@ fn template(args: &NewPropertyArgs, known: &Ontology, path: &Path) -> Result<Tem
     };
     let fits = args.name.starts_with(|c: char| c.is_ascii_uppercase()) && args.name.chars().all(char::is_alphanumeric);
     if !fits {
-        return Err(Diagnostic::error("X011", format!("`{}` is no name for a property", args.name))
-            .help("begin with a capital and use letters and digits only, such as `StaysUpright`")
+        return Err(Diagnostic::error("X011", format!("`{}` can't be the name of a property", args.name))
+            .help("begin with a capital letter and use only letters and digits, such as `StaysUpright`")
             .into());
     }
     if known.vocabulary.terms.contains_key(&names::act(&args.name)) {
-        return Err(Diagnostic::error("X011", format!("the ontology has a `{}` already", args.name))
-            .help("choose another name, or edit what is there")
+        return Err(Diagnostic::error("X011", format!("the ontology already has a term `{}`", args.name))
+            .help("choose another name, or edit the existing entry")
             .into());
     }
-    // The example speaks of a thing that is handled: `pickObject` rather than a surface or a place.
+    // The example rule uses an object such as `pickObject`, rather than a surface or a place.
     let things = action.parameters.iter().find(|name| name.ends_with("Object"));
     let designator = things.or(action.parameters.first()).map_or("pickObject", String::as_str);
     Ok(property_template(&args.name, &args.action, designator, "../rules/"))
 }
 
-/// An ontology's text with the entry of a property.
+/// Appends the entry of a property to an ontology's text.
 fn with_entry(ontology: &str, template: &Template) -> String {
     format!("{}{}", ontology.trim_end(), template.ontology_entry.replacen('\n', "\n\n", 1))
 }
 
 /// X011: the rule file exists.
 fn is_there(rule: &Path) -> Diagnostics {
-    Diagnostic::error("X011", format!("{} is there already", rule.display()))
+    Diagnostic::error("X011", format!("{} already exists", rule.display()))
         .help("choose another name, or edit that file")
         .into()
 }
@@ -89,7 +89,7 @@ fn write_property(path: &Path, rule: &Path, template: &Template) -> Result<(), D
         return Err(is_there(rule));
     }
     let text = Files::Disk.read(path).map_err(|why| {
-        written::unwritten(path, why).help("name an ontology in a folder that may be written, with `--ontology FILE`")
+        written::unwritten(path, why).help("name an ontology in a writable folder with `--ontology FILE`")
     })?;
     written::write(rule, &template.rule_text)?;
     written::write(path, with_entry(&text.text, template))?;
@@ -97,7 +97,7 @@ fn write_property(path: &Path, rule: &Path, template: &Template) -> Result<(), D
     Ok(())
 }
 
-/// Writes the shipped ontology and rules into a folder that has none, with the property added.
+/// Writes the shipped ontology and rules, with the property added, into a folder without an ontology.
 fn write_project(path: &Path, rule: &Path, template: &Template) -> Result<(), Diagnostics> {
     if Files::Shipped.read_bytes(rule).is_ok() {
         return Err(is_there(rule));
@@ -113,7 +113,7 @@ fn write_project(path: &Path, rule: &Path, template: &Template) -> Result<(), Di
         move that file away, or name your ontology with `--ontology FILE`",
     )?;
     output::print(&format!(
-        "wrote {}: the ontology and the rules that actcheck carries, with {} and its entry in {} added\n",
+        "wrote {}: the shipped ontology and rules, with {} and its entry in {} added\n",
         files.in_words(),
         rule.display(),
         path.display()
@@ -121,7 +121,8 @@ fn write_project(path: &Path, rule: &Path, template: &Template) -> Result<(), Di
     Ok(())
 }
 
-/// Makes configurations from `actcheck new campaign` use the ontology of this folder, and names those that do not.
+/// Makes configurations from `actcheck new campaign` use this folder's ontology, and lists those that still use the
+/// shipped one.
 fn link_configurations(ontology: &Path) -> Result<(), Diagnostics> {
     for file in configurations::here() {
         let Ok(source) = Files::Disk.read(&file) else { continue };

@@ -11,7 +11,7 @@ pub fn print(text: &str) {
     print_bytes(text.as_bytes());
 }
 
-/// Writes results that are no text, as [`print`] does.
+/// Writes binary results, as [`print`] does.
 pub fn print_bytes(results: &[u8]) {
     let mut out = std::io::stdout().lock();
     if let Err(error) = out.write_all(results).and_then(|()| out.flush()) {
@@ -28,7 +28,7 @@ pub fn colour() -> bool {
     std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }
 
-/// Writes all faults with their places, and how many there were.
+/// Writes all faults with their places, and the number of errors.
 pub fn print_diagnostics(faults: &Diagnostics) {
     let mut text = String::new();
     let handler = handler();
@@ -43,11 +43,11 @@ pub fn print_diagnostics(faults: &Diagnostics) {
     if errors > 1 {
         text.push_str(&format!("{errors} errors\n"));
     }
-    // Nobody is left to tell when the error stream itself fails.
+    // If the error stream itself fails, there is nowhere left to report it.
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
-/// A fault of a whole file has no excerpt that would name it: the message does.
+/// A fault of a whole file has no excerpt with the file's name, so the message names the file.
 fn with_file_in_message(fault: &Diagnostic) -> Diagnostic {
     match (&fault.source, &fault.span) {
         (Some(source), None) => Diagnostic { message: format!("{}: {}", source.name, fault.message), ..fault.clone() },

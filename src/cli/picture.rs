@@ -1,4 +1,4 @@
-//! `--picture FILE`: something drawn into a file whose ending says how.
+//! `--picture FILE`: draws into a file whose extension selects the format.
 
 use std::path::Path;
 
@@ -7,26 +7,25 @@ use crate::cli::written;
 use crate::history::{History, RunDetail};
 use crate::report::{Caption, Drawing, run_picture};
 
-/// A file that a picture shall be drawn into, of an ending that we can write.
+/// A picture file in a supported format.
 pub(super) struct Picture<'a> {
     file: &'a Path,
     render: fn(&Drawing) -> std::io::Result<Vec<u8>>,
 }
 
 impl<'a> Picture<'a> {
-    /// Looks at the ending, before anything is done that takes long.
+    /// Checks the extension, before any long computation begins.
     ///
     /// # Errors
-    /// X012: it is neither `.png` nor `.svg`.
+    /// X012: the extension is neither `.png` nor `.svg`.
     pub(super) fn new(file: &'a Path) -> Result<Self, Diagnostics> {
         let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         match ending.as_str() {
             "png" => Ok(Self { file, render: Drawing::to_png }),
             "svg" => Ok(Self { file, render: |drawing| Ok(drawing.to_svg().into_bytes()) }),
             _ => {
-                let message = format!("a picture can't be written as {}", file.display());
-                let help =
-                    format!("end the file's name in .png or .svg, such as {}", file.with_extension("png").display());
+                let message = format!("no picture format is known for {}", file.display());
+                let help = format!("use the extension .png or .svg, such as {}", file.with_extension("png").display());
                 Err(Diagnostic::error("X012", message).help(help).into())
             }
         }
@@ -40,7 +39,7 @@ impl<'a> Picture<'a> {
         let trace = history.trace(&run.row.run)?;
         let drawing = run_picture(&Caption::of(run), &trace).ok_or_else(|| {
             Diagnostic::error("X006", format!("run {} has no state to draw", run.row.run))
-                .help("it was broken before its first action; `actcheck show` says why")
+                .help("it broke before its first action; `actcheck show` shows the reason")
         })?;
         self.write(&drawing)
     }

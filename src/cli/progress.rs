@@ -1,4 +1,4 @@
-//! The live progress of a campaign. Quiet where the error stream is no terminal.
+//! The live progress of a campaign. Hidden if the error stream is not a terminal.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -12,7 +12,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A bar for so many runs. Where time ends them too, it shows the time instead of what is left of the runs.
+    /// Creates a bar for a number of runs. With a time budget, it shows the elapsed time instead of the remaining runs.
     pub fn new(runs: u64, time_secs: Option<f64>) -> Self {
         let bar = ProgressBar::with_draw_target(Some(runs), ProgressDrawTarget::stderr());
         let template = match time_secs {
@@ -26,12 +26,12 @@ impl Progress {
         Self { bar, failed: 0, spoilt: 0 }
     }
 
-    /// A handle to print above the bar from elsewhere.
+    /// Returns a handle for printing above the bar.
     pub fn bar(&self) -> ProgressBar {
         self.bar.clone()
     }
 
-    /// One more run is in the history.
+    /// Counts one more stored run.
     pub fn run(&mut self, run: &RunSummary) {
         self.failed += u64::from(run.failed());
         self.spoilt += u64::from(run.reason.is_some());
@@ -40,13 +40,13 @@ impl Progress {
         self.bar.inc(1);
     }
 
-    /// So many more runs were judged; so many outcomes failed in all.
+    /// Counts more judged runs, and shows the total number of failed outcomes.
     pub fn judged(&self, runs: u64, failed: u64) {
         self.bar.set_message(format!("{failed} failed"));
         self.bar.inc(runs);
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }

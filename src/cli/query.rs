@@ -8,7 +8,7 @@ use crate::cli::{history_dir, named_queries, output, stop};
 use crate::history::{Cancel, QueryAnswer};
 use crate::report::{Table, TableFormat, answer_table};
 
-/// Asks and prints the answer. Ctrl-C stops a query that takes long.
+/// Runs a query and prints its answer. Ctrl-C stops a long query.
 pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
     if args.list_named {
         return list_named(args.format);
@@ -25,8 +25,8 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
             return Ok(());
         }
         (QueryFormat::Turtle, _) => {
-            return Err(Diagnostic::error("X004", "this query's answer is a table, and Turtle is for graphs")
-                .help("ask with CONSTRUCT or DESCRIBE, or use `--format table`, `csv` or `json`")
+            return Err(Diagnostic::error("X004", "this query's answer is a table, but Turtle is for graphs")
+                .help("use CONSTRUCT or DESCRIBE, or `--format table`, `csv` or `json`")
                 .into());
         }
         (QueryFormat::Table, _) => TableFormat::Table,
@@ -37,14 +37,14 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// Prints the queries that have names. Needs no history.
+/// Prints the named queries. Needs no history.
 fn list_named(format: QueryFormat) -> Result<(), Diagnostics> {
     let format = match format {
         QueryFormat::Table => TableFormat::Table,
         QueryFormat::Csv => TableFormat::Csv,
         QueryFormat::Json => TableFormat::Json,
         QueryFormat::Turtle => {
-            return Err(Diagnostic::error("X004", "the list of queries is a table, and Turtle is for graphs")
+            return Err(Diagnostic::error("X004", "the list of queries is a table, but Turtle is for graphs")
                 .help("use `--format table`, `csv` or `json`")
                 .into());
         }
@@ -57,7 +57,7 @@ fn list_named(format: QueryFormat) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// The query's text, by its name, from the command line, a file, or (`-f -`) the input stream.
+/// The query's text: by name, from the command line, from a file, or (`-f -`) from standard input.
 fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
     if let Some(name) = &args.named {
         return named_queries::named(name);
@@ -67,7 +67,7 @@ fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
         (None, Some(file)) if file.as_os_str() == "-" => {
             let mut text = String::new();
             let read = std::io::stdin().read_to_string(&mut text);
-            read.map_err(|error| Diagnostic::error("X005", format!("the input stream can't be read: {error}")))?;
+            read.map_err(|error| Diagnostic::error("X005", format!("standard input can't be read: {error}")))?;
             Ok(Source::new("standard input", text))
         }
         (None, Some(file)) => Files::Disk.read(file).map_err(|why| {
@@ -81,7 +81,7 @@ fn text(args: &QueryArgs) -> Result<Source, Diagnostics> {
     }
 }
 
-/// Triples in Turtle, one a line.
+/// Triples in Turtle, one per line.
 fn turtle(triples: &[[Term; 3]]) -> String {
     let mut out = String::new();
     for (prefix, namespace) in names::PREFIXES {
@@ -93,7 +93,7 @@ fn turtle(triples: &[[Term; 3]]) -> String {
     out
 }
 
-/// A term as Turtle reads it back: literals that have no shorthand of the same type carry their datatype.
+/// A term in Turtle. Literals whose shorthand would have another type carry their datatype.
 fn turtle_term(term: &Term) -> String {
     let quoted = |text: &str| {
         let text = text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n").replace('\r', "\\r");

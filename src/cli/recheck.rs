@@ -14,7 +14,7 @@ use crate::cli::{clock, history_dir, output, stop};
 use crate::history::{History, RunFilter, RunRow};
 use crate::report::{RecheckSummary, recheck_json, recheck_table, recheck_text};
 
-/// Faults that are told; the rest are counted.
+/// Maximum number of faults that are reported; the rest are counted.
 const TOLD: usize = 5;
 
 /// `actcheck recheck`
@@ -26,16 +26,17 @@ pub struct RecheckArgs {
     /// Only the runs of this campaign; may be given several times [default: all]
     #[arg(long = "campaign", value_name = "ID")]
     pub campaigns: Vec<String>,
-    /// Judge by the rules of another time: a folder with `ontology/actions.ttl` (or `actions.ttl`) and what it links
+    /// Judge by the rules of another version: a folder with `ontology/actions.ttl` (or `actions.ttl`) and the files
+    /// that it links
     #[arg(long, value_name = "DIR", conflicts_with = "ontology")]
     pub as_of_rules: Option<PathBuf>,
-    /// The ontology whose rules judge [default: ontology/actions.ttl here, or the one that the program carries]
+    /// The ontology with the rules [default: ontology/actions.ttl here, or the shipped one]
     #[arg(long, value_name = "FILE")]
     pub ontology: Option<PathBuf>,
-    /// Workers; results don't depend on it [default: all cores]
+    /// Number of workers; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// Where the history lies.
+    /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
     /// How it is printed (csv: one line for each outcome that changed or is new)
@@ -43,7 +44,7 @@ pub struct RecheckArgs {
     pub format: Format,
 }
 
-/// Judges stored runs by today's rules, keeps what is news, and prints it. Returns the exit code.
+/// Judges stored runs by the current rules, stores new and changed outcomes, and prints them. Returns the exit code.
 pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     let (files, path) = ontology(args)?;
     let rules = RuleSet::prepare(&files, &path)?.only(&args.properties)?;
@@ -51,7 +52,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     let runs = runs(&history, &args.campaigns)?;
     let progress = Progress::new(runs.len() as u64, None);
     let bar = progress.bar();
-    let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; what was judged is kept"));
+    let stop = stop::on_interrupt(move || bar.println("stopping after the runs in flight; judgements so far are kept"));
     let options = RecheckOptions {
         jobs: args.jobs.map_or_else(all_cores, usize::from),
         batch: RecheckOptions::BATCH,
@@ -84,7 +85,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     }
 }
 
-/// The ontology that was named, one of another time, or the usual one.
+/// The named ontology, the one of another version, or the default one.
 fn ontology(args: &RecheckArgs) -> Result<(Files, PathBuf), Diagnostics> {
     let Some(folder) = &args.as_of_rules else { return Ok(ontology_file(args.ontology.as_deref())) };
     let places = ["ontology/actions.ttl", "actions.ttl"];
@@ -99,7 +100,7 @@ fn no_rules(folder: &Path) -> Diagnostic {
         .help("name a folder such as an older checkout of the project, with its ontology and rules")
 }
 
-/// The runs that are meant, all of them where no campaign is named.
+/// The runs of the named campaigns, or all runs if none is named.
 fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnostics> {
     let known: Vec<String> = history.campaigns()?.into_iter().map(|row| row.id).collect();
     let mut faults = Diagnostics::new();
@@ -114,7 +115,7 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
             "X034",
             format!("the history `{}` has no runs to judge", history.dir().display()),
         )
-        .help("`actcheck run CONFIG` makes some")
+        .help("`actcheck run CONFIG` creates some")
         .into());
     }
     Ok(runs)

@@ -1,4 +1,4 @@
-//! The cases of a project, which each of its campaigns runs first
+//! The cases of a project, which run before each of its campaigns.
 
 use std::path::{Path, PathBuf};
 
@@ -11,11 +11,11 @@ use crate::history::History;
 use crate::report::CaseSummary;
 use crate::rules::Budget;
 
-/// The cases of a campaign's folder, by name of their files, sorted; none for a part of a campaign that is not its first.
-/// Runs are kept in the campaign's history.
+/// Prepares the cases of a campaign, sorted by file name. Of a campaign in parts, only the first part gets them.
+/// Their runs go into the campaign's history.
 ///
 /// # Errors
-/// Every fault of every case at once: as of any configuration, or `S065` a file is no case.
+/// All faults of all cases at once: those of any configuration, or `S065` if a file is not a case.
 pub fn prepare(env: &Env, budget: &Budget) -> Result<Vec<(String, Env)>, Diagnostics> {
     let folder = campaign::regressions_folder(&env.campaign.source)?;
     let overrides = Overrides { history: Some(env.campaign.history.clone()), ..Overrides::default() };
@@ -25,16 +25,14 @@ pub fn prepare(env: &Env, budget: &Budget) -> Result<Vec<(String, Env)>, Diagnos
         match Env::prepare_within(&file, &overrides, budget.clone()) {
             Ok(case) if case.campaign.case.is_some() => cases.push((name_of(&file), case)),
             Ok(other) => faults.push(
-                Diagnostic::error("S065", "this is no case: it has no `[case]`")
+                Diagnostic::error("S065", "this file is not a case: it has no `[case]`")
                     .in_source(&other.campaign.source)
-                    .help(
-                        "only what `actcheck export` writes belongs into this folder, which every campaign runs first",
-                    ),
+                    .help("keep only files from `actcheck export` in this folder: every campaign runs them first"),
             ),
             Err(found) => faults.extend(found),
         }
     }
-    // Of a campaign in parts, the first part runs them for all; faults are told by every part.
+    // The first part of a campaign runs them for all parts; every part reports their faults.
     let is_first = env.campaign.shard.is_none_or(|shard| shard.number() == 1);
     faults.or(if is_first { cases } else { Vec::new() })
 }
@@ -46,7 +44,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, Diagnostics> {
     let entries = std::fs::read_dir(folder).and_then(|entries| entries.collect::<Result<Vec<_>, _>>());
     let entries = entries.map_err(|error| {
         Diagnostic::error("X041", format!("the regressions in {} can't be listed: {error}", folder.display()))
-            .help("allow it to be read, or move it away")
+            .help("make the folder readable, or move it away")
     })?;
     let mut files: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).collect();
     files.retain(|file| file.extension().is_some_and(|ending| ending == "toml"));
@@ -58,10 +56,10 @@ fn name_of(file: &Path) -> String {
     file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-/// Runs the cases, each as a campaign of its own.
+/// Runs each case as its own campaign.
 ///
 /// # Errors
-/// A scene can't be made any more, or writing failed.
+/// A scene can no longer be generated, or writing failed.
 pub fn run(cases: &[(String, Env)], history: &History, jobs: usize) -> Result<Vec<CaseSummary>, Diagnostics> {
     let manner = Manner { clock: clock::system(), disturb: None };
     let mut done = Vec::new();

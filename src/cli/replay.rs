@@ -17,31 +17,31 @@ use crate::history::{History, RunDetail, RunFilter};
 /// `actcheck replay`
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// Ids of runs, or their beginnings
+    /// Ids of runs, or unique prefixes
     #[arg(value_name = "RUN", required_unless_present_any = ["campaign", "sample"])]
     pub runs: Vec<String>,
     /// All runs of this campaign
     #[arg(long, value_name = "ID")]
     pub campaign: Option<String>,
-    /// So many runs by chance, of the campaign or of the whole history
+    /// A random sample of N runs, of the campaign or of the whole history
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "runs")]
     pub sample: Option<u32>,
-    /// Seed of that chance
+    /// Seed of the random sample
     #[arg(long, value_name = "S", default_value_t = 0, requires = "sample")]
     pub seed: u64,
-    /// Refuse, naming them, choices that are missing, left over or made from something else now
+    /// Fail if choices are missing, left over or made differently now, and list them
     #[arg(long, conflicts_with = "nearest")]
     pub exact: bool,
-    /// Bring values into their bounds and take nominal ones for what is missing (the default)
+    /// Clamp values to their bounds, and use nominal values for missing choices (the default)
     #[arg(long)]
     pub nearest: bool,
-    /// Run with this configuration instead of the one that the history keeps
+    /// Run with this configuration instead of the one in the history
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Workers, one simulation each; results don't depend on it [default: all cores]
+    /// Number of workers, each with one simulation; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// Where the history lies.
+    /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
     /// How the answer is printed
@@ -49,7 +49,7 @@ pub struct ReplayArgs {
     pub format: Format,
 }
 
-/// Runs stored runs again and prints whether they went the same way. Returns the exit code.
+/// Runs stored runs again and prints whether they are the same. Returns the exit code.
 pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
     let history = history_dir::open(&args.history)?;
     let runs = runs(&history, args)?;
@@ -75,7 +75,7 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
     if faults.has_errors() { Err(faults) } else { Ok(u8::from(done.iter().any(|replay: &Replay| !replay.same))) }
 }
 
-/// The runs that are meant, each once, in the order in which they are named.
+/// The requested runs, without duplicates, in the order in which they are named.
 fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnostics> {
     let mut ids: Vec<String> = Vec::new();
     for name in &args.runs {
@@ -106,7 +106,7 @@ fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnost
     Ok(runs)
 }
 
-/// So many of some runs, each as likely as any other, in their order.
+/// Draws `size` runs uniformly at random, in their order.
 fn sample(mut runs: Vec<String>, size: usize, seed: u64) -> Vec<String> {
     let mut choices = Choices::random(seed, 0);
     while runs.len() > size {
@@ -115,7 +115,7 @@ fn sample(mut runs: Vec<String>, size: usize, seed: u64) -> Vec<String> {
     runs
 }
 
-/// The campaigns of the runs, as they are today and as they were.
+/// The campaigns of the runs, as they are now and as they were.
 fn recall(history: &History, runs: &[RunDetail], args: &ReplayArgs) -> Result<BTreeMap<String, Recalled>, Diagnostics> {
     let mut campaigns = BTreeMap::new();
     for run in runs {

@@ -1,4 +1,4 @@
-//! What came of replays, for people and for programs.
+//! Results of replays as text, table and JSON.
 
 use std::fmt::Write as _;
 
@@ -8,10 +8,10 @@ use crate::base::names;
 use crate::campaign::{Difference, Replay};
 use crate::report::Table;
 
-/// Lines of one kind below a run; the rest is counted.
+/// Maximum number of lines of one kind below a run; the rest are counted.
 const MOST_LINES: usize = 12;
 
-/// Every run in words, and how many of all were the same.
+/// Describes every replay, and counts those that were the same.
 pub fn replay_text(replays: &[Replay], refused: usize) -> String {
     let mut out = String::new();
     for replay in replays {
@@ -36,8 +36,10 @@ fn one_text(out: &mut String, replay: &Replay) {
         let _ = writeln!(out, "  {}", difference_text(replay));
     }
     if let Some(secs) = replay.cut_secs {
-        let _ =
-            writeln!(out, "  only up to {secs:.3} s, where the clock on the wall had cut it off (`[budget] run_secs`)");
+        let _ = writeln!(
+            out,
+            "  only up to {secs:.3} s, where the wall-clock limit had ended the run (`[budget] run_secs`)"
+        );
     }
     lines(out, "choice", replay.misfits.iter().map(ToString::to_string));
     let or_none = |word: &Option<String>| word.clone().unwrap_or_else(|| "not judged".to_owned());
@@ -46,7 +48,7 @@ fn one_text(out: &mut String, replay: &Replay) {
         format!("{property} of action {} was {}, is {}", change.step, or_none(&change.was), or_none(&change.is))
     });
     lines(out, "outcome", outcomes);
-    let or_gone = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "not there".to_owned());
+    let or_gone = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "missing".to_owned());
     let changes = replay.changes.iter().map(|change| {
         format!("{} `{}` was {}, is {}", change.kind.word(), change.name, or_gone(&change.was), or_gone(&change.is))
     });
@@ -68,9 +70,9 @@ fn difference_text(replay: &Replay) -> String {
         let [was, is] = replay.reasons.each_ref().map(|reason| reason.as_deref().unwrap_or("completed"));
         return match was == is {
             true => {
-                "by less than the states show that were kept: 0.1 mm between the beginnings and ends of actions".into()
+                "by less than the resolution of the stored states: 0.1 mm between the starts and ends of actions".into()
             }
-            false => format!("it ended otherwise: was {was}, is {is}"),
+            false => format!("it ended differently: was {was}, is {is}"),
         };
     };
     let Difference { time_secs, step, body, quantity, unit, was, is, by, others } = found;
@@ -106,7 +108,7 @@ pub fn replay_table(replays: &[Replay]) -> Table {
     table
 }
 
-/// Everything, for programs.
+/// All results as JSON.
 pub fn replay_json(replays: &[Replay]) -> Value {
     let one = |replay: &Replay| {
         json!({

@@ -12,7 +12,7 @@ use crate::cli::{output, report_html, written};
 use crate::history::{History, RunDetail};
 use crate::report::HTML_COLUMNS;
 
-/// Patterns have at most so many conditions, and a chance of so much to be false, as `actcheck analyse` has them by default.
+/// Maximum number of conditions of a pattern, and the false discovery rate: the defaults of `actcheck analyse`.
 const DEPTH: u8 = 3;
 const LEVEL: f64 = 0.05;
 /// Millions, not 2^20, as browsers and file listings count them.
@@ -25,7 +25,7 @@ pub struct ReportArgs {
     /// Write the report as one page (HTML); `-` prints it
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
-    /// Write runs in 3D over simulated time, with contacts and outcomes, for the viewer of rerun; `-` prints them
+    /// Write runs in 3D over simulated time, with contacts and outcomes, for the Rerun viewer; `-` prints them
     #[cfg_attr(
         not(feature = "rerun"),
         doc = "",
@@ -33,16 +33,17 @@ pub struct ReportArgs {
     )]
     #[arg(long, value_name = "FILE.rrd")]
     pub rrd: Option<PathBuf>,
-    /// The same for other tools.
+    /// Formats of other tools.
     #[command(flatten)]
     pub formats: FormatArgs,
     /// Only this property, by its name in the ontology (may be given several times)
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
-    /// Room for the replays of failed runs in the page, and for recordings of runs: more take longer to make and to send
+    /// Maximum size of the replays of failed runs in the page, and of recordings; larger files take longer to make and
+    /// to send
     #[arg(long, value_name = "MB", default_value_t = 5.0, value_parser = megabytes)]
     pub replay_mb: f64,
-    /// Of which runs, and where the history lies.
+    /// The runs to report, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
 }
@@ -50,27 +51,27 @@ pub struct ReportArgs {
 fn megabytes(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(megabytes) if (0.0..=1000.0).contains(&megabytes) => Ok(megabytes),
-        _ => Err("a number of megabytes from 0 to 1000 is needed, such as 5".to_owned()),
+        _ => Err("must be a number of megabytes from 0 to 1000, such as 5".to_owned()),
     }
 }
 
 impl ReportArgs {
-    /// Whether a property was asked for by its name or IRI.
+    /// Whether a property was requested by its name or IRI.
     pub(super) fn wants(&self, property: &str) -> bool {
         self.property.iter().any(|name| is_meant(property, name))
     }
 
-    /// Leaves a run those outcomes that were asked for.
+    /// Removes the outcomes that were not requested from a run.
     pub(super) fn keep_wanted(&self, run: &mut RunDetail) {
         for action in &mut run.actions {
             action.judgements.retain(|judgement| self.property.is_empty() || self.wants(&judgement.property));
         }
     }
 
-    /// Whether a report goes to the output stream.
+    /// Whether a report goes to standard output.
     ///
     /// # Errors
-    /// X051: several would share it. X055: a report needs what this program was built without.
+    /// X051: several reports would go there. X055: a report needs a feature that this program was built without.
     fn prints(&self) -> Result<bool, Diagnostics> {
         let mut faults = Diagnostics::new();
         let printed = |file: &Option<PathBuf>| file.as_deref().is_some_and(|file| file.as_os_str() == "-");
@@ -78,14 +79,14 @@ impl ReportArgs {
         let streams = self.formats.printed() + files;
         if streams > 1 {
             faults.push(
-                Diagnostic::error("X051", "several reports can't share the output stream")
-                    .help("print one of them, and name files for the others"),
+                Diagnostic::error("X051", "only one report can go to standard output")
+                    .help("print one of them with `-`, and name files for the others"),
             );
         }
         if self.rrd.is_some() && !cfg!(feature = "rerun") {
             faults.push(
                 Diagnostic::error("X055", "this actcheck was built without recordings for rerun (`--rrd`)").help(
-                    "build it with them: `cargo build --release --locked --features rerun`; `--html` has runs in 3D without",
+                    "build it with them: `cargo build --release --locked --features rerun`; `--html` shows runs in 3D without it",
                 ),
             );
         }
@@ -93,7 +94,7 @@ impl ReportArgs {
     }
 }
 
-/// Writes the reports that were asked for.
+/// Writes the requested reports.
 pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
     let printed = args.prints()?;
     let history = args.chosen.open()?;
@@ -105,7 +106,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-/// Writes the reports in which runs can be watched, of what analysis found. Returns what there is to say of them.
+/// Writes the reports with replays, which are based on the analysis. Returns the messages to print.
 fn write_watched(args: &ReportArgs, history: &History) -> Result<Vec<String>, Diagnostics> {
     let found = found(args, history)?;
     let room = args.replay_mb * BYTES_IN_A_MB;

@@ -1,4 +1,5 @@
-//! `actcheck report` in other people's formats: reads run after run and hands each to the formats that were asked for.
+//! `actcheck report` in the formats of other tools: reads one run after another and passes each to the requested
+//! formats.
 
 use std::collections::BTreeSet;
 use std::io::Write as _;
@@ -17,20 +18,20 @@ use crate::report::{
 use crate::rules::{Budget, RuleBook};
 use crate::verdict::Outcome;
 
-/// Formats that are not a page of our own.
+/// Formats of other tools.
 #[derive(Debug, Args)]
 pub struct FormatArgs {
-    /// Write results for Allure 2 and 3 into this folder, which may hold others: one for each run, action and property, with
-    /// steps, parameters, explanations, and pictures of runs in which not everything passed
+    /// Write results for Allure 2 and 3 into this folder, beside any others: one for each run, action and property,
+    /// with steps, parameters, explanations, and pictures of runs in which not everything passed
     #[arg(long, value_name = "DIR")]
     pub allure: Option<PathBuf>,
-    /// Write JUnit's XML; `-` prints it
+    /// Write JUnit XML; `-` prints it
     #[arg(long, value_name = "FILE.xml")]
     pub junit: Option<PathBuf>,
-    /// Write outcomes in EARL and where they came from in PROV (Turtle); `-` prints it
+    /// Write outcomes in EARL and their provenance in PROV (Turtle); `-` prints them
     #[arg(long, value_name = "FILE.ttl")]
     pub earl: Option<PathBuf>,
-    /// Write one observation a run, in the schema of Hypothesis's observability (JSON lines); `-` prints them
+    /// Write one observation for each run, in the schema of Hypothesis's observability (JSON Lines); `-` prints them
     #[arg(long, value_name = "FILE.jsonl")]
     pub jsonl: Option<PathBuf>,
     /// Print a summary for a pull request (Markdown)
@@ -43,14 +44,14 @@ impl FormatArgs {
         self.markdown || [&self.allure, &self.junit, &self.earl, &self.jsonl].iter().any(|file| file.is_some())
     }
 
-    /// How many of them go to the output stream.
+    /// Number of formats that go to standard output.
     pub(super) fn printed(&self) -> usize {
         let files = [&self.junit, &self.earl, &self.jsonl];
         files.iter().filter(|file| file.as_deref() == Some(Path::new("-"))).count() + usize::from(self.markdown)
     }
 }
 
-/// Writes what was asked for. Returns what there is to say of it.
+/// Writes the requested formats. Returns the messages to print.
 pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>, Diagnostics> {
     if !args.formats.any() {
         return Ok(Vec::new());
@@ -69,7 +70,7 @@ pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>,
     sinks.finish(&args.formats, &campaigns)
 }
 
-/// The campaigns and runs that were asked for, in their order; smaller forms of runs only where their campaign is named.
+/// The requested campaigns and runs, in order; shrunk runs only if their campaign is named.
 fn asked_for(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
     let filter = args.chosen.filter(history)?;
     let shrunk = history.shrunk_campaigns()?;
@@ -88,7 +89,7 @@ fn asked_for(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, 
     Ok((campaigns, rows))
 }
 
-/// What has been made so far of each format.
+/// The output so far in each format.
 #[derive(Default)]
 struct Sinks<'a> {
     allure: Option<AllureFolder<'a>>,
@@ -137,7 +138,7 @@ impl<'a> Sinks<'a> {
 
     fn finish(self, asked: &FormatArgs, campaigns: &[CampaignRow]) -> Result<Vec<String>, Diagnostics> {
         let texts = [
-            (&asked.junit, self.junit.map(|report| report.text()), "JUnit's XML"),
+            (&asked.junit, self.junit.map(|report| report.text()), "JUnit XML"),
             (&asked.earl, self.earl.map(|report| report.text(campaigns)), "outcomes in EARL"),
             (&asked.jsonl, self.jsonl, "observations"),
         ];
@@ -167,7 +168,7 @@ struct AllureFolder<'a> {
     budget: Budget,
     repetitions: Repetitions,
     results: usize,
-    /// Runs whose trace can't be read: it is gone, or another version wrote it.
+    /// Number of runs whose trace can't be read: it is missing, or another version wrote it.
     untraced: usize,
 }
 
@@ -179,7 +180,7 @@ impl<'a> AllureFolder<'a> {
         campaigns: &[CampaignRow],
     ) -> Result<Self, Diagnostics> {
         let budget = Budget::default();
-        // Rules that can't be read today explain nothing; the outcomes are those of the history.
+        // If the current rules can't be read, there are no explanations; the outcomes come from the history.
         let rules = RuleBook::prepare_within(&args.chosen.ontology()?, &budget).ok();
         std::fs::create_dir_all(folder).map_err(|error| written::unwritten(folder, error))?;
         let ids: Vec<String> = campaigns.iter().map(|row| row.id.clone()).collect();
@@ -195,7 +196,7 @@ impl<'a> AllureFolder<'a> {
         self.write(&allure_results(run, number, &attachments))
     }
 
-    /// Explanations of what failed, and a picture where not everything passed.
+    /// Explanations of failures, and a picture unless everything passed.
     fn attachments(&mut self, run: &RunDetail) -> Vec<Attachment> {
         let mut judgements = run.actions.iter().flat_map(|action| &action.judgements);
         if judgements.all(|judgement| judgement.outcome == Outcome::Passed) {
@@ -218,7 +219,7 @@ impl<'a> AllureFolder<'a> {
                 bytes: explained.text.into_bytes(),
             })
             .collect();
-        // A run that was broken before its first state has nothing to draw.
+        // A run that broke before its first state has nothing to draw.
         let picture = run_picture(&Caption::of(run), &trace);
         attachments.extend(picture.map(|drawing| Attachment {
             about: None,
@@ -241,17 +242,17 @@ impl<'a> AllureFolder<'a> {
         let folder = self.folder.display();
         let mut told = vec![format!("{folder} holds {} results: npx allure generate {folder}", self.results)];
         if self.untraced > 0 {
-            told.push(format!("no pictures and explanations of {} runs: their traces can't be read", self.untraced));
+            told.push(format!("{} runs have no pictures and explanations: their traces can't be read", self.untraced));
         }
         told
     }
 }
 
-/// Says something that is no result: to the error stream where the output stream has a report.
+/// Prints messages: to the error stream if a report goes to standard output.
 pub(super) fn tell(lines: &[String], printed: bool) {
     let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
     if printed {
-        // Nobody is left to tell when the error stream itself fails.
+        // If the error stream itself fails, there is nowhere left to report it.
         let _ = std::io::stderr().lock().write_all(text.as_bytes());
     } else {
         output::print(&text);

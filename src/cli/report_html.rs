@@ -1,4 +1,4 @@
-//! `actcheck report --html`: gathers what the page shows.
+//! `actcheck report --html`: collects the content of the page.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -10,7 +10,7 @@ use crate::history::History;
 use crate::ontology::Ontology;
 use crate::report::{HtmlReport, PropertyWords, Replays, html, replay_order};
 
-/// The whole page, with replays for which there is so much room. Unit: bytes.
+/// Renders the whole page, with as many replays as fit into `room` bytes.
 ///
 /// # Errors
 /// The history can't be read.
@@ -37,7 +37,7 @@ fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
     ontology.properties.iter().map(|(iri, property)| (iri.clone(), told(property))).collect()
 }
 
-/// As many runs as there is room for.
+/// Replays of as many runs as fit into `room` bytes.
 fn replays(history: &History, ontology: &Ontology, order: &[String], room: f64) -> Result<Replays, Diagnostics> {
     let mut replays = Replays::default();
     if room <= 0.0 {

@@ -1,4 +1,4 @@
-//! `actcheck report --rrd`: runs for the viewer of rerun.
+//! `actcheck report --rrd`: recordings of runs for the Rerun viewer.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -11,8 +11,7 @@ use crate::cli::{output, watched, written};
 use crate::history::History;
 use crate::report::{RecordingFault, Recordings, replay_order};
 
-/// Writes recordings of the runs that were asked for, as many as there is room for. Unit of room: bytes. Returns what there is to say
-/// of them.
+/// Writes recordings of the requested runs, as many as fit into `room` bytes. Returns the message to print.
 ///
 /// # Errors
 /// The history can't be read, or the file can't be written.
@@ -26,7 +25,7 @@ pub(super) fn write(
     let order = order(found);
     let mut recordings = Recordings::new().map_err(unrecorded)?;
     watched::in_order(history, &found.ontology, &order, |(mut run, trace, explained)| {
-        // One run is worth its room, however large it is.
+        // The first run is always recorded, however large it is.
         if recordings.runs() > 0 && recordings.bytes() as f64 >= room {
             return Ok(ControlFlow::Break(()));
         }
@@ -42,7 +41,7 @@ pub(super) fn write(
     }
     written::write(file, &bytes)?;
     let (name, all, size) = (file.display(), order.len(), bytes.len() as f64 / 1e6);
-    let more = if runs < all { "; `--replay-mb` makes room for more" } else { "" };
+    let more = if runs < all { "; a higher `--replay-mb` includes more" } else { "" };
     Ok(Some(format!("{name} holds {runs} of {all} runs ({size:.1} MB{more}): rerun {name}")))
 }
 
@@ -56,6 +55,6 @@ fn order(found: &Analysed) -> Vec<String> {
 
 fn unrecorded(fault: RecordingFault) -> Diagnostics {
     Diagnostic::error("X056", format!("a run can't be recorded: {fault}"))
-        .help("leave `--rrd` out, and report this as a fault of actcheck")
+        .help("omit `--rrd`, and report this as a bug in actcheck")
         .into()
 }

@@ -18,10 +18,10 @@ use crate::verdict::{Counts, Outcome};
 /// `actcheck rules`
 #[derive(Debug, Args)]
 pub struct RulesArgs {
-    /// The ontology whose properties are listed [default: ontology/actions.ttl here, or the one that the program carries]
+    /// The ontology whose properties are listed [default: ontology/actions.ttl here, or the shipped one]
     #[arg(long, value_name = "FILE")]
     pub ontology: Option<PathBuf>,
-    /// Where the history lies.
+    /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
     /// How the table is printed
@@ -29,7 +29,7 @@ pub struct RulesArgs {
     pub format: Format,
 }
 
-/// Prints one line for each property of the ontology. Works without a history, then without pass rates.
+/// Prints one line for each property of the ontology. Without a history, there are no pass rates.
 pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
     let (files, path) = ontology_file(args.ontology.as_deref());
     let ontology = ontology::load(&files, &path)?;
@@ -92,7 +92,7 @@ fn described(property: &Property) -> [Value; 4] {
     [property.name.as_str(), property.label.as_str(), language, file].map(Value::from)
 }
 
-/// Names of the actions of which something is true.
+/// Names of the actions that satisfy a predicate.
 fn named(ontology: &Ontology, is: impl Fn(&Action) -> bool) -> Vec<String> {
     ontology.actions.iter().filter(|(_, action)| is(action)).map(|(name, _)| name.clone()).collect()
 }

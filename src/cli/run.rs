@@ -21,10 +21,10 @@ use crate::report::{
 use crate::rules::Budget;
 use crate::verdict::{Counts, Outcome, mean};
 
-/// The tables beside the history are brought up to date each time so many runs were kept.
+/// The tables beside the history are updated each time this many runs were stored.
 const MIRROR_EVERY: usize = 1_000;
 
-/// Runs a campaign and prints what came of it. Returns the exit code.
+/// Runs a campaign and prints its results. Returns the exit code.
 pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let (stop, shown) = interrupt();
     let budget = Budget { stop: Arc::clone(&stop), ..Budget::default() };
@@ -36,7 +36,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     };
     output::print_diagnostics(&session.env.campaign.warnings);
     let mut progress = Progress::new(session.env.runs_to_make(), session.env.campaign.limits.time_secs);
-    // From here on there is a campaign to end.
+    // From here on, an interrupt must end the campaign properly.
     shown.get_or_init(|| progress.bar());
     session.begin((clock.now)())?;
     let Session { env, history, id, kept, regressions, .. } = session;
@@ -55,7 +55,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         })
     });
     progress.finish();
-    // Sums are taken by index, so that a campaign that is joined from parts has the same last bit.
+    // Sums are taken in the order of indices, so that a campaign merged from parts gets bit-identical results.
     runs.sort_by_key(|run| run.index);
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
     let mut summary = summarise(&env, id.clone(), runs, &end);
@@ -64,7 +64,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         mirror(&history);
         summary.failure_modes = failure_modes(&history, id)?;
     }
-    // Where the history failed, that is what has to be told.
+    // If the history failed, only that fault is reported.
     let health = if finished.is_ok() { Some(health::examine(&history, &summary.campaign)?) } else { None };
     let results = Results { summary: &summary, health: health.as_ref(), format: args.format };
     let shrinks = args.shrink && finished.is_ok() && is_whole(&end);
@@ -81,14 +81,15 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     }
 }
 
-/// Brings the tables beside the history up to date. They can be made again at any time: a fault is told, and changes nothing else.
+/// Updates the tables beside the history. They can be rebuilt at any time, so a fault is only reported.
 fn mirror(history: &History) {
     if let Err(faults) = Mirror::update(history) {
         output::print_diagnostics(&faults);
     }
 }
 
-/// The flag that Ctrl-C sets, and a place for the bar that then tells of it; before there is one, Ctrl-C ends the process.
+/// The flag that Ctrl-C sets, and a cell for the bar that then shows it; while the cell is empty, Ctrl-C ends the
+/// process.
 fn interrupt() -> (Arc<AtomicBool>, Arc<OnceLock<ProgressBar>>) {
     let shown = Arc::new(OnceLock::<ProgressBar>::new());
     let bar = Arc::clone(&shown);
@@ -99,10 +100,10 @@ fn interrupt() -> (Arc<AtomicBool>, Arc<OnceLock<ProgressBar>>) {
     (stop, shown)
 }
 
-/// What came of a campaign, as it is to be printed.
+/// The results of a campaign, for printing.
 struct Results<'a> {
     summary: &'a CampaignSummary,
-    /// How healthy it is: part of text and JSON, on the error stream beside a table.
+    /// The campaign's health: part of text and JSON, printed to the error stream beside CSV.
     health: Option<&'a HealthSummary>,
     format: Format,
 }
@@ -131,8 +132,8 @@ impl Results<'_> {
         }
     }
 
-    /// The same with the smaller forms of runs. People read the campaign's results while these are still being made;
-    /// programs get one document.
+    /// Prints the results with the shrunk runs. The table is printed before shrinking, so that users need not wait for
+    /// it; CSV and JSON are one document.
     fn print_with(&self, shrink: impl FnOnce() -> shrink::ShrunkModes) -> Result<(), Diagnostics> {
         if self.format == Format::Table {
             self.print();
@@ -152,7 +153,7 @@ impl Results<'_> {
     }
 }
 
-/// The first run of each failure mode, with its place in the campaign.
+/// The first run of each failure mode, with its index in the campaign.
 fn examples(summary: &CampaignSummary) -> Vec<(String, u64)> {
     let failing = summary.failure_modes.iter().filter(|mode| !mode.failed.is_empty());
     let first = failing.filter_map(|mode| mode.runs.first());
@@ -167,7 +168,7 @@ pub(super) fn all_cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZero::get)
 }
 
-/// A crash of simulation is kept with its run; the panic's own message must not tear the progress bar.
+/// Silences panic messages, which would break the progress bar: a crash of the simulation is stored with its run.
 pub(super) fn quietly<T>(work: impl FnOnce() -> T) -> T {
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
@@ -184,12 +185,12 @@ fn spent(end: &CampaignEnd) -> Option<Spent> {
     }
 }
 
-/// Whether a campaign came to its own end.
+/// Whether a campaign ended on its own, without an interrupt or a fault.
 fn is_whole(end: &CampaignEnd) -> bool {
     matches!(end.ending, Ending::Finished | Ending::Budget(_))
 }
 
-/// Writes the campaign's end into the history. The runs are there already.
+/// Writes the campaign's end into the history, which has the runs already.
 fn finish(
     history: &History,
     id: &str,
@@ -250,7 +251,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
     summary
 }
 
-/// What a guided search knows of failure rates; nothing where another strategy chose the scenes.
+/// The failure rates of a guided search. Returns `None` if another strategy chose the scenes.
 fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignEnd) -> Option<GuidedSearch> {
     let line = |found: &WeightedRate| WeightedLine {
         test: found.test.clone(),

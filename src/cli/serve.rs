@@ -15,31 +15,31 @@ use crate::serve::{self, Example, Options};
 /// `actcheck serve`
 #[derive(Debug, Args)]
 pub struct ServeArgs {
-    /// Address to listen at; others than this machine's own let the network in
+    /// Address to listen on; any but this machine's own allows access from the network
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     pub bind: IpAddr,
-    /// Port to listen at; 0 takes a free one, which is printed
+    /// Port to listen on; 0 takes a free one, which is printed
     #[arg(long, value_name = "PORT", default_value_t = 7878)]
     pub port: u16,
-    /// A name by which clients call this server, beside addresses and localhost (may be given several times)
+    /// A host name by which clients reach this server, besides addresses and localhost (may be given several times)
     #[arg(long, value_name = "NAME")]
     pub allow_host: Vec<String>,
-    /// Time for a query, in seconds
+    /// Time limit for a query, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
     pub max_secs: f64,
-    /// Rows of an answer, or triples
+    /// Maximum number of rows or triples in an answer
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     pub max_rows: u64,
-    /// Size of an answer
+    /// Maximum size of an answer
     #[arg(long, value_name = "MB", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     pub max_mb: u64,
-    /// Memory for a query
+    /// Memory limit for a query
     #[arg(long, value_name = "MB", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(100..=1_000_000))]
     pub max_memory_mb: u64,
-    /// Queries at a time
+    /// Maximum number of concurrent queries
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..))]
     pub max_queries: u16,
-    /// Where the history lies.
+    /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
 }
@@ -47,7 +47,7 @@ pub struct ServeArgs {
 /// `actcheck serve-query`, which [`serve`] starts for each query.
 #[derive(Debug, Args)]
 pub struct ServeQueryArgs {
-    /// Where the history lies.
+    /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
 }
@@ -55,14 +55,14 @@ pub struct ServeQueryArgs {
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(seconds) if seconds > 0.0 && seconds <= 86_400.0 => Ok(seconds),
-        _ => Err("a number of seconds above 0 is needed, and at most 86400, such as 10".to_owned()),
+        _ => Err("must be a number of seconds above 0 and at most 86400, such as 10".to_owned()),
     }
 }
 
 /// Serves until Ctrl-C.
 pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
     let folder = history_dir::folder(&args.history)?;
-    // A wrong folder is told now; one that a campaign has is served when the campaign has ended.
+    // A wrong folder is reported now; a history that a campaign is writing is served after the campaign ends.
     if let Err(faults) = History::open_to_read(&folder)
         && faults.iter().any(|fault| fault.code != "H002")
     {
@@ -70,21 +70,21 @@ pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
     }
     let (asked, waiting) = channel();
     let _flag = stop::on_interrupt(move || {
-        // The receiver is there as long as the process.
+        // The receiver lives as long as the process.
         let _ = asked.send(());
     });
     let serving = serve::serve(options(args, &folder)?).map_err(|error| unheard(args, &error))?;
     let address = serving.address;
     output::print(&format!(
-        "http://{address}/ asks {}, http://{address}/report reports it, http://{address}/sparql is for programs; Ctrl-C ends\n",
+        "http://{address}/ serves {}, with a report at http://{address}/report and SPARQL at http://{address}/sparql; Ctrl-C stops it\n",
         folder.display()
     ));
-    // Only Ctrl-C sends, and it ends the waiting as well when it is gone.
+    // Only Ctrl-C sends; if its handler is dropped, the wait ends too.
     let _ = waiting.recv();
     Ok(())
 }
 
-/// Answers the query that comes on the input stream.
+/// Answers the query from standard input.
 pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
     let folder = history_dir::folder(&args.history)?;
     serve::answer(&folder, std::io::stdin().lock(), std::io::stdout().lock())
@@ -93,7 +93,8 @@ pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
 
 fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
     let program = std::env::current_exe().map_err(|error| {
-        Diagnostic::error("X052", format!("this program does not find itself: {error}")).help("start it by its path")
+        Diagnostic::error("X052", format!("the path of this program can't be found: {error}"))
+            .help("start actcheck by its full path")
     })?;
     let history = folder.display().to_string();
     let with_history = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).chain([history.clone()]).collect();
@@ -122,7 +123,7 @@ fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
 }
 
 fn unheard(args: &ServeArgs, error: &std::io::Error) -> Diagnostics {
-    Diagnostic::error("X053", format!("{} port {} can't be listened at: {error}", args.bind, args.port))
+    Diagnostic::error("X053", format!("can't listen on {} port {}: {error}", args.bind, args.port))
         .help("name another port with `--port`, or 0 for any; another address with `--bind`")
         .into()
 }

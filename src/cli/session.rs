@@ -1,4 +1,4 @@
-//! What `actcheck run` has in hand before the first run: a new campaign, one that goes on, or a case.
+//! Prepares `actcheck run`: opens a new campaign, a resumed one, or a case.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::history::{ActionDetail, CampaignRecord, History, RunDetail, RunFilter
 use crate::report::CaseSummary;
 use crate::rules::Budget;
 
-/// What a configuration asks for.
+/// The kind of work that a configuration describes.
 pub enum Opened {
     /// One scene.
     Case(Box<Env>),
@@ -23,20 +23,20 @@ pub enum Opened {
 pub struct Session {
     /// The campaign, ready to run.
     pub env: Env,
-    /// Where its runs are kept.
+    /// The history that stores its runs.
     pub history: History,
     /// Its id.
     pub id: String,
-    /// Whether it goes on.
+    /// Whether it is resumed.
     goes_on: bool,
     /// Runs that are in the history already, by index.
     pub kept: Vec<RunDetail>,
-    /// What came of the project's cases.
+    /// The results of the project's cases.
     pub regressions: Vec<CaseSummary>,
 }
 
-/// Prepares what the arguments ask for, and runs the project's cases. They are run when a campaign goes on too: whether they
-/// fail is part of what it says.
+/// Prepares the campaign or case of the arguments, and runs the project's cases. They also run when a campaign is
+/// resumed, because its results include them.
 pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diagnostics> {
     let going_on = args.resume.as_deref().map(|id| find(args, id)).transpose()?;
     let env = match &going_on {
@@ -64,7 +64,7 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
 }
 
 impl Session {
-    /// Writes that the campaign begins, or takes back how it ended.
+    /// Writes the beginning of a new campaign, or removes the end of a resumed one.
     pub fn begin(&self, now: String) -> Result<(), Diagnostics> {
         if self.goes_on {
             return self.history.reopen_campaign(&self.id);
@@ -75,7 +75,7 @@ impl Session {
     }
 }
 
-/// The campaign to go on with: the one with an id, or, where that is empty, the newest unfinished one.
+/// The campaign to resume: the one with the id, or the newest unfinished one if the id is empty.
 fn find(args: &RunArgs, id: &str) -> Result<(History, CampaignRecord), Diagnostics> {
     let folder = match (&args.history, &args.config) {
         (Some(folder), _) => Some(folder.clone()),
@@ -95,7 +95,7 @@ fn stored(history: &History, env: &Env, id: &str) -> Result<Vec<RunDetail>, Diag
     Ok(kept)
 }
 
-/// Puts the outcomes of an action as a new run has them: in the order of its success properties.
+/// Sorts the outcomes of an action as in a new run: in the order of its success properties.
 fn order(action: &mut ActionDetail, env: &Env) {
     if let Some(known) = env.ontology.actions.values().find(|known| known.iri == action.action) {
         let place = |property: &str| known.success_properties.iter().position(|iri| iri == property);

@@ -7,7 +7,7 @@ use crate::cli::{history_dir, output};
 use crate::history::RunDetail;
 use crate::report::{Table, run_json, run_text};
 
-/// Prints one run, and draws it where a picture is asked for.
+/// Prints one run, and draws it if a picture is requested.
 pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open_to_read(&args.history)?;

@@ -19,30 +19,30 @@ use crate::rules::Budget;
 /// `actcheck shrink`
 #[derive(Debug, Args)]
 pub struct ShrinkArgs {
-    /// Id of the run, or its beginning
+    /// Id of the run, or a unique prefix
     pub run: String,
-    /// Keep this property failing, by its name in the ontology [default: just those that failed]
+    /// The property that must still fail, by its name in the ontology [default: exactly those that failed]
     #[arg(long, value_name = "PROPERTY")]
     pub property: Option<String>,
-    /// Simulations at most, those of the explanation included
+    /// Maximum number of simulations, including those for the explanation
     #[arg(long, value_name = "N", default_value_t = TRIALS, value_parser = clap::value_parser!(u64).range(1..))]
     pub trials: u64,
-    /// Seconds at most [default: no limit]
+    /// Time limit in seconds [default: no limit]
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     pub time: Option<f64>,
-    /// A scene must fail in K of N repetitions with fresh noise [default: once, with the noise as it was]
+    /// A scene must fail in K of N repetitions with fresh noise [default: once, with the recorded noise]
     #[arg(long, value_name = "K/N", value_parser = repeat)]
     pub repeat: Option<Repeat>,
-    /// Workers, one simulation each; results don't depend on it [default: all cores]
+    /// Number of workers, each with one simulation; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// The configuration to run by [default: the campaign's own, as the history keeps it]
+    /// The configuration to run with [default: the campaign's own, from the history]
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Where the history lies.
+    /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
-    /// Draw the small scene before and after into this file, as pixels (.png) or lines (.svg)
+    /// Draw the shrunk scene before and after the run into this file, as a raster (.png) or vector image (.svg)
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
     /// How it is printed
@@ -50,20 +50,20 @@ pub struct ShrinkArgs {
     pub format: ShrinkFormat,
 }
 
-/// Simulations that one run may take where nothing else is said: three times what most need.
+/// Default limit of simulations for one run: three times the number that most runs need.
 pub const TRIALS: u64 = 200;
 
 /// Formats of a shrunk run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum ShrinkFormat {
-    /// For people
+    /// Human-readable text
     #[default]
     Text,
-    /// For programs
+    /// Machine-readable
     Json,
 }
 
-/// Finds the smallest scene that fails as a run did, keeps it and prints it. Returns the exit code.
+/// Finds the smallest scene that fails in the same way as a run, stores it and prints it. Returns the exit code.
 pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open(&args.history)?;
@@ -94,15 +94,15 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     Ok(if asked.load(Ordering::Relaxed) { stop::INTERRUPTED } else { 0 })
 }
 
-/// Smaller forms of a campaign's runs, and why some have none.
+/// Shrunk runs of a campaign, and the faults of those that could not be shrunk.
 pub struct ShrunkModes {
-    /// Those that were found.
+    /// The shrunk runs.
     pub done: Vec<ShrunkSummary>,
-    /// What went wrong with the others.
+    /// The faults of the others.
     pub faults: Diagnostics,
 }
 
-/// Shrinks one run of each failure mode of a campaign that has just ended, until somebody asks to stop.
+/// Shrinks one run of each failure mode of a campaign that has just ended, until `asked` is set.
 pub fn shrink_modes(
     env: &Env,
     history: &History,
@@ -117,7 +117,7 @@ pub fn shrink_modes(
     for (run, index) in examples.iter().take_while(|_| !stop()) {
         match shrink_one(env, history, (run, *index), &options) {
             Ok(one) => shrunk.done.push(one),
-            // Stopped in the middle of a rule, nothing fails as it should.
+            // If a rule was interrupted, the properties don't fail as expected: that is not a fault.
             Err(_) if stop() => {}
             Err(found) => shrunk.faults.extend(found),
         }
@@ -208,6 +208,6 @@ fn repeat(text: &str) -> Result<Repeat, String> {
     let parts = text.split_once('/').and_then(|(least, of)| Some((least.parse().ok()?, of.parse().ok()?)));
     match parts {
         Some((least, of)) if 1 <= least && least <= of && of <= 1000 => Ok(Repeat { least, of }),
-        _ => Err("must be like 3/5: at least 3 failures in 5 repetitions".to_owned()),
+        _ => Err("must be K/N, such as 3/5: at least 3 failures in 5 repetitions".to_owned()),
     }
 }

@@ -1,24 +1,24 @@
-//! Moments on the command line.
+//! Points in time on the command line.
 
 use crate::config::duration_secs;
 
-/// A moment as histories write it (RFC 3339, in UTC): of a day, of a moment, or of how long ago it is.
+/// Parses a day, a point in time or a duration before now. Returns the time as histories store it (RFC 3339, in UTC).
 ///
 /// # Errors
-/// It is none of these.
+/// The text is none of these.
 pub fn moment(text: &str) -> Result<String, String> {
     let rounded = |moment: jiff::Timestamp| moment.round(jiff::Unit::Second).unwrap_or(moment).to_string();
     if let Ok(moment) = text.parse::<jiff::Timestamp>() {
         return Ok(rounded(moment));
     }
-    // A date is read out of a longer text too, and would lose its time of day.
+    // A date is also parsed from a longer text, which would lose its time of day.
     if let Some(day) = text.parse::<jiff::civil::Date>().ok().filter(|_| !text.contains([':', 'T', 't', ' '])) {
         return Ok(format!("{day}T00:00:00Z"));
     }
     let ago = duration_secs(text).ok().and_then(|secs| jiff::SignedDuration::try_from_secs_f64(secs).ok());
     let then = ago.and_then(|ago| jiff::Timestamp::now().checked_sub(ago).ok());
     then.map(rounded).ok_or_else(|| {
-        "a day (2026-11-21), a moment (2026-11-21T18:00:00Z) or how long ago (90s, 10m, 12h) is needed".to_owned()
+        "must be a day (2026-11-21), a time (2026-11-21T18:00:00Z) or a duration before now (90s, 10m, 12h)".to_owned()
     })
 }
 

@@ -1,5 +1,5 @@
-//! Runs to be watched, read one behind the other: what a run is read and explained with takes most of the time of a report, so it is
-//! shared out among the cores.
+//! Runs to be replayed in a report, read in order. Reading and explaining them takes most of a report's time, so all
+//! cores share the work.
 
 use std::ops::ControlFlow;
 
@@ -10,16 +10,16 @@ use crate::report::Explained;
 use crate::rules::{Budget, RuleBook};
 use crate::verdict::Outcome;
 
-/// Runs that a worker reads before they are taken.
+/// Number of runs that a worker reads ahead.
 const RUNS_OF_A_WORKER: usize = 8;
 
-/// A run with its trace and what explains its failures.
+/// A run with its trace and the explanations of its failures.
 pub(super) type Watched = (RunDetail, Option<Trace>, Vec<Explained>);
 
-/// Reads runs in their order until enough were taken.
+/// Reads runs in the given order and passes each to `take`, until `take` returns [`ControlFlow::Break`].
 ///
 /// # Errors
-/// A run can't be read, or what takes it refuses.
+/// A run can't be read, or `take` fails.
 pub(super) fn in_order(
     history: &History,
     ontology: &Ontology,
@@ -27,11 +27,11 @@ pub(super) fn in_order(
     mut take: impl FnMut(Watched) -> Result<ControlFlow<()>, Diagnostics>,
 ) -> Result<(), Diagnostics> {
     let budget = Budget::default();
-    // Rules that can't be read today explain nothing; the outcomes are those of the history.
+    // If the current rules can't be read, there are no explanations; the outcomes come from the history.
     let rules = RuleBook::prepare_within(ontology, &budget).ok();
     let read = |id: &String| -> Result<Watched, Diagnostics> {
         let run = history.run(id)?;
-        // A run that was broken before its first state has no trace; all else is told of it.
+        // A run that broke before its first state has no trace; everything else about it is reported.
         let trace = history.trace(id).ok();
         let explained = rules.as_ref().map(|rules| explained(history, rules, &run, &budget)).unwrap_or_default();
         Ok((run, trace, explained))
@@ -55,7 +55,7 @@ pub(super) fn in_order(
     Ok(())
 }
 
-/// Why the failed properties of a run failed. What today's rules can't explain is left out.
+/// Explains the failed properties of a run. Omits those that the current rules can't explain.
 pub(super) fn explained(history: &History, rules: &RuleBook, run: &RunDetail, budget: &Budget) -> Vec<Explained> {
     let Ok(facts) = history.facts(&run.row.run) else { return Vec::new() };
     let mut found = Vec::new();

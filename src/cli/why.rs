@@ -12,7 +12,7 @@ use crate::history::{ActionDetail, RunDetail};
 use crate::ontology;
 use crate::rules::{Budget, RuleBook};
 
-/// Prints, for each outcome of a run that is asked for, the proof that a property holds or how near it came.
+/// Prints, for each requested outcome of a run, the proof that the property holds or how close it came.
 pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let budget = Budget { stop: Arc::clone(stop), ..Budget::default() };
     let history = history_dir::open_to_read(&args.history)?;
@@ -37,7 +37,7 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     if told == 0 { Err(nothing_to_tell(&run, args.property.as_deref()).into()) } else { Ok(()) }
 }
 
-/// The ontology that was named, or the one of this folder, or the one that the program carries.
+/// The named ontology, else the one in this folder, else the shipped one.
 pub(super) fn ontology_file(named: Option<&Path>) -> (Files, PathBuf) {
     const USUAL: &str = "ontology/actions.ttl";
     match named {
@@ -47,7 +47,7 @@ pub(super) fn ontology_file(named: Option<&Path>) -> (Files, PathBuf) {
     }
 }
 
-/// The properties of an action that are meant: one by its name, or all that were judged.
+/// The requested properties of an action: the named one, or all that were judged.
 fn asked(action: &ActionDetail, named: Option<&str>) -> Vec<String> {
     let all = action.judgements.iter().map(|judgement| judgement.property.clone());
     all.filter(|iri| named.is_none_or(|named| names::local(iri) == named || iri == named)).collect()
@@ -66,6 +66,6 @@ fn nothing_to_tell(run: &RunDetail, named: Option<&str>) -> Diagnostic {
                 .help(did_you_mean(named, judged))
         }
         _ => Diagnostic::error("X009", format!("run {} has no facts to explain", run.row.run))
-            .help("it was broken before its first action; `actcheck show` says why"),
+            .help("it broke before its first action; `actcheck show` shows the reason"),
     }
 }

@@ -1,19 +1,19 @@
-//! Results into files: whole or not at all.
+//! Writes results into files, completely or not at all.
 
 use std::fs;
 use std::path::Path;
 
 use crate::base::{Diagnostic, Diagnostics, write_whole};
 
-/// Writes a file. Where that fails, on a full disk say, what was there before is there still.
+/// Writes a file. If that fails, for instance on a full disk, the previous content is kept.
 ///
 /// # Errors
 /// X007: it can't be written.
 pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnostics> {
-    // What a link points to is written, not the link.
+    // Write the target of a link, not the link itself.
     let target = fs::canonicalize(file).unwrap_or_else(|_| file.to_path_buf());
     let written = match fs::metadata(&target) {
-        // A pipe or a terminal has no other to take its place, and a folder says itself that it is none.
+        // Pipes and terminals are written directly; directories are rejected by the OS.
         Ok(found) if !found.is_file() => fs::write(&target, bytes),
         _ => write_whole(&target, bytes.as_ref()),
     };
@@ -23,7 +23,7 @@ pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnost
 /// X007: a file or folder that can't be written.
 pub(super) fn unwritten(file: &Path, why: impl std::fmt::Display) -> Diagnostic {
     Diagnostic::error("X007", format!("{} can't be written: {why}", file.display()))
-        .help("name a file in a folder that exists and may be written")
+        .help("name a file in an existing, writable folder")
 }
 
 #[cfg(test)]
@@ -48,7 +48,7 @@ mod tests {
         write(&link, "through the link").expect("it can be written");
         assert_eq!(fs::read_to_string(&file).expect("it is there"), "through the link");
         assert!(write(Path::new("/dev/null"), "gone").is_ok());
-        // The disk that is always full.
+        // Writing to /dev/full always fails with a full disk.
         let told = write(Path::new("/dev/full"), "too much").expect_err("nothing can be written there");
         assert!(told.iter().any(|fault| fault.code == "X007"));
         let told = write(&folder.path().join("none").join("out.txt"), "x").expect_err("there is no such folder");

@@ -1,4 +1,4 @@
-//! What a query gives, and the handle that stops it.
+//! The answer of a query, and the handle that stops it.
 
 use oxigraph::sparql::CancellationToken;
 
@@ -13,10 +13,10 @@ pub enum QueryAnswer {
     Table {
         /// Names of the variables, without `?`.
         columns: Vec<String>,
-        /// One value for each column; nothing where it is unbound. In the query's order.
+        /// One value for each column, `None` if it is unbound; in the query's order.
         rows: Vec<Vec<Option<Term>>>,
     },
-    /// Of `CONSTRUCT` and `DESCRIBE`: sorted, each once.
+    /// Of `CONSTRUCT` and `DESCRIBE`: sorted, without duplicates.
     Graph(Vec<[Term; 3]>),
 }
 
@@ -27,12 +27,12 @@ pub struct Cancel {
 }
 
 impl Cancel {
-    /// A handle that has stopped nothing yet.
+    /// Creates a handle that is not cancelled.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Stops the query that was given this handle; it ends with a diagnostic.
+    /// Stops the query that has this handle; it returns a diagnostic.
     pub fn cancel(&self) {
         self.token.cancel();
     }

@@ -1,4 +1,4 @@
-//! Everything that is kept of one run, read back.
+//! Reads all details of one run.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail, RunRow, 
 use crate::scenario::Role;
 use crate::verdict::{Judgement, Outcome};
 
-/// Reads a run that is known to be there.
+/// Reads an existing run.
 pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageError> {
     let node = Node::read(store, run)?;
     Ok(RunDetail {
@@ -65,17 +65,17 @@ pub(super) fn discards(store: &Store, run: &NamedNode, node: &Node) -> Result<Ve
     Ok(found.into_iter().map(|(_, reason)| reason).collect())
 }
 
-/// The status of a word; what is no status is nobody's success.
+/// Parses a status. Any other word is `Broken`, so that it never counts as a success.
 pub(super) fn status(word: Option<&str>) -> RunStatus {
     word.and_then(RunStatus::from_word).unwrap_or(RunStatus::Broken)
 }
 
-/// The outcome of a word; what is no outcome is nobody's success.
+/// Parses an outcome. Any other word is `Broken`, so that it never counts as a success.
 pub(super) fn outcome(word: Option<&str>) -> Outcome {
     word.and_then(Outcome::from_word).unwrap_or(Outcome::Broken)
 }
 
-/// The version in a program's name and version.
+/// The version from the text `actcheck VERSION`.
 pub(super) fn version(node: &Node) -> String {
     let program = node.text("act:program").unwrap_or_default();
     program.rsplit(' ').next().unwrap_or_default().to_owned()
@@ -85,7 +85,7 @@ fn noise(node: &Node) -> BTreeMap<String, f64> {
     NOISE_TERMS.into_iter().filter_map(|name| Some((name.to_owned(), node.number(&names::act(name))?))).collect()
 }
 
-/// Values of the designators that a run or an execution names as such.
+/// Values of the designators of a run or an execution.
 pub(super) fn designators(node: &Node) -> BTreeMap<String, Vec<String>> {
     let mut found = BTreeMap::new();
     for designator in node.all("act:designator").iter().map(text_of) {
@@ -108,7 +108,7 @@ fn of_run(store: &Store, run: &NamedNode, class: &str) -> Result<Vec<(Term, Node
     Ok(found)
 }
 
-/// The objects of a run's scene: each kind by id.
+/// The objects of a run's scene, sorted by role, then by id.
 pub(super) fn objects(store: &Store, run: &NamedNode) -> Result<Vec<ObjectDetail>, StorageError> {
     let mut objects: Vec<ObjectDetail> =
         of_run(store, run, "act:SceneObject")?.iter().map(|(_, node)| object(node)).collect();
@@ -167,7 +167,7 @@ fn judgements(store: &Store, execution: &Term) -> Result<Vec<Judgement>, Storage
     Ok(judgements)
 }
 
-/// What an assertion says, with its result from the same graph.
+/// Reads the judgement of an assertion, whose result is in the same graph.
 pub(super) fn judgement(store: &Store, assertion: &Node, graph: GraphNameRef<'_>) -> Result<Judgement, StorageError> {
     let result = match assertion.all("earl:result").first() {
         Some(Term::BlankNode(result)) => Node::read_in(store, result, graph)?,

@@ -1,4 +1,4 @@
-//! The history as RDF files, for other people's tools.
+//! The history as RDF files, for other tools.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -12,7 +12,7 @@ use crate::history::rdf_text::serializer;
 use crate::history::{History, RdfSyntax};
 
 impl History {
-    /// Writes everything, facts and later judgements in their named graphs included, as N-Quads.
+    /// Writes the whole history as N-Quads, including facts and later judgements in their named graphs.
     ///
     /// # Errors
     /// `H016` the file can't be written, or the store can't be read.
@@ -26,7 +26,8 @@ impl History {
         write().map_err(|why| unwritten(file, &why))
     }
 
-    /// Writes the default graph (campaigns, runs, executions, scenes and outcomes; Turtle has no place for the named graphs) as Turtle.
+    /// Writes the default graph as Turtle: campaigns, runs, executions, scenes and outcomes. Turtle can't represent the
+    /// named graphs.
     ///
     /// # Errors
     /// As [`History::write_nquads`].
@@ -46,6 +47,6 @@ impl History {
 
 fn unwritten(file: &Path, why: &str) -> Diagnostics {
     Diagnostic::error("H016", format!("{} can't be written: {}", file.display(), why.to_lowercase()))
-        .help("name a file in a folder that exists and may be written")
+        .help("name a file in an existing, writable folder")
         .into()
 }

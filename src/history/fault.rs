@@ -1,4 +1,4 @@
-//! What can go wrong with a history, in words: each fault names the folder and the way out.
+//! Faults of a history: each names the folder and how to fix it.
 
 use std::io::ErrorKind;
 use std::path::Path;
@@ -7,38 +7,38 @@ use oxigraph::store::StorageError;
 
 use crate::base::{Diagnostic, Diagnostics};
 
-/// A folder can't be a history, or not be reached.
+/// H001: a folder can't be used as a history, or can't be accessed.
 pub(super) fn unusable(dir: &Path, why: &str) -> Diagnostics {
     Diagnostic::error("H001", format!("the history `{}` can't be opened: {why}", dir.display()))
-        .help("name a folder that you may write to with `--history DIR`")
+        .help("name a writable folder with `--history DIR`")
         .into()
 }
 
-/// Somebody else has it.
+/// H002: another process has the history open.
 pub(super) fn in_use(dir: &Path) -> Diagnostics {
     Diagnostic::error("H002", format!("the history `{}` is open in another process", dir.display()))
         .help("wait until it ends, or name another folder with `--history DIR`; nothing was changed")
         .into()
 }
 
-/// There is none where one was asked for.
+/// H003: the folder has no history.
 pub(super) fn none_there(dir: &Path) -> Diagnostics {
     Diagnostic::error("H003", format!("there is no history at `{}`", dir.display()))
         .help("`actcheck run CONFIG` writes one; name its folder with `--history DIR`")
         .into()
 }
 
-/// A folder with other things in it.
+/// H003: the folder holds other files.
 pub(super) fn foreign(dir: &Path) -> Diagnostics {
-    Diagnostic::error("H003", format!("the folder `{}` is no history: it holds other things", dir.display()))
+    Diagnostic::error("H003", format!("the folder `{}` is not a history: it holds other files", dir.display()))
         .help("name a new or empty folder, or that of a history, with `--history DIR`; nothing was changed")
         .into()
 }
 
-/// Its layout is of a later program.
+/// H004: a newer program wrote the history.
 pub(super) fn newer(dir: &Path, theirs: u64, ours: u64) -> Diagnostics {
     let message = format!(
-        "the history `{}` was written by a newer actcheck: its format is {theirs}, this program knows {ours}",
+        "the history `{}` was written by a newer actcheck: its format is {theirs}, this program supports {ours}",
         dir.display()
     );
     Diagnostic::error("H004", message)
@@ -60,10 +60,10 @@ pub(super) fn store(dir: &Path, doing: &str, error: &StorageError) -> Diagnostic
     }
 }
 
-/// What was written can't be read any more.
+/// H007: stored data can't be read any more.
 pub(super) fn damaged(dir: &Path, what: &str) -> Diagnostics {
     Diagnostic::error("H007", format!("the history `{}` is damaged: {}", dir.display(), lower(what)))
-        .help("restore the folder from a copy, or name another one with `--history DIR`")
+        .help("restore the folder from a backup, or name another one with `--history DIR`")
         .into()
 }
 
@@ -75,7 +75,7 @@ fn failed(dir: &Path, doing: &str, kind: ErrorKind, text: &str) -> Diagnostics {
             format!("the disk of the history `{}` is full: {doing} failed", dir.display()),
         )
         .help(
-            "free some space and run again: what was kept before is whole; or name another folder with `--history DIR`",
+            "free some space and run again: data stored before is complete; or name another folder with `--history DIR`",
         )
         .into();
     }
@@ -84,23 +84,23 @@ fn failed(dir: &Path, doing: &str, kind: ErrorKind, text: &str) -> Diagnostics {
     }
     match kind {
         ErrorKind::PermissionDenied => unusable(dir, "writing there is not permitted"),
-        ErrorKind::ReadOnlyFilesystem => unusable(dir, "it lies on a read-only file system"),
+        ErrorKind::ReadOnlyFilesystem => unusable(dir, "it is on a read-only file system"),
         _ if has(&["Permission denied"]) => unusable(dir, "writing there is not permitted"),
-        _ if has(&["Read-only file system"]) => unusable(dir, "it lies on a read-only file system"),
-        ErrorKind::NotFound => unusable(dir, "a part of its path is not there and can't be made"),
-        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => unusable(dir, "a file stands in its place"),
+        _ if has(&["Read-only file system"]) => unusable(dir, "it is on a read-only file system"),
+        ErrorKind::NotFound => unusable(dir, "a part of its path is missing and can't be created"),
+        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => unusable(dir, "a file exists at its path"),
         _ => Diagnostic::error("H006", format!("{doing} failed in the history `{}`: {}", dir.display(), lower(text)))
-            .help("see to the disk and run again: what was kept before is whole")
+            .help("check the disk and run again: data stored before is complete")
             .into(),
     }
 }
 
-/// A library's sentence in our spelling: the first letter small, no full stop.
+/// A library's message in our style: the first letter in lower case, no full stop.
 fn lower(text: &str) -> String {
     let text = text.trim().trim_end_matches('.');
     let mut letters = text.chars();
     match letters.next() {
-        // "IO error" stays as it is.
+        // "IO error" is kept.
         Some(first) if !letters.as_str().starts_with(|c: char| c.is_uppercase()) => {
             first.to_lowercase().chain(letters).collect()
         }

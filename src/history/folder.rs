@@ -1,7 +1,7 @@
-//! The folder of a history: its layout, its version, and that one process owns it.
+//! The folder of a history: its layout, its version, and its lock.
 //!
-//! `VERSION` says what the rest is; `lock` is held while a process has it open; `store/` is the RDF store; `traces/` has one
-//! file for each run; `hulls/` has the convex solids of meshes, which can be made again at any time.
+//! `VERSION` names the format; `lock` is held while a process has the folder open; `store/` is the RDF store; `traces/`
+//! has one file for each run; `hulls/` caches the convex solids of meshes, which can be recomputed at any time.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -15,19 +15,19 @@ use crate::history::fault;
 pub(super) const FORMAT: u64 = 1;
 const TITLE: &str = "actcheck history";
 
-/// A folder that this process owns, or reads with others, until the value is dropped.
+/// A folder that this process owns, or shares with other readers, until the value is dropped.
 #[derive(Debug)]
 pub(super) struct Folder {
     dir: PathBuf,
-    /// Holds the lock; the system gives it back when the process ends, however it ends.
+    /// Holds the lock. The operating system releases it when the process ends, even after a crash.
     _lock: File,
 }
 
 impl Folder {
-    /// Takes a folder, which is made where `create` says so.
+    /// Locks a folder for writing. Creates it if it is missing and `create` is `true`.
     pub(super) fn take(dir: &Path, create: bool) -> Result<Self, Diagnostics> {
         if dir.is_file() {
-            return Err(fault::unusable(dir, "a file stands in its place"));
+            return Err(fault::unusable(dir, "a file exists at its path"));
         }
         let known = has_version(dir)?;
         if !known && !create {
@@ -37,18 +37,18 @@ impl Folder {
             if holds_other_things(dir) {
                 return Err(fault::foreign(dir));
             }
-            fs::create_dir_all(dir).map_err(|error| fault::io(dir, "making the folder", &error))?;
+            fs::create_dir_all(dir).map_err(|error| fault::io(dir, "creating the folder", &error))?;
         }
         let folder = Self { dir: dir.to_path_buf(), _lock: lock(dir, File::try_lock)? };
         if !known {
             write_whole(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
                 .map_err(|error| fault::io(dir, "writing its version", &error))?;
         }
-        fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "making the folder of traces", &error))?;
+        fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;
         Ok(folder)
     }
 
-    /// Takes a part in a folder that is there: others may read it meanwhile, and nobody may write.
+    /// Locks an existing folder for reading: other processes may read it at the same time, and none may write.
     pub(super) fn share(dir: &Path) -> Result<Self, Diagnostics> {
         if !has_version(dir)? {
             return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
@@ -77,7 +77,7 @@ impl Folder {
     }
 }
 
-/// Whether there is a history that this program can read.
+/// Whether the folder has a history that this program can read.
 fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
     let text = match fs::read_to_string(dir.join("VERSION")) {
         Ok(text) => text,
@@ -91,7 +91,8 @@ fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
     if version > FORMAT { Err(fault::newer(dir, version, FORMAT)) } else { Ok(true) }
 }
 
-/// Whether a folder without a version holds anything but what checking a configuration or an interrupted beginning leaves.
+/// Whether a folder without a version holds any files other than those left by `actcheck check` or by an interrupted
+/// start.
 fn holds_other_things(dir: &Path) -> bool {
     let ours = BTreeSet::from(["lock", "VERSION.tmp", "hulls"]);
     fs::read_dir(dir)
@@ -111,7 +112,7 @@ fn lock(dir: &Path, how: fn(&File) -> Result<(), TryLockError>) -> Result<File, 
     match how(&file) {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(fault::in_use(dir)),
-        // Some network file systems know no locks; the store's own still guards.
+        // Some network file systems don't support locks; the store's own lock still protects it.
         Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(file),
         Err(TryLockError::Error(error)) => Err(fault::io(dir, "locking it", &error)),
     }

@@ -1,21 +1,23 @@
-//! The course of all bodies in few bytes: column by column, each value as its difference from what was to be expected.
+//! Compact encoding of the motion of all bodies: column by column, each value as its difference from a prediction.
 //!
-//! Every value comes back (a negative zero as zero). Columns whose values are multiples of one of the [`GRAINS`], to which a
-//! recorder may round, take about a byte a value, what does not move takes nothing, and all others take about three.
+//! The encoding is lossless (except that a negative zero becomes zero). Columns whose values are multiples of one of
+//! the [`GRAINS`], to which a recorder may round, take about one byte per value, constant columns take nothing, and all
+//! others about three bytes.
 
-/// Coarse ones first. The last is a power of two, which singles hold exactly.
+/// Steps of rounded values, coarse ones first. The last is a power of two, which `f32` represents exactly.
 const GRAINS: [f64; 3] = [2e-4, 1e-4, 1.0 / 8192.0];
-/// Values of one run at most; a damaged file must not ask for more memory than this. A long run has under a million.
+/// Maximum number of values of one run: limits the memory that a corrupt file can request. A long run has under a
+/// million.
 const MOST_VALUES: usize = 1 << 26;
 
 const RAGGED: u8 = 0;
 const COLUMNS: u8 = 1;
 const CONSTANT: u8 = 0;
 const BITS: u8 = 1;
-/// And behind it one for each of [`GRAINS`].
+/// First of the kinds for [`GRAINS`]: one for each, in order.
 const IN_GRAINS: u8 = 2;
 
-/// Rows of a table of numbers as bytes.
+/// Encodes the rows of a table of numbers.
 pub(super) fn encode(rows: &[Vec<f32>]) -> Vec<u8> {
     let width = rows.first().map_or(0, Vec::len);
     let mut out = Vec::new();
@@ -37,13 +39,14 @@ pub(super) fn encode(rows: &[Vec<f32>]) -> Vec<u8> {
     out
 }
 
-/// The rows of bytes that [`encode`] made; nothing where they are damaged.
+/// Decodes the rows that [`encode`] encoded. Returns `None` if the bytes are corrupt.
 #[cfg(test)]
 fn decode(bytes: &[u8]) -> Option<Vec<Vec<f32>>> {
     decode_next(bytes).map(|(rows, _)| rows)
 }
 
-/// The rows of bytes that begin with what [`encode`] made, and what follows; nothing where they are damaged.
+/// Decodes the rows that [`encode`] encoded at the start of `bytes`, and returns them with the remaining bytes. Returns
+/// `None` if the bytes are corrupt.
 pub(super) fn decode_next(bytes: &[u8]) -> Option<(Vec<Vec<f32>>, &[u8])> {
     let mut rest = Reader { bytes };
     let rows = read(&mut rest)?;
@@ -83,7 +86,7 @@ fn encode_column(values: &[f32], out: &mut Vec<u8>) {
         out.push(IN_GRAINS + kind);
         let (mut last, mut step) = (0i64, 0i64);
         for count in counts.into_iter().map(i64::from) {
-            // Bodies move evenly: the next value is expected one step further.
+            // Bodies move smoothly: the prediction repeats the last step.
             put_u64(out, zigzag(count - (last + step)));
             (last, step) = (count, count - last);
         }
@@ -93,7 +96,8 @@ fn encode_column(values: &[f32], out: &mut Vec<u8>) {
     }
 }
 
-/// Differences of the bits in their order, one plane of bytes after the other: the high ones are nearly all alike.
+/// Encodes differences of the bit patterns as four planes of bytes: those of the high bytes are nearly constant, so
+/// they compress well.
 fn encode_bits(values: &[f32], out: &mut Vec<u8>) {
     let mut last = 0u32;
     let mut differences = Vec::with_capacity(values.len());
@@ -144,7 +148,7 @@ fn decode_bits(height: usize, rest: &mut Reader<'_>) -> Option<Vec<f32>> {
     )
 }
 
-/// Values as counts of the first grain of which all are multiples, with its number.
+/// Returns the values as counts of the first grain of which all are multiples, with the index of that grain.
 fn counts_of(values: &[f32]) -> Option<(u8, Vec<i32>)> {
     (0u8..).zip(GRAINS).find_map(|(kind, grain)| {
         let counts = values.iter().map(|value| in_grains(*value, grain)).collect::<Option<Vec<i32>>>()?;
@@ -152,14 +156,14 @@ fn counts_of(values: &[f32]) -> Option<(u8, Vec<i32>)> {
     })
 }
 
-/// A value as a count of grains, where it is exactly that.
+/// Returns a value as a count of grains, or `None` if it is not an exact multiple.
 fn in_grains(value: f32, grain: f64) -> Option<i32> {
-    #[expect(clippy::cast_possible_truncation, reason = "what does not come back the same is refused below")]
+    #[expect(clippy::cast_possible_truncation, reason = "a value that does not round-trip is rejected below")]
     let count = (f64::from(value) / grain).round() as i32;
     (of_grains(count, grain) == value).then_some(count)
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "values are singles")]
+#[expect(clippy::cast_possible_truncation, reason = "values are `f32`")]
 fn of_grains(count: i32, grain: f64) -> f32 {
     (f64::from(count) * grain) as f32
 }
@@ -176,7 +180,7 @@ fn put(out: &mut Vec<u8>, value: usize) {
     put_u64(out, value as u64);
 }
 
-/// Seven bits a byte, low ones first.
+/// Writes a variable-length integer: seven bits per byte, low bits first.
 fn put_u64(out: &mut Vec<u8>, mut value: u64) {
     loop {
         let low = (value & 0x7f) as u8;
@@ -256,7 +260,7 @@ mod tests {
         for at in 0..bytes.len() {
             let mut bytes = bytes.clone();
             bytes[at] ^= 0xff;
-            // Only that it ends: another number may be read.
+            // Decoding must only terminate: it may return another number.
             let _ = decode(&bytes);
         }
     }

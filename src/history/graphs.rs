@@ -1,8 +1,8 @@
-//! Facts as named graphs: what questions of people are about.
+//! Facts as named graphs, for users' queries.
 //!
-//! A quad in a named graph takes about 250 bytes on disk. So the graphs leave out what another property says as well, what
-//! never changes during a run, and all but the strongest contact of each pair. Nothing is lost: the trace has everything, and
-//! rules judge stored runs by facts that are extracted from it.
+//! A quad in a named graph takes about 250 bytes on disk. The graphs therefore omit properties that follow from others,
+//! properties that never change during a run, and all but the strongest contact of each pair. Nothing is lost: the
+//! trace has everything, and rules judge stored runs by facts that are extracted from it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,10 +12,10 @@ use crate::base::{TermId, Terms, names};
 use crate::facts::{RunFacts, Triple};
 use crate::history::terms::to_store;
 
-/// Properties of the world vocabulary that the graphs leave out.
+/// Properties of the world vocabulary that the graphs omit.
 ///
-/// `w:minZ` and `w:maxZ` say how high a body reaches, which is what questions are about; mass, friction, restitution and what is
-/// fixed (a platform) are said once, of the objects of the scene; the limits of joints belong to the robot.
+/// `w:minZ` and `w:maxZ` are kept, because queries ask for heights; mass, friction, restitution and whether a body is
+/// fixed (a platform) are stored once, with the objects of the scene; joint limits belong to the robot.
 pub(super) const LEFT_OUT: [&str; 13] = [
     "minX",
     "minY",
@@ -32,25 +32,25 @@ pub(super) const LEFT_OUT: [&str; 13] = [
     "maxEffort",
 ];
 
-/// Classes that the properties of their members give away.
+/// Classes whose members are recognisable by their properties.
 pub(super) const UNTYPED: [&str; 5] = ["Joint", "Contact", "Percept", "PerceivedPlane", "PerceivedObject"];
 
-/// A node below another.
+/// The node of a part, whose IRI is below that of `node`.
 pub(super) fn below(node: &NamedNode, part: &str) -> NamedNode {
     NamedNode::new_unchecked(format!("{}/{part}", node.as_str()))
 }
 
-/// Graph of a state between actions, counted from 0.
+/// Graph of a state between actions; states count from 0.
 pub(super) fn state_graph(run: &NamedNode, state: usize) -> NamedNode {
     below(run, &format!("state/{state}"))
 }
 
-/// Graph of what happened during an action, counted from 0 (its name counts from 1).
+/// Graph of the events during an action. `step` counts from 0, the graph's name from 1.
 pub(super) fn during_graph(run: &NamedNode, step: usize) -> NamedNode {
     below(run, &format!("{}/during", step + 1))
 }
 
-/// States the facts of a run in its graphs.
+/// Writes the facts of a run into its graphs.
 pub(super) fn write(facts: &RunFacts, run: &NamedNode, quads: &mut Vec<Quad>) {
     let terms: Vec<Term> = (0u32..).take(facts.terms.len()).map(|id| to_store(facts.terms.term(id))).collect();
     let kept = Kept::of(&facts.terms);
@@ -73,7 +73,7 @@ pub(super) fn write(facts: &RunFacts, run: &NamedNode, quads: &mut Vec<Quad>) {
     }
 }
 
-/// What the graphs keep, by the numbers of the terms.
+/// Filter of the triples that the graphs keep, by term ids.
 struct Kept {
     left_out: BTreeSet<TermId>,
     untyped: BTreeSet<TermId>,
@@ -85,7 +85,7 @@ impl Kept {
         Self { left_out: ids(&LEFT_OUT), untyped: ids(&UNTYPED) }
     }
 
-    /// Only classes have these terms as values, so that the property needs no look.
+    /// Whether to keep a triple. The property need not be checked for `untyped`: only `rdf:type` has these values.
     fn keeps(&self, [_, property, value]: &Triple) -> bool {
         !self.left_out.contains(property) && !self.untyped.contains(value)
     }
@@ -95,7 +95,7 @@ fn w(terms: &Terms, local: &str) -> Option<TermId> {
     terms.id(&crate::base::Term::iri(names::w(local)))
 }
 
-/// Contacts of a pair that has a stronger one (or an equal one that is named before it).
+/// Contacts whose pair of bodies has a stronger contact, or an equal one with a smaller id.
 fn weak_contacts(triples: &[Triple], terms: &Terms) -> BTreeSet<TermId> {
     let [Some(first), Some(second), Some(force)] = ["first", "second", "maxForce"].map(|name| w(terms, name)) else {
         return BTreeSet::new();

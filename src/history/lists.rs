@@ -39,7 +39,7 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
     OPTIONAL { ?result act:margin ?margin }
 }";
 
-/// Judgements that were made after the run, and that no later one supersedes.
+/// Judgements made after the run that no later one supersedes.
 const RECHECKED: &str = "
 SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?margin ?rule WHERE {
     GRAPH act:rechecked {
@@ -54,7 +54,7 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
 
 const SHRUNK: &str = "SELECT DISTINCT ?campaign WHERE { ?run act:shrunkFrom ?original ; act:campaign ?campaign }";
 
-/// All of them, with what sets them apart.
+/// All judgements made after the run, with the values that distinguish them.
 const LATER: &str = "
 SELECT ?run ?step ?property ?at ?outcome ?rule WHERE {
     GRAPH act:rechecked {
@@ -82,7 +82,7 @@ fn number<T: std::str::FromStr + Default>(row: &Row, column: usize) -> T {
     may(row, column).unwrap_or_default()
 }
 
-/// All campaigns, by their start.
+/// All campaigns, sorted by start.
 pub(super) fn campaigns(store: &Store) -> Result<Vec<CampaignRow>, QueryEvaluationError> {
     let mut rows = Vec::new();
     for row in select(store, CAMPAIGNS, Vec::new())? {
@@ -119,12 +119,12 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
     }
 }
 
-/// Ids of the campaigns that hold the smaller form of a run.
+/// Ids of the campaigns that hold a shrunk run.
 pub(super) fn shrunk_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
     Ok(select(store, SHRUNK, Vec::new())?.iter().map(|row| id(row, 0)).collect())
 }
 
-/// Ids of all campaigns, by their start.
+/// Ids of all campaigns, sorted by start.
 pub(super) fn campaign_ids(store: &Store) -> Result<Vec<String>, QueryEvaluationError> {
     Ok(select(store, STARTS, Vec::new())?.iter().map(|row| id(row, 0)).collect())
 }
@@ -143,7 +143,7 @@ fn given(filter: &RunFilter) -> Vec<(&'static str, Term)> {
     [campaign, test, status].into_iter().flatten().collect()
 }
 
-/// The runs that a filter lets through, by the start of their campaign, then by index.
+/// The runs that match a filter, sorted by the start of their campaign, then by index.
 pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
     let mut rows: Vec<RunRow> = select(store, RUNS, given(filter))?
@@ -165,7 +165,7 @@ pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, Que
     Ok(rows)
 }
 
-/// Outcomes of the runs that a filter lets through, in the same order, then by step and property.
+/// Outcomes of the runs that match a filter, in the same order, then by step and property.
 pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeRow>, QueryEvaluationError> {
     let ranks = ranks(store)?;
     let mut rows: Vec<OutcomeRow> = select(store, OUTCOMES, given(filter))?.iter().map(outcome_row).collect();
@@ -181,12 +181,12 @@ pub(super) fn outcomes(store: &Store, filter: &RunFilter) -> Result<Vec<OutcomeR
     Ok(rows)
 }
 
-/// The judgements made after the run that nothing supersedes, each with the digest of its rule, in no order.
+/// The judgements made after the run that no other supersedes, each with the digest of its rule, unsorted.
 pub(super) fn rechecked(store: &Store, filter: &RunFilter) -> Result<Vec<(OutcomeRow, String)>, QueryEvaluationError> {
     Ok(select(store, RECHECKED, given(filter))?.iter().map(|row| (outcome_row(row), text(row, 10))).collect())
 }
 
-/// Ids of runs, each with a judgement that was made after it, as one text; in no order.
+/// Pairs of a run's id and a judgement made after the run, as one text; unsorted.
 pub(super) fn later_judgements(store: &Store) -> Result<Vec<(String, String)>, QueryEvaluationError> {
     let told = |row: &Row| (1..6).map(|column| text(row, column)).collect::<Vec<_>>().join(" ");
     Ok(select(store, LATER, Vec::new())?.iter().map(|row| (id(row, 0), told(row))).collect())

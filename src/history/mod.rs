@@ -1,6 +1,6 @@
-//! The memory: campaigns, runs, scenes, facts and outcomes in an RDF store on disk, traces in files beside it.
+//! The history: campaigns, runs, scenes, facts and outcomes in an RDF store on disk, with traces in files beside it.
 //!
-//! Never: judges, simulates, changes what was kept, or looks at a clock.
+//! Never: judges, simulates, changes stored runs, or reads a clock.
 
 mod answer;
 mod detail;
@@ -43,6 +43,6 @@ pub use vitals::RunVitals;
 pub use wire::{WireFault, WireSyntax};
 pub use write_scene::{NOISE_TERMS, noise};
 
-// What the readers of a history meet in its products.
+// Types that readers of a history find in its results.
 pub use crate::actions::{BodyState, ContactEpisode, Form, Snapshot, Trace};
 pub use crate::scenario::{Part, Role, Shape};

@@ -1,21 +1,21 @@
-//! Outcomes as they were last judged.
+//! The newest outcomes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::Diagnostics;
 use crate::history::{History, OutcomeRow, RunFilter, lists};
 
-/// The newest outcomes of some runs: those of the campaign itself where nothing later says otherwise.
+/// The newest outcomes of runs: later judgements where they exist, otherwise those of the campaign itself.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct NewestOutcomes {
     /// In the order of [`History::outcomes`].
     pub rows: Vec<OutcomeRow>,
-    /// Digests of the rules behind the later ones, by the IRI of the property.
+    /// Digests of the rules of later judgements, by the IRI of the property.
     pub rules: BTreeMap<String, BTreeSet<String>>,
 }
 
 impl History {
-    /// The newest outcomes of the runs that a filter lets through.
+    /// Returns the newest outcomes of the runs that match a filter.
     ///
     /// # Errors
     /// The store can't be read.
@@ -33,14 +33,14 @@ impl History {
                 }
             }
         }
-        // Stable, so that campaigns stay in their order.
+        // Keeps campaigns in their order.
         let order: BTreeMap<String, usize> =
             newest.rows.iter().enumerate().rev().map(|(at, row)| (row.campaign.clone(), at)).collect();
         newest.rows.sort_by_key(|row| (order.get(&row.campaign).copied(), key(row)));
         Ok(newest)
     }
 
-    /// Ids of the campaigns that hold the smaller form of a run of another, as shrinking writes them.
+    /// Returns the ids of the campaigns that hold a shrunk run of another campaign.
     ///
     /// # Errors
     /// The store can't be read.

@@ -1,4 +1,4 @@
-//! SPARQL over the history, for people: prefixes are known, faults have their place, updates are refused.
+//! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
@@ -13,13 +13,13 @@ use crate::history::{Cancel, QueryAnswer};
 
 /// Words with which an update begins.
 const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREATE", "ADD", "MOVE", "COPY", "WITH"];
-/// How often a waiting query looks whether it was stopped: nobody notices this much.
+/// Interval at which a waiting query checks whether it was stopped: too short to notice.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Answers a query.
 ///
-/// The evaluation looks at its token only when it reads the store, which a join of large results may not do for minutes. So it
-/// has a thread of its own, which is left alone (to end at its next look) when the query is stopped.
+/// The evaluation checks its token only when it reads the store, which a join of large results may not do for minutes.
+/// It therefore runs in its own thread; when the query is stopped, the thread is abandoned and ends at its next check.
 pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     let prepared =
@@ -29,7 +29,7 @@ pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<Qu
     std::thread::spawn(move || {
         let answer = prepared.on_store(&store).execute().and_then(collect);
         drop(store);
-        // Nobody listens any more when the query was stopped.
+        // If the query was stopped, the receiver is gone.
         let _ = sender.send(answer);
     });
     loop {
@@ -45,14 +45,14 @@ pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<Qu
 }
 
 fn stopped(text: &Source) -> Diagnostic {
-    Diagnostic::error("H013", "the query was stopped before it had ended").in_source(text)
+    Diagnostic::error("H013", "the query was stopped before it ended").in_source(text)
 }
 
-/// An evaluator that knows the prefixes and can be stopped.
+/// An evaluator with the predefined prefixes that can be stopped.
 pub(super) fn evaluator(cancel: &Cancel) -> SparqlEvaluator {
     let mut evaluator = SparqlEvaluator::new().with_cancellation_token(cancel.token());
     for (prefix, namespace) in names::PREFIXES {
-        // Our namespaces are valid IRIs, so that none is left out.
+        // Our namespaces are valid IRIs, so none is omitted.
         evaluator = match evaluator.clone().with_prefix(prefix, namespace) {
             Ok(with) => with,
             Err(_) => evaluator,
@@ -90,9 +90,9 @@ pub(super) fn evaluation_fault(text: &Source, error: &QueryEvaluationError) -> D
     match error {
         QueryEvaluationError::Cancelled => stopped(text),
         QueryEvaluationError::UnsupportedService(_) | QueryEvaluationError::Service(_) => {
-            Diagnostic::error("H012", "`SERVICE` asks another endpoint, which is not done here")
+            Diagnostic::error("H012", "`SERVICE` queries another endpoint, which is not supported")
                 .in_source(text)
-                .help("ask the history alone, and join the results elsewhere")
+                .help("query only the history, and join the results elsewhere")
         }
         other => Diagnostic::error("H012", format!("the query failed: {other}")).in_source(text),
     }
@@ -104,13 +104,13 @@ pub(super) fn refuse_update(text: &Source) -> Result<(), Diagnostics> {
     if !UPDATES.contains(&word.as_str()) {
         return Ok(());
     }
-    Err(Diagnostic::error("H011", format!("`{word}` changes what it finds: the history can only be asked"))
+    Err(Diagnostic::error("H011", format!("`{word}` is an update, but the history is read-only"))
         .at(text, span)
         .help("use `SELECT`, `ASK`, `CONSTRUCT` or `DESCRIBE`")
         .into())
 }
 
-/// The first word behind prefixes, base and comments.
+/// The first word after prefixes, base and comments.
 fn first_keyword(text: &str) -> Option<(&str, Span)> {
     let mut at = 0;
     loop {

@@ -6,7 +6,7 @@ use oxigraph::model::{NamedOrBlankNode, Term as StoreTerm, Triple};
 use crate::base::{Term, names};
 use crate::history::terms::to_store;
 
-/// A text form of a graph.
+/// A text format of a graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RdfSyntax {
     /// Turtle, with the known prefixes.
@@ -17,11 +17,12 @@ pub enum RdfSyntax {
     RdfXml,
 }
 
-/// The triples as text, in their order. What is no triple (a literal as subject, a property that is no IRI) is left out.
+/// Writes triples as text, in their order. Omits invalid triples (with a literal as subject, or a property that is not
+/// an IRI).
 pub fn rdf_text(triples: &[[Term; 3]], syntax: RdfSyntax) -> String {
     let mut writer = serializer(syntax).for_writer(Vec::new());
     for triple in triples.iter().filter_map(to_triple) {
-        // Writing to memory does not fail, and RDF/XML refuses only properties that no XML name can be made of.
+        // Writing to memory can't fail, and RDF/XML rejects only properties that can't be XML names.
         let _ = writer.serialize_triple(&triple);
     }
     let bytes = writer.finish().unwrap_or_default();
@@ -29,7 +30,7 @@ pub fn rdf_text(triples: &[[Term; 3]], syntax: RdfSyntax) -> String {
     if syntax == RdfSyntax::Turtle { with_ordered_prefixes(&text) } else { text }
 }
 
-/// The library writes its prefixes in an order of chance.
+/// Sorts the prefixes, which the library writes in random order.
 fn with_ordered_prefixes(text: &str) -> String {
     let is_prefix = |line: &&str| line.starts_with("@prefix ");
     let mut prefixes: Vec<&str> = text.split_inclusive('\n').take_while(is_prefix).collect();
@@ -46,7 +47,7 @@ pub(super) fn serializer(syntax: RdfSyntax) -> RdfSerializer {
         RdfSyntax::RdfXml => RdfFormat::RdfXml,
     });
     for (prefix, namespace) in names::PREFIXES {
-        // Our namespaces are valid IRIs, so that none is left out.
+        // Our namespaces are valid IRIs, so none is omitted.
         serializer = match serializer.clone().with_prefix(prefix, namespace) {
             Ok(with) => with,
             Err(_) => serializer,

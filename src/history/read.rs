@@ -1,4 +1,4 @@
-//! Reading the store: all that it says of one thing, and rows of a query of our own.
+//! Reads the store: all statements about one subject, and rows of internal queries.
 
 use std::collections::BTreeMap;
 
@@ -11,19 +11,19 @@ use crate::history::Cancel;
 use crate::history::query::evaluator;
 use crate::history::statements::iri;
 
-/// All that a graph says of one thing.
+/// All statements of a graph about one subject.
 #[derive(Debug, Default)]
 pub(super) struct Node {
     values: BTreeMap<String, Vec<Term>>,
 }
 
 impl Node {
-    /// Reads what the default graph says; a thing of which nothing is said is empty.
+    /// Reads a subject from the default graph. The node of an unknown subject is empty.
     pub(super) fn read<'a>(store: &Store, subject: impl Into<NamedOrBlankNodeRef<'a>>) -> Result<Self, StorageError> {
         Self::read_in(store, subject, GraphNameRef::DefaultGraph)
     }
 
-    /// The same for any graph.
+    /// Like [`Node::read`], for any graph.
     pub(super) fn read_in<'a>(
         store: &Store,
         subject: impl Into<NamedOrBlankNodeRef<'a>>,
@@ -37,38 +37,38 @@ impl Node {
         Ok(node)
     }
 
-    /// Every value of a property.
+    /// All values of a property.
     pub(super) fn all(&self, property: &str) -> &[Term] {
         self.values.get(iri(property).as_str()).map_or(&[], Vec::as_slice)
     }
 
-    /// Properties in order, with their values.
+    /// The properties with their values, sorted by property.
     pub(super) fn properties(&self) -> impl Iterator<Item = (&str, &[Term])> {
         self.values.iter().map(|(property, values)| (property.as_str(), values.as_slice()))
     }
 
-    /// Text of a literal, or the IRI.
+    /// The first value as text: of a literal its text, else the IRI.
     pub(super) fn text(&self, property: &str) -> Option<String> {
         self.all(property).first().map(text_of)
     }
 
-    /// A number.
+    /// The first value as a number.
     pub(super) fn number(&self, property: &str) -> Option<f64> {
         self.text(property)?.parse().ok()
     }
 
-    /// A count.
+    /// The first value as a count.
     pub(super) fn count(&self, property: &str) -> Option<u64> {
         self.text(property)?.parse().ok()
     }
 
-    /// A truth value.
+    /// The first value as a Boolean.
     pub(super) fn truth(&self, property: &str) -> Option<bool> {
         self.text(property)?.parse().ok()
     }
 }
 
-/// Text of a literal, or the IRI, or the label of a blank node.
+/// The text of a literal, the IRI, or the label of a blank node.
 pub(super) fn text_of(term: &Term) -> String {
     match term {
         Term::NamedNode(node) => node.as_str().to_owned(),
@@ -76,13 +76,13 @@ pub(super) fn text_of(term: &Term) -> String {
         Term::Literal(literal) => literal.value().to_owned(),
         #[expect(
             unreachable_patterns,
-            reason = "other builds of the library know quoted triples, which we never write"
+            reason = "other builds of the library have quoted triples, which we never write"
         )]
         other => other.to_string(),
     }
 }
 
-/// A value as people call it: the id of an object or run, or the text.
+/// A value in its short form: the id of an object or run, or the text.
 pub(super) fn id_of(term: &Term) -> String {
     match term {
         Term::NamedNode(node) => short_id(node.as_str()).to_owned(),
@@ -90,12 +90,12 @@ pub(super) fn id_of(term: &Term) -> String {
     }
 }
 
-/// The id in an IRI of ours.
+/// The id in one of our IRIs; other IRIs are returned unchanged.
 pub(super) fn short_id(iri: &str) -> &str {
     [names::RUN, names::CAMPAIGN, names::OBJ].iter().find_map(|namespace| iri.strip_prefix(namespace)).unwrap_or(iri)
 }
 
-/// Things of which a property has a value in the default graph, in no order that means anything.
+/// The subjects that have a value of a property in the default graph, unsorted.
 pub(super) fn subjects<'a>(
     store: &Store,
     property: &str,
@@ -104,7 +104,7 @@ pub(super) fn subjects<'a>(
     subjects_in(store, property, value, GraphNameRef::DefaultGraph)
 }
 
-/// The same for any graph.
+/// Like [`subjects`], for any graph.
 pub(super) fn subjects_in<'a>(
     store: &Store,
     property: &str,
@@ -119,7 +119,7 @@ pub(super) fn subjects_in<'a>(
         .collect()
 }
 
-/// Rows of one of our own queries, with some of its variables given.
+/// Runs an internal query with some of its variables bound, and returns its rows.
 pub(super) fn select(
     store: &Store,
     query: &str,

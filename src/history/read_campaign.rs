@@ -1,4 +1,4 @@
-//! A campaign's beginning, read back as it was written.
+//! Reads the beginning of a campaign.
 
 use oxigraph::model::Term;
 use oxigraph::store::{StorageError, Store};
@@ -9,7 +9,7 @@ use crate::history::read::{Node, text_of};
 use crate::history::write_campaign::campaign_node;
 use crate::history::{CampaignRecord, SkillRecord};
 
-/// What was asked for, judged by and simulated with; nothing where the history has no such campaign.
+/// Reads the record of a campaign. Returns `None` if the history has no such campaign.
 pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord>, StorageError> {
     let node = Node::read(store, &campaign_node(id))?;
     if node.properties().next().is_none() {
@@ -38,7 +38,7 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         skill: skill(&node),
         seed: node.count("act:seed").unwrap_or_default(),
         planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
-        // Histories of before there were repetitions lack it.
+        // Histories from before repetitions were introduced lack it.
         repeat: node.count("act:repeat").and_then(|repeat| u32::try_from(repeat).ok()).unwrap_or(1).max(1),
         time_secs: node.number("act:timeBudget"),
         until_width: node.number("act:untilWidth"),
@@ -51,7 +51,7 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
     }))
 }
 
-/// The program that performed actions, where there was one.
+/// The program that performed actions. Returns `None` if there was none.
 pub(super) fn skill(node: &Node) -> Option<SkillRecord> {
     Some(SkillRecord {
         command: node.text("act:skillCommand")?,
@@ -66,7 +66,7 @@ fn shards(node: &Node) -> Vec<Shard> {
     shards
 }
 
-/// The things that a property names.
+/// The nodes that a property names.
 fn parts(store: &Store, node: &Node, property: &str) -> Result<Vec<Node>, StorageError> {
     let named = node.all(property).iter().filter_map(|term| match term {
         Term::NamedNode(part) => Some(part),

@@ -1,8 +1,8 @@
-//! Judgements that were made after the run: beside the campaign's own, in a graph of their own.
+//! Judgements made after the run, in a separate graph beside the campaign's own.
 //!
-//! The campaign's own outcomes are in the default graph and stay as they are, so that whoever asks for outcomes there gets each
-//! once. A later one is written only where it says something new, and names the one that it supersedes: the newest is the one
-//! that nothing supersedes.
+//! The campaign's own outcomes are in the default graph and never change, so that queries there get each outcome once.
+//! A later judgement is written only if it differs, and names the one that it supersedes: the newest judgement is the
+//! one that no other supersedes.
 
 use std::collections::BTreeSet;
 
@@ -18,18 +18,18 @@ use crate::history::statements::{Statements, iri, time};
 use crate::history::write_run::{run_node, unique, write_assertion};
 use crate::verdict::Judgement;
 
-/// The graph of the judgements that were made after the run.
+/// The graph of judgements made after the run.
 const GRAPH: &str = "act:rechecked";
 
-/// A judgement that the history holds.
+/// A judgement in the history.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredJudgement {
-    /// What it says.
+    /// The judgement.
     pub judgement: Judgement,
     assertion: NamedOrBlankNode,
 }
 
-/// One property in one action of a stored run, judged anew.
+/// One property in one action of a stored run, judged again.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recheck {
     /// Id of the run.
@@ -38,21 +38,22 @@ pub struct Recheck {
     pub step: u32,
     /// IRI of the action.
     pub action: String,
-    /// The newest that the history held; nothing for a property that was never judged there.
+    /// The newest judgement in the history; `None` if the property was never judged there.
     pub before: Option<StoredJudgement>,
-    /// What today's rules say.
+    /// The judgement by the current rules.
     pub now: Judgement,
 }
 
 impl Recheck {
-    /// Whether it says anything that the history does not hold as its newest.
+    /// Whether it differs from the newest judgement in the history.
     pub fn is_news(&self) -> bool {
         !self.before.as_ref().is_some_and(|before| before.judgement.says_the_same(&self.now))
     }
 }
 
 impl History {
-    /// The newest judgement of each of some properties (IRIs) in one action of a run, by property. `step` counts from 1.
+    /// Returns the newest judgements of properties (IRIs) in one action of a run, sorted by property. `step` counts
+    /// from 1.
     ///
     /// # Errors
     /// The store can't be read.
@@ -61,10 +62,10 @@ impl History {
         newest(&self.store()?, &execution, properties).map_err(|error| self.fault("reading a run's outcomes", &error))
     }
 
-    /// Keeps what is news among some judgements, in one transaction: all of them or none. `at` is RFC 3339.
+    /// Stores the new judgements in one transaction: all of them or none. `at` is RFC 3339.
     ///
     /// # Errors
-    /// Writing failed: `H005`, `H006`. What was kept before is whole.
+    /// Writing failed: `H005`, `H006`. Data stored before is complete.
     pub fn commit_rechecks(&self, rechecks: &[Recheck], at: &str) -> Result<(), Diagnostics> {
         let mut statements = Statements::default();
         for recheck in rechecks.iter().filter(|recheck| recheck.is_news()) {
@@ -104,7 +105,7 @@ fn newest(store: &Store, execution: &NamedNode, properties: &[String]) -> Result
 fn write(recheck: &Recheck, at: &str, statements: &mut Statements) {
     let execution = execution(&recheck.run, recheck.step);
     let supersedes = recheck.before.as_ref().map(|before| before.assertion.clone());
-    // Each has another predecessor, so that no two get the same node, however fast they follow each other.
+    // Two rechecks within the same second have different predecessors, so they get different nodes.
     let predecessor = supersedes.as_ref().map(ToString::to_string).unwrap_or_default();
     let of = |part| unique(&[execution.as_str(), &recheck.now.property, part, at, &predecessor]);
     let assertion = of("recheck");

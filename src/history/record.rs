@@ -1,4 +1,4 @@
-//! What is kept of a campaign and of a run.
+//! The stored data of campaigns and runs.
 
 use std::collections::BTreeMap;
 
@@ -13,13 +13,13 @@ use crate::verdict::{Judgement, Outcome};
 pub struct CampaignRecord {
     /// Short id, such as `k7f3`; unique in its history.
     pub id: String,
-    /// The configuration's file name without its ending.
+    /// The configuration's file name without its extension.
     pub name: String,
     /// The configuration's text.
     pub config_text: String,
     /// Digest of that text.
     pub config_digest: String,
-    /// Where the configuration lies, seen from the history's folder; absolute where there is no way from there.
+    /// Path of the configuration relative to the history's folder; absolute if no relative path exists.
     pub config_path: String,
     /// Digest of the ontology.
     pub ontology_digest: String,
@@ -27,21 +27,21 @@ pub struct CampaignRecord {
     pub rules: Vec<(String, String, String)>,
     /// Digests of robot and models by name, sorted.
     pub models: Vec<(String, String)>,
-    /// The program that performed actions; nothing where the reference skills performed all.
+    /// The program that performed actions; `None` if the reference skills performed all.
     pub skill: Option<SkillRecord>,
     /// Seed of all randomness.
     pub seed: u64,
-    /// How many runs were asked for; where budgets end the campaign, at most so many.
+    /// Number of planned runs; an upper limit if a budget ends the campaign.
     pub planned_runs: u64,
     /// Runs of each scene.
     pub repeat: u32,
-    /// Budget of time on the clock. Unit: seconds.
+    /// Budget of wall-clock time. Unit: seconds.
     pub time_secs: Option<f64>,
     /// Width of intervals at which the campaign ends.
     pub until_width: Option<f64>,
     /// Number of failed runs at which the campaign ends.
     pub max_failures: Option<u64>,
-    /// The parts of these runs that it is made of, sorted; none: it was run as a whole.
+    /// The parts that the campaign consists of, sorted; empty if it was run as a whole.
     pub shards: Vec<Shard>,
     /// Name of the strategy by which its scenes were chosen.
     pub strategy: String,
@@ -49,31 +49,31 @@ pub struct CampaignRecord {
     pub started: String,
     /// Version of this program.
     pub program_version: String,
-    /// Digest of its sources; empty where an earlier one wrote the campaign.
+    /// Digest of the program's sources; empty if an earlier version wrote the campaign.
     pub program_digest: String,
 }
 
-/// A program that performs actions, as a campaign's record has it.
+/// A program that performs actions, as recorded with a campaign.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SkillRecord {
     /// Its command with its arguments, as the user wrote them.
     pub command: String,
-    /// Digest of the command and of its files.
+    /// Digest of the command and its files.
     pub digest: String,
-    /// Whether it was told the truth about scenes, which no robot knows.
+    /// Whether it received the ground truth of scenes, which no real robot has.
     pub privileged: bool,
 }
 
 impl SkillRecord {
-    /// What is to be said of campaigns whose program was told the truth.
+    /// Remark on campaigns whose program received the ground truth.
     pub const PRIVILEGED: &str =
-        "the program was told where everything truly is (`[skill] privileged = true`), which no robot is";
+        "the program received the ground truth (`[skill] privileged = true`), which no real robot has";
 }
 
 /// How a run ended as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RunStatus {
-    /// Every action came to its own end.
+    /// Every action ended on its own.
     Completed,
     /// Simulation or tool failed.
     Broken,
@@ -82,7 +82,7 @@ pub enum RunStatus {
 }
 
 impl RunStatus {
-    /// The word for it.
+    /// The word for the status.
     pub fn word(self) -> &'static str {
         match self {
             Self::Completed => "completed",
@@ -91,24 +91,24 @@ impl RunStatus {
         }
     }
 
-    /// The status of a word.
+    /// Parses the word of a status. Returns `None` for any other word.
     pub fn from_word(word: &str) -> Option<Self> {
         [Self::Completed, Self::Broken, Self::Timeout].into_iter().find(|status| status.word() == word)
     }
 }
 
-/// What is known of a campaign when it ends.
+/// The end of a campaign, with its results.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CampaignEnd {
     /// RFC 3339.
     pub ended: String,
-    /// The paper's T; nothing where there was no run.
+    /// The paper's T; `None` without runs.
     pub score: Option<f64>,
-    /// The same over the runs that were not broken.
+    /// The same without the broken runs.
     pub score_without_broken: Option<f64>,
     /// Counts of all outcomes.
     pub outcomes: BTreeMap<Outcome, u64>,
-    /// Scenes that were drawn for its runs and discarded.
+    /// Number of discarded scenes.
     pub discards: u64,
     /// The budget that ended it: `time`, `width` or `failures`.
     pub ended_by: Option<String>,
@@ -116,7 +116,7 @@ pub struct CampaignEnd {
     pub interrupted: bool,
 }
 
-/// One of several runs of a scene, each with other noise.
+/// One of several runs of a scene, each with different noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Repetition {
     /// Number of the scene in its campaign, from 0.
@@ -132,14 +132,14 @@ pub struct RunRecord {
     pub id: String,
     /// Id of its campaign.
     pub campaign: String,
-    /// Id of the run that it is a smaller form of.
+    /// Id of the run that it was shrunk from.
     pub shrunk_from: Option<String>,
     /// Position in the campaign, from 0.
     pub index: u64,
-    /// Which run of which scene it is, where scenes are run more than once.
+    /// Scene and repetition, if scenes are run more than once.
     pub repetition: Option<Repetition>,
-    /// Importance weight of its scene, where scenes are not drawn as the configuration's ranges say: the nominal
-    /// density by the one that it was drawn from.
+    /// Importance weight of its scene, if a search draws scenes from another distribution than the configuration's: the
+    /// nominal density divided by the sampling density.
     pub weight: Option<f64>,
     /// Names of the actions, joined by a space.
     pub test: String,
@@ -147,34 +147,34 @@ pub struct RunRecord {
     pub seed: u64,
     /// How it ended.
     pub status: RunStatus,
-    /// Why, where it did not complete.
+    /// Why it did not complete; `None` if it did.
     pub reason: Option<String>,
-    /// The last lines that the program printed, where a fault of its own ended the run: it performs the actions then.
+    /// The last lines that the program (which performs the actions) printed, if its fault ended the run.
     pub program_output: Option<String>,
     /// Mean of the action scores (the paper's S).
     pub score: f64,
     /// One for each action (the paper's A).
     pub action_scores: Vec<f64>,
-    /// Why each scene that was drawn for it before could not be used, in order.
+    /// Why each scene that was drawn before was discarded, in order.
     pub discards: Vec<String>,
     /// Every decision.
     pub choices: Vec<Choice>,
     /// The scene.
     pub scene: Scene,
-    /// What happened.
+    /// The trace.
     pub trace: Trace,
-    /// The same as facts.
+    /// The trace as facts.
     pub facts: RunFacts,
     /// IRIs of the actions, one for each action of the trace.
     pub actions: Vec<String>,
     /// One list for each action, in the order of its success properties.
     pub judgements: Vec<Vec<Judgement>>,
-    /// What simulation got wrong; nothing where it did not come to that.
+    /// Errors of the simulation; `None` if the scene could not be simulated.
     pub quality: Option<Quality>,
     /// RFC 3339.
     pub started: String,
     /// Wall time. Unit: seconds.
     pub wall_secs: f64,
-    /// Time on the clock that the campaign had taken when it was kept. Unit: seconds.
+    /// Wall-clock time from the campaign's start until the run was stored. Unit: seconds.
     pub elapsed_secs: f64,
 }

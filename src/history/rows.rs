@@ -1,4 +1,4 @@
-//! What is read from a history, as plain data.
+//! Plain data that is read from a history.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +6,14 @@ use crate::history::{Repetition, RunStatus, SkillRecord};
 use crate::scenario::Role;
 use crate::verdict::{Judgement, Outcome};
 
-/// Which runs are asked for; the default is all.
+/// Selects runs; the default selects all.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RunFilter {
-    /// Only those of this campaign.
+    /// Only runs of this campaign.
     pub campaign: Option<String>,
-    /// Only those of this test (names of its actions, joined by a space).
+    /// Only runs of this test (names of its actions, joined by a space).
     pub test: Option<String>,
-    /// Only those that ended so.
+    /// Only runs with this status.
     pub status: Option<RunStatus>,
 }
 
@@ -26,9 +26,9 @@ pub struct RunRow {
     pub campaign: String,
     /// Position in the campaign, from 0.
     pub index: u64,
-    /// Which run of which scene it is, where scenes are run more than once.
+    /// Scene and repetition, if scenes are run more than once.
     pub repetition: Option<Repetition>,
-    /// Importance weight of its scene, where scenes were not drawn as the configuration's ranges say.
+    /// Importance weight of its scene, if scenes were drawn from another distribution than the configuration's.
     pub weight: Option<f64>,
     /// Names of the actions, joined by a space.
     pub test: String,
@@ -51,7 +51,7 @@ pub struct CampaignRow {
     pub name: String,
     /// RFC 3339.
     pub started: String,
-    /// RFC 3339; nothing where the program was ended from outside.
+    /// RFC 3339; `None` if the program was killed.
     pub ended: Option<String>,
     /// The budget that ended it: `time`, `width` or `failures`.
     pub ended_by: Option<String>,
@@ -59,15 +59,15 @@ pub struct CampaignRow {
     pub interrupted: bool,
     /// Seed of all randomness.
     pub seed: u64,
-    /// How many runs were asked for.
+    /// Number of planned runs.
     pub planned_runs: u64,
-    /// How many runs are kept.
+    /// Number of stored runs.
     pub runs: u64,
     /// The paper's T.
     pub score: Option<f64>,
-    /// The same over the runs that were not broken.
+    /// The same without the broken runs.
     pub score_without_broken: Option<f64>,
-    /// Counts of outcomes; empty where it never ended.
+    /// Counts of outcomes; empty if the campaign never ended.
     pub outcomes: BTreeMap<Outcome, u64>,
     /// Version of the program that ran it.
     pub program_version: String,
@@ -75,7 +75,7 @@ pub struct CampaignRow {
     pub config_digest: String,
     /// Digest of the ontology.
     pub ontology_digest: String,
-    /// The program that performed actions; nothing where the reference skills performed all.
+    /// The program that performed actions; `None` if the reference skills performed all.
     pub skill: Option<SkillRecord>,
 }
 
@@ -98,32 +98,32 @@ pub struct OutcomeRow {
     pub property: String,
     /// The outcome.
     pub outcome: Outcome,
-    /// How far from flipping, in the property's unit.
+    /// How far the outcome was from flipping, in the property's unit.
     pub margin: Option<f64>,
 }
 
-/// Everything that is to be shown of one run.
+/// All details of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunDetail {
-    /// As in a list.
+    /// The run as in a list.
     pub row: RunRow,
     /// Seed of the campaign.
     pub seed: u64,
     /// Why it did not complete.
     pub reason: Option<String>,
-    /// The last lines that the program printed, where a fault of its own ended the run.
+    /// The last lines that the program printed, if its fault ended the run.
     pub program_output: Option<String>,
-    /// Why each scene that was drawn for it before could not be used, in order.
+    /// Why each scene that was drawn before was discarded, in order.
     pub discards: Vec<String>,
     /// Unit: seconds.
     pub wall_secs: f64,
-    /// Time on the clock that the campaign had taken when it was kept. Unit: seconds.
+    /// Wall-clock time from the campaign's start until the run was stored. Unit: seconds.
     pub elapsed_secs: f64,
     /// Name of the world.
     pub world: String,
     /// Version of the program that ran it.
     pub program_version: String,
-    /// Where the base stood at first. Units: metres, metres, radians. Shape: x, y, heading.
+    /// Initial pose of the base. Units: metres, metres, radians. Shape: x, y, heading.
     pub robot_base: [f64; 3],
     /// Standard deviations of sensing by name of their term, such as `positionNoise`. Units: metres, radians.
     pub noise: BTreeMap<String, f64>,
@@ -135,7 +135,7 @@ pub struct RunDetail {
     pub actions: Vec<ActionDetail>,
 }
 
-/// One object of a run's scene, as it was placed, and what became of it.
+/// One object of a run's scene: its initial pose, its physics, and its later displacement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectDetail {
     /// Id in the scene.
@@ -144,7 +144,7 @@ pub struct ObjectDetail {
     pub model: String,
     /// Its class: an IRI.
     pub category: String,
-    /// What it is there for.
+    /// Its role in the scene.
     pub role: Role,
     /// Unit: metres.
     pub x: f64,
@@ -162,11 +162,11 @@ pub struct ObjectDetail {
     pub restitution: f64,
     /// Horizontal distance from the base. Unit: metres.
     pub robot_distance_m: f64,
-    /// Horizontal distance to the nearest other object that is no platform. Unit: metres.
+    /// Horizontal distance to the nearest other object, except platforms. Unit: metres.
     pub neighbour_distance_m: Option<f64>,
-    /// Horizontal distance to the nearest target; nothing for a target. Unit: metres.
+    /// Horizontal distance to the nearest target; `None` for a target. Unit: metres.
     pub target_distance_m: Option<f64>,
-    /// Largest distance from where it was before an action. Unit: metres.
+    /// Largest distance from its position before an action. Unit: metres.
     pub displacement_m: Option<f64>,
     /// Largest angle from the vertical during an action. Unit: radians.
     pub max_tilt_rad: Option<f64>,
@@ -181,9 +181,9 @@ pub struct ActionDetail {
     pub action: String,
     /// The paper's A.
     pub score: f64,
-    /// Whether it reported success; nothing where it came to no report.
+    /// Whether it reported success; `None` without a report.
     pub reported: Option<bool>,
-    /// Its own words, or why it did not complete.
+    /// The message of its report, or why it did not complete.
     pub message: Option<String>,
     /// Simulated time. Unit: seconds.
     pub duration_secs: f64,

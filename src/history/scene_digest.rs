@@ -1,4 +1,4 @@
-//! Whether two runs had the same scene.
+//! Digests of scenes, which show whether two runs had the same scene.
 
 use std::collections::BTreeMap;
 
@@ -14,14 +14,14 @@ use crate::history::{History, ObjectDetail, RunRow};
 /// The scene of a run, in two digests.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SceneDigest {
-    /// The test, the world, which objects stand where, and where the robot stands.
+    /// The test, the world, the designators, the objects with their poses, and the pose of the robot's base.
     pub arrangement: String,
     /// Mass, friction and restitution of the objects.
     pub physics: String,
 }
 
 impl History {
-    /// The scenes of some runs, by the ids of the runs.
+    /// Returns the scenes of runs by run id.
     ///
     /// # Errors
     /// The store can't be read.

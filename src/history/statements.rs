@@ -1,10 +1,10 @@
-//! Quads while they are being written, spoken in prefixed names.
+//! Builds quads from prefixed names.
 
 use oxigraph::model::{GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term};
 
 use crate::base::names;
 
-/// An IRI from a prefixed name of [`names::PREFIXES`], such as `act:score`; anything else is taken as an IRI.
+/// Expands a prefixed name of [`names::PREFIXES`], such as `act:score`; any other text is used as an IRI.
 pub(super) fn iri(name: &str) -> NamedNode {
     let expanded = name.split_once(':').and_then(|(prefix, local)| {
         let (_, namespace) = names::PREFIXES.iter().find(|(known, _)| *known == prefix)?;
@@ -13,12 +13,12 @@ pub(super) fn iri(name: &str) -> NamedNode {
     NamedNode::new_unchecked(expanded.unwrap_or_else(|| name.to_owned()))
 }
 
-/// A moment in time.
+/// A literal for a point in time.
 pub(super) fn time(rfc3339: &str) -> Literal {
     Literal::new_typed_literal(rfc3339, iri("xsd:dateTime"))
 }
 
-/// A count. (A seed may be larger than what `i64` holds: the store then keeps its digits.)
+/// A literal for a count. (For a seed above `i64::MAX` the store keeps its digits.)
 pub(super) fn count(value: u64) -> Literal {
     Literal::from(value)
 }
@@ -26,31 +26,31 @@ pub(super) fn count(value: u64) -> Literal {
 /// Quads of one transaction.
 #[derive(Debug, Default)]
 pub(super) struct Statements {
-    /// What was stated so far.
+    /// The quads so far.
     pub(super) quads: Vec<Quad>,
 }
 
 impl Statements {
-    /// Begins to speak of something, in the default graph.
+    /// Starts statements about a subject, in the default graph.
     pub(super) fn about(&mut self, subject: impl Into<NamedOrBlankNode>) -> About<'_> {
         About { quads: &mut self.quads, subject: subject.into() }
     }
 }
 
-/// Statements about one thing in the default graph.
+/// Statements about one subject in the default graph.
 pub(super) struct About<'a> {
     quads: &'a mut Vec<Quad>,
     subject: NamedOrBlankNode,
 }
 
 impl About<'_> {
-    /// States the value of a property.
+    /// Adds the value of a property.
     pub(super) fn has(&mut self, property: &str, value: impl Into<Term>) -> &mut Self {
         self.quads.push(Quad::new(self.subject.clone(), iri(property), value, GraphName::DefaultGraph));
         self
     }
 
-    /// States the value of a property where there is one.
+    /// Adds the value of a property unless it is `None`.
     pub(super) fn may(&mut self, property: &str, value: Option<impl Into<Term>>) -> &mut Self {
         match value {
             Some(value) => self.has(property, value),
@@ -58,12 +58,12 @@ impl About<'_> {
         }
     }
 
-    /// States a text.
+    /// Adds a text as the value of a property.
     pub(super) fn text(&mut self, property: &str, value: &str) -> &mut Self {
         self.has(property, Literal::new_simple_literal(value))
     }
 
-    /// States a class.
+    /// Adds a class.
     pub(super) fn is_a(&mut self, class: &str) -> &mut Self {
         self.has("rdf:type", iri(class))
     }

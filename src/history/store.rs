@@ -1,4 +1,4 @@
-//! A history that is open: its folder, and the RDF store in it.
+//! An open history: its folder, and the RDF store in it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -23,38 +23,38 @@ use crate::history::{
 };
 use crate::history::{lists, read_campaign};
 
-/// A history that this process has open, and no other (but for reading: [`History::open_to_read`]).
+/// A history that only this process has open (except after [`History::open_to_read`], which shares it).
 ///
-/// A run that [`History::commit`] took is there whole after the process was killed, and after [`History::flush`] also after a
-/// power cut. The file of its trace is written before, so that a run in the store always has one.
+/// A run that [`History::commit`] stored survives a kill of the process, and after [`History::flush`] also a power cut.
+/// Its trace file is written first, so that every run in the store has one.
 pub struct History {
-    // Dropped before the folder, which gives the lock back. Nothing only where opening it anew failed.
+    // Dropped before the folder, which releases the lock. `None` only if reopening failed.
     store: RwLock<Option<Store>>,
     folder: Folder,
 }
 
 impl History {
-    /// Opens the history in a folder; where there is none, it is made.
+    /// Opens the history in a folder, and creates it if missing.
     ///
     /// # Errors
-    /// `H001` the folder can't be used, `H002` another process has it, `H003` it holds other things, `H004` a newer program
-    /// wrote it, `H005` the disk is full, `H006`, `H007` it is damaged.
+    /// `H001` the folder can't be used, `H002` another process has it open, `H003` it holds other files, `H004` a newer
+    /// program wrote it, `H005` the disk is full, `H006`, `H007` it is damaged.
     pub fn open(dir: &Path) -> Result<Self, Diagnostics> {
         Self::open_folder(Folder::take(dir, true)?)
     }
 
-    /// Opens the history in a folder, which must be there.
+    /// Opens the existing history in a folder.
     ///
     /// # Errors
-    /// As [`History::open`]; `H003` also where there is none.
+    /// As [`History::open`]; also `H003` if the folder has no history.
     pub fn open_existing(dir: &Path) -> Result<Self, Diagnostics> {
         Self::open_folder(Folder::take(dir, false)?)
     }
 
-    /// Opens the history in a folder for queries alone, beside others that do the same. Nothing can be written.
+    /// Opens the existing history in a folder read-only. Other processes may do so at the same time.
     ///
     /// # Errors
-    /// As [`History::open_existing`]; `H002` while another process has it to write.
+    /// As [`History::open_existing`]; `H002` while another process has it open for writing.
     pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
         let folder = Folder::share(dir)?;
         let store = Store::open_read_only(folder.store());
@@ -67,13 +67,13 @@ impl History {
         Ok(Self { store: RwLock::new(Some(store)), folder })
     }
 
-    /// The store, for one piece of work. (Clones are the same store.)
+    /// Returns a handle of the store. (All clones use the same store.)
     pub(super) fn store(&self) -> Result<Store, Diagnostics> {
         let store = self.store.read().unwrap_or_else(PoisonError::into_inner);
         store.clone().ok_or_else(|| fault::damaged(self.dir(), "it could not be opened again"))
     }
 
-    /// Closes the store and opens it anew: that is when it gives up the logs of what is long in its tables, which are as
+    /// Closes and reopens the store. Only then does it delete logs whose content is already in its tables; they are as
     /// large as the tables of a hundred runs.
     pub(super) fn reopen(&self) -> Result<(), Diagnostics> {
         let mut store = self.store.write().unwrap_or_else(PoisonError::into_inner);
@@ -82,12 +82,13 @@ impl History {
         Ok(())
     }
 
-    /// The folder as it was given.
+    /// The folder as the caller gave it.
     pub fn dir(&self) -> &Path {
         self.folder.dir()
     }
 
-    /// An id for a new campaign: short, unlike all others here, the same for the same history, configuration and seed.
+    /// Returns an id for a new campaign: short, unique in this history, and the same for the same history,
+    /// configuration and seed.
     ///
     /// # Errors
     /// The store can't be read.
@@ -95,11 +96,11 @@ impl History {
         let known: BTreeSet<String> = self.campaign_ids()?.into_iter().collect();
         let first = known.len() as u64;
         let free = (first..).map(|counter| campaign_id(config_digest, seed, counter)).find(|id| !known.contains(id));
-        // There are nearly a million ids; whoever has used them all gets a long one.
+        // There are nearly a million short ids; when all are used, a long one follows.
         Ok(free.unwrap_or_else(|| config_digest.to_owned()))
     }
 
-    /// Writes a campaign, before its first run, and removes what killed processes left.
+    /// Writes a campaign before its first run, and removes the leftovers of killed processes.
     ///
     /// # Errors
     /// Writing failed: `H005`, `H006`.
@@ -111,7 +112,7 @@ impl History {
         self.flush()
     }
 
-    /// Takes back the end of a campaign that goes on, and removes what killed processes left.
+    /// Removes the end of a campaign that is resumed, and the leftovers of killed processes.
     ///
     /// # Errors
     /// Writing failed: `H005`, `H006`.
@@ -134,10 +135,10 @@ impl History {
         self.flush()
     }
 
-    /// Keeps a run: when this returns, it is there whole; when it fails, nothing of it is.
+    /// Stores a run, completely or (on an error) not at all.
     ///
     /// # Errors
-    /// Writing failed: `H005`, `H006`. What was kept before is whole.
+    /// Writing failed: `H005`, `H006`. Runs stored before are complete.
     pub fn commit(&self, record: &RunRecord) -> Result<(), Diagnostics> {
         let doing = format!("writing run {}", record.id);
         let bytes = trace_file::encode(&record.choices, &record.trace)
@@ -145,13 +146,13 @@ impl History {
         let file = self.folder.trace(&record.id);
         write_whole(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
         self.store()?.extend(write_run::quads(record)).map_err(|error| {
-            // A trace without a run is harmless; if it can't be removed now, the next campaign does.
+            // A trace without a run is harmless; if it can't be removed now, the next campaign removes it.
             let _ = std::fs::remove_file(&file);
             self.fault(&doing, &error)
         })
     }
 
-    /// Brings everything that was committed to the disk.
+    /// Flushes all committed data to the disk.
     ///
     /// # Errors
     /// Writing failed: `H005`, `H006`.
@@ -159,7 +160,7 @@ impl History {
         self.store()?.flush().map_err(|error| self.fault("writing to the disk", &error))
     }
 
-    /// Writes how a campaign ended, and brings everything to the disk.
+    /// Writes the end of a campaign, and flushes everything to the disk.
     ///
     /// # Errors
     /// Writing failed: `H005`, `H006`.
@@ -171,7 +172,7 @@ impl History {
         self.reopen()
     }
 
-    /// All campaigns, by their start, then by id.
+    /// Returns all campaigns, sorted by start, then by id.
     ///
     /// # Errors
     /// The store can't be read.
@@ -179,7 +180,7 @@ impl History {
         lists::campaigns(&self.store()?).map_err(|error| self.query_fault(&error))
     }
 
-    /// What a campaign was asked for, judged by and simulated with.
+    /// Returns the record of a campaign.
     ///
     /// # Errors
     /// `H014` there is no such campaign.
@@ -200,15 +201,16 @@ impl History {
         }
     }
 
-    /// The runs that a filter lets through, by the start of their campaign, then by index.
+    /// Returns the runs that match a filter, sorted by the start of their campaign, then by index. An unknown campaign
+    /// has no runs.
     ///
     /// # Errors
-    /// The store can't be read. A campaign that is not there has no runs.
+    /// The store can't be read.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
         lists::runs(&self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
-    /// Ids of the runs of every campaign that does not hold the smaller form of a run, by the start of the campaign, sorted as texts.
+    /// Returns the ids of all campaigns without shrunk runs, sorted by start, each with its run ids, sorted as strings.
     ///
     /// # Errors
     /// The store can't be read.
@@ -228,7 +230,8 @@ impl History {
         Ok(found)
     }
 
-    /// Outcomes of the runs that a filter lets through, in the order of [`History::runs`], then by step and property.
+    /// Returns the outcomes of the runs that match a filter, in the order of [`History::runs`], then by step and
+    /// property.
     ///
     /// # Errors
     /// The store can't be read.
@@ -236,10 +239,10 @@ impl History {
         lists::outcomes(&self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
-    /// The id of a run from its id, its IRI, `run:ID`, or a beginning that only one run has.
+    /// Returns the id of a run, given its id, its IRI, `run:ID`, or a unique prefix.
     ///
     /// # Errors
-    /// `H008` no run is meant, or several are.
+    /// `H008` no run matches, or several do.
     pub fn resolve(&self, name: &str) -> Result<String, Diagnostics> {
         let name = short_id(name.trim().trim_start_matches('<').trim_end_matches('>'));
         let name = name.strip_prefix("run:").unwrap_or(name);
@@ -255,18 +258,16 @@ impl History {
                     Some(found) => format!("did you mean `{found}`? `actcheck list` shows all runs"),
                     None => "`actcheck list` shows all runs".to_owned(),
                 }),
-            several => {
-                Diagnostic::error("H008", format!("`{name}` can be any of {} runs", several.len())).help(format!(
-                    "say which: {}{}",
-                    several.iter().take(5).map(|id| id.as_str()).collect::<Vec<_>>().join(", "),
-                    if several.len() > 5 { ", …" } else { "" }
-                ))
-            }
+            several => Diagnostic::error("H008", format!("`{name}` matches {} runs", several.len())).help(format!(
+                "name one of them: {}{}",
+                several.iter().take(5).map(|id| id.as_str()).collect::<Vec<_>>().join(", "),
+                if several.len() > 5 { ", …" } else { "" }
+            )),
         };
         Err(fault.into())
     }
 
-    /// Everything that is to be shown of a run, named as in [`History::resolve`].
+    /// Returns all details of a run, named as in [`History::resolve`].
     ///
     /// # Errors
     /// `H008` there is no such run.
@@ -275,17 +276,17 @@ impl History {
         detail::read(&self.store()?, &run_node(&id)).map_err(|error| self.fault("reading a run", &error))
     }
 
-    /// What happened in a run, named as in [`History::resolve`].
+    /// Returns the trace of a run, named as in [`History::resolve`].
     ///
     /// # Errors
-    /// `H008` there is no such run, `H009` its trace is missing, `H007` or damaged.
+    /// `H008` there is no such run, `H009` its trace is missing, `H007` its trace is damaged.
     pub fn trace(&self, name: &str) -> Result<Trace, Diagnostics> {
         let id = self.resolve(name)?;
         Ok(self.decoded(&id, trace_file::decode)?.1)
     }
 
-    /// What happened in a run, named as in [`History::resolve`], without the course of its bodies: all that facts are made
-    /// of, in a tenth of the time.
+    /// Returns the trace of a run, named as in [`History::resolve`], without the motion of its bodies: everything from
+    /// which facts are extracted, in a tenth of the time.
     ///
     /// # Errors
     /// As [`History::trace`].
@@ -294,7 +295,7 @@ impl History {
         Ok(self.decoded(&id, trace_file::decode_states)?.1)
     }
 
-    /// Every decision of a run, named as in [`History::resolve`].
+    /// Returns every decision of a run, named as in [`History::resolve`].
     ///
     /// # Errors
     /// As [`History::trace`].
@@ -303,10 +304,10 @@ impl History {
         Ok(self.decoded(&id, trace_file::decode_states)?.0)
     }
 
-    /// Tells what is kept of the health of a campaign's runs, one by one, in the order of their indices.
+    /// Calls `each` with the health data of every run of a campaign, in the order of their indices.
     ///
     /// # Errors
-    /// `H014` there is no such campaign, else as [`History::trace`].
+    /// `H014` there is no such campaign; otherwise as [`History::trace`].
     pub fn each_vitals(&self, campaign: &str, mut each: impl FnMut(&RunVitals)) -> Result<(), Diagnostics> {
         self.campaign(campaign)?;
         for row in self.runs(&RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() })? {
@@ -317,9 +318,10 @@ impl History {
         Ok(())
     }
 
-    /// The facts of a run, named as in [`History::resolve`]: extracted from its trace, the same as when it was run.
+    /// Returns the facts of a run, named as in [`History::resolve`]: extracted from its trace, the same as during the
+    /// run.
     ///
-    /// They are not read from the store, which holds them for queries, because that takes many times as long.
+    /// The store holds facts only for queries; reading them from there would take many times as long.
     ///
     /// # Errors
     /// As [`History::trace`].
@@ -333,20 +335,20 @@ impl History {
     /// `act:before`, `act:after` and `act:during` name.
     ///
     /// # Errors
-    /// `H010` it is no query, `H011` it is an update, `H012` it failed.
+    /// `H010` the text is not a query, `H011` it is an update, `H012` the evaluation failed.
     pub fn query(&self, sparql: &str) -> Result<QueryAnswer, Diagnostics> {
         self.query_from(&Source::new("query", sparql), &Cancel::new())
     }
 
-    /// The same for a text that has a name, with a handle that stops it.
+    /// Like [`History::query`], for a source text with a name, and with a handle that stops the query.
     ///
     /// # Errors
-    /// As [`History::query`]; `H013` it was stopped.
+    /// As [`History::query`]; `H013` the query was stopped.
     pub fn query_from(&self, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
         query::answer(&self.store()?, text, cancel)
     }
 
-    /// The file of a run's trace, whether it is there or not.
+    /// Path of a run's trace file, which need not exist.
     pub(super) fn trace_path(&self, run: &str) -> PathBuf {
         self.folder.trace(run)
     }
@@ -355,7 +357,7 @@ impl History {
         let file = self.folder.trace(id);
         let bytes = std::fs::read(&file).map_err(|error| {
             Diagnostic::error("H009", format!("the trace of run {id} can't be read from `{}`: {error}", file.display()))
-                .help("restore the file from a copy; what the store says of the run is still there")
+                .help("restore the file from a backup; the store's data on the run is intact")
         })?;
         decode(&bytes).map_err(|why| fault::damaged(self.dir(), &format!("the trace of run {id}: {why}")))
     }
@@ -367,7 +369,7 @@ impl History {
             .map_err(|error| self.fault("reading", &error))
     }
 
-    /// Ids of all things of a class, sorted.
+    /// Ids of all instances of a class, sorted.
     fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
         let class = iri(class);
         let found =
@@ -381,7 +383,7 @@ impl History {
         self.ids("act:Campaign")
     }
 
-    /// Removes traces that have no run. Only a process that was killed leaves such, and its campaign has no end.
+    /// Removes traces without a run. Only killed processes leave them, and their campaigns have no end.
     fn remove_orphans(&self) -> Result<(), Diagnostics> {
         let mut ended = BTreeMap::new();
         for entry in std::fs::read_dir(self.folder.traces()).into_iter().flatten().filter_map(Result::ok) {
@@ -397,7 +399,7 @@ impl History {
                 }
             };
             if orphan {
-                // Harmless where it stays.
+                // Harmless if it remains.
                 let _ = std::fs::remove_file(entry.path());
             }
         }
@@ -434,17 +436,17 @@ impl History {
 fn open_store(folder: &Folder) -> Result<Store, Diagnostics> {
     let path = folder.store();
     let store = Store::open(&path).map_err(|error| fault::store(folder.dir(), "opening its store", &error))?;
-    // Each opening leaves a report of over 100 kB for the store's own developers.
+    // Each opening leaves a log of over 100 kB, which is only useful to the store's developers.
     for entry in std::fs::read_dir(&path).into_iter().flatten().filter_map(Result::ok) {
         if entry.file_name().to_string_lossy().starts_with("LOG.old.") {
-            // Harmless where it stays.
+            // Harmless if it remains.
             let _ = std::fs::remove_file(entry.path());
         }
     }
     Ok(store)
 }
 
-/// A letter and three letters or digits, without those that look alike.
+/// Computes a campaign's id: a letter and three letters or digits, without characters that look alike.
 pub(super) fn campaign_id(config_digest: &str, seed: u64, counter: u64) -> String {
     const LETTERS: &[u8] = b"abcdefghjkmnpqrstvwxyz";
     const ALL: &[u8] = b"abcdefghjkmnpqrstvwxyz23456789";

@@ -1,14 +1,15 @@
-//! What is wrong with the text of a query, told at its place.
+//! Reports syntax errors of queries at their place.
 //!
-//! The parser reports the furthest place where one of its attempts failed, and all that it would have taken there. An attempt at
-//! a keyword fails behind as many characters as the keyword has; this is undone here, so that the place is where people look.
+//! The parser reports the furthest place where one of its alternatives failed, and every token that it expected there.
+//! The reported place of a failed keyword is off by the keyword's length; this module corrects it, so that the place is
+//! the one that users expect.
 
 use crate::base::{Diagnostic, Source, names};
 
 /// Expected words that a message lists; a syntax error can have a hundred.
 const EXPECTED_SHOWN: usize = 8;
 
-/// A syntax error of the parser, which reads `error at 1:8: expected one of …`, at its place.
+/// Converts a syntax error of the parser, such as `error at 1:8: expected one of …`, into a diagnostic with its place.
 pub(super) fn syntax_fault(text: &Source, error: &str) -> Diagnostic {
     let place = error.strip_prefix("error at ").and_then(|rest| {
         let (place, expected) = rest.split_once(": ")?;
@@ -16,18 +17,18 @@ pub(super) fn syntax_fault(text: &Source, error: &str) -> Diagnostic {
         Some((offset(&text.text, line.parse().ok()?, column.parse().ok()?), expected))
     });
     let Some((end, expected)) = place else {
-        return Diagnostic::error("H010", format!("this is no SPARQL query: {error}")).in_source(text);
+        return Diagnostic::error("H010", format!("this is not a SPARQL query: {error}")).in_source(text);
     };
     let expected = expected.strip_prefix("expected ").unwrap_or(expected);
     let expected: Vec<&str> = expected.strip_prefix("one of ").unwrap_or(expected).split(", ").map(str::trim).collect();
-    // Every other item is a keyword, a quoted sign or a class of signs in brackets.
+    // Every other item is a keyword, a quoted character or a character class in brackets.
     match expected.iter().find(|item| item.contains(' ') && !item.starts_with(['[', '"', '\''])) {
         Some(reason) => told(text, end, reason),
         None => unexpected(text, end, &expected),
     }
 }
 
-/// A reason in the parser's own words: it is found behind what it is about.
+/// Reports a reason in the parser's own words. Its place is after the word that it concerns.
 fn told(text: &Source, end: usize, reason: &str) -> Diagnostic {
     let before = text.text[..end].trim_end();
     let start = before.rfind(char::is_whitespace).map_or(0, |at| at + 1);
@@ -35,23 +36,23 @@ fn told(text: &Source, end: usize, reason: &str) -> Diagnostic {
     let fault = |message: String| Diagnostic::error("H010", message).at(text, start..before.len());
     if reason == "Prefix not found" {
         let known: Vec<&str> = names::PREFIXES.iter().map(|(prefix, _)| *prefix).collect();
-        return fault(format!("the prefix of `{word}` is not known"))
-            .help(format!("declare it with `PREFIX`, or use one of those that are: {}", known.join(", ")));
+        return fault(format!("the prefix of `{word}` is unknown"))
+            .help(format!("declare it with `PREFIX`, or use a known one: {}", known.join(", ")));
     }
     let mut letters = reason.chars();
     let first = letters.next().map(char::to_lowercase).into_iter().flatten();
     let fault = fault(first.chain(letters).collect());
     if reason.contains("unbound") {
         return fault
-            .help("every variable behind `SELECT` must be in `GROUP BY` or in an aggregate such as `COUNT(?x)`");
+            .help("every variable after `SELECT` must be in `GROUP BY` or in an aggregate such as `COUNT(?x)`");
     }
     fault
 }
 
-/// Text that nothing begins with that could stand there.
+/// Reports text that is not valid at its place.
 fn unexpected(text: &Source, end: usize, expected: &[&str]) -> Diagnostic {
     let keyword = |item: &&str| item.len() > 1 && item.chars().all(|c| c.is_ascii_alphanumeric());
-    // `[_]` is any sign: a keyword was looked for where the text has not that many.
+    // `[_]` is any character: a keyword was expected, but the text is shorter than it.
     let only_keywords = expected.iter().all(|item| *item == "[_]" || keyword(item));
     let shortest = expected.iter().filter(|item| keyword(item)).map(|item| item.len()).min();
     let start = match shortest {
@@ -67,16 +68,17 @@ fn unexpected(text: &Source, end: usize, expected: &[&str]) -> Diagnostic {
         text.text[start..stop].split_whitespace().collect::<Vec<_>>().join(" ").chars().take(40).collect();
     let message = match found.as_str() {
         "" => "the query ends too early".to_owned(),
-        found => format!("this is no SPARQL query: it can't be understood at `{found}`"),
+        found => format!("this is not a SPARQL query: unexpected `{found}`"),
     };
     let fault = Diagnostic::error("H010", message).at(text, start..stop);
     match listed(expected) {
-        Some(list) => fault.help(format!("there could be {list}")),
+        Some(list) => fault.help(format!("expected {list}")),
         None => fault.help("a query is `SELECT … WHERE { … }`, `ASK { … }`, `CONSTRUCT` or `DESCRIBE`"),
     }
 }
 
-/// What was expected, without classes of signs, shortened to a readable number.
+/// Lists the expected tokens, without character classes, shortened to a readable number. Returns `None` if none is
+/// left.
 fn listed(expected: &[&str]) -> Option<String> {
     let words: Vec<String> = expected
         .iter()
@@ -90,12 +92,13 @@ fn listed(expected: &[&str]) -> Option<String> {
     }
 }
 
-/// A place that many characters before another.
+/// Returns the offset of the place that many characters before another.
 fn back(text: &str, end: usize, characters: usize) -> usize {
     text[..end].char_indices().rev().nth(characters.saturating_sub(1)).map_or(0, |(at, _)| at)
 }
 
-/// Byte offset of a line and a column (of characters), both counted from 1; the end where there is no such place.
+/// Byte offset of a line and a column (in characters), both counted from 1. Returns the text's length if there is no
+/// such place.
 fn offset(text: &str, line: usize, column: usize) -> usize {
     let start = match line.checked_sub(2) {
         None => 0,

@@ -1,11 +1,11 @@
-//! Our terms to the store's and back.
+//! Converts our terms to the store's and back.
 
 use oxigraph::model::vocab::{rdf, xsd};
 use oxigraph::model::{BlankNode, Literal, NamedNode, Term as StoreTerm};
 
 use crate::base::Term;
 
-/// A term as the store has it.
+/// Converts a term to the store's type.
 pub(super) fn to_store(term: &Term) -> StoreTerm {
     match term {
         Term::Iri(iri) => NamedNode::new_unchecked(iri.as_ref()).into(),
@@ -24,7 +24,8 @@ pub(super) fn to_store(term: &Term) -> StoreTerm {
     }
 }
 
-/// A term of the store as ours. A number that ours can't hold, or that is none, stays a literal with its datatype.
+/// Converts a term of the store to ours. An invalid number, or one that is too large, remains a literal with its
+/// datatype.
 pub(super) fn from_store(term: &StoreTerm) -> Term {
     match term {
         StoreTerm::NamedNode(node) => Term::iri(node.as_str()),
@@ -32,7 +33,7 @@ pub(super) fn from_store(term: &StoreTerm) -> Term {
         StoreTerm::Literal(literal) => from_literal(literal),
         #[expect(
             unreachable_patterns,
-            reason = "other builds of the library know quoted triples, which we never write"
+            reason = "other builds of the library have quoted triples, which we never write"
         )]
         other => Term::string(other.to_string()),
     }

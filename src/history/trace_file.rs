@@ -1,7 +1,7 @@
-//! The file of a run: its decisions and its trace, so that it can be judged anew, drawn and replayed.
+//! The file of a run: its decisions and its trace, so that the run can be judged again, drawn and replayed.
 //!
-//! Two compressed parts, one behind the other: what facts are made of, and the course of all bodies, which only pictures and
-//! replay need.
+//! It has two compressed parts: first the data from which facts are extracted, then the motion of all bodies, which
+//! only pictures and replay need.
 
 use std::io::{Read, Write};
 
@@ -14,17 +14,18 @@ use crate::actions::{ActionTrace, Form, Frames, RobotCourse, SceneMap, Trace};
 use crate::base::Choice;
 use crate::history::frames;
 
-/// What each file begins with. The last letter is the format; it goes up whenever a type of the trace changes.
+/// Magic bytes at the start of each file. The last one is the format version; it increases whenever a type of the trace
+/// changes.
 const MAGIC: &[u8; 8] = b"actrace3";
 
-/// First part: decisions, states, actions, time between frames, names of tracks, hash. Behind it stand the map, the forms of
-/// bodies and what the robot went through. (Traces of earlier versions end before either.)
+/// First part: decisions, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies and
+/// the courses of the robot follow it. (Traces of earlier versions end before any of these.)
 type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
 
-/// A run's file as bytes.
+/// Encodes a run's file.
 ///
 /// # Errors
-/// A sentence, where a part can't be written as bytes. (None of today's types can bring that about.)
+/// A message, if a part can't be encoded. (The current types never cause this.)
 pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, String> {
     let frames = &trace.frames;
     let head = (choices, &trace.snapshots, &trace.actions, frames.period_secs, &frames.names, &trace.hash);
@@ -38,21 +39,22 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
     Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
 }
 
-/// Decisions and the whole trace.
+/// Decodes the decisions and the whole trace.
 ///
 /// # Errors
-/// A sentence that says what is damaged.
+/// A message that names the damaged part.
 pub(super) fn decode(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (head, course) = parts(bytes)?;
     let (choices, mut trace) = decode_head(head)?;
     let course = expanded(course)?;
-    let (rows, rest) = frames::decode_next(&course).ok_or("the course of the bodies can't be read")?;
+    let (rows, rest) = frames::decode_next(&course).ok_or("the motion of the bodies can't be read")?;
     trace.frames.rows = rows;
-    decode_motions(rest, &mut trace).ok_or("the course of the robot can't be read")?;
+    decode_motions(rest, &mut trace).ok_or("the motion of the robot can't be read")?;
     Ok((choices, trace))
 }
 
-/// Behind the course of the bodies: what the robot measured and was told, for each action the joints and the rows.
+/// Encodes the robot's measurements and commands, which follow the motion of the bodies: joints and rows for each
+/// action.
 fn encode_motions(trace: &Trace) -> Result<Vec<u8>, String> {
     let mut out = Vec::new();
     for course in &trace.robot_courses {
@@ -62,7 +64,7 @@ fn encode_motions(trace: &Trace) -> Result<Vec<u8>, String> {
     Ok(out)
 }
 
-/// Traces of earlier versions end before; they have none.
+/// Decodes the robot's motion. Traces of earlier versions end before it and have none.
 fn decode_motions(mut rest: &[u8], trace: &mut Trace) -> Option<()> {
     if rest.is_empty() {
         return Some(());
@@ -74,10 +76,10 @@ fn decode_motions(mut rest: &[u8], trace: &mut Trace) -> Option<()> {
     Some(())
 }
 
-/// Decisions and the trace without the rows of its frames: all that facts are made of.
+/// Decodes the decisions and the trace without the rows of its frames: everything from which facts are extracted.
 ///
 /// # Errors
-/// A sentence that says what is damaged.
+/// A message that names the damaged part.
 pub(super) fn decode_states(bytes: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     decode_head(parts(bytes)?.0)
 }
@@ -104,13 +106,13 @@ fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     ))
 }
 
-/// The next part, or an empty one where the file ends before it.
+/// The next part, or an empty one if the file ends before it.
 fn part_of<'a, T: Default + serde::Deserialize<'a>>(rest: &'a [u8]) -> Result<(T, &'a [u8]), postcard::Error> {
     if rest.is_empty() { Ok((T::default(), rest)) } else { postcard::take_from_bytes(rest) }
 }
 
 fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let rest = bytes.strip_prefix(MAGIC.as_slice()).ok_or("it is no trace of this format")?;
+    let rest = bytes.strip_prefix(MAGIC.as_slice()).ok_or("it is not a trace of this format")?;
     let (length, rest) = rest.split_first_chunk::<4>().ok_or("it ends too early")?;
     rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| "it ends too early".to_owned())
 }

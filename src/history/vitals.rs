@@ -1,4 +1,4 @@
-//! What is kept of a run that tells how healthy its campaign is.
+//! Values of a run that show the health of its campaign.
 
 use oxigraph::store::{StorageError, Store};
 
@@ -7,7 +7,7 @@ use crate::history::detail;
 use crate::history::read::Node;
 use crate::history::write_run::run_node;
 
-/// A run as one of the many that a campaign made.
+/// The values of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunVitals {
     /// Its id.
@@ -16,21 +16,22 @@ pub struct RunVitals {
     pub index: u64,
     /// Every decision, in order.
     pub choices: Vec<Choice>,
-    /// Reasons of the scenes that were discarded before its own.
+    /// Reasons why scenes were discarded before its own.
     pub discards: Vec<String>,
-    /// Whether a search chose its scene, so that it stands for others of the space more or less than for itself.
+    /// Whether a search chose its scene, so that the run has an importance weight.
     pub steered: bool,
     /// Position among the runs of its scene, from 0.
     pub repetition: u64,
     /// Unit: seconds.
     pub wall_secs: f64,
-    /// How deep two things went into each other. Unit: metres. Nothing in runs of a program that did not measure it.
+    /// Deepest penetration of two bodies. Unit: metres. `None` in runs of earlier versions, which did not measure it.
     pub deepest_penetration_m: Option<f64>,
-    /// Energy that came from nowhere. Unit: joules. Nothing in runs of a program that did not measure it.
+    /// Energy that the simulation created by error. Unit: joules. `None` in runs of earlier versions, which did not
+    /// measure it.
     pub energy_gain_j: Option<f64>,
 }
 
-/// Reads a run that is known to be there; its decisions come from its file.
+/// Reads an existing run. The caller reads its decisions from its trace file.
 pub(super) fn read(store: &Store, run: &str, choices: Vec<Choice>) -> Result<RunVitals, StorageError> {
     let node_name = run_node(run);
     let node = Node::read(store, &node_name)?;

@@ -1,4 +1,4 @@
-//! Answers of queries in the forms in which the SPARQL protocol sends them.
+//! Query answers in the formats of the SPARQL protocol.
 
 use std::io;
 
@@ -11,7 +11,7 @@ use crate::history::rdf_text::serializer;
 use crate::history::syntax_fault::syntax_fault;
 use crate::history::{Cancel, History, RdfSyntax};
 
-/// A form in which an answer is sent.
+/// A format of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WireSyntax {
     /// SPARQL 1.1 query results in JSON.
@@ -31,12 +31,12 @@ pub enum WireSyntax {
 }
 
 impl WireSyntax {
-    /// Those of `SELECT` and `ASK`, the usual one first.
+    /// Formats for `SELECT` and `ASK`, the default first.
     pub const TABLES: [Self; 4] = [Self::Json, Self::Xml, Self::Csv, Self::Tsv];
-    /// Those of `CONSTRUCT` and `DESCRIBE`, the usual one first.
+    /// Formats for `CONSTRUCT` and `DESCRIBE`, the default first.
     pub const GRAPHS: [Self; 3] = [Self::Turtle, Self::NTriples, Self::RdfXml];
 
-    /// Its media types: the one that it is sent as, then others by which it is asked for.
+    /// Its media types: first the one for responses, then others that requests may use.
     pub fn media_types(self) -> &'static [&'static str] {
         match self {
             Self::Json => &["application/sparql-results+json", "application/json"],
@@ -50,22 +50,22 @@ impl WireSyntax {
     }
 }
 
-/// Why there is no answer.
+/// The reason why a query has no answer.
 #[derive(Debug, Clone)]
 pub enum WireFault {
-    /// The text is no query.
+    /// The text is not a query.
     Malformed(Diagnostics),
-    /// It asks for what is not done here.
+    /// The query uses an unsupported feature or exceeds a limit.
     Refused(Diagnostics),
-    /// None of the forms of its answer is wanted.
+    /// The client accepts no format of the answer.
     NotAcceptable,
-    /// It failed.
+    /// The evaluation failed.
     Failed(Diagnostics),
 }
 
 impl History {
-    /// Answers a query in a form that `choose` takes from those that there are; with more rows or triples than `most_rows` it is
-    /// refused. Runs until it has the answer: who wants it to end sooner ends the process.
+    /// Answers a query in the format that `choose` selects from those available. Refuses answers with more than
+    /// `most_rows` rows or triples. Can't be cancelled: to stop it early, end the process.
     ///
     /// # Errors
     /// See [`WireFault`].
@@ -77,7 +77,7 @@ impl History {
     ) -> Result<(WireSyntax, Vec<u8>), WireFault> {
         refuse_update(text).map_err(WireFault::Refused)?;
         if let Some(span) = service(&text.text) {
-            let fault = Diagnostic::error("H017", "`SERVICE` asks another endpoint, which is not done here");
+            let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
         let prepared = evaluator(&Cancel::new())
@@ -103,8 +103,8 @@ impl History {
         written.map_err(|stop| match stop {
             Stop::TooMany => {
                 let message = format!("the answer has more than {most_rows} rows");
-                let fault =
-                    Diagnostic::error("H018", message).help("ask for less, or in parts with `LIMIT` and `OFFSET`");
+                let fault = Diagnostic::error("H018", message)
+                    .help("request less, or fetch it in parts with `LIMIT` and `OFFSET`");
                 WireFault::Refused(fault.into())
             }
             Stop::Evaluation(error) => failed(error),
@@ -113,7 +113,7 @@ impl History {
     }
 }
 
-/// Why an answer was not written to its end.
+/// The reason why an answer was not written completely.
 enum Stop {
     TooMany,
     Evaluation(QueryEvaluationError),
@@ -169,9 +169,10 @@ fn graph(triples: QueryTripleIter<'_>, syntax: WireSyntax, most_rows: u64) -> Re
     Ok(writer.finish()?)
 }
 
-/// Where the keyword `SERVICE` stands outside of texts, IRIs, names and comments.
+/// Returns the span of the keyword `SERVICE` outside of strings, IRIs, names and comments, or `None` if it does not
+/// occur.
 ///
-/// A query that hides it in escapes is not found here, and gets no answer from elsewhere either: nothing is there that could ask.
+/// It misses keywords written with escapes. They do no harm: the evaluator has no client for other endpoints.
 fn service(text: &str) -> Option<Span> {
     let bytes = text.as_bytes();
     let is_name = |byte: &u8| byte.is_ascii_alphanumeric() || *byte > 127 || b"_:-.?$@%".contains(byte);
@@ -195,7 +196,7 @@ fn service(text: &str) -> Option<Span> {
     None
 }
 
-/// Length of a text in quotes, in three of them too.
+/// Length of a string in single or triple quotes.
 fn quoted(rest: &[u8]) -> usize {
     let quote = rest[0];
     let long = rest.len() >= 3 && rest[1] == quote && rest[2] == quote;
@@ -211,7 +212,7 @@ fn quoted(rest: &[u8]) -> usize {
     rest.len()
 }
 
-/// Length of an IRI in angle brackets; of the bracket alone where it is a comparison.
+/// Length of an IRI in angle brackets, or 1 if the bracket is a comparison.
 fn iri(rest: &[u8]) -> usize {
     let end = rest[1..].iter().position(|byte| *byte <= b' ' || b"<>\"{}|^`".contains(byte));
     match end {

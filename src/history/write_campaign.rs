@@ -1,4 +1,4 @@
-//! A campaign as quads: what it was asked for, what it was judged by, how it ended.
+//! A campaign as quads: its configuration, its rules and models, and its end.
 
 use oxigraph::model::{Literal, NamedNode, Quad};
 
@@ -12,7 +12,7 @@ pub(super) fn campaign_node(id: &str) -> NamedNode {
     NamedNode::new_unchecked(format!("{}{id}", names::CAMPAIGN))
 }
 
-/// What is known before the first run.
+/// The quads that are written before the first run.
 pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
     let mut statements = Statements::default();
     let campaign = campaign_node(&record.id);
@@ -63,7 +63,7 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
     statements.quads
 }
 
-/// What is known after its last run.
+/// The quads that are written after the last run.
 pub(super) fn end(id: &str, end: &CampaignEnd) -> Vec<Quad> {
     let mut statements = Statements::default();
     let mut about = statements.about(campaign_node(id));
@@ -80,7 +80,7 @@ pub(super) fn end(id: &str, end: &CampaignEnd) -> Vec<Quad> {
     statements.quads
 }
 
-/// Everything that [`end`] can state of a campaign.
+/// All properties that [`end`] can write.
 pub(super) fn end_properties() -> Vec<NamedNode> {
     let whole = CampaignEnd {
         score: Some(0.0),
@@ -92,7 +92,7 @@ pub(super) fn end_properties() -> Vec<NamedNode> {
     end("", &whole).into_iter().map(|quad| quad.predicate).collect()
 }
 
-/// Program and version as one text.
+/// The program's name and version as one text.
 pub(super) fn program(version: &str) -> String {
     format!("actcheck {version}")
 }

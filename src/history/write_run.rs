@@ -1,4 +1,4 @@
-//! A run as quads: itself, its executions, its outcomes, and its facts in named graphs.
+//! A run as quads: the run, its executions, its outcomes, and its facts in named graphs.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub(super) fn run_node(id: &str) -> NamedNode {
     NamedNode::new_unchecked(format!("{}{id}", names::RUN))
 }
 
-/// Everything that the store keeps of a run.
+/// All quads of a run.
 pub(super) fn quads(record: &RunRecord) -> Vec<Quad> {
     let run = run_node(&record.id);
     let mut statements = Statements::default();
@@ -62,7 +62,8 @@ fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
     write_designators(&record.scene.designators, record, &mut about);
 }
 
-/// The scenes that were drawn for a run before its own: they count, whoever stops and resumes the campaign.
+/// Writes the scenes that were discarded before the run's own, so that their number survives interrupting and resuming
+/// the campaign.
 fn write_discards(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
     for (number, reason) in record.discards.iter().enumerate() {
         statements
@@ -74,7 +75,7 @@ fn write_discards(record: &RunRecord, run: &NamedNode, statements: &mut Statemen
     }
 }
 
-/// Designators: an object where the scene has one of that name, otherwise a text.
+/// Writes designators: as an object if the scene has one of that name, otherwise as a text.
 fn write_designators(designators: &BTreeMap<String, Vec<String>>, record: &RunRecord, about: &mut About<'_>) {
     for (designator, values) in designators {
         let property = names::act(designator);
@@ -128,7 +129,7 @@ fn end_word(end: &ActionEnd) -> &'static str {
     }
 }
 
-/// What there is to say of how an action ended: why it did not complete, or its own words.
+/// The message of an action: why it did not complete, or the message of its report.
 fn message(action: &ActionTrace) -> Option<&str> {
     match &action.end {
         ActionEnd::Broken(reason) | ActionEnd::Timeout(reason) | ActionEnd::Cut(reason) => Some(reason),
@@ -136,7 +137,7 @@ fn message(action: &ActionTrace) -> Option<&str> {
     }
 }
 
-/// States a judgement with the two nodes that it gets: the assertion and its result.
+/// Writes a judgement as two nodes: the assertion and its result.
 pub(super) fn write_assertion(
     judgement: &Judgement,
     execution: &NamedNode,
@@ -160,7 +161,7 @@ pub(super) fn write_assertion(
         .may("act:heldBefore", judgement.held_before.map(Literal::from));
 }
 
-/// A blank node that is the same whenever the same is written.
+/// A blank node whose label depends only on the texts.
 pub(super) fn unique(texts: &[&str]) -> BlankNode {
     let mut digest = Digest::new();
     for text in texts {

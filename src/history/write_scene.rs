@@ -1,4 +1,4 @@
-//! A scene as quads: each object as it was placed, and what became of it.
+//! A scene as quads: each object with its initial pose and its later displacement.
 
 use oxigraph::model::{Literal, NamedNode};
 
@@ -8,7 +8,7 @@ use crate::history::RunRecord;
 use crate::history::statements::{Statements, iri};
 use crate::scenario::{Role, Scene, SceneObject};
 
-/// Local names of the terms for what makes sensing wrong, in the order of [`noise`].
+/// Local names of the terms for sensing errors, in the order of [`noise`].
 pub const NOISE_TERMS: [&str; 13] = [
     "positionNoise",
     "heightNoise",
@@ -25,8 +25,8 @@ pub const NOISE_TERMS: [&str; 13] = [
     "landmarkHeadingNoise",
 ];
 
-/// What makes sensing wrong in a scene, standard deviations for the most part, by local name of their terms. Units: those of the
-/// terms.
+/// Returns the sensing errors of a scene, most of them standard deviations, with the local names of their terms. Units:
+/// those of the terms.
 pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
     let sensing = &scene.sensing;
     let odometry = &sensing.odometry;
@@ -48,7 +48,7 @@ pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
     std::array::from_fn(|idx| (NOISE_TERMS[idx], values[idx]))
 }
 
-/// States the scene of a run: on the run's node what belongs to the whole, and one node for each object.
+/// Writes the scene of a run: values of the whole scene on the run's node, and one node for each object.
 pub(super) fn write(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
     let scene = &record.scene;
     let standing = scene.objects.iter().filter(|object| object.role != Role::Platform).count();
@@ -108,7 +108,7 @@ fn scene_base(record: &RunRecord) -> [f64; 3] {
     record.scene.robot.base
 }
 
-/// Horizontal distance of an object from the nearest of some others.
+/// Horizontal distance from an object to the nearest other object that satisfies `among`.
 fn nearest(scene: &Scene, object: &SceneObject, among: impl Fn(&SceneObject) -> bool) -> Option<Literal> {
     let [x, y, _] = object.pose.position;
     scene

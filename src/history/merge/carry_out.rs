@@ -1,4 +1,4 @@
-//! Writes what was planned: a campaign's statements, then its runs, each whole, then its end.
+//! Carries out a plan: writes each campaign's statements, then its runs, each in one transaction, then its end.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,23 +16,24 @@ use crate::history::write_campaign::{self, campaign_node};
 use crate::history::write_run::run_node;
 use crate::history::{History, fault};
 
-/// What was written.
+/// The result of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Merged {
-    /// Runs that were added.
+    /// Number of added runs.
     pub runs: u64,
-    /// Runs whose traces their histories had lost: what the store says of them is there.
+    /// Runs whose traces were already missing in their histories: only their data from the store was merged.
     pub without_trace: Vec<String>,
-    /// Whether somebody asked for the end before all was written.
+    /// Whether the merge was stopped before everything was written.
     pub interrupted: bool,
 }
 
-/// Brings what was planned into a history, and tells `on_run` of each run that is added.
+/// Writes a plan into a history, and calls `on_run` after each added run.
 ///
-/// Whatever ends it early, the destination is whole: a campaign that is not complete has no end yet, and merging again completes it.
+/// If it ends early, the destination is consistent: an incomplete campaign has no end yet, and merging again completes
+/// it.
 ///
 /// # Errors
-/// A history can't be read, or the destination not be written.
+/// A history can't be read, or the destination can't be written.
 pub fn carry_out(
     plan: &MergePlan,
     sources: &[History],
@@ -77,7 +78,7 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// What is said of a campaign, without its end: whoever looks at it now finds it unfinished.
+    /// Writes the statements about a campaign without its end, so that readers see it as unfinished.
     fn begin(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
         let work = &campaign.work;
         let node = campaign_node(&campaign.id);
@@ -95,7 +96,7 @@ impl Writer<'_> {
         self.write(&quads, &ends)
     }
 
-    /// What a history says of a campaign that the destination lacks, without its times.
+    /// A source's statements about a campaign that the destination lacks, without its start and end.
     fn statements(&self, campaign: &PlannedMerge, place: usize, id: &str) -> Result<Vec<Quad>, Diagnostics> {
         let [start, path, first] = ["prov:startedAtTime", "act:configPath", "act:firstId"].map(iri);
         let mut quads = self.about(place, &campaign_node(id))?;
@@ -124,7 +125,7 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// Only what was judged later: the rest is there.
+    /// Copies only later judgements: the destination has the rest of the run.
     fn judgements(&self, place: usize, run: &str) -> Result<(), Diagnostics> {
         let later = GraphName::from(iri("act:rechecked"));
         let mut quads = self.about(place, &run_node(run))?;
@@ -146,7 +147,7 @@ impl Writer<'_> {
         self.into.flush()
     }
 
-    /// All that a history says of a campaign or run, as the destination calls it.
+    /// All statements of a source about a campaign or run, with the ids of the destination.
     fn about(&self, place: usize, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
         let source = &self.sources[place];
         let quads = about(&source.store()?, node).map_err(|error| source.fault("reading it", &error))?;
@@ -160,12 +161,12 @@ impl Writer<'_> {
         ends.map_err(|error| self.into.fault("reading a campaign", &error))
     }
 
-    /// In one transaction.
+    /// Adds and removes quads in one transaction.
     fn write(&self, new: &[Quad], old: &[Quad]) -> Result<(), Diagnostics> {
         if new.is_empty() && old.is_empty() {
             return Ok(());
         }
-        replace(&self.into.store()?, new, old).map_err(|error| self.into.fault("writing what is merged", &error))
+        replace(&self.into.store()?, new, old).map_err(|error| self.into.fault("writing merged data", &error))
     }
 }
 
@@ -180,27 +181,27 @@ fn replace(store: &Store, new: &[Quad], old: &[Quad]) -> Result<(), StorageError
     transaction.commit()
 }
 
-/// Whether a quad about a campaign says how it ended.
+/// Whether a quad about a campaign describes its end.
 fn is_end(quad: &Quad) -> bool {
     write_campaign::end_properties().contains(&quad.predicate)
 }
 
-/// A path that is seen from one folder, as it is seen from another; as it is where nothing lies there.
+/// Converts a path relative to one folder into a path relative to another. Returns it unchanged if the file does not
+/// exist.
 fn moved(path: &str, from: &Path, to: &Path) -> String {
     let absolute = std::fs::canonicalize(from.join(path)).ok();
     let seen = absolute.zip(std::fs::canonicalize(to).ok()).and_then(|(path, to)| pathdiff::diff_paths(path, to));
     seen.map_or_else(|| path.to_owned(), |path| path.display().to_string())
 }
 
-/// What a merge came to lack, as a warning.
 impl Merged {
-    /// The runs whose traces were lost before.
+    /// Returns a warning about runs whose traces were already missing, or `None` if no trace is missing.
     pub fn warning(&self) -> Option<Diagnostic> {
         let first = self.without_trace.first()?;
-        let message = format!("{} runs have lost their traces before, the first is {first}", self.without_trace.len());
+        let message = format!("{} runs had no trace before the merge, the first is {first}", self.without_trace.len());
         Some(
             Diagnostic::warning("H009", message)
-                .help("their outcomes and facts are there; replay and recheck need traces"),
+                .help("their outcomes and facts were merged; replay and recheck need traces"),
         )
     }
 }

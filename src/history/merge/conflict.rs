@@ -1,4 +1,4 @@
-//! What can't be joined, in words: each fault names the campaigns and the way out.
+//! Conflicts of a merge: each fault names the campaigns and how to resolve it.
 
 use std::collections::BTreeSet;
 
@@ -6,10 +6,10 @@ use crate::base::Diagnostic;
 use crate::history::CampaignRecord;
 use crate::history::merge::survey::Found;
 
-/// Run numbers told in one message.
+/// Maximum number of run numbers in one message.
 const TOLD: usize = 8;
 
-/// Run numbers of indices.
+/// Lists the run numbers of indices.
 pub(super) fn numbers(indices: &[u64]) -> String {
     let mut text = indices.iter().take(TOLD).map(|index| (index + 1).to_string()).collect::<Vec<_>>().join(", ");
     if indices.len() > TOLD {
@@ -18,25 +18,25 @@ pub(super) fn numbers(indices: &[u64]) -> String {
     text
 }
 
-/// The same run of one campaign went two ways.
+/// H020: the same run of one campaign has two different results.
 pub(super) fn other_results(first: &Found, second: &Found, indices: &[u64]) -> Diagnostic {
     let message = format!(
-        "`{}` and `{}` are of one campaign, and differ in trace or outcomes of {}: {}",
+        "`{}` and `{}` belong to one campaign, but differ in trace or outcomes of {}: {}",
         first.name(),
         second.name(),
         if indices.len() == 1 { "a run".to_owned() } else { format!("{} runs", indices.len()) },
         numbers(indices)
     );
     Diagnostic::error("H020", message).help(format!(
-        "something changed between them that their records don't tell, such as the program; leave one out: `--leave-out {}`",
+        "something changed between them that is not in their records, such as the program; leave one out: `--leave-out {}`",
         second.name()
     ))
 }
 
-/// Parts that were asked for alike and made with different things.
+/// H021: parts of one campaign were made with different programs, rules or models.
 pub(super) fn other_ingredients(first: &Found, second: &Found) -> Diagnostic {
     let message = format!(
-        "`{}` and `{}` are parts of one campaign, and were made with different things: {}",
+        "`{}` and `{}` are parts of one campaign, but were made with different versions of: {}",
         first.name(),
         second.name(),
         differences(&first.record, &second.record).join(", ")
@@ -45,7 +45,7 @@ pub(super) fn other_ingredients(first: &Found, second: &Found) -> Diagnostic {
         .help(format!("run the part again, or leave one out: `--leave-out {}`", second.name()))
 }
 
-/// Names of what two campaigns were not made with alike.
+/// Names the program, ontology, models and rules in which two campaigns differ.
 fn differences(first: &CampaignRecord, second: &CampaignRecord) -> Vec<String> {
     let mut found = Vec::new();
     let program = |record: &CampaignRecord| format!("{} {}", record.program_version, record.program_digest);
@@ -70,10 +70,10 @@ fn differences(first: &CampaignRecord, second: &CampaignRecord) -> Vec<String> {
     found
 }
 
-/// Two campaigns have one id.
+/// H022: two campaigns have the same id.
 pub(super) fn id_taken(first: &Found, second: &Found) -> Diagnostic {
     let message = format!(
-        "`{}` (started {}) and `{}` (started {}) are two campaigns with one id",
+        "`{}` (started {}) and `{}` (started {}) are two campaigns with the same id",
         first.name(),
         first.record.started,
         second.name(),
@@ -85,24 +85,24 @@ pub(super) fn id_taken(first: &Found, second: &Found) -> Diagnostic {
     ))
 }
 
-/// The destination holds several parts, which can't be joined in place.
+/// H023: the destination holds several parts of one campaign, which can't be merged in place.
 pub(super) fn parts_in_place(members: &[&Found]) -> Diagnostic {
     let names: Vec<String> = members.iter().map(|found| format!("`{}`", found.record.id)).collect();
     let message = format!("{} of `{}` are parts of one campaign", names.join(" and "), members[0].dir);
     Diagnostic::error("H023", message)
-        .help("what a history holds is not changed: name a new folder with `--into`, and this one among those to merge")
+        .help("campaigns in the destination are not changed: name a new folder with `--into`, and add this one to the histories to merge")
 }
 
-/// A run was judged later in both places, and not alike.
+/// H024: a run was rechecked in both histories with different results.
 pub(super) fn other_judgements(first: &Found, second: &Found, indices: &[u64]) -> Diagnostic {
     let message = format!(
-        "`{}` and `{}` were both rechecked, and not alike: runs {}",
+        "`{}` and `{}` were both rechecked, with different results: runs {}",
         first.name(),
         second.name(),
         numbers(indices)
     );
     Diagnostic::error("H024", message).help(format!(
-        "which judgement is the newest can't be told; leave one out (`--leave-out {}`) and `actcheck recheck` the result",
+        "the newest judgement can't be determined; leave one out (`--leave-out {}`) and `actcheck recheck` the result",
         second.name()
     ))
 }

@@ -1,14 +1,14 @@
-//! All that a store says of one campaign or run.
+//! Copies all statements about one campaign or run.
 
 use std::collections::BTreeSet;
 
 use oxigraph::model::{GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term, TermRef};
 use oxigraph::store::{StorageError, Store};
 
-/// Every quad about a node, about what is named below it, about the blank nodes that either is tied to, and in the graphs that are
-/// named below it.
+/// Returns every quad about a node, about the nodes below its IRI, about blank nodes connected to either, and in the
+/// named graphs below its IRI.
 ///
-/// What a run is made of is nowhere listed, so that whatever a later program keeps of it comes along too.
+/// The properties of a run are not listed anywhere, so that data added by later versions is copied too.
 pub(super) fn about(store: &Store, root: &NamedNode) -> Result<Vec<Quad>, StorageError> {
     let below = format!("{}/", root.as_str());
     let belongs = |node: &NamedOrBlankNode| match node {

@@ -1,9 +1,9 @@
-//! Several histories as one: campaigns that are parts of a whole become it, and what is met twice is kept once.
+//! Merges several histories into one: parts of a campaign become one campaign, and duplicates are kept once.
 //!
-//! First everything is read and checked ([`plan`]); only what has no conflict is then written ([`carry_out`]), each campaign so
-//! that whoever ends the program at any moment leaves a history that the same command completes.
+//! [`plan`] first reads and checks everything; [`carry_out`] then writes it if there is no conflict. If the program is
+//! ended at any moment, the same command completes the history.
 //!
-//! Never: writes before all is checked, changes a history that is merged from, or decides between two results.
+//! Never: writes before everything is checked, changes a source history, or chooses between two results.
 
 mod carry_out;
 mod conflict;

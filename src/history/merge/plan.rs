@@ -1,4 +1,4 @@
-//! What will be in the destination, checked against everything that is known.
+//! Plans the content of the destination, and checks it for conflicts.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,21 +10,21 @@ use crate::history::store::campaign_id;
 use crate::history::{CampaignEnd, History, RunStatus};
 use crate::verdict::{Counts, Outcome, mean};
 
-/// How histories are merged.
+/// Options of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct MergeOptions {
-    /// A campaign whose id another one has gets a new one. Without, that is a fault.
+    /// Whether a campaign gets a new id if another one has its id. If `false`, the duplicate id is a fault.
     pub rename: bool,
-    /// Campaigns that are left out: `ID`, or `DIR#ID`.
+    /// Campaigns to leave out: `ID`, or `DIR#ID`.
     pub leave_out: Vec<String>,
 }
 
-/// What is to be written, without a conflict.
+/// A merge without conflicts, ready to be written.
 #[derive(Debug, Clone)]
 pub struct MergePlan {
-    /// By start, then by id.
+    /// Sorted by start, then by id.
     pub campaigns: Vec<PlannedMerge>,
-    /// New ids of campaigns, by history and old id; those that keep theirs too.
+    /// New ids of campaigns by history and old id, including unchanged ids.
     pub(super) ids: BTreeMap<(usize, String), String>,
 }
 
@@ -35,53 +35,53 @@ pub struct PlannedMerge {
     pub id: String,
     /// Name of its configuration.
     pub name: String,
-    /// What it is made from: `DIR#ID`.
+    /// Its sources: `DIR#ID`.
     pub from: Vec<String>,
-    /// Whether it is made of parts.
+    /// Whether it consists of parts.
     pub joined: bool,
-    /// Runs that it will have.
+    /// Number of runs after the merge.
     pub runs: u64,
-    /// Runs that the destination does not have yet.
+    /// Number of runs that the destination does not have yet.
     pub added: u64,
-    /// How many runs were asked for.
+    /// Number of planned runs.
     pub planned: u64,
-    /// Indices of the runs that no part has; empty for a campaign that was run as a whole.
+    /// Indices of the runs that no part has; empty if the campaign was run as a whole.
     pub missing: Vec<u64>,
     pub(super) work: Work,
 }
 
-/// What has to be written for a campaign.
+/// The writes for one campaign.
 #[derive(Debug, Clone)]
 pub(super) struct Work {
-    /// History and id there of the campaign whose statements are taken; nothing: the destination's own.
+    /// Source history and id of the campaign whose statements are copied; `None` if the destination has them.
     pub(super) statements: Option<(usize, String)>,
-    /// Parts that the destination's campaign does not say yet.
+    /// Parts that the destination's campaign does not list yet.
     pub(super) shards: Vec<String>,
-    /// When the first part began; nothing where it stays as it is.
+    /// Start of the first part; `None` if the start does not change.
     pub(super) started: Option<String>,
-    /// History and id there of the runs to copy, by index.
+    /// Source history and id of each run to copy, by index.
     pub(super) runs: BTreeMap<u64, (usize, String)>,
-    /// The same for runs of which only later judgements are new.
+    /// Source history and id of each run of which only later judgements are new, by index.
     pub(super) judgements: BTreeMap<u64, (usize, String)>,
     pub(super) end: PlannedEnd,
 }
 
-/// How the campaign's end is written.
+/// The end of a campaign.
 #[derive(Debug, Clone)]
 pub(super) enum PlannedEnd {
-    /// It stays as it is, or there is none.
+    /// Unchanged, or missing.
     Same,
-    /// As in a history under an id.
+    /// Copied from a source history and id.
     Of(usize, String),
     /// Computed from the parts.
     Computed(Box<CampaignEnd>),
 }
 
-/// Reads all histories and says what merging them into another would give. Nothing is written.
+/// Reads all histories and plans their merge into another one. Writes nothing.
 ///
 /// # Errors
-/// `H020` results differ, `H021` parts were made with different things, `H022` an id is taken, `H023` parts lie in the destination,
-/// `H024` later judgements differ, `H025` what is to be left out is not there; all of them at once.
+/// `H020` results differ, `H021` parts were made differently, `H022` an id is taken, `H023` parts are in the
+/// destination, `H024` later judgements differ, `H025` a campaign to leave out does not exist; all faults at once.
 pub fn plan(sources: &[History], into: Option<&History>, options: &MergeOptions) -> Result<MergePlan, Diagnostics> {
     let mut found = Vec::new();
     for (place, source) in sources.iter().enumerate() {
@@ -104,7 +104,7 @@ pub fn plan(sources: &[History], into: Option<&History>, options: &MergeOptions)
     Ok(MergePlan { ids: new_ids(&groups, &campaigns), campaigns })
 }
 
-/// Leaves out the campaigns that the user named.
+/// Removes the campaigns to leave out.
 fn without(found: Vec<Found>, names: &[String]) -> Result<Vec<Found>, Diagnostics> {
     let known: Vec<String> = found.iter().flat_map(|found| [found.record.id.clone(), found.name()]).collect();
     let mut faults = Diagnostics::new();
@@ -116,7 +116,8 @@ fn without(found: Vec<Found>, names: &[String]) -> Result<Vec<Found>, Diagnostic
     faults.or(kept.collect())
 }
 
-/// Parts that were asked for alike have to be made with the same things.
+/// Checks that parts with the same configuration, seed and number of runs were made with the same program, ontology,
+/// rules and models.
 fn check_parts(all: &[Found]) -> Diagnostics {
     let mut first_of: BTreeMap<(&str, u64, u64), &Found> = BTreeMap::new();
     let mut faults = Diagnostics::new();
@@ -130,12 +131,12 @@ fn check_parts(all: &[Found]) -> Diagnostics {
     faults
 }
 
-/// What makes two campaigns the same one.
+/// The identity of a campaign: equal for copies and parts of the same one.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Identity {
-    /// Parts of the same whole.
+    /// Part of the campaign with this digest.
     Parts(String),
-    /// The same campaign, or the same regression of a project, which each of its histories has.
+    /// A whole campaign, or a regression of a project, which occurs in each of the project's histories.
     Whole { first_id: String, whole: String, content: Option<String> },
 }
 
@@ -146,12 +147,12 @@ fn identity(found: &Found) -> Identity {
     Identity::Whole {
         first_id: found.first_id.clone(),
         whole: found.whole(),
-        // Shrinking gives the same id to small runs of several parts.
+        // Shrunk runs of several parts can have the same id.
         content: found.shrunk.then(|| found.runs.values().map(|run| run.content.as_str()).collect()),
     }
 }
 
-/// Campaigns that are the same one; the destination's first, then by start, id and folder.
+/// Groups campaigns by identity; those of the destination first, then by start, id and folder.
 fn groups(all: &[Found]) -> Vec<Vec<&Found>> {
     let mut groups: BTreeMap<Identity, Vec<&Found>> = BTreeMap::new();
     for found in all {
@@ -193,7 +194,7 @@ fn check_group(group: &[&Found], faults: &mut Diagnostics) {
     }
 }
 
-/// An id for each group: its own where that is free.
+/// Chooses an id for each group: its own if that is free.
 fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) -> Vec<String> {
     let everywhere: BTreeSet<&str> = groups.iter().flatten().map(|found| found.record.id.as_str()).collect();
     let mut taken: BTreeMap<String, &Found> = BTreeMap::new();
@@ -203,7 +204,7 @@ fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) ->
         let id = match taken.get(&found.record.id) {
             None => found.record.id.clone(),
             Some(first) => {
-                // Nobody chose the ids of shrunk runs, and parts that were shrunk apart come to the same ones.
+                // Shrunk runs may be renamed freely: parts that were shrunk separately get the same ids.
                 if !rename && !found.shrunk && !asked_alike(first, found) {
                     faults.push(conflict::id_taken(first, found));
                 }
@@ -216,7 +217,7 @@ fn choose_ids(groups: &[Vec<&Found>], rename: bool, faults: &mut Diagnostics) ->
     ids
 }
 
-/// Whether two parts belong to what should be one campaign: then it was told why it is not.
+/// Whether two parts should be one campaign. If they are not, H021 has already been reported.
 fn asked_alike(first: &Found, second: &Found) -> bool {
     let asked = |found: &Found| (found.record.config_digest.clone(), found.record.seed, found.record.planned_runs);
     let parts = |found: &Found| !found.record.shards.is_empty();
@@ -243,10 +244,10 @@ fn started(group: &[&Found]) -> String {
     group.iter().map(|found| found.record.started.clone()).min().unwrap_or_default()
 }
 
-/// A run and where it is.
+/// A run with its campaign.
 type Copy<'a> = (&'a Found, &'a FoundRun);
 
-/// What becomes of a group.
+/// Plans the merge of a group.
 fn planned(group: &[&Found], id: String) -> PlannedMerge {
     let own = group.iter().copied().find(|found| found.place.is_none());
     let first = group[0];
@@ -281,10 +282,11 @@ fn planned(group: &[&Found], id: String) -> PlannedMerge {
     }
 }
 
-/// Of each run the copy that was judged last, then the one that was made first: whatever the order of the histories.
+/// Chooses a copy of each run: the one with the most later judgements, then the one that started first. The order of
+/// histories does not matter.
 fn best_copies<'a>(group: &[&'a Found]) -> BTreeMap<u64, Copy<'a>> {
     let mut best: BTreeMap<u64, Copy<'a>> = BTreeMap::new();
-    // The destination's is the first of all, and stays where another is no better.
+    // The destination's copy comes first, and is kept unless another is better.
     for found in group {
         for (index, run) in &found.runs {
             let rank = |run: &FoundRun| (Reverse(run.later.len()), run.row.started.clone());
@@ -297,13 +299,13 @@ fn best_copies<'a>(group: &[&'a Found]) -> BTreeMap<u64, Copy<'a>> {
     best
 }
 
-/// History and id there of the runs that are to be taken from one.
+/// Source history and id of each wanted run, by index. Excludes runs of the destination.
 fn copies(best: &BTreeMap<u64, Copy<'_>>, wanted: impl Fn(u64, &FoundRun) -> bool) -> BTreeMap<u64, (usize, String)> {
     let wanted = best.iter().filter(|(index, (_, run))| wanted(**index, run));
     wanted.filter_map(|(index, (found, run))| Some((*index, (found.place?, run.row.run.clone())))).collect()
 }
 
-/// Parts of the group that the destination's campaign does not say yet.
+/// Parts of the group that the destination's campaign does not list yet.
 fn new_shards(group: &[&Found], own: Option<&Found>) -> Vec<String> {
     let of = |found: &Found| found.record.shards.iter().copied().collect::<BTreeSet<Shard>>();
     let said = own.map(of).unwrap_or_default();
@@ -311,18 +313,18 @@ fn new_shards(group: &[&Found], own: Option<&Found>) -> Vec<String> {
     all.difference(&said).map(ToString::to_string).collect()
 }
 
-/// The end of the copy that came farthest.
+/// The end of the most complete copy.
 fn end_of_copies(group: &[&Found]) -> PlannedEnd {
     let rank =
         |found: &&&Found| (found.runs.len(), found.row.ended.is_some(), !found.row.interrupted, found.place.is_none());
-    // Of equals the first.
+    // Among equals, the first wins.
     match group.iter().rev().max_by_key(rank) {
         Some(found) => found.place.map_or(PlannedEnd::Same, |place| PlannedEnd::Of(place, found.record.id.clone())),
         None => PlannedEnd::Same,
     }
 }
 
-/// The end of all parts together, as the whole campaign would have written it.
+/// The end of all parts together, as a run of the whole campaign would have written it.
 fn end_of_parts(group: &[&Found], best: &BTreeMap<u64, Copy<'_>>, missing: &[u64], more: bool) -> PlannedEnd {
     let own = group.iter().find(|found| found.place.is_none());
     let Some(ended) = group.iter().filter_map(|found| found.row.ended.clone()).max() else { return PlannedEnd::Same };

@@ -1,4 +1,4 @@
-//! New ids for campaigns, and with them for their runs and all that is named after these.
+//! Renames campaigns, and with them their runs and all nodes below them.
 
 use std::collections::BTreeMap;
 
@@ -9,26 +9,26 @@ use crate::history::read::text_of;
 use crate::history::statements::iri;
 use crate::history::write_run::unique;
 
-/// How the campaigns of one history are called in another.
+/// New ids of the campaigns of one history.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Renames {
     new_ids: BTreeMap<String, String>,
 }
 
 impl Renames {
-    /// From pairs of an old and a new id.
+    /// Creates renames from pairs of an old and a new id.
     pub(super) fn new(pairs: impl IntoIterator<Item = (String, String)>) -> Self {
         Self { new_ids: pairs.into_iter().filter(|(old, new)| old != new).collect() }
     }
 
-    /// The new id of a run.
+    /// Returns the new id of a run.
     pub(super) fn run(&self, id: &str) -> String {
         let renamed =
             id.rsplit_once('-').and_then(|(old, number)| Some(format!("{}-{number}", self.new_ids.get(old)?)));
         renamed.unwrap_or_else(|| id.to_owned())
     }
 
-    /// An IRI, renamed where it is of a campaign or run or below one.
+    /// Renames the IRI of a campaign or run, or of a node below one. Returns other IRIs unchanged.
     fn iri(&self, text: &str) -> String {
         let of = |namespace: &str, new: &dyn Fn(&str) -> Option<String>| {
             let rest = text.strip_prefix(namespace)?;
@@ -40,7 +40,7 @@ impl Renames {
             .unwrap_or_else(|| text.to_owned())
     }
 
-    /// The quads of a run or of a campaign as they would be if it had been made under its new id.
+    /// Renames the quads of a run or campaign, as if it had been created with its new id.
     pub(super) fn apply(&self, quads: Vec<Quad>) -> Vec<Quad> {
         if self.new_ids.is_empty() {
             return quads;
@@ -68,7 +68,7 @@ impl Renames {
         Quad::new(subject, quad.predicate.clone(), object, graph)
     }
 
-    /// A campaign's label may end in the id of the run that was shrunk.
+    /// Renames a campaign's label, which may end in the id of a shrunk run.
     fn label(&self, literal: &Literal) -> Literal {
         match literal.value().rsplit_once(' ') {
             Some((words, run)) => Literal::new_simple_literal(format!("{words} {}", self.run(run))),
@@ -77,13 +77,13 @@ impl Renames {
     }
 }
 
-/// Labels of the blank nodes of a run: digests of what they are about, so that they change with its id.
+/// New labels of the blank nodes of a run. Labels are digests that include the run's id, so they change with it.
 #[derive(Default)]
 struct Labels {
     new: BTreeMap<String, BlankNode>,
 }
 
-/// What the label of an assertion is made of.
+/// The inputs of an assertion's label.
 #[derive(Default)]
 struct Assertion {
     execution: String,
@@ -113,7 +113,8 @@ impl Labels {
         }
         assertions.retain(|_, assertion| !assertion.execution.is_empty());
         let mut labels = Self::default();
-        // Each names the one before it, which therefore comes first; what is in a circle is damaged and keeps its label.
+        // An assertion's label depends on the one it supersedes, which must come first. Cycles are corrupt and keep
+        // their labels.
         loop {
             let ready: Vec<String> = assertions
                 .iter()
@@ -136,7 +137,7 @@ impl Labels {
         }
     }
 
-    /// As the writers of outcomes and of later judgements label them.
+    /// Computes labels in the same way as the writers of outcomes and later judgements.
     fn add(&mut self, label: String, assertion: Assertion) {
         let Assertion { execution, property, at, supersedes, result } = assertion;
         let [own, of_result] = match &at {

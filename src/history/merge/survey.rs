@@ -1,4 +1,4 @@
-//! What a history holds, as far as merging has to know it.
+//! The content of a history, as far as merging needs it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,17 +12,17 @@ use crate::verdict::Counts;
 /// A campaign of one of the histories.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
-    /// Position of its history among those that are merged; nothing: it is in the destination.
+    /// Index of its history among the sources; `None` if it is in the destination.
     pub(super) place: Option<usize>,
-    /// The folder of its history, as it was given.
+    /// The folder of its history, as the caller gave it.
     pub(super) dir: String,
     pub(super) record: CampaignRecord,
     pub(super) row: CampaignRow,
-    /// Id that it had where it was run.
+    /// Id that it had when it was run.
     pub(super) first_id: String,
-    /// Whether it holds the smaller form of a run.
+    /// Whether it holds a shrunk run.
     pub(super) shrunk: bool,
-    /// By index.
+    /// Its runs by index.
     pub(super) runs: BTreeMap<u64, FoundRun>,
 }
 
@@ -30,16 +30,16 @@ pub(super) struct Found {
 #[derive(Debug, Clone)]
 pub(super) struct FoundRun {
     pub(super) row: RunRow,
-    /// Digest over everything that must be the same wherever it is made.
+    /// Digest over everything that must be the same on every machine.
     pub(super) content: String,
     pub(super) counts: Counts,
     pub(super) discards: u64,
-    /// The judgements that were made later.
+    /// The judgements made after the run.
     pub(super) later: BTreeSet<String>,
 }
 
 impl Found {
-    /// As it is called in messages.
+    /// Its name in messages: `DIR#ID`.
     pub(super) fn name(&self) -> String {
         format!("{}#{}", self.dir, self.record.id)
     }
@@ -127,7 +127,7 @@ fn runs(
     Ok(runs)
 }
 
-/// Times and ids are left out.
+/// Digest of a run and its outcomes, without times and ids.
 fn content(row: &RunRow, outcomes: &[OutcomeRow]) -> String {
     let mut digest = Digest::new();
     for text in [&row.test, row.status.word(), &row.trace_hash] {
