@@ -58,11 +58,7 @@ fn an_exported_run_goes_the_same_way_inside_the_project_and_anywhere() {
     let (code, case) = run_case(machine.path(), "case.toml");
     assert_eq!((code, &case["same_trace"]), (Some(1), &true.into()), "{case:#}");
     let output = actcheck(machine.path(), &["run", "case.toml"]);
-    assert!(
-        stdout(&output).contains("still fails as recorded: NoGraspCollisions; same trace"),
-        "{}",
-        stdout(&output)
-    );
+    assert!(stdout(&output).contains("still fails as recorded: NoGraspCollisions; same trace"), "{}", stdout(&output));
     // The run of a case is a run like any other: it can be replayed and exported once more.
     let again = case["run"].as_str().unwrap();
     let replayed = actcheck(machine.path(), &["replay", again, "--history", "h2"]);

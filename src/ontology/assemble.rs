@@ -12,12 +12,13 @@ use crate::ontology::{check, read, rule_files};
 
 /// Loads an ontology with its imports and linked rule files.
 ///
-/// Accepts Turtle and RDF/XML, distinguished by file extension or content. Relative file IRIs become machine-independent IRIs.
+/// Accepts Turtle and RDF/XML, distinguished by file extension or content. Relative file IRIs become
+/// machine-independent IRIs.
 ///
 /// # Errors
-/// Reports all faults at once: a file can't be read or parsed (O001 to O003), a success property is not a property (O004), a
-/// property has no rule or several (O005, O006), a parameter is missing or unknown (O007, O008), a rule file is missing, has an
-/// unknown extension or an absolute path (O009 to O011), or the ontology has no action (O012).
+/// Reports all faults at once: a file can't be read or parsed (O001 to O003), a success property is not a property
+/// (O004), a property has no rule or several (O005, O006), a parameter is missing or unknown (O007, O008), a rule file
+/// is missing, has an unknown extension or an absolute path (O009 to O011), or the ontology has no action (O012).
 pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     let mut found = Diagnostics::new();
     let graph = Graph::new(read::read(files, path, &mut found));
@@ -73,8 +74,9 @@ fn libraries(graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
             && let Some((source, span)) = &library.linked_at
         {
             let message = format!("the rule library `{}` is not Datalog", library.path);
-            found
-                .push(Diagnostic::error("O010", message).at(source, span.clone()).help("rule libraries must end in `.rls`"));
+            found.push(
+                Diagnostic::error("O010", message).at(source, span.clone()).help("rule libraries must end in `.rls`"),
+            );
         }
         libraries.insert((library.path.clone(), Arc::clone(&library.source.name)), library);
     }

@@ -4,8 +4,8 @@ use crate::base::names;
 use crate::ontology::Ontology;
 
 impl Ontology {
-    /// Returns the IRI of the class whose label or local name matches the longest suffix of the name's words. Digits are
-    /// ignored: `coke_can_2` is a can, `CoffeeTable` a coffee table. Returns `None` if no class matches.
+    /// Returns the IRI of the class whose label or local name matches the longest suffix of the name's words. Digits
+    /// are ignored: `coke_can_2` is a can, `CoffeeTable` a coffee table. Returns `None` if no class matches.
     pub fn class_called(&self, name: &str) -> Option<&str> {
         let words = words(name);
         (0..words.len()).find_map(|start| {

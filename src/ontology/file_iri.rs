@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 /// Prefix of file IRIs. They contain the path relative to the ontology's folder, never an absolute path.
 const FILE: &str = "https://w3id.org/actcheck/file/";
-/// Placeholder for a parent folder. [`LEVELS`] of them precede the ontology's folder, enough for any sensible `../../…`.
+/// Placeholder for a parent folder. [`LEVELS`] of them precede the ontology's folder, enough for any sensible
+/// `../../…`.
 const ABOVE: &str = "~above~/";
 const LEVELS: usize = 12;
 /// The ontology's own folder.

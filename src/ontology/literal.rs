@@ -63,7 +63,8 @@ fn double(text: &str) -> Option<f64> {
     }
 }
 
-/// Normalises a decimal: `+01.50` becomes `1.5`, `2` and `2.` become `2.0`. Returns `None` if the text is not a decimal.
+/// Normalises a decimal: `+01.50` becomes `1.5`, `2` and `2.` become `2.0`. Returns `None` if the text is not a
+/// decimal.
 fn canonical_decimal(text: &str) -> Option<String> {
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),

@@ -58,8 +58,8 @@ struct Waiting {
     importer: Option<(usize, Span)>,
 }
 
-/// Reads a file and its imports, each once. Follows relative paths and [`SHIPPED`], the embedded ontology. Ignores all other
-/// imports: nothing is downloaded.
+/// Reads a file and its imports, each once. Follows relative paths and [`SHIPPED`], the embedded ontology. Ignores all
+/// other imports: nothing is downloaded.
 pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Reading {
     let mut reading = Reading::default();
     let home = Home { files: files.clone(), folder: root.parent().unwrap_or(Path::new("")).to_path_buf() };

@@ -10,8 +10,8 @@ use crate::ontology::{RuleFile, RuleLanguage};
 
 /// Reads the rule file that a statement's object names: an IRI or a string with a path relative to the ontology file.
 ///
-/// Returns `None` and adds a fault if the path is not relative (O011), its extension is unknown (O010), or the file can't be read
-/// (O009).
+/// Returns `None` and adds a fault if the path is not relative (O011), its extension is unknown (O010), or the file
+/// can't be read (O009).
 pub(super) fn read(graph: &Graph, statement: &Statement, found: &mut Diagnostics) -> Option<RuleFile> {
     let mention = match &statement.object {
         Term::Iri(text) | Term::String(text) => text.to_string(),

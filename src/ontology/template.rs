@@ -11,8 +11,9 @@ pub struct Template {
     pub ontology_entry: String,
 }
 
-/// Returns the template of a property `name` (`StaysUpright`) for an action (`Pick`). `rules_folder` is the folder of the rule file
-/// relative to the ontology file, with a trailing slash. `designator` names the object that the example tests.
+/// Returns the template of a property `name` (`StaysUpright`) for an action (`Pick`). `rules_folder` is the folder of
+/// the rule file relative to the ontology file, with a trailing slash. `designator` names the object that the example
+/// tests.
 pub fn property_template(name: &str, action: &str, designator: &str, rules_folder: &str) -> Template {
     let rule_file = format!("{}.rls", snake_case(name));
     let words = snake_case(name).replace('_', " ");

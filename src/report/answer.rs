@@ -8,7 +8,8 @@ use crate::report::Table;
 
 /// Converts an answer to a table: its rows, a single `true` or `false`, or its triples.
 ///
-/// If `short` is `true`, IRIs are abbreviated with the known prefixes (for people); otherwise they are written in full (for programs).
+/// If `short` is `true`, IRIs are abbreviated with the known prefixes (for people); otherwise they are written in full
+/// (for programs).
 pub fn answer_table(answer: &QueryAnswer, short: bool) -> Table {
     match answer {
         QueryAnswer::Boolean(value) => {

@@ -1,5 +1,5 @@
-//! Tables for campaigns whose tests have several actions: one line per run with the score of each action, as in the paper's
-//! Table IV, and the properties by action.
+//! Tables for campaigns whose tests have several actions: one line per run with the score of each action, as in the
+//! paper's Table IV, and the properties by action.
 
 use comfy_table::{Attribute, Cell, Color};
 
@@ -12,7 +12,8 @@ pub(super) fn has_several_actions(summary: &CampaignSummary) -> bool {
     summary.runs.iter().any(|run| run.actions.len() > 1)
 }
 
-/// Scores of the shown runs: the paper's A of each action, and S. The last line has the means over all runs (T in column S).
+/// Scores of the shown runs: the paper's A of each action, and S. The last line has the means over all runs (T in
+/// column S).
 pub(super) fn scores_table(summary: &CampaignSummary, shown: &[&RunSummary], colour: bool) -> comfy_table::Table {
     let mut table = ruled();
     if colour {

@@ -17,7 +17,7 @@ const RUNS_SHOWN: usize = 40;
 /// Maximum number of failed runs that are described in words.
 const FAILURES_TOLD: usize = 20;
 
-/// Prints the table of runs × properties, the scores, and the witness of each failed property.
+/// Formats the table of runs × properties, the scores, and the witness of each failed property.
 pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
     let mut out = regressions_text(&summary.regressions);
     if !out.is_empty() {
@@ -150,7 +150,7 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
     let _ = writeln!(out, "campaign {} in {}", summary.campaign, summary.history);
 }
 
-/// Prints which properties fail together, and how often.
+/// Writes which properties fail together, and how often.
 fn failure_modes(out: &mut String, summary: &CampaignSummary) {
     let modes = summary.failure_modes.iter().filter(|mode| !mode.failed.is_empty());
     for mode in modes {
@@ -166,7 +166,7 @@ fn failure_modes(out: &mut String, summary: &CampaignSummary) {
     }
 }
 
-/// Prints warnings about properties whose outcomes may be misleading.
+/// Writes warnings about properties whose outcomes may be misleading.
 fn remarks(out: &mut String, summary: &CampaignSummary) {
     if summary.privileged {
         let _ = writeln!(out, "note: {}", SkillRecord::PRIVILEGED);

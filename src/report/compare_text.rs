@@ -11,7 +11,7 @@ use crate::verdict::{Counts, Outcome};
 /// Maximum number of runs, settings or names in a line or list; `--format json` has all.
 const TOLD: usize = 10;
 
-/// Prints both sides, their differences, rates and tests of each property, the scenes that flipped, and the verdict.
+/// Formats both sides, their differences, rates and tests of each property, the scenes that flipped, and the verdict.
 pub fn compare_text(summary: &CompareSummary) -> String {
     let mut out = String::new();
     let [first, second] = &summary.sides;
@@ -142,14 +142,15 @@ fn flips(out: &mut String, summary: &CompareSummary) {
     }
 }
 
-/// Prints the scenes that were left out: a side that lost many more than the other biases the rates.
+/// Writes the scenes that were left out: a side that lost many more than the other biases the rates.
 fn left_out(out: &mut String, summary: &CompareSummary) {
     for line in &summary.comparison.lines {
         let lost = line.left_out[0].total();
         if lost > 0 {
             let [a, b] = line.left_out.map(undecided);
             let name = compared_name(&line.of);
-            let _ = writeln!(out, "{name}: {lost} scenes left out because they were not decided in both (A: {a}; B: {b})");
+            let _ =
+                writeln!(out, "{name}: {lost} scenes left out because they were not decided in both (A: {a}; B: {b})");
         }
     }
 }

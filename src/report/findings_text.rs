@@ -16,7 +16,8 @@ const TOLD_LINES: usize = 10;
 /// Shades of heat map cells, by failure rate in steps of 20 %.
 const SHADES: [char; 5] = ['·', '░', '▒', '▓', '█'];
 
-/// Prints counts, failure modes and cascades, then each property with its patterns, margins, trend, flaky scenes and heat maps.
+/// Formats counts, failure modes and cascades, then each property with its patterns, margins, trend, flaky scenes and
+/// heat maps.
 pub fn findings_text(summary: &FindingsSummary) -> String {
     let mut out = String::new();
     let campaigns = list(summary.campaigns.iter().map(String::as_str));
@@ -133,7 +134,8 @@ fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
     }
     let unconfirmed = patterns.patterns.len() - confirmed;
     if unconfirmed > 0 {
-        let _ = writeln!(out, "  {unconfirmed} more were not confirmed on the held-out runs (--format json lists them)");
+        let _ =
+            writeln!(out, "  {unconfirmed} more were not confirmed on the held-out runs (--format json lists them)");
     }
     if patterns.tried == 0 {
         let _ =
@@ -185,7 +187,7 @@ fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
     let _ = writeln!(out, "     runs: {}", list(report.runs(pattern).into_iter()));
 }
 
-/// Prints the command that generates more scenes of a pattern.
+/// Writes the command that generates more scenes of a pattern.
 fn more(out: &mut String, report: &PropertyReport, pattern: &Pattern, (number, summary): (usize, &FindingsSummary)) {
     let parameters = &report.findings.subject.parameters;
     if scene_rule(&pattern.conditions, parameters, "").is_ok() {

@@ -153,7 +153,7 @@ pub fn health_table(summary: &HealthSummary) -> Table {
     table
 }
 
-/// Prints coverage, then the other measurements.
+/// Formats coverage, then the other measurements.
 pub fn health_text(summary: &HealthSummary) -> String {
     let health = &summary.health;
     let mut out = String::new();

@@ -9,11 +9,12 @@ const LOST_SECS: f64 = 0.2;
 /// Lead time: playback starts this long before the deciding event. Unit: seconds.
 const BEFORE_SECS: f64 = 0.3;
 
-/// Returns the moment that decided an outcome, from the movable objects that its witness names. Unit: seconds since the run began.
+/// Returns the moment that decided an outcome, from the movable objects that its witness names. Unit: seconds since the
+/// run began.
 ///
-/// In this order: the robot first touched a named object that is not a parameter of the action; such an object moved; the robot
-/// lost contact with the named objects; if it never touched them, a link was nearest to them. If none applies, returns the end
-/// of the action. All but the last are shifted earlier by [`BEFORE_SECS`].
+/// In this order: the robot first touched a named object that is not a parameter of the action; such an object moved;
+/// the robot lost contact with the named objects; if it never touched them, a link was nearest to them. If none
+/// applies, returns the end of the action. All but the last are shifted earlier by [`BEFORE_SECS`].
 pub(super) fn decided(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
     let begin = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
     let (run_begin, start, end) = (begin(0), begin(action_idx), begin(action_idx + 1));
@@ -69,8 +70,8 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// When an object had moved, since the action began. Returns `None` if it did not. Unit: seconds; `start` and `end` since the run
-/// began.
+/// When an object had moved, since the action began. Returns `None` if it did not. Unit: seconds; `start` and `end`
+/// since the run began.
 fn moved(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
     let slot = trace.frames.names.iter().position(|name| name == id)?;
     let mut course = course(trace, slot, start, end);
@@ -78,8 +79,8 @@ fn moved(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
     course.find(|(_, now)| distance(*now, place) > MOVED_M).map(|(secs, _)| secs)
 }
 
-/// When a link of the robot was nearest to any of the objects, since the action began. Unit: seconds; `start` and `end` since the run
-/// began.
+/// When a link of the robot was nearest to any of the objects, since the action began. Unit: seconds; `start` and `end`
+/// since the run began.
 fn nearest(trace: &Trace, ids: &[&str], start: f64, end: f64) -> Option<f64> {
     let slots = |wanted: &dyn Fn(&str) -> bool| -> Vec<usize> {
         trace.frames.names.iter().enumerate().filter(|(_, name)| wanted(name)).map(|(slot, _)| slot).collect()

@@ -45,10 +45,11 @@ impl OracleSummary {
 
     fn warning(&self, gap: &OracleGap) -> Diagnostic {
         match gap {
-            OracleGap::FaultUnnoticed(fault) => {
-                Diagnostic::warning("V001", format!("no property notices the fault `{fault}`: {}", self.what(fault)))
-                    .help("add a property that fails with this fault (`actcheck new property`), or tighten one that should")
-            }
+            OracleGap::FaultUnnoticed(fault) => Diagnostic::warning(
+                "V001",
+                format!("no property notices the fault `{fault}`: {}", self.what(fault)),
+            )
+            .help("add a property that fails with this fault (`actcheck new property`), or tighten one that should"),
             OracleGap::PropertyNoticesNothing(property) => {
                 let name = self.name(property);
                 Diagnostic::warning("V002", format!("the property `{name}` notices no fault")).help(
@@ -101,7 +102,7 @@ fn word(notice: Notice) -> &'static str {
     }
 }
 
-/// Prints the matrix: how often each property failed with each fault, and a legend.
+/// Formats the matrix: how often each property failed with each fault, and a legend.
 pub fn oracles_text(summary: &OracleSummary) -> String {
     let mut table = ruled();
     table.force_no_tty();

@@ -13,7 +13,7 @@ use crate::verdict::{Counts, Outcome};
 /// Maximum number of changes printed at a terminal; `--format csv` has all.
 const TOLD: usize = 20;
 
-/// Prints the counts of each property before and now, and the outcomes that changed.
+/// Formats the counts of each property before and now, and the outcomes that changed.
 pub fn recheck_text(summary: &RecheckSummary) -> String {
     let mut out = String::new();
     let mut table = ruled();
@@ -47,7 +47,7 @@ fn runs(count: u64) -> String {
     if count == 1 { "1 run".to_owned() } else { format!("{count} runs") }
 }
 
-/// Prints changed outcomes, then new outcomes that failed; other new outcomes are omitted.
+/// Writes changed outcomes, then new outcomes that failed; other new outcomes are omitted.
 fn changes(out: &mut String, summary: &RecheckSummary) {
     let (changed, new): (Vec<&Change>, Vec<&Change>) =
         summary.changes.iter().partition(|change| change.before.is_some());

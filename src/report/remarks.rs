@@ -8,7 +8,8 @@ use crate::analysis::wilson;
 use crate::report::CampaignSummary;
 use crate::verdict::Outcome;
 
-/// Minimum number of judgements for a "never" remark: with 4 of 4, the lower bound of the interval is still near one half.
+/// Minimum number of judgements for a "never" remark: with 4 of 4, the lower bound of the interval is still near one
+/// half.
 const LEAST_FOR_NEVER: u64 = 5;
 /// From this number of judgements on, "never failed" is a warning: a property that fails in a tenth of all scenes would
 /// probably have failed (0.9³⁰ = 4 %).

@@ -13,7 +13,7 @@ const POWERS_SHOWN: usize = 5;
 /// Maximum number of flaky scenes listed for each property; the JSON has all.
 const SCENES_NAMED: usize = 6;
 
-/// Prints the consistency of repeated scenes. Prints nothing if every scene was run once.
+/// Writes the consistency of repeated scenes. Writes nothing if every scene was run once.
 pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
     let repeated = summary.repeated();
     let most = repeated.iter().map(|property| property.found.pass_powers.len()).max().unwrap_or(0);
@@ -58,7 +58,7 @@ fn noise_share(variance: Option<Variance>) -> String {
     share.map_or_else(|| "no variance".to_owned(), |share| format!("{:.0} %", share * 100.0))
 }
 
-/// Prints the scenes in which a property only sometimes passes, each with its first run.
+/// Writes the scenes in which a property only sometimes passes, each with its first run.
 fn flaky(out: &mut String, summary: &CampaignSummary, property: &RepeatedProperty) {
     let scenes = &property.found.flaky;
     if scenes.is_empty() {

@@ -8,7 +8,7 @@ use crate::base::names;
 use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 use crate::report::table::ruled;
 
-/// Prints a run: its scene, the reports of its actions, and every outcome with margin and witness.
+/// Formats a run: its scene, the reports of its actions, and every outcome with margin and witness.
 pub fn run_text(run: &RunDetail) -> String {
     let mut out = String::new();
     let row = &run.row;

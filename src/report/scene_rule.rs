@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use crate::analysis::{Condition, Parameter};
 use crate::base::names;
 
-/// Maps each numeric table parameter to the facts of a scene: the body of a rule for `value(?v)`, where `?o` is the target, `?s` its
-/// surface and `?n` any other object that is not a platform. `ontology/world.ttl` and `ontology/history.ttl` define the terms.
+/// Maps each numeric table parameter to the facts of a scene: the body of a rule for `value(?v)`, where `?o` is the
+/// target, `?s` its surface and `?n` any other object that is not a platform. `ontology/world.ttl` and
+/// `ontology/history.ttl` define the terms.
 const NUMBERS: [(&str, &str); 35] = [
     ("target_friction", "target(?o), before(?o, w:friction, ?v)"),
     ("target_mass_kg", "target(?o), before(?o, w:mass, ?v)"),

@@ -72,8 +72,7 @@ pub fn shrunk_text(shrunk: &ShrunkSummary) -> String {
     let failed: Vec<&str> = shrunk.failed.iter().map(|iri| names::local(iri)).collect();
     let _ = writeln!(out, "{}: the smallest scene found that fails like {}", shrunk.run.row.run, shrunk.original);
     let _ = writeln!(out, "fails {}", failed.join(" + "));
-    let end =
-        if shrunk.minimal { "nothing more can be removed" } else { "stopped at a limit: it may not be minimal" };
+    let end = if shrunk.minimal { "nothing more can be removed" } else { "stopped at a limit: it may not be minimal" };
     let _ = writeln!(
         out,
         "{} of {} other objects left, {} of {} choices not nominal; {} simulations, {} more to explain; {end}",
@@ -88,8 +87,7 @@ pub fn shrunk_text(shrunk: &ShrunkSummary) -> String {
         let _ = writeln!(out, "with fresh noise it fails in {failures} of {of} repetitions");
     }
     if shrunk.noise_kept {
-        let _ =
-            writeln!(out, "with fresh noise the run does not fail often enough: its recorded noise is kept");
+        let _ = writeln!(out, "with fresh noise the run does not fail often enough: its recorded noise is kept");
     }
     let _ = writeln!(out, "\n{}", scene_table(shrunk));
     if shrunk.choices.is_empty() {

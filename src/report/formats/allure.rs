@@ -1,8 +1,8 @@
 //! Exports results for Allure 2 and 3: one file for each property of each action of a run.
 //!
-//! Allure treats results with the same history id as retries and hides all but the last. Version 2 reads the id; version 3 derives
-//! it from the test case and its parameters. Therefore both contain the scene and the repetition number: each repetition is a
-//! separate result, and the same scene in another campaign continues the history.
+//! Allure treats results with the same history id as retries and hides all but the last. Version 2 reads the id;
+//! version 3 derives it from the test case and its parameters. Therefore both contain the scene and the repetition
+//! number: each repetition is a separate result, and the same scene in another campaign continues the history.
 
 use serde_json::{Value, json};
 
@@ -43,8 +43,8 @@ impl Attachment {
 
 /// Returns the files of a run with their names: a result for each property of each action, and the attachments.
 ///
-/// `number` is the run's number among those of its scene ([`super::Repetitions`]). Times are simulated times, counted from the start
-/// of the run.
+/// `number` is the run's number among those of its scene ([`super::Repetitions`]). Times are simulated times, counted
+/// from the start of the run.
 pub fn allure_results(run: &RunDetail, number: u64, attachments: &[Attachment]) -> Vec<(String, Vec<u8>)> {
     let whole = Attachment {
         about: None,
@@ -125,7 +125,8 @@ fn details(judgement: &Judgement) -> String {
     format!("{}\n{margin}\nrule {}", message(judgement), judgement.rule_digest)
 }
 
-/// Parameters that identify a result (scene and repetition), and further parameters that are excluded from the identity.
+/// Parameters that identify a result (scene and repetition), and further parameters that are excluded from the
+/// identity.
 fn parameters(run: &RunDetail, number: u64, scene: &str, judgement: &Judgement) -> Vec<Value> {
     let told = |name: &str, value: String| json!({ "name": name, "value": value, "excluded": true });
     let mut all = vec![

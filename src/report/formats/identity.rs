@@ -9,7 +9,8 @@ use crate::history::{ActionDetail, RunDetail};
 /// Number of characters of a scene's name: enough for a million scenes without collisions, and short enough to read.
 const SCENE_LETTERS: usize = 12;
 
-/// Name of a run's scene: a digest of its objects with poses, masses, friction and restitution, the robot's pose, and the test.
+/// Name of a run's scene: a digest of its objects with poses, masses, friction and restitution, the robot's pose, and
+/// the test.
 ///
 /// Noise is not included: it is the only difference between runs of a scene.
 pub(super) fn scene(run: &RunDetail) -> String {

@@ -8,8 +8,8 @@ use crate::verdict::{Counts, Judgement, Outcome};
 
 /// One suite for each campaign and test, one case for each property of each action of each run.
 ///
-/// JUnit has four results: passed, failure, error and skipped. Broken and timeout become errors with the outcome as their type;
-/// inapplicable and untested become skipped with the outcome in their text.
+/// JUnit has four results: passed, failure, error and skipped. Broken and timeout become errors with the outcome as
+/// their type; inapplicable and untested become skipped with the outcome in their text.
 #[derive(Debug, Clone, Default)]
 pub struct JunitReport {
     suites: Vec<Suite>,
@@ -157,7 +157,8 @@ fn text(raw: &str) -> String {
     })
 }
 
-/// Escapes an attribute's value. Line ends are written as character references, because parsers normalise them otherwise.
+/// Escapes an attribute's value. Line ends are written as character references, because parsers normalise them
+/// otherwise.
 fn attribute(raw: &str) -> String {
     text(raw).replace('"', "&quot;").replace('\t', "&#9;").replace('\n', "&#10;")
 }

@@ -13,8 +13,8 @@ use crate::verdict::{Counts, Judgement, Outcome};
 /// Returns the observation of a run. `campaign_started` is the start of its campaign (RFC 3339), by which viewers group
 /// observations.
 ///
-/// The schema has three results: `failed` if a property failed; `gave_up` if the run was broken or timed out, or nothing could be
-/// judged; `passed` otherwise. The features include the counts of all six outcomes.
+/// The schema has three results: `failed` if a property failed; `gave_up` if the run was broken or timed out, or
+/// nothing could be judged; `passed` otherwise. The features include the counts of all six outcomes.
 pub fn observation(run: &RunDetail, campaign_started: &str) -> Value {
     let judgements = || run.actions.iter().flat_map(|action| &action.judgements);
     let counts = Counts::of(judgements().map(|judgement| judgement.outcome));

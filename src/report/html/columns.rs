@@ -99,8 +99,8 @@ pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
     pack.finish()
 }
 
-/// For each run, the row that describes its scene: the one whose surface is nearest to the target. Actions at another place refer to
-/// another surface.
+/// For each run, the row that describes its scene: the one whose surface is nearest to the target. Actions at another
+/// place refer to another surface.
 fn first_rows(table: &OutcomeTable) -> Vec<usize> {
     let runs = table.text("run");
     let (x, y) = (table.number("surface_x_m"), table.number("surface_y_m"));

@@ -6,9 +6,9 @@ use crate::analysis::OutcomeTable;
 use crate::report::FindingsSummary;
 use crate::verdict::Outcome;
 
-/// Returns run ids in the order in which they should be included as replays. Failed runs come first, taken in turn from each failure
-/// mode and each property, so that the first few cover all of them. Then come runs that did not complete, then one run of each test
-/// in which nothing failed, for comparison.
+/// Returns run ids in the order in which they should be included as replays. Failed runs come first, taken in turn from
+/// each failure mode and each property, so that the first few cover all of them. Then come runs that did not complete,
+/// then one run of each test in which nothing failed, for comparison.
 pub fn replay_order(findings: &FindingsSummary, table: &OutcomeTable) -> Vec<String> {
     let runs = table.text("run");
     let mut queues: Vec<Vec<&str>> = findings

@@ -1,4 +1,5 @@
-//! Packs columns and trajectories as bytes that a browser can unpack without a library: a JSON header followed by plain arrays.
+//! Packs columns and trajectories as bytes that a browser can unpack without a library: a JSON header followed by plain
+//! arrays.
 
 use std::io::Write as _;
 
@@ -43,7 +44,8 @@ impl Pack {
         self.array(kind, values.len(), &bytes)
     }
 
-    /// Adds a column of numbers, quantised to 1/65534 of their range, and returns its descriptor. Returns `None` if it has no numbers.
+    /// Adds a column of numbers, quantised to 1/65534 of their range, and returns its descriptor. Returns `None` if it
+    /// has no numbers.
     pub fn numbers(&mut self, values: &[f64]) -> Option<Value> {
         let known = || values.iter().copied().filter(|value| value.is_finite());
         let (low, high) = (known().min_by(f64::total_cmp)?, known().max_by(f64::total_cmp)?);
@@ -62,8 +64,8 @@ impl Pack {
         Some(placed)
     }
 
-    /// Adds columns of integers as second differences, which are small because bodies move smoothly. All low bytes precede all high
-    /// bytes, which are nearly always equal and so compress well.
+    /// Adds columns of integers as second differences, which are small because bodies move smoothly. All low bytes
+    /// precede all high bytes, which are nearly always equal and so compress well.
     pub fn courses(&mut self, columns: &[Vec<i16>]) -> Value {
         let length = columns.first().map_or(0, Vec::len);
         let mut lower = Vec::with_capacity(columns.len() * length);

@@ -11,8 +11,8 @@ use crate::report::html::events::action;
 use crate::report::html::pack::{Pack, packed};
 use crate::report::html::shapes::Shapes;
 
-/// Smallest quantisation step of positions, which is the resolution of traces. The step is larger if a run spans more than 6.5 m.
-/// Unit: metres.
+/// Smallest quantisation step of positions, which is the resolution of traces. The step is larger if a run spans more
+/// than 6.5 m. Unit: metres.
 const GRAIN_M: f64 = 1e-4;
 /// Quantisation step of quaternion components, as in traces.
 const GRAIN_TURN: f64 = 2e-4;
@@ -128,8 +128,8 @@ fn word(role: Role) -> &'static str {
     if role == Role::PlaceOther { Role::Other.word() } else { role.word() }
 }
 
-/// Quantises seven columns for each track (position, quaternion). Returns the columns, the lowest corner and the position step. Values
-/// that are not finite repeat the previous one.
+/// Quantises seven columns for each track (position, quaternion). Returns the columns, the lowest corner and the
+/// position step. Values that are not finite repeat the previous one.
 fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64) {
     let value =
         |row: &Vec<f32>, column: usize| row.get(column).copied().filter(|value| value.is_finite()).map(f64::from);

@@ -19,7 +19,8 @@ impl Shapes {
         self.number(form.parts.iter().map(part).collect())
     }
 
-    /// Returns the index of the bounding box of a body without a shape. Frame: world axes, relative to the body's origin.
+    /// Returns the index of the bounding box of a body without a shape. Frame: world axes, relative to the body's
+    /// origin.
     pub fn around(&mut self, body: &BodyState) -> usize {
         let size = [0, 1, 2].map(|axis| round(body.aabb_max[axis] - body.aabb_min[axis]));
         let middle = [0, 1, 2]

@@ -1,8 +1,9 @@
 //! Draws a run without a screen or graphics hardware: its scene before and after, from above and from the side.
 //!
-//! From a run to pixels: [`run`] lays out the panels, [`window`] selects the region that each shows, [`outline`] and [`paths`] compute
-//! the outlines of bodies and the paths of motions, and [`labels`] places names. The result is a [`drawing`] of plain shapes, which
-//! [`svg`] writes and [`png`] rasterises, with glyphs from [`font`]. [`patterns`] draws the runs of patterns in the same way.
+//! From a run to pixels: [`run`] lays out the panels, [`window`] selects the region that each shows, [`outline`] and
+//! [`paths`] compute the outlines of bodies and the paths of motions, and [`labels`] places names. The result is a
+//! [`drawing`] of plain shapes, which [`svg`] writes and [`png`] rasterises, with glyphs from [`font`]. [`patterns`]
+//! draws the runs of patterns in the same way.
 //!
 //! Never: reads or writes a file, or uses a shape that is not in the trace.
 

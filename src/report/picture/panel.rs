@@ -11,7 +11,8 @@ use crate::report::picture::paths::{Mover, Way, pose_at};
 use crate::report::picture::window::{Bounds, Window};
 use crate::report::picture::{font, paint};
 
-/// Upper bound of a link's extent from its origin. Links farther than this outside of the window are omitted. Unit: metres.
+/// Upper bound of a link's extent from its origin. Links farther than this outside of the window are omitted. Unit:
+/// metres.
 const LINK_REACH_M: f64 = 0.8;
 
 /// Data shared by all panels of a run.

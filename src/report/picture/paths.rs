@@ -93,8 +93,8 @@ fn base(trace: &Trace) -> Option<(usize, Isometry3<f64>)> {
     carrier(trace, base)
 }
 
-/// The link to which a frame is fixed: the frame's relative pose is the same at the start and at the end. If there are several, the
-/// nearest.
+/// The link to which a frame is fixed: the frame's relative pose is the same at the start and at the end. If there are
+/// several, the nearest.
 fn carrier(trace: &Trace, frame: impl Fn(&Snapshot) -> Isometry3<f64>) -> Option<(usize, Isometry3<f64>)> {
     let (first, last) = (frame(trace.snapshots.first()?), frame(trace.snapshots.last()?));
     let links = trace.frames.names.iter().enumerate().filter(|(_, name)| name.starts_with("robot/"));

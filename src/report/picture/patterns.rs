@@ -1,4 +1,5 @@
-//! Draws patterns: scatter plots of runs over two scene parameters, with failures as crosses and the range of the pattern marked.
+//! Draws patterns: scatter plots of runs over two scene parameters, with failures as crosses and the range of the
+//! pattern marked.
 
 use crate::analysis::{Condition, Parameter, Pattern, Subject, Values};
 use crate::report::FindingsSummary;
@@ -113,7 +114,8 @@ struct Plane<'a> {
 }
 
 impl<'a> Plane<'a> {
-    /// Chooses the axes: the ranges of a pattern first, then the usual parameters. Returns `None` if there are fewer than two.
+    /// Chooses the axes: the ranges of a pattern first, then the usual parameters. Returns `None` if there are fewer
+    /// than two.
     fn of(subject: &'a Subject, pattern: &Pattern) -> Option<Self> {
         let ranges = pattern.conditions.iter().filter_map(|condition| match condition {
             Condition::Range { parameter, low, high } => Axis::of(subject.parameters.get(*parameter)?, [*low, *high]),

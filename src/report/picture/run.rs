@@ -21,9 +21,9 @@ const HIGHEST_PX: [f64; 3] = [330.0, 430.0, 340.0];
 
 /// Draws a run. Returns `None` if it has no state to draw.
 ///
-/// On the left is the state before the first action with percepts; on the right is the state after the last action with the paths of
-/// base, hand and target, in the colour of the action. The top row is a map, if the world is larger than the close-ups; below it are
-/// close-ups from above and from the side.
+/// On the left is the state before the first action with percepts; on the right is the state after the last action with
+/// the paths of base, hand and target, in the colour of the action. The top row is a map, if the world is larger than
+/// the close-ups; below it are close-ups from above and from the side.
 pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     let of_role =
         |role: Role| caption.roles.iter().filter(move |(_, other)| **other == role).map(|(id, _)| id.as_str());
@@ -54,7 +54,8 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     Some(drawing)
 }
 
-/// Horizontal axis of the side view: the axis along which the robot approaches, so that hand and target do not hide each other.
+/// Horizontal axis of the side view: the axis along which the robot approaches, so that hand and target do not hide
+/// each other.
 fn across(trace: &Trace, about: &Bounds) -> usize {
     let base = trace.snapshots.first().map_or([0.0; 3], |snapshot| snapshot.robot.base_true);
     let way = |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();

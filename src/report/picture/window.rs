@@ -123,7 +123,8 @@ const AROUND_M: f64 = 0.12;
 /// The same close-up shows before and after, if it is not larger than this. Unit: metres.
 const LARGEST_CLOSE_UP_M: f64 = 2.8;
 
-/// Regions of the close-ups before and after: the same region if it is small enough. Returns `None` if the trace has no states.
+/// Regions of the close-ups before and after: the same region if it is small enough. Returns `None` if the trace has no
+/// states.
 pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>) -> Option<[Bounds; 2]> {
     let before = about(trace.snapshots.first()?, subjects, trace);
     let after = about(trace.snapshots.last()?, subjects, trace);
@@ -173,7 +174,8 @@ fn limited(mut bounds: Bounds) -> Bounds {
     bounds
 }
 
-/// The whole world. Returns `None` if the close-ups already show nearly all of it: places, furniture and the path of the base.
+/// The whole world. Returns `None` if the close-ups already show nearly all of it: places, furniture and the path of
+/// the base.
 pub(super) fn overview(trace: &Trace, close_ups: &[Bounds; 2], ways: &[[f64; 3]]) -> Option<Bounds> {
     let rooms = trace
         .map

@@ -88,7 +88,8 @@ impl<'a> Known<'a> {
     }
 }
 
-/// Positions and orientations of one track. Poses that are not finite repeat the previous one. Units: metres, unit quaternions.
+/// Positions and orientations of one track. Poses that are not finite repeat the previous one. Units: metres, unit
+/// quaternions.
 fn track(rows: &[Vec<f32>], slot: usize) -> (Vec<[f32; 3]>, Vec<Quaternion>) {
     let mut last = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
     let poses = rows.iter().map(|row| {

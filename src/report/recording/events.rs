@@ -16,8 +16,8 @@ struct Line {
     text: String,
 }
 
-/// Records the events below `events`: actions with their phases, contacts, and outcomes other than passed. For a run without a trace,
-/// all known events are at the beginning.
+/// Records the events below `events`: actions with their phases, contacts, and outcomes other than passed. For a run
+/// without a trace, all known events are at the beginning.
 ///
 /// # Errors
 /// The rerun library rejects a line.

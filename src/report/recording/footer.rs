@@ -8,8 +8,8 @@ use re_protos::log_msg::v1alpha1::RrdFooter;
 
 use crate::report::recording::stream::RecordingFault;
 
-/// Sorts the manifest of a file: recordings by id, columns by name. The format does not define the order, and the library writes a
-/// different one each time.
+/// Sorts the manifest of a file: recordings by id, columns by name. The format does not define the order, and the
+/// library writes a different one each time.
 ///
 /// # Errors
 /// The file has no manifest.

@@ -18,8 +18,8 @@ pub(super) struct Face {
     pub corners: Vec<Point3<f64>>,
 }
 
-/// Computes the faces of the convex hull: all planes through three points with no point beyond them. Coplanar points give two faces,
-/// collinear points none.
+/// Computes the faces of the convex hull: all planes through three points with no point beyond them. Coplanar points
+/// give two faces, collinear points none.
 ///
 /// The complexity is O(n⁴).
 pub(super) fn faces(points: &[[f64; 3]]) -> Vec<Face> {

@@ -14,8 +14,8 @@ pub(super) fn title(run: &RunDetail) -> String {
     Caption::of(run).title
 }
 
-/// Formats the outcomes of all properties with witness, margin and explanation (Markdown). Text of models, rules and messages is
-/// escaped.
+/// Formats the outcomes of all properties with witness, margin and explanation (Markdown). Text of models, rules and
+/// messages is escaped.
 pub(super) fn document(run: &RunDetail, explained: &[Explained]) -> String {
     let caption = Caption::of(run);
     let mut out = format!("# {}\n", plain(&caption.title));
