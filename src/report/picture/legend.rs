@@ -56,7 +56,7 @@ fn entries(material: &Material<'_>) -> Vec<(Sample, &'static str)> {
         (true, Sample::Area(paint::FURNITURE), "furniture"),
         (true, Sample::Area(paint::ROBOT), "robot"),
         (perceived, Sample::Area(paint::GLIMPSE), "perceived, where the robot believes it"),
-        (moved(Mover::Base), Sample::Way(Mover::Base), "way of the base, in the colour of its action"),
+        (moved(Mover::Base), Sample::Way(Mover::Base), "path of the base, in the colour of its action"),
         (moved(Mover::Hand), Sample::Way(Mover::Hand), "of the hand"),
         (moved(Mover::Target), Sample::Way(Mover::Target), "of the target"),
     ];
