@@ -149,7 +149,7 @@ fn missing_parameters(graph: &Graph, known: &Known, name: &str, action: &Action,
             let help = if known.parameters.contains(parameter) {
                 match nearest(parameter, action.parameters.iter().map(String::as_str)) {
                     Some(near) => format!("is the action's parameter `{near}` meant to be `{parameter}`?"),
-                    None => format!("state `act:{name} act:hasParameter act:{parameter}`"),
+                    None => format!("add `act:{name} act:hasParameter act:{parameter}`"),
                 }
             } else {
                 did_you_mean(parameter, action.parameters.iter().chain(&known.parameters).map(String::as_str))
@@ -177,7 +177,8 @@ fn unknown_parameter(graph: &Graph, known: &Known, statement: &Statement, who: &
     Some(Diagnostic::error("O008", message).at(source, span).help(help))
 }
 
-/// Other names used as parameters. In an ontology without declarations, they are the only candidates for suggestions.
+/// Candidates for suggestions if declarations are missing: names used as parameters elsewhere, and the standard
+/// designators.
 fn mentioned_parameters(graph: &Graph, except: &str) -> BTreeSet<String> {
     let predicates = [names::act("hasParameter"), names::act("needsParameter")];
     graph
