@@ -1,10 +1,10 @@
-"""Runs two campaigns, exports what they left, and runs every notebook on it from top to bottom.
+"""Runs two campaigns, exports their results, and executes every notebook on them from top to bottom.
 
-    python notebooks/regenerate.py                             the notebooks here, with their outputs
-    python notebooks/regenerate.py --runs 8 --into /tmp/try    a quick try, which changes nothing here
+    python notebooks/regenerate.py                             regenerates the notebooks in place
+    python notebooks/regenerate.py --runs 8 --into /tmp/try    a quick test, which writes to another folder
 
-Needs the packages of tests/foreign/requirements.txt, and actcheck: `make notebooks` has both. What was exported stays in the folder
-`data` beside the notebooks that were written.
+Requires the packages of tests/foreign/requirements.txt, and actcheck; `make notebooks` provides both. The exported data
+stay in the folder `data` next to the written notebooks.
 """
 
 import argparse
@@ -22,16 +22,16 @@ from nbclient.exceptions import CellExecutionError
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-# The same scenes twice: the second robot's senses are better.
+# The same scenes twice: the second robot has better sensors.
 CAMPAIGNS = {"first": "configs/pick.toml", "second": "benches/quiet_pick.toml"}
 
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--actcheck", default=str(ROOT / "actcheck"), help="the program [default: ./actcheck of the checkout]")
+    arguments.add_argument("--actcheck", default=str(ROOT / "actcheck"), help="path of the program [default: ./actcheck of the checkout]")
     arguments.add_argument("--runs", default="200", help="runs of each campaign [default: 200]")
-    arguments.add_argument("--jobs", default="2", help="runs at a time [default: 2]")
-    arguments.add_argument("--into", type=Path, default=HERE, help="where the notebooks are written [default: here]")
+    arguments.add_argument("--jobs", default="2", help="number of parallel runs [default: 2]")
+    arguments.add_argument("--into", type=Path, default=HERE, help="output folder [default: the notebooks folder]")
     asked = arguments.parse_args()
     asked.into.mkdir(parents=True, exist_ok=True)
     data = asked.into.resolve() / "data"
@@ -50,11 +50,11 @@ def actcheck(asked, *words, good=(0,)):
 
 
 def export(asked, data):
-    """Leaves tables, findings and RDF of both campaigns, and their comparison."""
+    """Exports tables, findings and RDF of both campaigns, and their comparison."""
     for name, config in CAMPAIGNS.items():
         folder = data / name
         history = ["--history", folder / "history"]
-        # 1: a property failed, which is what campaigns are for.
+        # Exit code 1 means that a property failed, which is a valid result.
         actcheck(asked, "run", config, "--runs", asked.runs, "--jobs", asked.jobs, *history, good=(0, 1))
         actcheck(asked, "export", "--parquet", folder, "--nquads", folder / "history.nq", *history)
         (folder / "findings.json").write_text(actcheck(asked, "analyse", "--format", "json", *history))
@@ -63,19 +63,19 @@ def export(asked, data):
 
 
 def execute(source, target, data):
-    """Runs a notebook in order and writes it with its outputs. Returns what went wrong."""
+    """Executes a notebook in order and writes it with its outputs. Returns the error, or `None`."""
     book = nbformat.read(source, as_version=4)
     os.environ["ACTCHECK_DATA"] = str(data)
     os.environ["ACTCHECK_QUERIES"] = str(ROOT / "ontology" / "queries")
     fault = None
     try:
-        # Sockets in a private folder instead of ports: no other user of the machine can connect.
+        # Use sockets in a private folder instead of ports, so that other users of the machine can't connect.
         with tempfile.TemporaryDirectory() as sockets:
             kernel = AsyncKernelManager(kernel_name="python3", transport="ipc", ip=f"{sockets}/kernel")
             NotebookClient(book, km=kernel, timeout=300, record_timing=False).execute()
     except CellExecutionError as error:
         fault = f"{source.name}: {error}"
-    # What differs from machine to machine says nothing.
+    # Remove machine-dependent metadata.
     book.metadata["language_info"] = {"name": "python"}
     nbformat.write(book, target)
     return fault

@@ -58,11 +58,7 @@ fn an_exported_run_goes_the_same_way_inside_the_project_and_anywhere() {
     let (code, case) = run_case(machine.path(), "case.toml");
     assert_eq!((code, &case["same_trace"]), (Some(1), &true.into()), "{case:#}");
     let output = actcheck(machine.path(), &["run", "case.toml"]);
-    assert!(
-        stdout(&output).contains("still fails as it did: NoGraspCollisions; the same trace"),
-        "{}",
-        stdout(&output)
-    );
+    assert!(stdout(&output).contains("still fails as recorded: NoGraspCollisions; same trace"), "{}", stdout(&output));
     // The run of a case is a run like any other: it can be replayed and exported once more.
     let again = case["run"].as_str().unwrap();
     let replayed = actcheck(machine.path(), &["replay", again, "--history", "h2"]);
@@ -121,7 +117,7 @@ fn a_case_survives_edits_of_rules_comments_and_ontology() {
     let (code, case) = run_case(project.path(), "case.toml");
     assert_eq!((code, &case["recurrence"]), (Some(1), &"otherwise".into()), "{case:#}");
     let output = actcheck(project.path(), &["run", "case.toml", "--history", "h2"]);
-    let told = "fails otherwise: MovedObject + NoGraspCollisions (it was NoGraspCollisions); the same trace";
+    let told = "fails differently: MovedObject + NoGraspCollisions (was NoGraspCollisions); same trace";
     assert!(stdout(&output).contains(told), "{}", stdout(&output));
 
     let ontology = project.path().join("ontology/actions.ttl");

@@ -88,7 +88,7 @@ fn the_misspelt_parameter_is_reported_as_what_it_is() {
     let found = ontology::load(&Files::Disk, Path::new("tests/data/pick_misspelt.owl")).unwrap_err();
     let first = found.iter().next().unwrap();
     assert_eq!((first.code, first.place().as_deref()), ("O008", Some("tests/data/pick_misspelt.owl:21:48")));
-    assert_eq!(first.message, "the action `Pick` has the parameter `pickOject`, which is declared nowhere");
+    assert_eq!(first.message, "the action `Pick` has the parameter `pickOject`, which is not declared");
     assert_eq!(first.help.as_deref(), Some("did you mean `pickObject`?"));
     // The property's own need is the only other fault.
     assert_eq!(found.iter().map(|fault| fault.code).collect::<Vec<_>>(), ["O008", "O007"]);

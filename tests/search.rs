@@ -191,7 +191,7 @@ fn a_guided_campaign_is_the_same_at_any_number_of_workers() {
     assert_eq!(of(&one, "weight"), of(&three, "weight"));
     assert_eq!(resumed["search"], told["search"]);
 
-    assert!(text.contains("are no rates") && text.contains("weighted, 22 scenes"), "{text}");
+    assert!(text.contains("are not failure rates") && text.contains("weighted, 22 scenes"), "{text}");
     assert_eq!((&told["search"]["strategy"], &told["search"]["counts_are_rates"]), (&"boundary".into(), &false.into()));
     let rates = told["search"]["weighted_failure_rates"].as_array().unwrap();
     assert_eq!(rates.len(), 3);

@@ -109,7 +109,7 @@ fn rdf_is_all_there(here: &Path) {
 fn findings_are_told(here: &Path) {
     let text = stdout(&actcheck(here, &["analyse"]));
     assert!(text.starts_with("12 runs of 2 campaigns ("), "{text}");
-    assert!(text.contains("60 outcomes: ") && text.contains("how runs fail"), "{text}");
+    assert!(text.contains("60 outcomes: ") && text.contains("failure modes"), "{text}");
     assert!(text.contains("MovedObject (Pick): fails in"), "{text}");
     let found = json(here, &["analyse", "--property", "MovedObject", "--format", "json"]);
     let of = &found["properties"][0];

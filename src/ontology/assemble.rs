@@ -1,4 +1,4 @@
-//! Statements to an ontology in which every link leads somewhere.
+//! Assembles statements into an ontology and checks that all its references resolve.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -10,18 +10,19 @@ use crate::ontology::read::Statement;
 use crate::ontology::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
 use crate::ontology::{check, read, rule_files};
 
-/// Reads an ontology with what it imports and the rule files that it links.
+/// Loads an ontology with its imports and linked rule files.
 ///
-/// Turtle and RDF/XML, told apart by ending or content. Relative IRIs of files become IRIs that name no machine.
+/// Accepts Turtle and RDF/XML, distinguished by file extension or content. Relative file IRIs become
+/// machine-independent IRIs.
 ///
 /// # Errors
-/// Every fault at once: a text can't be read or parsed (O001 to O003), a success property is none (O004), a property has
-/// no rule or several (O005, O006), a parameter is missing or unknown (O007, O008), a rule file is missing or of no rule
-/// language (O009 to O011), there is no action (O012).
+/// Reports all faults at once: a file can't be read or parsed (O001 to O003), a success property is not a property
+/// (O004), a property has no rule or several (O005, O006), a parameter is missing or unknown (O007, O008), a rule file
+/// is missing, has an unknown extension or an absolute path (O009 to O011), or the ontology has no action (O012).
 pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     let mut found = Diagnostics::new();
     let graph = Graph::new(read::read(files, path, &mut found));
-    // What a text with a syntax error seems to lack may be in the part that could not be read.
+    // Missing definitions may be in the part that could not be parsed, so further checks would mislead.
     if found.has_errors() {
         return Err(found);
     }
@@ -53,7 +54,7 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     })
 }
 
-/// Faults in the order of their places, text by text.
+/// Sorts faults by source file, then by position.
 fn in_order_of_place(found: Diagnostics, sources: &[Source]) -> Diagnostics {
     let rank = |fault: &Diagnostic| sources.iter().position(|source| fault.source.as_ref() == Some(source));
     let mut faults: Vec<Diagnostic> = found.into_iter().collect();
@@ -63,7 +64,7 @@ fn in_order_of_place(found: Diagnostics, sources: &[Source]) -> Diagnostics {
     sorted
 }
 
-/// Libraries in the order of their paths, each once.
+/// Rule libraries without duplicates, sorted by path.
 fn libraries(graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
     let predicate = names::act("ruleLibrary");
     let mut libraries: BTreeMap<(String, Arc<str>), RuleFile> = BTreeMap::new();
@@ -73,15 +74,16 @@ fn libraries(graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
             && let Some((source, span)) = &library.linked_at
         {
             let message = format!("the rule library `{}` is not Datalog", library.path);
-            found
-                .push(Diagnostic::error("O010", message).at(source, span.clone()).help("a library's ending is `.rls`"));
+            found.push(
+                Diagnostic::error("O010", message).at(source, span.clone()).help("rule libraries must end in `.rls`"),
+            );
         }
         libraries.insert((library.path.clone(), Arc::clone(&library.source.name)), library);
     }
     libraries.into_values().collect()
 }
 
-/// The one rule file of each property.
+/// The rule file of each property, by IRI.
 fn property_rules(graph: &Graph, found: &mut Diagnostics) -> BTreeMap<String, RuleFile> {
     let mut rules = BTreeMap::new();
     for iri in graph.individuals(&names::act("Property")) {
@@ -100,7 +102,7 @@ fn property_rules(graph: &Graph, found: &mut Diagnostics) -> BTreeMap<String, Ru
                 found.push(
                     Diagnostic::error("O006", message)
                         .at(source, span)
-                        .help("link one; make two properties of two rules"),
+                        .help("link one rule file; for two rules, declare two properties"),
                 );
             }
         }
@@ -120,7 +122,7 @@ fn property(graph: &Graph, iri: String, rule: RuleFile) -> Property {
     }
 }
 
-/// An action with what is stated on it and on the classes that it is an instance of.
+/// Builds an action from its own statements and those inherited from its classes.
 fn action(graph: &Graph, iri: String) -> Action {
     let stated = |predicate: &str| check::inherited(graph, &iri, predicate);
     let iris = |predicate: &str| -> Vec<String> {
@@ -155,7 +157,7 @@ fn triples(graph: &Graph) -> Vec<[Term; 3]> {
     triples
 }
 
-/// Classes whose individuals can stand as predicates.
+/// Classes whose individuals can be predicates.
 const PROPERTY_CLASSES: [(&str, &str); 5] = [
     (names::RDF, "Property"),
     (names::OWL, "ObjectProperty"),
@@ -178,12 +180,12 @@ fn vocabulary(graph: &Graph) -> Vocabulary {
 }
 
 impl Ontology {
-    /// Whether a class is another one or stands below it.
+    /// Whether `class` equals `ancestor` or is a subclass of it.
     pub fn is_a(&self, class: &str, ancestor: &str) -> bool {
         class == ancestor || self.superclasses.get(class).is_some_and(|above| above.contains(ancestor))
     }
 
-    /// Whether the ontology declares a class of this IRI.
+    /// Whether the ontology declares a class with this IRI.
     pub fn has_class(&self, class: &str) -> bool {
         self.vocabulary.terms.contains_key(class) || self.superclasses.contains_key(class)
     }

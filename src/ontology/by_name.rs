@@ -1,11 +1,11 @@
-//! What a thing is, by what it is called.
+//! Finds the class of an object from its name.
 
 use crate::base::names;
 use crate::ontology::Ontology;
 
 impl Ontology {
-    /// The class that a name speaks of: the last words of the name are a class's label or local name, and no class is
-    /// called by more of them. Numbers don't count: `coke_can_2` is a can, `CoffeeTable` a coffee table.
+    /// Returns the IRI of the class whose label or local name matches the longest suffix of the name's words. Digits
+    /// are ignored: `coke_can_2` is a can, `CoffeeTable` a coffee table. Returns `None` if no class matches.
     pub fn class_called(&self, name: &str) -> Option<&str> {
         let words = words(name);
         (0..words.len()).find_map(|start| {
@@ -18,7 +18,7 @@ impl Ontology {
     }
 }
 
-/// The words of a name in lower case: parted by anything but letters, and before capitals.
+/// Splits a name into lower-case words, at non-letters and before capitals.
 fn words(name: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut was_lower = false;

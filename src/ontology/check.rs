@@ -1,4 +1,4 @@
-//! What must be true of actions, properties and designators together.
+//! Consistency checks across actions, properties and designators.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ use crate::ontology::Action;
 use crate::ontology::graph::Graph;
 use crate::ontology::read::Statement;
 
-/// Individuals of `act:Action` or of a class below it, and individuals of those (a special kind of Pick is a Pick).
+/// Individuals of `act:Action` or of its subclasses, and individuals of those (a special kind of Pick is a Pick).
 pub(super) fn action_iris(graph: &Graph) -> BTreeSet<String> {
     let mut actions = graph.individuals(&names::act("Action"));
     loop {
@@ -21,7 +21,7 @@ pub(super) fn action_iris(graph: &Graph) -> BTreeSet<String> {
     }
 }
 
-/// Statements about an individual and about everything that it is an instance of, in the order of the texts.
+/// Statements about an individual and about all its classes, in reading order.
 pub(super) fn inherited<'a>(graph: &'a Graph, iri: &str, predicate: &str) -> Vec<&'a Statement> {
     let mut owners: BTreeSet<String> = BTreeSet::from([iri.to_owned()]);
     let mut waiting = vec![iri.to_owned()];
@@ -31,12 +31,12 @@ pub(super) fn inherited<'a>(graph: &'a Graph, iri: &str, predicate: &str) -> Vec
         owners.extend(above);
     }
     let mut statements: Vec<&Statement> = owners.iter().flat_map(|owner| graph.stated(owner, predicate)).collect();
-    // All statements lie in one list, in the order in which they were read.
+    // All statements are in one slice in reading order, so their addresses give that order.
     statements.sort_by_key(|statement| std::ptr::from_ref::<Statement>(statement));
     statements
 }
 
-/// A property that no rule verifies (O005).
+/// Fault: no rule verifies the property (O005).
 pub(super) fn unverified(graph: &Graph, iri: &str) -> Diagnostic {
     let name = names::local(iri);
     let fault = Diagnostic::error("O005", format!("no rule verifies the property `{name}`"));
@@ -65,11 +65,11 @@ fn at_first(graph: &Graph, iri: &str, fault: Diagnostic) -> Diagnostic {
     }
 }
 
-/// Checks every action's properties and parameters; each fault once, where it is stated.
+/// Checks the properties and parameters of all actions. Reports each fault once, where it is stated.
 pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: &mut Diagnostics) {
     if actions.is_empty() {
         let fault = Diagnostic::error("O012", "the ontology has no action")
-            .help("state one, such as `act:Pick a act:Action`, or import an ontology that does");
+            .help("declare one, such as `act:Pick a act:Action`, or import an ontology that does");
         found.push(match graph.sources().first() {
             Some(source) => fault.in_source(source),
             None => fault,
@@ -79,7 +79,7 @@ pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: 
     let mut told: BTreeSet<(String, usize)> = BTreeSet::new();
     for (name, action) in actions {
         for fault in faults_of(graph, &known, name, action) {
-            // An inherited statement is wrong once, not once for every action that inherits it.
+            // Report a faulty inherited statement once, not for every action that inherits it.
             let place = fault.span.as_ref().map_or(0, |span| span.start);
             let source = fault.source.as_ref().map_or(String::new(), |source| source.name.to_string());
             let parameter_fault = fault.code == "O007";
@@ -90,7 +90,7 @@ pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: 
     }
 }
 
-/// What success properties and parameters may be.
+/// Declared properties and parameters, to check references against.
 struct Known {
     properties: BTreeSet<String>,
     parameters: BTreeSet<String>,
@@ -119,18 +119,18 @@ fn faults_of(graph: &Graph, known: &Known, name: &str, action: &Action) -> Vec<D
     faults
 }
 
-/// A success property that is no property (O004).
+/// Fault: a success property is not declared as a property (O004).
 fn no_property(graph: &Graph, known: &Known, statement: &Statement, property: &str) -> Diagnostic {
     let (source, span) = graph.place(statement, property);
     let local = names::local(property);
     let help = match nearest(local, known.properties.iter().map(|iri| names::local(iri))) {
         Some(found) => format!("did you mean `{found}`?"),
-        None => format!("state that it is one: `{} a act:Property ; act:verifiedBy <…>`", names::shorten(property)),
+        None => format!("declare it: `{} a act:Property ; act:verifiedBy <…>`", names::shorten(property)),
     };
-    Diagnostic::error("O004", format!("`{local}` is no property")).at(source, span).help(help)
+    Diagnostic::error("O004", format!("`{local}` is not a property")).at(source, span).help(help)
 }
 
-/// Parameters that a property needs and an action does not have (O007).
+/// Faults: parameters that a property needs but the action does not have (O007).
 fn missing_parameters(graph: &Graph, known: &Known, name: &str, action: &Action, property: &str) -> Vec<Diagnostic> {
     let predicate = names::act("needsParameter");
     let needs = graph.stated(property, &predicate);
@@ -149,7 +149,7 @@ fn missing_parameters(graph: &Graph, known: &Known, name: &str, action: &Action,
             let help = if known.parameters.contains(parameter) {
                 match nearest(parameter, action.parameters.iter().map(String::as_str)) {
                     Some(near) => format!("is the action's parameter `{near}` meant to be `{parameter}`?"),
-                    None => format!("state `act:{name} act:hasParameter act:{parameter}`"),
+                    None => format!("add `act:{name} act:hasParameter act:{parameter}`"),
                 }
             } else {
                 did_you_mean(parameter, action.parameters.iter().chain(&known.parameters).map(String::as_str))
@@ -159,7 +159,7 @@ fn missing_parameters(graph: &Graph, known: &Known, name: &str, action: &Action,
         .collect()
 }
 
-/// A parameter that is declared nowhere (O008).
+/// Fault: a parameter is not declared (O008). Returns `None` if it is declared.
 fn unknown_parameter(graph: &Graph, known: &Known, statement: &Statement, who: &str) -> Option<Diagnostic> {
     let iri = statement.object.as_iri()?;
     let parameter = names::local(iri);
@@ -171,13 +171,14 @@ fn unknown_parameter(graph: &Graph, known: &Known, statement: &Statement, who: &
     let candidates = known.parameters.iter().chain(&mentioned).map(String::as_str);
     let help = match nearest(parameter, candidates) {
         Some(near) => format!("did you mean `{near}`?"),
-        None => format!("state that it is one: `{} a act:PropertyParameter`", names::shorten(iri)),
+        None => format!("declare it: `{} a act:PropertyParameter`", names::shorten(iri)),
     };
-    let message = format!("{who} the parameter `{parameter}`, which is declared nowhere");
+    let message = format!("{who} the parameter `{parameter}`, which is not declared");
     Some(Diagnostic::error("O008", message).at(source, span).help(help))
 }
 
-/// Other names that stand where parameters do: in a listing without declarations they are all there is.
+/// Candidates for suggestions if declarations are missing: names used as parameters elsewhere, and the standard
+/// designators.
 fn mentioned_parameters(graph: &Graph, except: &str) -> BTreeSet<String> {
     let predicates = [names::act("hasParameter"), names::act("needsParameter")];
     graph

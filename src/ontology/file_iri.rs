@@ -1,22 +1,23 @@
-//! IRIs of files: relative paths between ontology and rule files, without a path of a machine.
+//! File IRIs: machine-independent relative paths between ontology and rule files.
 
 use std::path::{Path, PathBuf};
 
-/// IRIs of files begin so. They name a file by its path from the ontology's folder, never by a path of a machine.
+/// Prefix of file IRIs. They contain the path relative to the ontology's folder, never an absolute path.
 const FILE: &str = "https://w3id.org/actcheck/file/";
-/// One folder above the one below it. Enough of them stand above the ontology's folder for any sensible `../../…`.
+/// Placeholder for a parent folder. [`LEVELS`] of them precede the ontology's folder, enough for any sensible
+/// `../../…`.
 const ABOVE: &str = "~above~/";
 const LEVELS: usize = 12;
 /// The ontology's own folder.
 const HERE: &str = "~here~/";
-/// What relative IRIs in a file are resolved against; `relative` is the file's path from the ontology's folder.
+/// Base IRI of a file; `relative` is the file's path from the ontology's folder.
 pub(super) fn base_of(relative: &str) -> String {
     format!("{FILE}{}{HERE}{relative}", ABOVE.repeat(LEVELS))
 }
 
-/// Path of a file IRI from the ontology's folder, with slashes; nothing for any other IRI.
+/// Path of a file IRI relative to the ontology's folder, with slashes. Returns `None` for any other IRI.
 ///
-/// `…/close_object.rls` next to the folder is `../close_object.rls`.
+/// A file `close_object.rls` next to the folder gives `../close_object.rls`.
 pub(super) fn relative_of(iri: &str) -> Option<String> {
     let rest = iri.strip_prefix(FILE)?;
     let (rest, levels) = without_above(rest);
@@ -34,7 +35,7 @@ fn without_above(mut rest: &str) -> (&str, usize) {
     (rest, levels)
 }
 
-/// A file IRI for statements: `…/file/ontology/actions.ttl`, `…/file/rules/moved_object.rls`.
+/// File IRI without placeholders, for statements: `…/file/ontology/actions.ttl`, `…/file/rules/moved_object.rls`.
 pub(super) fn plain(relative: &str) -> String {
     match relative.strip_prefix("../") {
         Some(beside) if !beside.starts_with("../") => format!("{FILE}{beside}"),
@@ -43,7 +44,7 @@ pub(super) fn plain(relative: &str) -> String {
     }
 }
 
-/// Path from the ontology's folder of a plain file IRI; nothing for any other IRI.
+/// Path of a plain file IRI relative to the ontology's folder. Returns `None` for any other IRI.
 pub(super) fn path_of_plain(iri: &str) -> Option<String> {
     let rest = iri.strip_prefix(FILE)?;
     Some(match rest.strip_prefix("ontology/") {
@@ -52,12 +53,12 @@ pub(super) fn path_of_plain(iri: &str) -> Option<String> {
     })
 }
 
-/// A file of which the path from the ontology's folder is known, as an IRI writes it.
+/// Path on disk of a file, given its percent-encoded path relative to the ontology's folder.
 pub(super) fn on_disk(folder: &Path, relative: &str) -> PathBuf {
     beside(folder, &decoded(relative))
 }
 
-/// A path seen from where the program runs: without `..` where that changes nothing.
+/// Joins a folder and a relative path, and removes `..` if that keeps the meaning.
 pub(super) fn beside(folder: &Path, relative: &str) -> PathBuf {
     let (mut base, mut rest) = (folder.to_path_buf(), Path::new(relative));
     while let Ok(shorter) = rest.strip_prefix("..") {
@@ -69,13 +70,13 @@ pub(super) fn beside(folder: &Path, relative: &str) -> PathBuf {
     base.join(rest)
 }
 
-/// A file name as an IRI writes it.
+/// Percent-encodes a file name for an IRI.
 pub(super) fn encoded(name: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
     name.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
 }
 
-/// Percent signs with two hexadecimal digits become the bytes that they stand for, where that gives UTF-8.
+/// Decodes percent-encoded bytes, if the result is UTF-8.
 fn decoded(text: &str) -> String {
     let bytes = text.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());

@@ -1,16 +1,16 @@
-//! Statements by subject and predicate, with class and property hierarchies followed upwards.
+//! Index of statements by subject and predicate, with transitive class and property hierarchies.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::{Source, Span, Term, names};
 use crate::ontology::read::{Home, Reading, Statement};
 
-/// Questions that assembling an ontology asks of its statements.
+/// Index of the statements of an ontology.
 pub(super) struct Graph {
     reading: Reading,
-    /// Statements of a subject IRI, by index, in the order of the texts.
+    /// Indices of the statements of each subject IRI, in reading order.
     by_subject: BTreeMap<String, Vec<usize>>,
-    /// Each class with all classes above it, itself left out.
+    /// Each class with all its superclasses, excluding itself.
     pub(super) superclasses: BTreeMap<String, BTreeSet<String>>,
     superproperties: BTreeMap<String, BTreeSet<String>>,
 }
@@ -36,22 +36,22 @@ impl Graph {
         &self.reading.sources
     }
 
-    /// All IRIs that something is said of, sorted.
+    /// IRIs of all subjects, sorted.
     pub(super) fn subjects(&self) -> impl Iterator<Item = &str> {
         self.by_subject.keys().map(String::as_str)
     }
 
-    /// What is said of an IRI, in the order of the texts.
+    /// Statements about an IRI, in reading order.
     pub(super) fn about<'a>(&'a self, subject: &str) -> impl Iterator<Item = &'a Statement> {
         self.by_subject.get(subject).into_iter().flatten().map(|idx| &self.reading.statements[*idx])
     }
 
-    /// Statements of a subject with a predicate or one of its sub-properties.
+    /// Statements with this subject, and this predicate or one of its sub-properties.
     pub(super) fn stated<'a>(&'a self, subject: &str, predicate: &str) -> impl Iterator<Item = &'a Statement> {
         self.about(subject).filter(move |statement| self.means(&statement.predicate, predicate))
     }
 
-    /// The first text that a subject has for a predicate.
+    /// The first string value of a subject's predicate.
     pub(super) fn text(&self, subject: &str, predicate: &str) -> Option<String> {
         self.stated(subject, predicate).find_map(|statement| match &statement.object {
             Term::String(text) | Term::LangString(text, _) => Some(text.to_string()),
@@ -59,12 +59,12 @@ impl Graph {
         })
     }
 
-    /// `rdfs:label`, or the local name.
+    /// `rdfs:label`, or the local name if there is none.
     pub(super) fn label(&self, iri: &str) -> String {
         self.text(iri, &rdfs("label")).unwrap_or_else(|| names::local(iri).to_owned())
     }
 
-    /// Classes that an individual is stated to be of, with all classes above them.
+    /// Declared classes of an individual, with all their superclasses.
     pub(super) fn classes_of(&self, individual: &str) -> BTreeSet<String> {
         let mut classes = BTreeSet::new();
         for class in self.stated(individual, &format!("{}type", names::RDF)).filter_map(|s| s.object.as_iri()) {
@@ -74,17 +74,17 @@ impl Graph {
         classes
     }
 
-    /// Individuals of a class or of one below it, sorted.
+    /// Individuals of a class or of its subclasses, sorted.
     pub(super) fn individuals(&self, class: &str) -> BTreeSet<String> {
         self.subjects().filter(|subject| self.classes_of(subject).contains(class)).map(str::to_owned).collect()
     }
 
-    /// Text and place of a statement's mention of an IRI.
+    /// Source and span of an IRI in a statement.
     pub(super) fn place(&self, statement: &Statement, iri: &str) -> (&Source, Span) {
         (&self.reading.sources[statement.text], self.reading.place(statement, iri))
     }
 
-    /// What relative paths in a statement's text are relative to.
+    /// Base of the relative paths in a statement's source.
     pub(super) fn home(&self, statement: &Statement) -> &Home {
         &self.reading.homes[statement.text]
     }

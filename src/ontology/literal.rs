@@ -1,4 +1,4 @@
-//! RDF terms of the parser as our own.
+//! Converts the parser's RDF terms to [`Term`].
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use oxigraph::model::{Literal, NamedOrBlankNode, Term as RdfTerm};
 
 use crate::base::Term;
 
-/// A subject; `blank` names blank nodes.
+/// Converts a subject; `blank` names blank nodes.
 pub(super) fn subject(node: &NamedOrBlankNode, blank: impl FnOnce(&str) -> Arc<str>) -> Term {
     match node {
         NamedOrBlankNode::NamedNode(iri) => Term::iri(iri.as_str()),
@@ -15,7 +15,7 @@ pub(super) fn subject(node: &NamedOrBlankNode, blank: impl FnOnce(&str) -> Arc<s
     }
 }
 
-/// An object; `blank` names blank nodes. Nothing for terms that have no place in an ontology (quoted triples).
+/// Converts an object; `blank` names blank nodes. Returns `None` for quoted triples, which ontologies do not use.
 pub(super) fn object(term: &RdfTerm, blank: impl FnOnce(&str) -> Arc<str>) -> Option<Term> {
     match term {
         RdfTerm::NamedNode(iri) => Some(Term::iri(iri.as_str())),
@@ -63,7 +63,8 @@ fn double(text: &str) -> Option<f64> {
     }
 }
 
-/// `+01.50` becomes `1.5`, `2` and `2.` become `2.0`.
+/// Normalises a decimal: `+01.50` becomes `1.5`, `2` and `2.` become `2.0`. Returns `None` if the text is not a
+/// decimal.
 fn canonical_decimal(text: &str) -> Option<String> {
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),

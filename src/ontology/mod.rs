@@ -1,6 +1,6 @@
-//! Actions, properties, designators, categories and the vocabulary, read from RDF files and checked.
+//! Reads and checks the ontology: actions, properties, designators, categories and the vocabulary, from RDF files.
 //!
-//! Never: parses a rule, knows what a configuration asks for, or goes to the network.
+//! Never: parses a rule, reads a configuration, or accesses the network.
 
 mod assemble;
 mod by_name;

@@ -1,29 +1,29 @@
-//! What an ontology says, checked: actions, properties, designators, categories, vocabulary.
+//! The checked ontology: actions, properties, designators, categories, vocabulary.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::{Source, Span, Term};
 
-/// A checked ontology with everything that it imports.
+/// A checked ontology, including its imports.
 #[derive(Debug, Clone)]
 pub struct Ontology {
-    /// The root file and what it imports, in reading order.
+    /// The root file and its imports, in reading order.
     pub sources: Vec<Source>,
     /// Actions by local name (`Pick`).
     pub actions: BTreeMap<String, Action>,
     /// Properties by IRI.
     pub properties: BTreeMap<String, Property>,
-    /// Local names of all designators (`pickObject`), those of no action included.
+    /// Local names of all designators (`pickObject`), including those that no action uses.
     pub designators: BTreeSet<String>,
-    /// Rule files whose derived predicates every rule may use (`act:ruleLibrary`), in order of their names.
+    /// Rule files whose derived predicates every rule may use (`act:ruleLibrary`), sorted by path.
     pub libraries: Vec<RuleFile>,
-    /// Every statement, sorted; what `ontology(s, p, o)` sees.
+    /// All statements, sorted: the facts of `ontology(s, p, o)`.
     pub triples: Vec<[Term; 3]>,
-    /// Each class with all classes above it (itself left out).
+    /// Each class with all its superclasses, excluding itself.
     pub superclasses: BTreeMap<String, BTreeSet<String>>,
-    /// Terms that facts and rules may speak of.
+    /// Terms that facts and rules may use.
     pub vocabulary: Vocabulary,
-    /// Digest over all sources (not the rule files).
+    /// Digest of all sources, excluding the rule files.
     pub digest: String,
 }
 
@@ -36,9 +36,9 @@ pub struct Action {
     pub label: String,
     /// `rdfs:comment`.
     pub comment: Option<String>,
-    /// Where it is performed: the IRI of a coordinate frame.
+    /// IRI of the coordinate frame in which it is performed.
     pub performed_in: Option<String>,
-    /// IRIs of success properties, inherited ones included, sorted by their order in the ontology text.
+    /// IRIs of its success properties, including inherited ones, in the order of the ontology text.
     pub success_properties: Vec<String>,
     /// IRIs of properties that must hold for the success properties to be applicable.
     pub preconditions: Vec<String>,
@@ -70,9 +70,9 @@ pub struct Property {
 pub struct RuleFile {
     /// Its text.
     pub source: Source,
-    /// By the file's ending.
+    /// Its language, from the file extension.
     pub language: RuleLanguage,
-    /// Path relative to the ontology's folder, as it stands in the ontology; what the history keeps.
+    /// Path relative to the ontology's folder, as written in the ontology. The history stores this path.
     pub path: String,
     /// Digest of its text.
     pub digest: String,
@@ -89,17 +89,17 @@ pub enum RuleLanguage {
     Sparql,
 }
 
-/// Terms by IRI.
+/// The described terms.
 #[derive(Debug, Clone, Default)]
 pub struct Vocabulary {
-    /// Every IRI that the ontology describes.
+    /// All described terms, by IRI.
     pub terms: BTreeMap<String, VocabularyTerm>,
 }
 
 /// One described term.
 #[derive(Debug, Clone, Default)]
 pub struct VocabularyTerm {
-    /// Whether it can stand as a predicate.
+    /// Whether it can be a predicate.
     pub is_property: bool,
     /// Unit of its values (`w:unit`), such as `m`, `rad`, `kg`, `N`.
     pub unit: Option<String>,

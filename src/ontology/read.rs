@@ -1,4 +1,4 @@
-//! RDF texts to statements, with the texts that they import.
+//! Reads RDF files and their imports into statements.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,54 +12,54 @@ use oxigraph::io::{RdfFormat, RdfParseError, RdfParser};
 use crate::base::{Diagnostic, Diagnostics, Files, Source, Span, Term, names};
 use crate::ontology::{file_iri, literal};
 
-/// Importing this IRI adds the ontology that the program carries, wherever the importing file lies.
+/// Importing this IRI adds the ontology embedded in the program, independent of the importing file's location.
 const SHIPPED: &str = "https://w3id.org/actcheck/ontology";
 const SHIPPED_FOLDER: &str = "ontology";
 const SHIPPED_ROOT: &str = "actions.ttl";
-/// Beyond this many, syntax errors of one text are echoes of the first ones.
+/// Maximum number of syntax errors reported per file; more are usually consequences of the first ones.
 const MOST_SYNTAX_ERRORS: usize = 5;
-/// Imports beyond this are a mistake.
+/// Maximum number of imported files; more indicate a mistake.
 const MOST_FILES: usize = 200;
 
-/// One statement and where it stands.
+/// A statement with its source position.
 #[derive(Debug, Clone)]
 pub(super) struct Statement {
     pub(super) subject: Term,
     /// An IRI.
     pub(super) predicate: Arc<str>,
     pub(super) object: Term,
-    /// Index of its text.
+    /// Index of its source.
     pub(super) text: usize,
-    /// End of the line on which it was complete. Unit: bytes.
+    /// End of the line on which the statement ends. Unit: bytes.
     pub(super) end: usize,
 }
 
-/// All statements of a root file and of what it imports.
+/// All statements of a root file and its imports.
 #[derive(Debug, Default)]
 pub(super) struct Reading {
     pub(super) sources: Vec<Source>,
-    /// For each text, what relative paths in it are relative to.
+    /// For each source, the base of its relative paths.
     pub(super) homes: Vec<Home>,
     pub(super) statements: Vec<Statement>,
 }
 
-/// Where a text comes from: relative paths of its statements are relative to this folder.
+/// Location of a source: its relative paths are relative to this folder.
 #[derive(Debug, Clone)]
 pub(super) struct Home {
     pub(super) files: Files,
     pub(super) folder: PathBuf,
 }
 
-/// A text that is still to be read.
+/// A file that is queued for reading.
 struct Waiting {
     home: Home,
-    /// Path from the home's folder, as an IRI writes it.
+    /// Percent-encoded path relative to the home's folder.
     relative: String,
     importer: Option<(usize, Span)>,
 }
 
-/// Reads a file and what it imports, each once: by relative paths, and [`SHIPPED`] from inside the program. All other
-/// imports are left alone: nothing is fetched.
+/// Reads a file and its imports, each once. Follows relative paths and [`SHIPPED`], the embedded ontology. Ignores all
+/// other imports: nothing is downloaded.
 pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Reading {
     let mut reading = Reading::default();
     let home = Home { files: files.clone(), folder: root.parent().unwrap_or(Path::new("")).to_path_buf() };
@@ -68,7 +68,7 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
     let mut seen: BTreeSet<PathBuf> = BTreeSet::new();
     while let Some(Waiting { home, relative, importer }) = waiting.pop() {
         let path = file_iri::on_disk(&home.folder, &relative);
-        // A carried file and one on disk may have one path, but not one name.
+        // An embedded file and a file on disk may have the same path, so the embedded one gets a prefix.
         let key = if home.files == Files::Shipped { Path::new("built-in:").join(&path) } else { path.clone() };
         if !seen.insert(key) || seen.len() > MOST_FILES {
             continue;
@@ -99,7 +99,7 @@ fn unreadable(path: &Path, reason: &str, importer: Option<(&Source, Span)>) -> D
         Some((source, span)) => {
             Diagnostic::error("O003", format!("cannot read the imported ontology {}: {reason}", path.display()))
                 .at(source, span)
-                .help("imports with a relative path are read from there, seen from the file that imports")
+                .help("relative imports are resolved against the importing file")
         }
     }
 }
@@ -122,7 +122,7 @@ fn imports_of(reading: &Reading, text: usize) -> Vec<Waiting> {
         .collect()
 }
 
-/// Parses one text. What comes before and after a syntax error still counts.
+/// Parses one source. Statements before and after a syntax error are kept.
 fn parse(source: &Source, text: usize, base: &str, statements: &mut Vec<Statement>, found: &mut Diagnostics) {
     let format = format_of(source);
     let position = Rc::new(Cell::new(mark_length(source)));
@@ -162,20 +162,20 @@ fn syntax_error(source: &Source, error: &RdfParseError, end: usize) -> Diagnosti
         Some(range) => offset(range.start.offset)..offset(range.end.offset),
         None => line_before(&source.text, end),
     };
-    // Their messages begin with the place, which ours have anyway.
+    // The parser's messages begin with the position, which diagnostics already have.
     let text = error.to_string();
     let message =
         text.rsplit_once("Parser error at ").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, m)| m);
     let message = lower_case_start(&message.trim_end_matches('.').replace('\n', " "));
     Diagnostic::error("O002", format!("this is not {}: {message}", language(source))).at(source, span).help(
         match format_of(source) {
-            RdfFormat::RdfXml => "every tag that is opened must be closed, and every prefix declared by `xmlns:…`",
-            _ => "every statement ends in ` .`, and every prefix is declared by `@prefix …: <…> .`",
+            RdfFormat::RdfXml => "close every tag, and declare every prefix with `xmlns:…`",
+            _ => "end every statement with ` .`, and declare every prefix with `@prefix …: <…> .`",
         },
     )
 }
 
-/// "A dot is missing" becomes "a dot is missing"; words in capitals stay.
+/// Converts the first letter to lower case ("A dot is missing"), unless the first word is in capitals.
 fn lower_case_start(text: &str) -> String {
     let mut chars = text.chars();
     match (chars.next(), chars.clone().next()) {
@@ -199,18 +199,18 @@ fn language(source: &Source) -> &'static str {
     if format_of(source) == RdfFormat::RdfXml { "RDF/XML" } else { "Turtle" }
 }
 
-/// Some editors begin texts with a byte order mark, which the parsers do not know. Unit: bytes.
+/// Length of the byte order mark, which some editors write but the parsers don't accept. Unit: bytes.
 fn mark_length(source: &Source) -> usize {
     if source.text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 }
 }
 
-/// By the ending where it says something, otherwise by how the text begins.
+/// Determines the format from the file extension, or from the first characters if the extension is ambiguous.
 fn format_of(source: &Source) -> RdfFormat {
     let ending = source.name.rsplit('.').next().unwrap_or("").to_lowercase();
     match ending.as_str() {
         "ttl" | "nt" => RdfFormat::Turtle,
         "rdf" | "xml" => RdfFormat::RdfXml,
-        // `.owl` files come in both.
+        // `.owl` files can have either format.
         _ if begins_like_xml(&source.text) => RdfFormat::RdfXml,
         _ => RdfFormat::Turtle,
     }
@@ -221,13 +221,13 @@ fn begins_like_xml(text: &str) -> bool {
     ["<?xml", "<!", "<rdf:", "<RDF", "<owl:"].iter().any(|start| text.starts_with(start))
 }
 
-/// Blank nodes are numbered, so that the same text always gives the same statements.
+/// Numbers blank nodes, so that the same text always gives the same statements.
 fn blank(known: &mut BTreeMap<String, Arc<str>>, text: usize, id: &str) -> Arc<str> {
     let next = known.len() + 1;
     Arc::clone(known.entry(id.to_owned()).or_insert_with(|| format!("t{}b{next}", text + 1).into()))
 }
 
-/// Hands out a text line by line, so that it is known how far the parser has come.
+/// Feeds a text to the parser line by line, to track how far it has read.
 struct Lines<'a> {
     text: &'a [u8],
     position: Rc<Cell<usize>>,
@@ -245,7 +245,7 @@ impl Read for Lines<'_> {
 }
 
 impl Reading {
-    /// Where a statement mentions an IRI: the last mention of its local name before the statement's end.
+    /// Span of an IRI in a statement: the last occurrence of its local name before the statement's end.
     pub(super) fn place(&self, statement: &Statement, iri: &str) -> Span {
         let text = &self.sources[statement.text].text;
         let before = &text[..floor_char(text, statement.end)];
@@ -253,7 +253,7 @@ impl Reading {
     }
 }
 
-/// The end of an IRI as texts write it: behind the last `#`, `/` or the prefix's `:`; for files, the file name.
+/// The part of an IRI that occurs in the text: after the last `#`, `/` or the prefix's `:`; for files, the file name.
 fn written_name(iri: &str) -> &str {
     names::local(iri)
 }
@@ -278,7 +278,7 @@ fn floor_char(text: &str, offset: usize) -> usize {
     offset
 }
 
-/// File IRIs without the scaffolding that makes `..` work.
+/// Replaces file IRIs by their plain form, without the placeholders that make `..` work.
 fn make_plain(statement: &mut Statement) {
     for term in [&mut statement.subject, &mut statement.object] {
         if let Term::Iri(iri) = term

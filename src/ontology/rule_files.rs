@@ -1,4 +1,4 @@
-//! The rule files that an ontology links: found, read, not yet parsed.
+//! Finds and reads the rule files that an ontology links, without parsing them.
 
 use std::path::Path;
 
@@ -8,9 +8,10 @@ use crate::ontology::graph::Graph;
 use crate::ontology::read::Statement;
 use crate::ontology::{RuleFile, RuleLanguage};
 
-/// Reads the rule file that a statement's object names: an IRI or a string, relative to the ontology file.
+/// Reads the rule file that a statement's object names: an IRI or a string with a path relative to the ontology file.
 ///
-/// Faults: it is not relative (O011), has neither ending (O010), or can't be read (O009).
+/// Returns `None` and adds a fault if the path is not relative (O011), its extension is unknown (O010), or the file
+/// can't be read (O009).
 pub(super) fn read(graph: &Graph, statement: &Statement, found: &mut Diagnostics) -> Option<RuleFile> {
     let mention = match &statement.object {
         Term::Iri(text) | Term::String(text) => text.to_string(),
@@ -22,12 +23,12 @@ pub(super) fn read(graph: &Graph, statement: &Statement, found: &mut Diagnostics
     };
     let Some(path) = relative_path(&statement.object) else {
         let help = "name it relative to the ontology file, such as `<../rules/moved_object.rls>`, or in quotes";
-        fault("O011", format!("the rule file {} is not given by a relative path", statement.object), help.to_owned());
+        fault("O011", format!("the path of the rule file {} is not relative", statement.object), help.to_owned());
         return None;
     };
     let Some(language) = language_of(&path) else {
-        let help = "the ending tells the language: `.rls` is Datalog, `.rq` is SPARQL";
-        fault("O010", format!("the rule file `{path}` has neither ending of a rule language"), help.to_owned());
+        let help = "the extension determines the language: `.rls` is Datalog, `.rq` is SPARQL";
+        fault("O010", format!("the rule file `{path}` must end in `.rls` or `.rq`"), help.to_owned());
         return None;
     };
     let home = graph.home(statement);
@@ -69,6 +70,6 @@ fn help_for_missing(files: &Files, place: &Path) -> String {
         files.list(place.parent().unwrap_or(Path::new(""))).iter().map(|path| name(path)).collect();
     match nearest(&name(place), beside.iter().map(String::as_str)) {
         Some(found) => format!("did you mean `{found}`?"),
-        None => format!("it is looked for at {}: the path is relative to the ontology file", place.display()),
+        None => format!("it was expected at {}: the path is relative to the ontology file", place.display()),
     }
 }

@@ -1,46 +1,47 @@
-//! A new property, ready to edit: the text of its rule file and its entry in the ontology.
+//! Template of a new property: the text of its rule file and its ontology entry.
 
-/// The two texts of a new property.
+/// Rule file and ontology entry of a new property.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Template {
     /// The rule file's name, such as `stays_upright.rls`.
     pub rule_file: String,
     /// The rule file's text.
     pub rule_text: String,
-    /// What to append to the ontology (Turtle). It needs the prefixes `act:` and `rdfs:`.
+    /// Turtle to append to the ontology. It uses the prefixes `act:` and `rdfs:`.
     pub ontology_entry: String,
 }
 
-/// Texts for a property `name` (`StaysUpright`) of an action (`Pick`), whose rule file lies at `rule_iri` seen from the
-/// ontology file. `designator` is the one whose object the example speaks of.
+/// Returns the template of a property `name` (`StaysUpright`) for an action (`Pick`). `rules_folder` is the folder of
+/// the rule file relative to the ontology file, with a trailing slash. `designator` names the object that the example
+/// tests.
 pub fn property_template(name: &str, action: &str, designator: &str, rules_folder: &str) -> Template {
     let rule_file = format!("{}.rls", snake_case(name));
     let words = snake_case(name).replace('_', " ");
     let rule_text = format!(
-        "% {name}: write here in one sentence what must hold for {action} to count as a success.\n\
+        "% {name}: describe in one sentence the condition that must hold for {action} to count as a success.\n\
          %\n\
-         % The example below says: the object did not tilt by more than 0.5 rad (29 degrees) on the way. Change it.\n\
-         % What can be asked: before(s, p, o), after(s, p, o), during(s, p, o), parameter(designator, value), ontology(s, p, o),\n\
-         % and what the libraries in rules/lib derive. The terms of w: are described in ontology/world.ttl.\n\n\
+         % The example below requires that the object did not tilt by more than 0.5 rad (29 degrees) during the action. Change it.\n\
+         % Available predicates: before(s, p, o), after(s, p, o), during(s, p, o), parameter(designator, value), ontology(s, p, o),\n\
+         % and those derived by the libraries in rules/lib. ontology/world.ttl describes the terms of w:.\n\n\
          @prefix act: <http://actions#> .\n\
          @prefix w: <https://w3id.org/actcheck/world#> .\n\n\
-         % Passed means that some success(…) was derived. For \"for all\" write violation(…) instead: passed then means that none was.\n\
+         % The property passes if a success(…) fact is derived. For a \"for all\" condition, write violation(…) instead: it passes if none is derived.\n\
          success(?object, ?tilt) :- parameter(act:{designator}, ?object), during(?object, w:maxTilt, ?tilt), ?tilt < 0.5 .\n\n\
-         % How far the outcome was from flipping, in the unit that the ontology gives; positive on the side of passed.\n\
+         % How far the outcome was from flipping, in the unit given in the ontology (act:unit); positive if passed.\n\
          margin(?m) :- parameter(act:{designator}, ?object), during(?object, w:maxTilt, ?tilt), ?m = 0.5 - ?tilt .\n\n\
-         % What people read.\n\
+         % The explanation that reports show.\n\
          because(?text) :- parameter(act:{designator}, ?object), during(?object, w:maxTilt, ?tilt),\n    \
          ?text = CONCAT(STRAFTER(STR(?object), \"object/\"), \" tilted by \", STR(ROUND(?tilt * 100) / 100), \" rad, may tilt by 0.5 rad\") .\n"
     );
     let ontology_entry = format!(
-        "\nact:{name} a act:Property ;\n    rdfs:label \"{words}\" ;\n    rdfs:comment \"Write here what must hold.\" ;\n    \
+        "\nact:{name} a act:Property ;\n    rdfs:label \"{words}\" ;\n    rdfs:comment \"Describe here what must hold.\" ;\n    \
          act:needsParameter act:{designator} ;\n    act:unit \"rad\" ;\n    act:verifiedBy <{rules_folder}{rule_file}> .\n\
          act:{action} act:successProperty act:{name} .\n"
     );
     Template { rule_file, rule_text, ontology_entry }
 }
 
-/// `StaysUpright` as `stays_upright`.
+/// Converts `StaysUpright` to `stays_upright`.
 fn snake_case(name: &str) -> String {
     let mut out = String::new();
     for (idx, c) in name.chars().enumerate() {

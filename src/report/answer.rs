@@ -1,4 +1,4 @@
-//! The answer to a query as a table.
+//! A query's answer as a table.
 
 use serde_json::Value;
 
@@ -6,9 +6,10 @@ use crate::base::{Term, names};
 use crate::history::QueryAnswer;
 use crate::report::Table;
 
-/// The table of an answer: of its rows, of `true` or `false`, or of triples.
+/// Converts an answer to a table: its rows, a single `true` or `false`, or its triples.
 ///
-/// With `short`, IRIs are shortened by the known prefixes, for people; otherwise they stand whole, for programs.
+/// If `short` is `true`, IRIs are abbreviated with the known prefixes (for people); otherwise they are written in full
+/// (for programs).
 pub fn answer_table(answer: &QueryAnswer, short: bool) -> Table {
     match answer {
         QueryAnswer::Boolean(value) => {
@@ -37,7 +38,7 @@ fn value(term: &Term, short: bool) -> Value {
         Term::Blank(label) => format!("_:{label}").into(),
         Term::String(text) | Term::LangString(text, _) | Term::Literal(text, _) => text.as_ref().into(),
         Term::Integer(value) => (*value).into(),
-        // A decimal's digits must not pass through a binary fraction.
+        // Decimals stay text: converting them to `f64` would change their digits.
         Term::Decimal(text) => text.as_ref().into(),
         Term::Double(value) if value.is_finite() => (*value).into(),
         Term::Double(value) => value.to_string().into(),

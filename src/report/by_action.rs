@@ -1,5 +1,5 @@
-//! A campaign whose tests have several actions: a line a run with the score of each action, as in the paper's Table IV, and
-//! the properties by action.
+//! Tables for campaigns whose tests have several actions: one line per run with the score of each action, as in the
+//! paper's Table IV, and the properties by action.
 
 use comfy_table::{Attribute, Cell, Color};
 
@@ -7,12 +7,13 @@ use crate::report::table::ruled;
 use crate::report::{ActionSummary, CampaignSummary, PropertyLine, RunSummary};
 use crate::verdict::{Counts, Outcome, mean};
 
-/// Whether there is a run of more than one action.
+/// Whether any run has more than one action.
 pub(super) fn has_several_actions(summary: &CampaignSummary) -> bool {
     summary.runs.iter().any(|run| run.actions.len() > 1)
 }
 
-/// The scores of some runs: the paper's A of each action and S. The last line has the means of all runs, T below S.
+/// Scores of the shown runs: the paper's A of each action, and S. The last line has the means over all runs (T in
+/// column S).
 pub(super) fn scores_table(summary: &CampaignSummary, shown: &[&RunSummary], colour: bool) -> comfy_table::Table {
     let mut table = ruled();
     if colour {
@@ -49,7 +50,7 @@ pub(super) fn scores_table(summary: &CampaignSummary, shown: &[&RunSummary], col
     table
 }
 
-/// `A1 MoveTo`, and only `A1` where tests begin with different actions.
+/// Column headers: `A1 MoveTo`, or just `A1` if the tests differ in that action.
 fn steps(summary: &CampaignSummary) -> Vec<String> {
     let longest = summary.runs.iter().map(|run| run.actions.len()).max().unwrap_or(0);
     let title = |step: usize| {
@@ -63,7 +64,7 @@ fn steps(summary: &CampaignSummary) -> Vec<String> {
     (0..longest).map(title).collect()
 }
 
-/// Red where a property failed, yellow where one was not decided.
+/// Red if a property failed, yellow if one was not decided.
 fn score_cell(action: &ActionSummary) -> Cell {
     let counts = Counts::of(action.judgements.iter().map(|judgement| judgement.outcome));
     let cell = Cell::new(format!("{:.2}", action.score));
@@ -80,7 +81,7 @@ fn mean_cell(value: Option<f64>) -> Cell {
     Cell::new(value.map_or_else(String::new, |value| format!("{value:.2}")))
 }
 
-/// All properties, by action: each action's name stands before the first of its properties.
+/// All properties, grouped by action. Only the first row of each group has the action's name.
 pub(super) fn properties_table(
     summary: &CampaignSummary,
     rate: impl Fn(&PropertyLine) -> String,
@@ -106,7 +107,7 @@ mod tests {
     use crate::history::RunStatus;
     use crate::report::summary::tests::{campaign, run};
 
-    /// A run of two actions, each with both properties.
+    /// A run with two actions, each with both properties.
     fn two(index: u64, first: [Outcome; 2], second: [Outcome; 2]) -> RunSummary {
         let mut both = run(index, RunStatus::Completed, &first);
         let mut other = run(index, RunStatus::Completed, &second).actions.remove(0);

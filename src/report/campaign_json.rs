@@ -1,4 +1,4 @@
-//! A campaign for programs.
+//! A campaign's summary as JSON.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use crate::report::weighted::weighted_json;
 use crate::report::{CampaignSummary, RunSummary, Share, case_json};
 use crate::verdict::Judgement;
 
-/// The same that [`crate::report::campaign_text`] says, as one JSON object.
+/// Returns the content of [`crate::report::campaign_text`] as one JSON object.
 pub fn campaign_json(summary: &CampaignSummary) -> Value {
     let properties: Vec<Value> = summary
         .property_lines()

@@ -1,11 +1,11 @@
-//! A campaign as one flat table: a row for each property of each action of each run.
+//! A campaign as a flat table with one row for each property of each action of each run.
 
 use serde_json::Value;
 
 use crate::base::names;
 use crate::report::{CampaignSummary, Table};
 
-/// The flat table.
+/// Builds the flat table.
 pub fn campaign_table(summary: &CampaignSummary) -> Table {
     let mut table =
         Table::new(["run", "index", "test", "status", "action", "property", "outcome", "margin", "witness"]);

@@ -1,4 +1,4 @@
-//! A campaign for people at a terminal.
+//! A campaign's summary for the terminal.
 
 use std::fmt::Write as _;
 
@@ -12,11 +12,12 @@ use crate::report::weighted::weighted_text;
 use crate::report::{CampaignSummary, PropertyLine, RunSummary, Share, by_action, regressions_text};
 use crate::verdict::Outcome;
 
-/// Rows of the table of runs, and failed runs told in words; the rest are a command away.
+/// Maximum number of rows in the table of runs. The text names the command that lists the rest.
 const RUNS_SHOWN: usize = 40;
+/// Maximum number of failed runs that are described in words.
 const FAILURES_TOLD: usize = 20;
 
-/// The table of runs × properties, the scores, and for each failed property its witness in words.
+/// Formats the table of runs × properties, the scores, and the witness of each failed property.
 pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
     let mut out = regressions_text(&summary.regressions);
     if !out.is_empty() {
@@ -39,7 +40,7 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
     if summary.runs.is_empty() {
         return;
     }
-    // Every run while they fit; then those that did not pass, which are the ones to look at.
+    // All runs if they fit; otherwise the runs that did not pass, which are of most interest.
     let fit = summary.runs.len() <= RUNS_SHOWN;
     let shown: Vec<&RunSummary> = summary.runs.iter().filter(|run| fit || !run.passed()).take(RUNS_SHOWN).collect();
     let several = by_action::has_several_actions(summary);
@@ -56,7 +57,7 @@ fn runs_table(out: &mut String, summary: &CampaignSummary, colour: bool) {
     }
 }
 
-/// The outcomes of some runs of one action each.
+/// Outcomes of the shown runs, for tests with a single action.
 fn outcomes_table(summary: &CampaignSummary, shown: &[&RunSummary], colour: bool) -> comfy_table::Table {
     let mut table = ruled();
     if colour {
@@ -75,7 +76,7 @@ fn outcomes_table(summary: &CampaignSummary, shown: &[&RunSummary], colour: bool
     table
 }
 
-/// Outcomes of a property in a run: one for each action that has it.
+/// Outcomes of a property in a run, one for each action that has the property.
 fn outcomes_cell(run: &RunSummary, property: &str) -> Cell {
     let outcomes: Vec<Outcome> = run
         .actions
@@ -117,7 +118,7 @@ fn properties_table(out: &mut String, summary: &CampaignSummary) {
 }
 
 fn pass_rate(line: &PropertyLine) -> String {
-    line.rate.as_ref().map_or_else(|| "nothing decided".to_owned(), Share::to_string)
+    line.rate.as_ref().map_or_else(|| "none decided".to_owned(), Share::to_string)
 }
 
 fn scores(out: &mut String, summary: &CampaignSummary) {
@@ -149,7 +150,7 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
     let _ = writeln!(out, "campaign {} in {}", summary.campaign, summary.history);
 }
 
-/// Which properties fail together, and how often.
+/// Writes which properties fail together, and how often.
 fn failure_modes(out: &mut String, summary: &CampaignSummary) {
     let modes = summary.failure_modes.iter().filter(|mode| !mode.failed.is_empty());
     for mode in modes {
@@ -165,7 +166,7 @@ fn failure_modes(out: &mut String, summary: &CampaignSummary) {
     }
 }
 
-/// Properties whose outcomes say less than they seem to.
+/// Writes warnings about properties whose outcomes may be misleading.
 fn remarks(out: &mut String, summary: &CampaignSummary) {
     if summary.privileged {
         let _ = writeln!(out, "note: {}", SkillRecord::PRIVILEGED);

@@ -1,28 +1,28 @@
-//! Scenes that are run again, and whether they fail as they did.
+//! Results of re-running cases: whether each scene still fails as recorded.
 
 use serde_json::{Value, json};
 
 use crate::verdict::Recurrence;
 
-/// A case in short.
+/// Summary of one case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaseSummary {
-    /// Its file, as people name it.
+    /// The case file's path as displayed.
     pub file: String,
-    /// Id of today's run.
+    /// Id of the new run.
     pub run: String,
-    /// Names of the properties that failed when it was taken.
+    /// Names of the properties that failed when the case was recorded.
     pub expected: Vec<String>,
-    /// What came of it.
+    /// How the new result compares with the recorded one.
     pub recurrence: Recurrence,
-    /// Whether every bit of every state is the same; nothing where the case does not say what it was.
+    /// Whether the trace is bit-for-bit the same. `None` if the case has no trace hash.
     pub same_trace: Option<bool>,
-    /// Why the run did not complete.
+    /// Why the run did not complete, if it did not.
     pub reason: Option<String>,
 }
 
 impl CaseSummary {
-    /// Whether a property fails.
+    /// Whether any property fails.
     pub fn fails(&self) -> bool {
         match self.recurrence {
             Recurrence::AsBefore => !self.expected.is_empty(),
@@ -31,7 +31,7 @@ impl CaseSummary {
         }
     }
 
-    /// 0: nothing fails. 1: a property fails. 2: it could not be decided.
+    /// 0: nothing fails. 1: a property fails. 2: the case could not be decided.
     pub fn exit_code(&self) -> u8 {
         match self.recurrence {
             Recurrence::Undecided(_) => 2,
@@ -40,28 +40,28 @@ impl CaseSummary {
     }
 }
 
-/// What came of one case, in words.
+/// Describes the result of one case in words.
 pub fn case_text(case: &CaseSummary) -> String {
     let was = listed(&case.expected);
     let told = match &case.recurrence {
-        Recurrence::AsBefore if case.expected.is_empty() => "still passes as it did".to_owned(),
-        Recurrence::AsBefore => format!("still fails as it did: {was}"),
+        Recurrence::AsBefore if case.expected.is_empty() => "still passes as recorded".to_owned(),
+        Recurrence::AsBefore => format!("still fails as recorded: {was}"),
         Recurrence::NoLonger => format!("no longer fails: {was}"),
         Recurrence::Otherwise(now) if case.expected.is_empty() => format!("fails now: {}", listed(now)),
-        Recurrence::Otherwise(now) => format!("fails otherwise: {} (it was {was})", listed(now)),
+        Recurrence::Otherwise(now) => format!("fails differently: {} (was {was})", listed(now)),
         Recurrence::Undecided(what) if what.is_empty() => "nothing was judged".to_owned(),
         Recurrence::Undecided(what) => format!("could not be decided: {}", listed(what)),
     };
     let trace = match case.same_trace {
-        Some(true) => "; the same trace",
-        Some(false) => "; another trace than then",
+        Some(true) => "; same trace",
+        Some(false) => "; different trace",
         None => "",
     };
     let reason = case.reason.as_ref().map_or_else(String::new, |reason| format!(" ({reason})"));
     format!("{told}{reason}{trace}\n")
 }
 
-/// How many cases of a corpus ran, and those of which something is to be said; nothing where there are none.
+/// Summarises a corpus in one line: the number of cases and the ones that need attention. Empty if there are no cases.
 pub fn regressions_text(cases: &[CaseSummary]) -> String {
     if cases.is_empty() {
         return String::new();
@@ -79,7 +79,7 @@ pub fn regressions_text(cases: &[CaseSummary]) -> String {
         Recurrence::AsBefore if case.fails() => with(case, &listed(&case.expected)),
         _ => None,
     });
-    tell(["fails otherwise", "fail otherwise"], &|case| match &case.recurrence {
+    tell(["fails differently", "fail differently"], &|case| match &case.recurrence {
         Recurrence::Otherwise(now) => with(case, &listed(now)),
         _ => None,
     });
@@ -99,7 +99,7 @@ fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
     names.into_iter().map(String::as_str).collect::<Vec<_>>().join(" + ")
 }
 
-/// The same for programs.
+/// Returns the result of one case as JSON.
 pub fn case_json(case: &CaseSummary) -> Value {
     let (failed, undecided) = match &case.recurrence {
         Recurrence::AsBefore => (case.expected.iter().collect::<Vec<_>>(), Vec::new()),
@@ -146,13 +146,13 @@ mod tests {
         ];
         assert_eq!(
             regressions_text(&cases),
-            "regressions: 5 ran, 1 fails again: a.toml (A); 1 fails otherwise: c.toml (B + C); \
+            "regressions: 5 ran, 1 fails again: a.toml (A); 1 fails differently: c.toml (B + C); \
              1 could not be decided: d.toml (A); 1 no longer fails: b.toml (A)\n"
         );
         assert_eq!(regressions_text(&[]), "");
         assert_eq!(cases.each_ref().map(CaseSummary::exit_code), [1, 0, 1, 2, 0]);
         let texts = cases.each_ref().map(case_text);
-        assert_eq!(texts[0], "still fails as it did: A\n");
-        assert_eq!(texts[2], "fails otherwise: B + C (it was A)\n");
+        assert_eq!(texts[0], "still fails as recorded: A\n");
+        assert_eq!(texts[2], "fails differently: B + C (was A)\n");
     }
 }

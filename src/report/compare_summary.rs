@@ -1,4 +1,4 @@
-//! A comparison with what people have to know of its sides.
+//! A comparison of two campaigns, with a description of each side.
 
 use crate::analysis::{Compared, Comparison};
 use crate::base::names;
@@ -6,62 +6,62 @@ use crate::base::names;
 /// One side of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComparedSide {
-    /// As it was named: `k7f3`, `old/.actcheck#k7f3` or `k7f3@rechecked`.
+    /// As given on the command line: `k7f3`, `old/.actcheck#k7f3` or `k7f3@rechecked`.
     pub name: String,
     /// Id of the campaign.
     pub campaign: String,
     /// Name of its configuration.
     pub config: String,
-    /// How many runs it has.
+    /// Number of runs it has.
     pub runs: u64,
-    /// How many were asked for.
+    /// Number of runs it was asked for.
     pub planned: u64,
-    /// RFC 3339.
+    /// When it started (RFC 3339).
     pub started: String,
     /// Text of its configuration.
     pub config_text: String,
 }
 
-/// One thing that the sides do not share.
+/// One difference between the sides.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SideChange {
     /// Such as "model".
     pub kind: String,
     /// Its name.
     pub name: String,
-    /// Digest or version of the first side; nothing where it lacks it.
+    /// Digest or version in the first side; `None` if it is absent there.
     pub first: Option<String>,
-    /// Digest or version of the second side; nothing where it lacks it.
+    /// Digest or version in the second side; `None` if it is absent there.
     pub second: Option<String>,
 }
 
-/// Two campaigns, compared, for the printers.
+/// Two compared campaigns, ready to print.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CompareSummary {
-    /// The first and the second.
+    /// First and second side.
     pub sides: [ComparedSide; 2],
-    /// What the numbers say.
+    /// The statistical comparison.
     pub comparison: Comparison,
     /// Configuration, program, models, ontology and rules that differ.
     pub changes: Vec<SideChange>,
-    /// The level at which the second must not be worse, where that was asked.
+    /// Significance level at which the second side must not be worse, if one was given.
     pub level: Option<f64>,
 }
 
 impl CompareSummary {
-    /// 1 where the second is worse at the level that was asked for, otherwise 0.
+    /// 1 if the second side is significantly worse at the given level, otherwise 0.
     pub fn exit_code(&self) -> u8 {
         u8::from(self.level.is_some_and(|level| !self.comparison.worse_at(level).is_empty()))
     }
 
-    /// The lines of the configurations that only the first, and only the second has, without comments.
+    /// Configuration lines that only the first side has, and those that only the second has. Comments are ignored.
     pub fn config_lines(&self) -> [Vec<String>; 2] {
         let [first, second] = self.sides.each_ref().map(|side| settings(&side.config_text));
         [without(&first, &second), without(&second, &first)]
     }
 }
 
-/// What a line is about, in words.
+/// The subject of a comparison line, in words.
 pub(super) fn compared_name(of: &Compared) -> String {
     match of {
         Compared::WholeRun => "whole run".to_owned(),
@@ -69,11 +69,11 @@ pub(super) fn compared_name(of: &Compared) -> String {
     }
 }
 
-/// Lines of a configuration, each behind its table's name, without what stands behind `#`.
+/// Lines of a configuration, each prefixed with its table's name. Comments are removed.
 fn settings(text: &str) -> Vec<String> {
     let (mut found, mut table) = (Vec::new(), String::new());
     for line in text.lines() {
-        // A `#` within quotes is cut too: on both sides, so that only what is told gets shorter.
+        // A `#` inside quotes is cut too. Both sides are cut alike, so only the printed line gets shorter.
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.starts_with('[') && line.ends_with(']') && !line.contains('=') {
             table = format!("{line} ");
@@ -84,7 +84,7 @@ fn settings(text: &str) -> Vec<String> {
     found
 }
 
-/// The lines of one list that another lacks, as often as it lacks them.
+/// Multiset difference: the lines of `lines` that `others` lacks, counting repetitions.
 fn without(lines: &[String], others: &[String]) -> Vec<String> {
     let mut left: Vec<&String> = others.iter().collect();
     let mut found = Vec::new();

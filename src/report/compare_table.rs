@@ -1,11 +1,11 @@
-//! Two campaigns side by side, for programs.
+//! A comparison of two campaigns as CSV and JSON.
 
 use serde_json::{Value, json};
 
 use crate::analysis::{Compared, ComparedLine};
 use crate::report::{CompareSummary, Table};
 
-/// One row for each property, and the first for whole runs (without action and property).
+/// One row for each property. The first row is for whole runs and has neither action nor property.
 pub fn compare_table(summary: &CompareSummary) -> Table {
     let mut table = Table::new([
         "action",
@@ -55,7 +55,7 @@ pub fn compare_table(summary: &CompareSummary) -> Table {
     table
 }
 
-/// Everything.
+/// Returns the whole comparison as JSON.
 pub fn compare_json(summary: &CompareSummary) -> Value {
     let found = &summary.comparison;
     let [first, second] = summary.sides.each_ref().map(|side| {
@@ -117,7 +117,7 @@ fn parts_json(of: &Compared) -> Value {
     json!({ "action": action, "property": property })
 }
 
-/// Action and property; nothing for whole runs.
+/// Action and property; `(None, None)` for whole runs.
 fn parts(of: &Compared) -> (Option<String>, Option<String>) {
     match of {
         Compared::WholeRun => (None, None),
@@ -125,7 +125,7 @@ fn parts(of: &Compared) -> (Option<String>, Option<String>) {
     }
 }
 
-/// Pairs of ids in one cell.
+/// Joins pairs of run ids into one cell.
 fn ids(runs: &[(String, String)]) -> String {
     runs.iter().map(|(a, b)| format!("{a}/{b}")).collect::<Vec<_>>().join(" ")
 }

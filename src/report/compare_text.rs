@@ -1,4 +1,4 @@
-//! Two campaigns side by side, for people at a terminal.
+//! A comparison of two campaigns for the terminal.
 
 use std::fmt::Write as _;
 
@@ -8,10 +8,10 @@ use crate::report::table::ruled;
 use crate::report::{CompareSummary, ComparedSide};
 use crate::verdict::{Counts, Outcome};
 
-/// Runs, settings and names told in one line or list; `--format json` has all.
+/// Maximum number of runs, settings or names in a line or list; `--format json` has all.
 const TOLD: usize = 10;
 
-/// Both sides, what differs between them, rates and tests of each property, the scenes that flipped, and the verdict.
+/// Formats both sides, their differences, rates and tests of each property, the scenes that flipped, and the verdict.
 pub fn compare_text(summary: &CompareSummary) -> String {
     let mut out = String::new();
     let [first, second] = &summary.sides;
@@ -42,12 +42,12 @@ fn scenes(out: &mut String, summary: &CompareSummary) {
     }
     if !found.other_scene.is_empty() {
         let runs: Vec<String> = found.other_scene.iter().map(|(a, b)| format!("{a}/{b}")).collect();
-        let _ = writeln!(out, "{} with another scene or test under the same number: {}", runs.len(), list(&runs));
+        let _ = writeln!(out, "{} with a different scene or test at the same index: {}", runs.len(), list(&runs));
     }
     if found.other_physics > 0 {
         let _ = writeln!(
             out,
-            "in {} of the {} the objects have other masses, frictions or restitutions",
+            "in {} of the {} the objects have different masses, frictions or restitutions",
             found.other_physics, found.pairs
         );
     }
@@ -58,10 +58,10 @@ fn changes(out: &mut String, summary: &CompareSummary) {
         out.push_str("\nprogram, configuration, models, ontology and rules are the same in both\n");
         return;
     }
-    out.push_str("\nwhat differs\n");
+    out.push_str("\ndifferences\n");
     let short = |digest: &Option<String>| match digest {
         Some(digest) => shortened(digest),
-        None => "not there".to_owned(),
+        None => "absent".to_owned(),
     };
     for change in summary.changes.iter().take(TOLD) {
         let _ =
@@ -77,7 +77,7 @@ fn changes(out: &mut String, summary: &CompareSummary) {
     }
 }
 
-/// A text with only the first letters of each digest in it.
+/// Shortens each digest in a text to its first eight characters.
 fn shortened(text: &str) -> String {
     let pieces = text.split_inclusive(|letter: char| !letter.is_ascii_hexdigit());
     let short = |piece: &str| match piece.find(|letter: char| !letter.is_ascii_hexdigit()).unwrap_or(piece.len()) {
@@ -123,7 +123,7 @@ fn lines(out: &mut String, summary: &CompareSummary) {
 fn difference(line: &ComparedLine) -> String {
     match &line.difference {
         Some(found) => format!("{:+.1} [{:+.1}, {:+.1}]", 100.0 * found.value, 100.0 * found.low, 100.0 * found.high),
-        None => "nothing decided".to_owned(),
+        None => "none decided".to_owned(),
     }
 }
 
@@ -142,14 +142,15 @@ fn flips(out: &mut String, summary: &CompareSummary) {
     }
 }
 
-/// A side that lost much more than the other hides something from the rates.
+/// Writes the scenes that were left out: a side that lost many more than the other biases the rates.
 fn left_out(out: &mut String, summary: &CompareSummary) {
     for line in &summary.comparison.lines {
         let lost = line.left_out[0].total();
         if lost > 0 {
             let [a, b] = line.left_out.map(undecided);
             let name = compared_name(&line.of);
-            let _ = writeln!(out, "{name}: {lost} scenes left out, for they were not decided in both (A: {a}; B: {b})");
+            let _ =
+                writeln!(out, "{name}: {lost} scenes left out because they were not decided in both (A: {a}; B: {b})");
         }
     }
 }

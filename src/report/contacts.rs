@@ -1,11 +1,11 @@
-//! Which contacts of an action are told where not all can be.
+//! Selects the contacts of an action that are shown.
 
 use crate::history::ContactEpisode;
 
-/// Contacts of an action that are told at most: the strongest.
+/// Maximum number of contacts shown for an action.
 const MOST_CONTACTS: usize = 60;
 
-/// The strongest contacts, in the order in which they began.
+/// Returns the strongest contacts in chronological order.
 pub(super) fn strongest(contacts: &[ContactEpisode]) -> Vec<&ContactEpisode> {
     let mut all: Vec<&ContactEpisode> = contacts.iter().collect();
     if all.len() > MOST_CONTACTS {

@@ -1,11 +1,11 @@
-//! What analysis found, for programs.
+//! Findings of the analysis as JSON.
 
 use serde_json::{Value, json};
 
 use crate::analysis::{Cascade, Condition, Judged, Parameter, Pattern, TwoByTwo, TwoWay};
 use crate::report::findings_summary::{FindingsSummary, PropertyReport};
 
-/// Everything.
+/// Returns all findings as JSON.
 pub fn findings_json(summary: &FindingsSummary) -> Value {
     let modes: Vec<Value> = summary
         .modes

@@ -1,4 +1,4 @@
-//! What analysis found, with what texts need to name.
+//! Findings of the analysis, with the names needed to print them.
 
 use crate::analysis::{
     Cascade, Condition, FailureMode, FlakyScene, Parameter, Pattern, PropertyFindings, Trend, TwoWay,
@@ -7,55 +7,55 @@ use crate::base::names;
 use crate::report::Table;
 use crate::verdict::Counts;
 
-/// Everything that `actcheck analyse` tells.
+/// The output of `actcheck analyse`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FindingsSummary {
-    /// Where the history lies, as the user named it.
+    /// Path of the history, as the user named it.
     pub history: String,
-    /// How the user calls this program.
+    /// How the user invoked this program.
     pub program: String,
-    /// Options that choose the same runs again, each with a space before it.
+    /// Options that select the same runs again, each preceded by a space.
     pub options: String,
-    /// Ids of the campaigns, by their starts.
+    /// Ids of the campaigns in order of their start.
     pub campaigns: Vec<String>,
-    /// Runs in the table.
+    /// Number of runs in the table.
     pub runs: u64,
-    /// Outcomes in the table.
+    /// Outcome counts of the table.
     pub counts: Counts,
-    /// Runs that fail alike.
+    /// Failure modes: runs that share the same set of failed properties.
     pub modes: Vec<FailureMode>,
-    /// Failures that lead to later ones.
+    /// Pairs of properties in which a failure is associated with a later failure.
     pub cascades: Vec<Cascade>,
-    /// Each property of each action.
+    /// One report for each property of each action.
     pub properties: Vec<PropertyReport>,
-    /// Chance of a false finding that is borne.
+    /// Significance level of the findings.
     pub level: f64,
 }
 
 /// One property.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PropertyReport {
-    /// What its outcomes say.
+    /// Findings of the analysis.
     pub findings: PropertyFindings,
     /// Unit of its margin.
     pub unit: Option<String>,
-    /// From campaign to campaign.
+    /// Failure rate from campaign to campaign.
     pub trend: Trend,
-    /// Scenes that went both ways.
+    /// Scenes that both passed and failed.
     pub flaky: Vec<FlakyScene>,
-    /// Scenes that were run more than once.
+    /// Number of scenes that were run more than once.
     pub repeated_scenes: u64,
     /// Heat maps.
     pub maps: Vec<TwoWay>,
 }
 
 impl PropertyReport {
-    /// What people call it.
+    /// Display name of the property.
     pub fn name(&self) -> &str {
         names::local(&self.findings.property)
     }
 
-    /// The pattern in a sentence.
+    /// Describes a pattern in one sentence.
     pub fn sentence(&self, pattern: &Pattern) -> String {
         let all = pattern.all;
         let elsewhere = match pattern.elsewhere {
@@ -73,7 +73,7 @@ impl PropertyReport {
         )
     }
 
-    /// The conditions of a pattern, as people say them.
+    /// Describes the conditions of a pattern in words.
     pub fn conditions(&self, pattern: &Pattern) -> String {
         let parameters = &self.findings.subject.parameters;
         let told: Vec<String> =
@@ -84,7 +84,7 @@ impl PropertyReport {
         }
     }
 
-    /// Ids of the runs of a pattern: the failed ones first.
+    /// Ids of the runs of a pattern, failed runs first.
     pub fn runs(&self, pattern: &Pattern) -> Vec<&str> {
         let failed = &self.findings.subject.failed;
         let of = |wanted: bool| pattern.runs.iter().filter(move |run| failed[**run] == wanted);
@@ -92,13 +92,13 @@ impl PropertyReport {
     }
 }
 
-/// A share, such as `71 %`; small ones with a digit behind the point.
+/// Formats a proportion, such as `71 %`; values below 10 % have one decimal.
 pub(super) fn percent(share: f64) -> String {
     let share = share * 100.0;
     if share > 0.0 && share < 9.95 { format!("{share:.1} %") } else { format!("{share:.0} %") }
 }
 
-/// A condition as people say it, such as `target friction < 0.35`.
+/// Describes a condition, such as `target friction < 0.35`.
 fn told(condition: &Condition, parameter: &Parameter) -> String {
     let unit = parameter.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
     let bare = match &parameter.unit {
@@ -118,7 +118,7 @@ fn told(condition: &Condition, parameter: &Parameter) -> String {
     }
 }
 
-/// One row for each pattern.
+/// Returns one row for each pattern.
 pub fn findings_table(summary: &FindingsSummary) -> Table {
     let mut table = Table::new([
         "action",
@@ -170,7 +170,7 @@ pub fn findings_table(summary: &FindingsSummary) -> Table {
     table
 }
 
-/// One row for each cell of the heat maps.
+/// Returns one row for each cell of the heat maps.
 pub fn maps_table(summary: &FindingsSummary) -> Table {
     let mut table = Table::new(["action", "property", "by", "down", "across", "runs", "failed", "rate", "low", "high"]);
     for report in &summary.properties {

@@ -1,4 +1,4 @@
-//! What analysis found, for people at a terminal.
+//! Findings of the analysis for the terminal.
 
 use std::fmt::Write as _;
 
@@ -9,14 +9,15 @@ use crate::report::table::ruled;
 use crate::report::{Share, scene_rule};
 use crate::verdict::{Counts, Outcome};
 
-/// Runs and scenes told in one line; `--format json` has all.
+/// Maximum number of runs or scenes listed in one line; `--format json` has all.
 const TOLD: usize = 8;
-/// Failure modes and cascades told.
+/// Maximum number of failure modes and of cascades listed.
 const TOLD_LINES: usize = 10;
-/// How dark a cell of a heat map is, by fifths of failures.
+/// Shades of heat map cells, by failure rate in steps of 20 %.
 const SHADES: [char; 5] = ['·', '░', '▒', '▓', '█'];
 
-/// Counts first, then the ways in which runs fail, then each property: its patterns, margins, trend, flaky scenes and maps.
+/// Formats counts, failure modes and cascades, then each property with its patterns, margins, trend, flaky scenes and
+/// heat maps.
 pub fn findings_text(summary: &FindingsSummary) -> String {
     let mut out = String::new();
     let campaigns = list(summary.campaigns.iter().map(String::as_str));
@@ -46,9 +47,9 @@ fn modes(out: &mut String, summary: &FindingsSummary) {
     if summary.modes.is_empty() {
         return;
     }
-    out.push_str("\nhow runs fail\n");
+    out.push_str("\nfailure modes\n");
     let mut table = ruled();
-    table.set_header(["share", "runs", "failed properties", "such as"]);
+    table.set_header(["share", "runs", "failed properties", "example"]);
     for mode in summary.modes.iter().take(TOLD_LINES) {
         let failed: Vec<&str> = mode.failed.iter().map(|iri| names::local(iri)).collect();
         let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
@@ -70,14 +71,14 @@ fn cascades(out: &mut String, summary: &FindingsSummary) {
     if summary.cascades.is_empty() {
         return;
     }
-    out.push_str("\nwhat leads to what\n");
+    out.push_str("\ncascades\n");
     let name = |of: &Judged| format!("{} ({} {})", names::local(&of.property), of.step, names::local(&of.action));
     for cascade in summary.cascades.iter().take(TOLD_LINES) {
         let table = cascade.table;
         let share = |failed: u64, of: u64| if of == 0 { "none".to_owned() } else { percent(failed as f64 / of as f64) };
         let _ = writeln!(
             out,
-            "where {} fails, {} fails in {} of {} runs; where it passes, in {} of {} (p adjusted {})",
+            "if {} fails, {} fails in {} of {} runs; if it passes, in {} of {} (adjusted p {})",
             name(&cascade.first),
             name(&cascade.later),
             share(table.failed_in, table.failed_in + table.passed_in),
@@ -129,20 +130,21 @@ fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
     }
     let confirmed = patterns.confirmed().count();
     if confirmed == 0 {
-        out.push_str("  no condition on the scenes goes with its failures beyond chance\n");
+        out.push_str("  no condition on the scenes is significantly associated with its failures\n");
     }
     let unconfirmed = patterns.patterns.len() - confirmed;
     if unconfirmed > 0 {
-        let _ = writeln!(out, "  {unconfirmed} more did not hold on the runs kept aside (--format json has them)");
+        let _ =
+            writeln!(out, "  {unconfirmed} more were not confirmed on the held-out runs (--format json lists them)");
     }
     if patterns.tried == 0 {
         let _ =
-            writeln!(out, "  (too few runs failed, or passed, to look for one; {} were kept aside)", patterns.held_out);
+            writeln!(out, "  (too few runs failed, or passed, to search for one; {} were held out)", patterns.held_out);
         return;
     }
     let _ = writeln!(
         out,
-        "  (tried {} conditions, up to {} together, on {} parameters of {} runs; {} were kept aside to confirm; level {})",
+        "  (tried {} conditions, up to {} combined, on {} parameters of {} runs; {} were held out to confirm; level {})",
         patterns.tried,
         patterns.depth,
         patterns.parameters,
@@ -151,19 +153,19 @@ fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
         summary.level
     );
     if patterns.depth == 3 && patterns.combined < patterns.parameters {
-        let _ = writeln!(out, "  (three at a time only of the {} most promising parameters)", patterns.combined);
+        let _ = writeln!(out, "  (combinations of three only use the {} most promising parameters)", patterns.combined);
     }
     if found.twins + found.repeated > 0 {
         let _ = writeln!(
             out,
-            "  ({} runs went bit for bit like a later one, {} had the scene of an earlier one: each counts once)",
+            "  ({} runs are bit-for-bit duplicates of a later one, {} repeat the scene of an earlier one: each counts once)",
             found.twins, found.repeated
         );
     }
     if found.steered > 0 {
         let _ = writeln!(
             out,
-            "  (a search chose the scenes of {} runs: shares are of these runs, not of what the configuration's ranges give)",
+            "  (a search chose the scenes of {} runs: rates describe these runs, not the configured ranges)",
             found.steered
         );
     }
@@ -173,7 +175,7 @@ fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
     let held_out = pattern.held_out;
     let _ = writeln!(
         out,
-        "     {:.1} times as often as all runs; WRAcc {:.3}; p {}, adjusted {}; kept aside: {} of {} fail, p {}",
+        "     {:.1} times as often as all runs; WRAcc {:.3}; p {}, adjusted {}; held out: {} of {} fail, p {}",
         pattern.lift,
         pattern.wracc,
         probability(pattern.p),
@@ -185,14 +187,14 @@ fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
     let _ = writeln!(out, "     runs: {}", list(report.runs(pattern).into_iter()));
 }
 
-/// How to make more such scenes.
+/// Writes the command that generates more scenes of a pattern.
 fn more(out: &mut String, report: &PropertyReport, pattern: &Pattern, (number, summary): (usize, &FindingsSummary)) {
     let parameters = &report.findings.subject.parameters;
     if scene_rule(&pattern.conditions, parameters, "").is_ok() {
         let _ = writeln!(
             out,
             "     more such scenes: {} analyse --property {} --scene-rule {number}{} > more.rls, and `require = \"more.rls\"` under \
-             `[scene]` of a configuration beside it",
+             `[scene]` of a configuration in the same folder",
             summary.program,
             report.name(),
             summary.options
@@ -200,7 +202,7 @@ fn more(out: &mut String, report: &PropertyReport, pattern: &Pattern, (number, s
     }
 }
 
-/// A probability, such as `0.03` or `2e-7`.
+/// Formats a probability, such as `0.030` or `2e-7`.
 fn probability(p: f64) -> String {
     match p {
         p if p <= 0.0 => "< 1e-300".to_owned(),
@@ -214,7 +216,7 @@ fn margins(out: &mut String, report: &PropertyReport) {
         let unit = report.unit.as_deref().unwrap_or("");
         let _ = writeln!(
             out,
-            "  margin {unit}: least {:.4}, 5 % {:.4}, 25 % {:.4}, median {:.4}, 75 % {:.4}, 95 % {:.4}, most {:.4}",
+            "  margin {unit}: min {:.4}, 5 % {:.4}, 25 % {:.4}, median {:.4}, 75 % {:.4}, 95 % {:.4}, max {:.4}",
             margins.least, margins.p05, margins.p25, margins.p50, margins.p75, margins.p95, margins.most
         );
     }
@@ -233,7 +235,7 @@ fn trend(out: &mut String, report: &PropertyReport) {
     for change in &report.trend.changes {
         let _ = writeln!(
             out,
-            "  changed with {}: from {} to {} (p adjusted {})",
+            "  changed at {}: from {} to {} (adjusted p {})",
             points[change.at].campaign,
             percent(change.before.rate),
             percent(change.behind.rate),
@@ -254,7 +256,7 @@ fn map(out: &mut String, map: &TwoWay) {
     let _ = writeln!(out, "{table}");
 }
 
-/// A cell, such as `▒ 45 % of 40`.
+/// Formats a heat map cell, such as `▒ 45 % of 40`.
 fn shaded(cell: &TwoWayCell) -> String {
     match cell.failing {
         None => String::new(),

@@ -1,4 +1,4 @@
-//! How healthy a campaign is, for people and programs.
+//! A campaign's health report as text, table and JSON.
 
 use std::fmt::Write as _;
 
@@ -9,26 +9,26 @@ use crate::base::{Diagnostic, Diagnostics, names};
 use crate::report::Table;
 use crate::report::table::ruled;
 
-/// A campaign's health with what messages need to name.
+/// A campaign's health, with the names that messages refer to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HealthSummary {
     /// The campaign's id.
     pub campaign: String,
-    /// Where the history lies, as the user named it.
+    /// Path of the history, as the user named it.
     pub history: String,
-    /// How the user calls this program.
+    /// How the user invoked this program.
     pub program: String,
-    /// What was found.
+    /// The measured health.
     pub health: Health,
 }
 
 impl HealthSummary {
-    /// 0: nothing is wrong. 1: something is.
+    /// 0: the campaign is healthy. 1: there are warnings.
     pub fn exit_code(&self) -> u8 {
         u8::from(!self.health.ailments.is_empty())
     }
 
-    /// What is wrong, as warnings with what to do.
+    /// The problems found, as warnings with help.
     pub fn warnings(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         for ailment in &self.health.ailments {
@@ -44,14 +44,14 @@ impl HealthSummary {
                 format!("{discards} of {drawn} scenes were discarded; the first, for run {run}: {reason}"),
             )
             .help(
-                "fewer or smaller objects, a larger surface, or ranges nearer to what `[scene] require` asks for, waste less and \
-                 bias the sample less",
+                "use fewer or smaller objects, a larger surface, or ranges closer to `[scene] require`: fewer discards waste \
+                 less time and bias the sample less",
             ),
             Ailment::Inapplicable(property, not, of) => Diagnostic::warning(
                 "Q001",
                 format!("{} was inapplicable in {not} of {of} judgements", names::local(property)),
             )
-            .help("generate scenes to which it applies, or widen what its rule calls `applicable`"),
+            .help("generate scenes to which it applies, or widen the `applicable` condition of its rule"),
             Ailment::Neglected(parameter) => neglected(parameter),
             Ailment::PairNeglected(pair) => Diagnostic::warning(
                 "Q003",
@@ -60,24 +60,24 @@ impl HealthSummary {
                     pair.cells, pair.names[0], pair.names[1], pair.hits, pair.draws, pair.expected_hits
                 ),
             )
-            .help("the two go together, so that failures can't be put down to one of them: do discards or a case tie them?"),
+            .help("the two parameters vary together, so failures can't be attributed to one of them: check whether discards or a case tie them"),
             Ailment::Duplicates(times, run, of) => {
-                Diagnostic::warning("Q004", format!("{times} runs repeat another one in every decision: {run} is {of} again"))
+                Diagnostic::warning("Q004", format!("{times} runs make the same decisions as another run: {run} repeats {of}"))
                     .help("widen the ranges of `[physics]`, `[sensing]` or the models, or ask for fewer runs")
             }
             Ailment::Slow(run, secs, median) => Diagnostic::warning(
                 "Q005",
                 format!("run {run} took {secs:.1} s, {:.0} times the median of {median:.1} s", secs / median.max(1e-9)),
             )
-            .help(format!("`{}` shows what it did; `[budget]` bounds what a run may take", self.show(run))),
+            .help(format!("`{}` shows the run; `[budget]` limits the time of a run", self.show(run))),
             Ailment::Penetration(run, depth) => Diagnostic::warning(
                 "Q006",
-                format!("in run {run} things went {:.1} mm into each other: contacts were not simulated well", depth * 1e3),
+                format!("in run {run}, bodies penetrated each other by {:.1} mm: contacts were simulated inaccurately", depth * 1e3),
             )
             .help("raise `[physics] steps_per_second` or `iterations`, or make heavy objects lighter"),
             Ailment::Energy(run, energy) => Diagnostic::warning(
                 "Q007",
-                format!("in run {run} objects gained {energy:.2} J that nothing gave them: simulation was unstable"),
+                format!("in run {run}, objects gained {energy:.2} J without a cause: the simulation was unstable"),
             )
             .help("raise `[physics] steps_per_second` or `iterations`, or lower `restitution`"),
         }
@@ -87,7 +87,7 @@ impl HealthSummary {
         format!("{} show {run} --history {}", self.program, self.history)
     }
 
-    /// Pairs of bins of all pairs of parameters: tried, expected, all.
+    /// Pairs of bins over all pairs of parameters: number tried, number expected, total.
     fn pairs(&self) -> (usize, f64, usize) {
         let pairs = &self.health.pairs;
         (
@@ -103,13 +103,13 @@ fn neglected(parameter: &ParameterCoverage) -> Diagnostic {
     let bin = parameter.neglected.unwrap_or_default();
     let (times, even) = (parameter.counts.get(bin).copied().unwrap_or_default(), parameter.draws as f64 / bins as f64);
     let message = format!(
-        "`{}` was in the {} of its {bins} equally probable parts {times} times of {}, not about {even:.0}",
+        "`{}` fell into the {} of its {bins} equally probable bins {times} times in {} draws, not about {even:.0}",
         parameter.name,
         ordinal(bin + 1),
         parameter.draws
     );
     Diagnostic::warning("Q002", message)
-        .help("what is hardly tried is hardly tested: do discards leave such scenes out? (`act:discards` of each run)")
+        .help("rarely drawn values are rarely tested: check whether discards exclude such scenes (`act:discards` of each run)")
 }
 
 fn ordinal(number: usize) -> String {
@@ -122,7 +122,7 @@ fn ordinal(number: usize) -> String {
     format!("{number}{ending}")
 }
 
-/// The warnings in a line each, for the end of a campaign's summary; nothing where it is healthy.
+/// One line for each warning, for the end of a campaign's summary. Empty if the campaign is healthy.
 pub fn health_lines(summary: &HealthSummary) -> String {
     let mut out = String::new();
     for warning in summary.warnings().iter() {
@@ -136,7 +136,7 @@ pub fn health_lines(summary: &HealthSummary) -> String {
     out
 }
 
-/// One row for each parameter: how often each of its bins was tried.
+/// Returns one row for each parameter: how often its bins were tried.
 pub fn health_table(summary: &HealthSummary) -> Table {
     let mut table = Table::new(["parameter", "draws", "bins", "hit", "expected_hit", "least", "most"]);
     for parameter in &summary.health.parameters {
@@ -153,14 +153,14 @@ pub fn health_table(summary: &HealthSummary) -> Table {
     table
 }
 
-/// Coverage, then what else was measured, for people.
+/// Formats coverage, then the other measurements.
 pub fn health_text(summary: &HealthSummary) -> String {
     let health = &summary.health;
     let mut out = String::new();
     if !health.parameters.is_empty() {
         let mut table = ruled();
         table.force_no_tty();
-        table.set_header(["parameter", "draws", "parts hit (expected)", "draws in each part"]);
+        table.set_header(["parameter", "draws", "bins hit (expected)", "draws in each bin"]);
         for parameter in &health.parameters {
             let counts: Vec<String> = parameter.counts.iter().map(u64::to_string).collect();
             table.add_row([
@@ -174,7 +174,7 @@ pub fn health_text(summary: &HealthSummary) -> String {
     }
     let (hits, expected, cells) = summary.pairs();
     if cells > 0 {
-        let _ = writeln!(out, "pairs of parts of two parameters: {hits} of {cells} tried (expected {expected:.0})");
+        let _ = writeln!(out, "pairs of bins of two parameters: {hits} of {cells} tried (expected {expected:.0})");
     }
     let drawn = health.runs + health.discards;
     let _ = writeln!(out, "scenes discarded: {} of {drawn}", health.discards);
@@ -185,7 +185,7 @@ pub fn health_text(summary: &HealthSummary) -> String {
         let _ = writeln!(out, "deepest penetration: {:.2} mm ({run})", depth * 1e3);
     }
     if let Some((energy, run)) = &health.energy {
-        let _ = writeln!(out, "energy from nowhere: at most {:.4} J in a run ({run})", energy);
+        let _ = writeln!(out, "unexplained energy gain: at most {:.4} J in a run ({run})", energy);
     }
     let _ = match health.ailments.len() {
         0 => writeln!(out, "campaign {} in {} is healthy", summary.campaign, summary.history),
@@ -195,7 +195,7 @@ pub fn health_text(summary: &HealthSummary) -> String {
     out
 }
 
-/// The same for programs.
+/// Returns the health report as JSON.
 pub fn health_json(summary: &HealthSummary) -> Value {
     let health = &summary.health;
     let parameters = health.parameters.iter().map(|parameter| {

@@ -1,4 +1,4 @@
-//! Verdicts and tables as people and programs read them.
+//! Formats verdicts, findings and tables for people and for programs.
 //!
 //! Never: decides an outcome, computes a statistic of its own, or writes to a stream.
 

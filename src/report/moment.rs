@@ -1,18 +1,20 @@
-//! The moment of a run at which to begin looking, when one of its properties failed.
+//! Finds the moment of a run at which a failed property was decided, as the starting point for playback.
 
 use crate::history::Trace;
 
-/// What has come so far from its place has been moved. Unit: metres.
+/// A displacement beyond this counts as moved. Unit: metres.
 const MOVED_M: f64 = 0.01;
-/// A contact that ends sooner before the end of its action was not lost. Unit: seconds.
+/// A contact that ends closer than this to the end of its action does not count as lost. Unit: seconds.
 const LOST_SECS: f64 = 0.2;
-/// So long before it something can be seen coming. Unit: seconds.
+/// Lead time: playback starts this long before the deciding event. Unit: seconds.
 const BEFORE_SECS: f64 = 0.3;
 
-/// When what a witness speaks of was decided, since the run began. Unit: seconds.
+/// Returns the moment that decided an outcome, from the movable objects that its witness names. Unit: seconds since the
+/// run began.
 ///
-/// Of the things that the witness names: the robot touched one that the action has nothing to do with; such a thing moved; the robot
-/// lost hold of what it handles, or never came to it and was nearest. Otherwise the end of the action, whose state was judged.
+/// In this order: the robot first touched a named object that is not a parameter of the action; such an object moved;
+/// the robot lost contact with the named objects; if it never touched them, a link was nearest to them. If none
+/// applies, returns the end of the action. All but the last are shifted earlier by [`BEFORE_SECS`].
 pub(super) fn decided(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
     let begin = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
     let (run_begin, start, end) = (begin(0), begin(action_idx), begin(action_idx + 1));
@@ -46,7 +48,7 @@ pub(super) fn decided(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
     at.clamp(start, end.max(start)) - run_begin
 }
 
-/// Whether a text has a word.
+/// Whether a text contains a whole word.
 fn names(text: &str, word: &str) -> bool {
     let of_word = |c: char| c.is_alphanumeric() || c == '_';
     !word.is_empty()
@@ -55,7 +57,7 @@ fn names(text: &str, word: &str) -> bool {
             .any(|(at, _)| !text[..at].ends_with(of_word) && !text[at + word.len()..].starts_with(of_word))
 }
 
-/// Positions of a track in the frames of an action, with their times since the action began. Units: seconds, metres.
+/// Positions of a track in the frames of an action, with times since the action began. Units: seconds, metres.
 fn course<'a>(trace: &'a Trace, slot: usize, start: f64, end: f64) -> impl Iterator<Item = (f64, [f64; 3])> + use<'a> {
     let secs = |idx: usize| idx as f64 * trace.frames.period_secs;
     let at = move |row: &Vec<f32>| row.get(7 * slot..7 * slot + 3).map(|at| [at[0], at[1], at[2]].map(f64::from));
@@ -68,7 +70,8 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// When a thing had come from its place, since the action began. Units: seconds; `start` and `end` since the run began.
+/// When an object had moved, since the action began. Returns `None` if it did not. Unit: seconds; `start` and `end`
+/// since the run began.
 fn moved(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
     let slot = trace.frames.names.iter().position(|name| name == id)?;
     let mut course = course(trace, slot, start, end);
@@ -76,7 +79,8 @@ fn moved(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
     course.find(|(_, now)| distance(*now, place) > MOVED_M).map(|(secs, _)| secs)
 }
 
-/// When a link of the robot was nearest to one of some things, since the action began. Units: seconds; `start` and `end` since the run began.
+/// When a link of the robot was nearest to any of the objects, since the action began. Unit: seconds; `start` and `end`
+/// since the run began.
 fn nearest(trace: &Trace, ids: &[&str], start: f64, end: f64) -> Option<f64> {
     let slots = |wanted: &dyn Fn(&str) -> bool| -> Vec<usize> {
         trace.frames.names.iter().enumerate().filter(|(_, name)| wanted(name)).map(|(slot, _)| slot).collect()

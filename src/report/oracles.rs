@@ -1,4 +1,4 @@
-//! Tests of the oracles: the matrix of faults × properties for people and programs.
+//! Results of testing the oracles: the matrix of faults × properties as text, table and JSON.
 
 use std::fmt::Write as _;
 
@@ -9,32 +9,32 @@ use crate::base::{Diagnostic, Diagnostics};
 use crate::report::Table;
 use crate::report::table::ruled;
 
-/// What is said when the oracles of a campaign were tested.
+/// Result of testing the oracles of a configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OracleSummary {
     /// The configuration, as the user named it.
     pub config: String,
     /// Seed of the scenes.
     pub seed: u64,
-    /// Runs that were planned without a fault, and with each.
+    /// Number of planned runs without a fault, and with each fault.
     pub planned: u64,
-    /// Name of each fault and what it does, in the order of the rows.
+    /// Name and description of each fault, in row order.
     pub faults: Vec<(String, String)>,
-    /// Name of each property, in the order of the columns.
+    /// Name of each property, in column order.
     pub names: Vec<String>,
     /// The results.
     pub matrix: OracleMatrix,
-    /// What they leave open.
+    /// Gaps that the results show.
     pub gaps: Vec<OracleGap>,
 }
 
 impl OracleSummary {
-    /// 0: every fault is noticed and every property notices one. 1: there is a gap.
+    /// 0: every fault is noticed and every property notices a fault. 1: there is a gap.
     pub fn exit_code(&self) -> u8 {
         u8::from(!self.gaps.is_empty())
     }
 
-    /// The gaps as warnings with what to do.
+    /// The gaps as warnings with help.
     pub fn warnings(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         for gap in &self.gaps {
@@ -45,34 +45,35 @@ impl OracleSummary {
 
     fn warning(&self, gap: &OracleGap) -> Diagnostic {
         match gap {
-            OracleGap::FaultUnnoticed(fault) => {
-                Diagnostic::warning("V001", format!("no property notices the fault `{fault}`: {}", self.what(fault)))
-                    .help("add a property that fails then (`actcheck new property`), or tighten one that should")
-            }
+            OracleGap::FaultUnnoticed(fault) => Diagnostic::warning(
+                "V001",
+                format!("no property notices the fault `{fault}`: {}", self.what(fault)),
+            )
+            .help("add a property that fails with this fault (`actcheck new property`), or tighten one that should"),
             OracleGap::PropertyNoticesNothing(property) => {
                 let name = self.name(property);
                 Diagnostic::warning("V002", format!("the property `{name}` notices no fault")).help(
-                    "it passes with every fault as it does without: is its rule too weak, or its threshold too wide?",
+                    "it passes with every fault as it does without: check whether its rule is too weak or its threshold too wide",
                 )
             }
             OracleGap::FaultTooRare(fault, scenes) => Diagnostic::warning(
                 "V003",
-                format!("the fault `{fault}` came about in {scenes} of {} scenes: too few to tell", self.planned),
+                format!("the fault `{fault}` took effect in {scenes} of {} scenes: too few to judge", self.planned),
             )
-            .help("more scenes (`--runs`), or scenes in which the action succeeds more often, would tell"),
+            .help("run more scenes (`--runs`), or scenes in which the action succeeds more often"),
             OracleGap::PropertyTooRare(property, passed) => {
                 let (name, scenes) = (self.name(property), self.matrix.scenes);
                 Diagnostic::warning(
                     "V004",
-                    format!("the property `{name}` passed in {passed} of {scenes} scenes without a fault: too few to tell what it notices"),
+                    format!("the property `{name}` passed in {passed} of {scenes} scenes without a fault: too few to judge which faults it notices"),
                 )
-                .help("more scenes (`--runs`), or scenes in which it passes more often, would tell")
+                .help("run more scenes (`--runs`), or scenes in which it passes more often")
             }
             OracleGap::NothingPasses(fault, scenes) => Diagnostic::warning(
                 "V005",
                 format!("an action passes with the fault `{fault}` in {scenes} scenes: {}", self.what(fault)),
             )
-            .help("some property has to see in the world that the action was done"),
+            .help("add a property that checks the action's effect on the world"),
         }
     }
 
@@ -101,12 +102,12 @@ fn word(notice: Notice) -> &'static str {
     }
 }
 
-/// The matrix for people: how often each property failed with each fault, and what that means.
+/// Formats the matrix: how often each property failed with each fault, and a legend.
 pub fn oracles_text(summary: &OracleSummary) -> String {
     let mut table = ruled();
     table.force_no_tty();
     let names = summary.names.iter().cloned();
-    table.set_header(["fault".to_owned(), "came about".to_owned()].into_iter().chain(names));
+    table.set_header(["fault".to_owned(), "took effect".to_owned()].into_iter().chain(names));
     let matrix = &summary.matrix;
     let alone = matrix.properties.iter().map(|(_, passed, failed)| format!("{failed}/{}", passed + failed));
     let scenes = format!("{} of {}", matrix.scenes, summary.planned);
@@ -122,8 +123,8 @@ pub fn oracles_text(summary: &OracleSummary) -> String {
     let mut out = format!("{table}\n\n");
     let _ = writeln!(
         out,
-        "failed/decided in the scenes in which the fault came about; * noticed: fails beyond chance where it passed without\n\
-         the fault in the same scene (McNemar's exact test, one-sided, p ≤ {LEVEL})\n"
+        "failed/decided in the scenes in which the fault took effect; * noticed: fails significantly more often than in the\n\
+         same scenes without the fault (McNemar's exact test, one-sided, p ≤ {LEVEL})\n"
     );
     for (fault, what) in &summary.faults {
         let _ = writeln!(out, "  {fault}: {what}");
@@ -136,7 +137,7 @@ pub fn oracles_text(summary: &OracleSummary) -> String {
     out
 }
 
-/// The matrix as a table with one row for each fault and property.
+/// Returns the matrix as a table with one row for each fault and property.
 pub fn oracles_table(summary: &OracleSummary) -> Table {
     let mut table = Table::new([
         "fault",
@@ -169,7 +170,7 @@ pub fn oracles_table(summary: &OracleSummary) -> Table {
     table
 }
 
-/// The same for programs, with what the results leave open.
+/// Returns the matrix and its gaps as JSON.
 pub fn oracles_json(summary: &OracleSummary) -> Value {
     let properties = summary.matrix.properties.iter().zip(&summary.names).map(
         |((iri, passed, failed), name)| json!({ "property": iri, "name": name, "passed": passed, "failed": failed }),

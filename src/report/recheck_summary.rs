@@ -1,22 +1,22 @@
-//! What a recheck changed, counted and listed.
+//! The changes that a recheck made, counted and listed.
 
 use std::collections::BTreeMap;
 
 use crate::history::Recheck;
 use crate::verdict::{Counts, Judgement, Outcome};
 
-/// Why an outcome is another than it was, or is there at all.
+/// Why an outcome changed or is new.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Why {
     /// The property was never judged in this run.
     NewProperty,
-    /// Its rules changed: digests of the rule file with its libraries, before and now.
+    /// Its rules changed: digests of the rule file including its libraries, before and now.
     RuleChanged(String, String),
-    /// Its rules did not change: the ontology or the program did.
+    /// Its rules are unchanged: the ontology or the program changed.
     SameRule,
 }
 
-/// An outcome that is new, or another than it was.
+/// An outcome that changed or is new.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
     /// Id of the run.
@@ -25,42 +25,42 @@ pub struct Change {
     pub step: u32,
     /// IRI of the action.
     pub action: String,
-    /// Outcome and margin that the history held; nothing for a property that was never judged there.
+    /// Outcome and margin in the history. `None` if the property was never judged there.
     pub before: Option<(Outcome, Option<f64>)>,
-    /// What the rules say now.
+    /// The new judgement.
     pub now: Judgement,
-    /// Why.
+    /// Reason for the change.
     pub why: Why,
 }
 
-/// One property in all runs that were judged.
+/// One property over all rechecked runs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RecheckLine {
-    /// Outcomes that the history held.
+    /// Outcomes in the history.
     pub before: Counts,
     /// Outcomes now.
     pub now: Counts,
-    /// Of them: never judged before.
+    /// Outcomes of properties that were never judged before.
     pub new: u64,
-    /// Of them: another outcome than before.
+    /// Outcomes that differ from before.
     pub changed: u64,
-    /// Of them: the same outcome, with another margin, witness or rule.
+    /// Unchanged outcomes with a different margin, witness or rule.
     pub restated: u64,
 }
 
-/// A whole recheck.
+/// The result of a recheck.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RecheckSummary {
-    /// Runs that were judged.
+    /// Number of rechecked runs.
     pub runs: u64,
-    /// By IRI of the property.
+    /// Counts by property IRI.
     pub properties: BTreeMap<String, RecheckLine>,
-    /// In the order of the runs, then by step, then in the order of the action's properties.
+    /// Changes ordered by run, then by step, then by the order of the action's properties.
     pub changes: Vec<Change>,
 }
 
 impl RecheckSummary {
-    /// Counts one more judgement.
+    /// Adds one judgement.
     pub fn add(&mut self, recheck: &Recheck) {
         let line = self.properties.entry(recheck.now.property.clone()).or_default();
         line.now.add(recheck.now.outcome);
@@ -95,7 +95,7 @@ impl RecheckSummary {
         counts
     }
 
-    /// 1 something fails now, 0 nothing fails and something passes, 2 nothing could be decided.
+    /// 1: a property fails. 0: at least one passes and none fails. 2: nothing could be decided.
     pub fn exit_code(&self) -> u8 {
         match self.now() {
             counts if counts.failed > 0 => 1,

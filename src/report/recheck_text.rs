@@ -1,4 +1,4 @@
-//! What a recheck changed, for people and for programs.
+//! The changes that a recheck made, as text, table and JSON.
 
 use std::fmt::Write as _;
 
@@ -10,10 +10,10 @@ use crate::report::table::ruled;
 use crate::report::{RecheckSummary, Table};
 use crate::verdict::{Counts, Outcome};
 
-/// Changes that are told at a terminal; `--format csv` has all.
+/// Maximum number of changes printed at a terminal; `--format csv` has all.
 const TOLD: usize = 20;
 
-/// Counts of each property before and now, and the outcomes that changed.
+/// Formats the counts of each property before and now, and the outcomes that changed.
 pub fn recheck_text(summary: &RecheckSummary) -> String {
     let mut out = String::new();
     let mut table = ruled();
@@ -36,9 +36,9 @@ pub fn recheck_text(summary: &RecheckSummary) -> String {
 fn told(summary: &RecheckSummary, restated: u64) -> String {
     let changed: u64 = summary.properties.values().map(|line| line.changed).sum();
     let new: u64 = summary.properties.values().map(|line| line.new).sum();
-    let mut text = format!("{} judged anew: {changed} outcomes changed, {new} new", runs(summary.runs));
+    let mut text = format!("{} judged again: {changed} outcomes changed, {new} new", runs(summary.runs));
     if restated > 0 {
-        let _ = write!(text, ", {restated} the same by another rule, margin or witness");
+        let _ = write!(text, ", {restated} unchanged with a different rule, margin or witness");
     }
     text
 }
@@ -47,7 +47,7 @@ fn runs(count: u64) -> String {
     if count == 1 { "1 run".to_owned() } else { format!("{count} runs") }
 }
 
-/// Changed outcomes first; of the new ones those that failed, which are the ones to look at.
+/// Writes changed outcomes, then new outcomes that failed; other new outcomes are omitted.
 fn changes(out: &mut String, summary: &RecheckSummary) {
     let (changed, new): (Vec<&Change>, Vec<&Change>) =
         summary.changes.iter().partition(|change| change.before.is_some());
@@ -81,17 +81,17 @@ fn margins(change: &Change) -> String {
     }
 }
 
-/// The reason in words, with so many letters of the digests.
+/// Describes the reason, with digests shortened to `letters` characters.
 fn why_text(why: &Why, letters: usize) -> String {
     let short = |digest: &str| digest.get(..letters).unwrap_or(digest).to_owned();
     match why {
         Why::NewProperty => "property is new".to_owned(),
         Why::RuleChanged(before, now) => format!("rule changed {} → {}", short(before), short(now)),
-        Why::SameRule => "same rule, other ontology or program".to_owned(),
+        Why::SameRule => "same rule, different ontology or program".to_owned(),
     }
 }
 
-/// The outcomes that occurred, with their numbers.
+/// Lists the outcomes that occurred, with their counts.
 fn counted(counts: Counts) -> String {
     let words: Vec<String> = Outcome::ALL
         .into_iter()
@@ -101,7 +101,7 @@ fn counted(counts: Counts) -> String {
     if words.is_empty() { "none".to_owned() } else { words.join(", ") }
 }
 
-/// One line for each outcome that changed or is new.
+/// Returns one row for each outcome that changed or is new.
 pub fn recheck_table(summary: &RecheckSummary) -> Table {
     let mut table = Table::new([
         "run",
@@ -132,7 +132,7 @@ pub fn recheck_table(summary: &RecheckSummary) -> Table {
     table
 }
 
-/// The same with the counts of each property.
+/// Returns the changes and the counts of each property as JSON.
 pub fn recheck_json(summary: &RecheckSummary) -> Value {
     let properties: Vec<Value> = summary
         .properties

@@ -1,4 +1,4 @@
-//! What a campaign shows about its properties themselves: outcomes that say less than they seem to.
+//! Remarks on the properties of a campaign: outcomes that may be misleading.
 
 use std::collections::BTreeMap;
 
@@ -8,32 +8,34 @@ use crate::analysis::wilson;
 use crate::report::CampaignSummary;
 use crate::verdict::Outcome;
 
-/// Fewer judgements than this are no ground for "never": with 4 of 4 the interval still begins below a half.
+/// Minimum number of judgements for a "never" remark: with 4 of 4, the lower bound of the interval is still near one
+/// half.
 const LEAST_FOR_NEVER: u64 = 5;
-/// From here on "never failed" is a warning: a property that fails in a tenth of all scenes would have failed (0.9³⁰ = 4 %).
+/// From this number of judgements on, "never failed" is a warning: a property that fails in a tenth of all scenes would
+/// probably have failed (0.9³⁰ = 4 %).
 const LEAST_FOR_SUSPICION: u64 = 30;
 
-/// A property, or several alike, whose outcomes say less than they seem to.
+/// A remark on one property, or on several with the same counts, whose outcomes may be misleading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remark {
-    /// What is odd.
+    /// Kind of oddity.
     pub oddity: Oddity,
     /// IRI and label of each property.
     pub properties: Vec<(String, String)>,
-    /// How many of the judgements are odd.
+    /// Number of odd judgements.
     pub count: u64,
-    /// Of how many.
+    /// Number of judgements considered.
     pub of: u64,
-    /// Whether something is to be done about it.
+    /// Whether the remark is a warning rather than a note.
     pub warning: bool,
-    /// The first run that shows it, where one does.
+    /// The first run that shows it, if any.
     pub run: Option<String>,
 }
 
-/// What can be odd about a property's outcomes.
+/// Kinds of oddities in a property's outcomes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Oddity {
-    /// It passed, but had held before the action already.
+    /// It passed, but already held before the action.
     HeldBefore,
     /// It was decided often and never passed.
     NeverPassed,
@@ -42,7 +44,7 @@ pub enum Oddity {
 }
 
 impl Oddity {
-    /// The word for it.
+    /// Name of the oddity in the output.
     pub fn word(self) -> &'static str {
         match self {
             Self::HeldBefore => "held before",
@@ -53,7 +55,7 @@ impl Oddity {
 }
 
 impl CampaignSummary {
-    /// What is odd about the properties; those that are alike together.
+    /// Remarks on the properties. Properties with the same oddity and counts share a remark.
     pub fn remarks(&self) -> Vec<Remark> {
         let mut alike: BTreeMap<(Oddity, u64, u64), Vec<(String, String)>> = BTreeMap::new();
         for line in self.property_lines() {
@@ -94,11 +96,11 @@ impl CampaignSummary {
         run.map(|run| run.id.clone())
     }
 
-    /// A remark in words, with what to do.
+    /// Describes a remark and suggests what to do.
     pub fn remark_text(&self, remark: &Remark) -> String {
         let labels: Vec<&str> = remark.properties.iter().map(|(_, label)| label.as_str()).collect();
         let names = labels.join(", ");
-        // Of the side that was never seen, at most so much can be left.
+        // Upper bound of the rate of the outcome that never occurred.
         let most = wilson(0, remark.of).map_or(100.0, |interval| interval.high * 100.0);
         let ask = match (&remark.run, labels.first()) {
             (Some(run), Some(label)) => format!("{} why {run} {label} --history {}", self.program, self.history),
@@ -107,16 +109,16 @@ impl CampaignSummary {
         let (count, of) = (remark.count, remark.of);
         match remark.oddity {
             Oddity::HeldBefore => format!(
-                "{names} held already before the action in {count} of {of} passes, which say nothing about it: \
-                 let the rule compare `after` with `before`, or require it to be false beforehand ({ask})"
+                "{names} already held before the action in {count} of {of} passes, which say nothing about the action: \
+                 compare `after` with `before` in the rule, or require it to be false beforehand ({ask})"
             ),
             Oddity::NeverPassed => format!(
                 "{names} never passed in {of} judgements (so in at most {most:.0} % of such scenes): \
-                 is the rule right? ({ask})"
+                 check its rule ({ask})"
             ),
             Oddity::NeverFailed if remark.warning => format!(
                 "{names} never failed in {of} judgements (so in at most {most:.0} % of such scenes): \
-                 can it fail at all? Try scenes that make it hard"
+                 check whether it can fail at all, with scenes that make it hard"
             ),
             Oddity::NeverFailed => {
                 format!("{names} never failed in {of} judgements (so in at most {most:.0} % of such scenes)")
@@ -124,7 +126,7 @@ impl CampaignSummary {
         }
     }
 
-    /// The remarks for programs.
+    /// Returns the remarks as JSON.
     pub(super) fn remarks_json(&self) -> Value {
         let remark = |remark: &Remark| {
             let properties: Vec<&str> = remark.properties.iter().map(|(iri, _)| iri.as_str()).collect();
@@ -147,7 +149,7 @@ mod tests {
     fn told(runs: u64, outcomes: [Outcome; 2], held_before: Option<bool>) -> Vec<(Oddity, u64, u64, bool)> {
         let runs = (0..runs).map(|index| {
             let mut run = run(index, RunStatus::Completed, &outcomes);
-            // In every third run.
+            // Set in every third run.
             if index.is_multiple_of(3) {
                 run.actions[0].judgements[0].held_before = held_before;
             }
@@ -166,7 +168,7 @@ mod tests {
         assert_eq!(told(4, [Passed, Failed], None), []);
         assert_eq!(told(40, [Broken, Broken], None), []);
         assert_eq!(told(4, [Passed, Passed], Some(true)), [(Oddity::HeldBefore, 2, 4, true)]);
-        // Two properties alike make one remark.
+        // Two properties with the same counts make one remark.
         assert_eq!(told(6, [Passed, Passed], None), [(Oddity::NeverFailed, 6, 6, false)]);
     }
 }

@@ -1,22 +1,22 @@
-//! What repetitions of scenes say: each property, and the runs as a whole.
+//! Consistency of repeated scenes, for each property and for whole runs.
 
 use crate::analysis::{Consistency, Interval, Repeated, consistency};
 use crate::report::{CampaignSummary, RunSummary};
 use crate::verdict::{Counts, Judgement, Outcome};
 
-/// How alike the runs of a scene are in one property, or as a whole.
+/// Consistency of repeated runs in one property, or of whole runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RepeatedProperty {
-    /// IRI of the property; nothing for whole runs, which pass where everything does.
+    /// IRI of the property. `None` for whole runs, which pass if everything passes.
     pub property: Option<String>,
     /// Its label.
     pub label: String,
-    /// What the repetitions say.
+    /// Measured consistency.
     pub found: Consistency,
 }
 
 impl CampaignSummary {
-    /// Each property, then the runs as a whole; nothing where every scene was run once.
+    /// Consistency of each property, then of whole runs. Empty if every scene was run once.
     pub fn repeated(&self) -> Vec<RepeatedProperty> {
         if !self.is_repeated() {
             return Vec::new();
@@ -32,12 +32,12 @@ impl CampaignSummary {
             .collect()
     }
 
-    /// Runs of a scene, in order of their repetition.
+    /// Runs of a scene, in order of repetition.
     pub fn runs_of_scene(&self, scene: u64) -> impl Iterator<Item = &RunSummary> {
         self.runs.iter().filter(move |run| run.repetition.is_some_and(|repetition| repetition.scene == scene))
     }
 
-    /// The interval of a pass rate that knows which runs are of one scene; nothing where every scene was run once.
+    /// Interval of a pass rate that accounts for repeated scenes. Returns `None` if every scene was run once.
     pub(super) fn interval_of_repeated(&self, property: Option<&str>) -> Option<Interval> {
         if self.is_repeated() { consistency(&self.decided(property)).rate } else { None }
     }
@@ -46,7 +46,7 @@ impl CampaignSummary {
         self.runs.iter().any(|run| run.repetition.is_some())
     }
 
-    /// The runs in which a property was decided, or, without one, those that were not broken.
+    /// The runs in which a property was decided. Without a property, all runs that are not broken.
     fn decided(&self, property: Option<&str>) -> Vec<Repeated> {
         let of = |run: &RunSummary| {
             let scene = run.repetition?.scene;

@@ -1,4 +1,4 @@
-//! Repetitions for people and for programs.
+//! Consistency of repeated scenes as text and JSON.
 
 use std::fmt::Write as _;
 
@@ -8,12 +8,12 @@ use crate::analysis::{Flaky, PassPower, Variance};
 use crate::report::table::ruled;
 use crate::report::{CampaignSummary, RepeatedProperty};
 
-/// Columns of pass^k; the rest are in the JSON.
+/// Maximum number of pass^k columns; the JSON has all.
 const POWERS_SHOWN: usize = 5;
-/// Flaky scenes named for each property; the rest are in the JSON.
+/// Maximum number of flaky scenes listed for each property; the JSON has all.
 const SCENES_NAMED: usize = 6;
 
-/// What the repetitions of each scene say; nothing where every scene was run once.
+/// Writes the consistency of repeated scenes. Writes nothing if every scene was run once.
 pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
     let repeated = summary.repeated();
     let most = repeated.iter().map(|property| property.found.pass_powers.len()).max().unwrap_or(0);
@@ -25,7 +25,7 @@ pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
     table.force_no_tty();
     let header = ["property", "always passed", "always failed", "flaky"].map(str::to_owned);
     let of_powers = powers.iter().map(|k| format!("pass^{k} [95 % interval]"));
-    table.set_header(header.into_iter().chain(of_powers).chain(["spread by noise".to_owned()]));
+    table.set_header(header.into_iter().chain(of_powers).chain(["variance from noise".to_owned()]));
     for RepeatedProperty { label, found, .. } in &repeated {
         let scenes = found.always_passed + found.always_failed + found.flaky.len() as u64;
         let of = |count: u64| format!("{count} of {scenes}");
@@ -36,14 +36,14 @@ pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
     let _ = writeln!(out, "{table}");
     let _ = writeln!(
         out,
-        "pass^k: the probability that k runs of a scene, each with other noise, all pass\n\
-         spread by noise: share of the outcomes' variance within scenes; the rest is between them"
+        "pass^k: the probability that k runs of a scene, each with different noise, all pass\n\
+         variance from noise: share of the outcomes' variance within scenes; the rest is between scenes"
     );
     repeated.iter().for_each(|property| flaky(out, summary, property));
     out.push('\n');
 }
 
-/// The first ones and the last.
+/// The first values of k, and the last.
 fn shown_powers(most: usize) -> Vec<u64> {
     (1..=most as u64).filter(|k| *k < POWERS_SHOWN as u64 || *k == most as u64).collect()
 }
@@ -55,10 +55,10 @@ fn told(power: &PassPower) -> String {
 
 fn noise_share(variance: Option<Variance>) -> String {
     let share = variance.and_then(|variance| variance.noise_share());
-    share.map_or_else(|| "no spread".to_owned(), |share| format!("{:.0} %", share * 100.0))
+    share.map_or_else(|| "no variance".to_owned(), |share| format!("{:.0} %", share * 100.0))
 }
 
-/// The scenes in which a property sometimes passes, with their first run.
+/// Writes the scenes in which a property only sometimes passes, each with its first run.
 fn flaky(out: &mut String, summary: &CampaignSummary, property: &RepeatedProperty) {
     let scenes = &property.found.flaky;
     if scenes.is_empty() {
@@ -74,7 +74,7 @@ fn flaky(out: &mut String, summary: &CampaignSummary, property: &RepeatedPropert
     let _ = writeln!(out, "  {}: flaky in scene {}{more}", property.label, named.join(", "));
 }
 
-/// The same as JSON: `null` where every scene was run once.
+/// Returns the consistency of repeated scenes as JSON, or `null` if every scene was run once.
 pub(super) fn repeated_json(summary: &CampaignSummary) -> Value {
     let repeated = summary.repeated();
     if repeated.is_empty() {

@@ -1,4 +1,4 @@
-//! One stored run for people and for programs.
+//! One stored run as text and JSON.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use crate::base::names;
 use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 use crate::report::table::ruled;
 
-/// Everything about a run: its scene, what the actions reported, every outcome with margin and witness.
+/// Formats a run: its scene, the reports of its actions, and every outcome with margin and witness.
 pub fn run_text(run: &RunDetail) -> String {
     let mut out = String::new();
     let row = &run.row;
@@ -121,7 +121,7 @@ fn action_text(out: &mut String, action: &ActionDetail) {
     let _ = writeln!(out, "{table}");
 }
 
-/// The same for programs.
+/// Returns the run as JSON.
 pub fn run_json(run: &RunDetail) -> Value {
     let row = &run.row;
     let objects: Vec<Value> = run

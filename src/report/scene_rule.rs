@@ -1,12 +1,13 @@
-//! A pattern as a rule that asks for more scenes of its kind (`[scene] require` of a configuration).
+//! Converts a pattern to a rule that generates more such scenes (`[scene] require` of a configuration).
 
 use std::fmt::Write as _;
 
 use crate::analysis::{Condition, Parameter};
 use crate::base::names;
 
-/// What a parameter of the tables is in the facts of a scene: the rest of a rule for `value(?v)`, where `?o` is the target, `?s` its
-/// surface, `?n` any other thing that is no platform. (`ontology/world.ttl` and `ontology/history.ttl` say what the terms mean.)
+/// Maps each numeric table parameter to the facts of a scene: the body of a rule for `value(?v)`, where `?o` is the
+/// target, `?s` its surface and `?n` any other object that is not a platform. `ontology/world.ttl` and
+/// `ontology/history.ttl` define the terms.
 const NUMBERS: [(&str, &str); 35] = [
     ("target_friction", "target(?o), before(?o, w:friction, ?v)"),
     ("target_mass_kg", "target(?o), before(?o, w:mass, ?v)"),
@@ -58,7 +59,7 @@ const NUMBERS: [(&str, &str); 35] = [
     ("landmark_noise_rad", "before(_, act:landmarkHeadingNoise, ?v)"),
 ];
 
-/// Names, in the same way: the rest of a rule for `named(?t)`.
+/// Maps each parameter with a name as its value to the body of a rule for `named(?t)`.
 const NAMES: [(&str, &str); 4] = [
     ("world", "before(_, act:worldName, ?t)"),
     ("target_model", "target(?o), before(?o, act:model, ?t)"),
@@ -66,14 +67,14 @@ const NAMES: [(&str, &str); 4] = [
     ("neighbour_model", "nearest(?d), away(?n, _, _, ?d), before(?n, act:model, ?t)"),
 ];
 
-/// Classes of things, in the same way: the rest of a rule for `thing(?t)`.
+/// Maps each parameter with a class as its value to the body of a rule for `thing(?t)`.
 const KINDS: [(&str, &str); 3] = [
     ("target_category", "target(?t)"),
     ("surface_category", "parameter(act:objectSurface, ?t)"),
     ("neighbour_category", "nearest(?d), away(?t, _, _, ?d)"),
 ];
 
-/// What the rules above build on.
+/// Auxiliary predicates that the rules above use.
 const DEFINITIONS: &str = r#"target(?o) :- parameter(act:pickObject, ?o) .
 role(?n, ?r) :- before(?n, act:role, ?r) .
 loose(?n) :- role(?n, ?r), ?r != "platform" .
@@ -102,10 +103,10 @@ kind(?t, ?c) :- before(?t, rdf:type, ?c) .
 kind(?t, ?c) :- kind(?t, ?below), ontology(?below, rdfs:subClassOf, ?c) .
 "#;
 
-/// The rule file that a scene satisfies where all conditions hold.
+/// Returns the text of a rule file that a scene satisfies if all conditions hold.
 ///
 /// # Errors
-/// Names of the parameters that facts about a scene do not have.
+/// Returns the names of the parameters that can't be computed from the facts of a scene.
 pub fn scene_rule(conditions: &[Condition], parameters: &[Parameter], sentence: &str) -> Result<String, Vec<String>> {
     let mut rules = String::new();
     let mut asked = Vec::new();
@@ -135,7 +136,7 @@ pub fn scene_rule(conditions: &[Condition], parameters: &[Parameter], sentence: 
     Ok(text)
 }
 
-/// The rules of one condition, and the literal that asks for it.
+/// The rules of one condition, and the literal that requires it. Returns `None` for an unknown parameter.
 fn asked_of(condition: &Condition, name: &str, number: usize) -> Option<(String, String)> {
     let known = |among: &[(&str, &'static str)]| among.iter().find(|(known, _)| *known == name).map(|(_, body)| *body);
     match condition {
@@ -145,7 +146,7 @@ fn asked_of(condition: &Condition, name: &str, number: usize) -> Option<(String,
                 return Some((rule, format!("named_{number}({kind:?})")));
             }
             let body = known(&KINDS)?;
-            // Tables know classes by their local names.
+            // The tables contain the local names of classes.
             let rule = ['#', '/'].map(|mark| {
                 format!(
                     "thing_{number}(?t) :- {body}, kind(?t, ?c), STRENDS(STR(?c), {:?}) .\n",

@@ -1,4 +1,4 @@
-//! A shrunk run for people and for programs.
+//! A shrunk run as text and JSON.
 
 use std::fmt::Write as _;
 
@@ -9,34 +9,34 @@ use crate::history::RunDetail;
 use crate::report::Table;
 use crate::report::table::ruled;
 
-/// What shrinking found, as plain data.
+/// The result of shrinking, as plain data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShrunkSummary {
     /// Id of the run that was shrunk.
     pub original: String,
-    /// The small run, as the history keeps it.
+    /// The shrunk run, as stored in the history.
     pub run: RunDetail,
     /// IRIs of the properties that failed in the original.
     pub failed: Vec<String>,
-    /// Other objects in the original.
+    /// Number of other objects in the original.
     pub others_before: usize,
-    /// Choices that were not nominal in the original.
+    /// Number of choices that were not nominal in the original.
     pub special_before: usize,
     /// Choices that are not nominal now.
     pub choices: Vec<ShrunkChoice>,
-    /// Whether nothing more can be taken away.
+    /// Whether the scene is minimal: nothing more can be removed.
     pub minimal: bool,
-    /// Simulations that shrinking took.
+    /// Number of simulations for shrinking.
     pub simulations: u64,
-    /// Simulations that the explanation took.
+    /// Number of simulations for the explanation.
     pub explaining: u64,
-    /// The nearest scene that passes: name of the choice and its value there.
+    /// The nearest scene that passes: name and value of the choice that differs.
     pub neighbour: Option<(String, f64)>,
-    /// How often it fails with fresh noise, of how many repetitions.
+    /// Number of failures with fresh noise, and number of repetitions.
     pub fresh: Option<(u32, u32)>,
-    /// Whether noise had to stay as recorded.
+    /// Whether the recorded noise had to be kept.
     pub noise_kept: bool,
-    /// Why each property fails, as text.
+    /// Explanation of each failed property, as text.
     pub why: Vec<String>,
 }
 
@@ -47,33 +47,32 @@ pub struct ShrunkChoice {
     pub name: String,
     /// Its value.
     pub value: f64,
-    /// What it would be if nothing were special.
+    /// Its nominal value.
     pub nominal: f64,
-    /// Unit of the values; empty for factors and for places in a list.
+    /// Unit of the values; empty for factors and for list indices.
     pub unit: &'static str,
-    /// Whether it passes with the nominal value alone; nothing where that was not tried.
+    /// Whether the run passes if only this choice is set to its nominal value. `None` if that was not tried.
     pub matters: Option<bool>,
-    /// It fails with values from here to there.
+    /// Range of values with which the run fails.
     pub fails: (f64, f64),
-    /// The nearest values with which it passes, below and above.
+    /// Nearest values with which the run passes, below and above that range.
     pub passes: (Option<f64>, Option<f64>),
 }
 
 impl ShrunkSummary {
-    /// Other objects that are left.
+    /// Number of other objects left.
     pub fn others(&self) -> usize {
         self.run.objects.iter().filter(|object| object.role.is_bystander()).count()
     }
 }
 
-/// For people: the small scene, what of it matters, and why it fails.
+/// Formats the shrunk scene, the choices that matter, and why it fails.
 pub fn shrunk_text(shrunk: &ShrunkSummary) -> String {
     let mut out = String::new();
     let failed: Vec<&str> = shrunk.failed.iter().map(|iri| names::local(iri)).collect();
     let _ = writeln!(out, "{}: the smallest scene found that fails like {}", shrunk.run.row.run, shrunk.original);
     let _ = writeln!(out, "fails {}", failed.join(" + "));
-    let end =
-        if shrunk.minimal { "nothing more can be taken away" } else { "stopped by its limits: it may get smaller yet" };
+    let end = if shrunk.minimal { "nothing more can be removed" } else { "stopped at a limit: it may not be minimal" };
     let _ = writeln!(
         out,
         "{} of {} other objects left, {} of {} choices not nominal; {} simulations, {} more to explain; {end}",
@@ -88,8 +87,7 @@ pub fn shrunk_text(shrunk: &ShrunkSummary) -> String {
         let _ = writeln!(out, "with fresh noise it fails in {failures} of {of} repetitions");
     }
     if shrunk.noise_kept {
-        let _ =
-            writeln!(out, "with fresh noise the run itself does not fail often enough: its noise is kept as recorded");
+        let _ = writeln!(out, "with fresh noise the run does not fail often enough: its recorded noise is kept");
     }
     let _ = writeln!(out, "\n{}", scene_table(shrunk));
     if shrunk.choices.is_empty() {
@@ -148,7 +146,7 @@ fn choice_table(shrunk: &ShrunkSummary) -> String {
 }
 
 fn number(value: f64) -> String {
-    // Adding 0 makes a negative zero a plain one.
+    // Adding 0 turns negative zero into zero.
     let text = format!("{:.4}", value + 0.0);
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
@@ -158,7 +156,7 @@ fn with_unit(value: f64, unit: &str) -> String {
     format!("{} {unit}", number(value)).trim_end().to_owned()
 }
 
-/// A campaign's table with one more column: the run that is the smaller form of a row's run, where there is one.
+/// Adds a column to a campaign's table: the id of the shrunk run, if the row's run was shrunk.
 pub fn with_shrunk(mut table: Table, shrunk: &[ShrunkSummary]) -> Table {
     let of = table.columns.iter().position(|column| column == "run");
     table.columns.push("shrunk_to".to_owned());
@@ -170,7 +168,7 @@ pub fn with_shrunk(mut table: Table, shrunk: &[ShrunkSummary]) -> Table {
     table
 }
 
-/// The same for programs.
+/// Returns the shrunk run as JSON.
 pub fn shrunk_json(shrunk: &ShrunkSummary) -> Value {
     let choices: Vec<Value> = shrunk
         .choices

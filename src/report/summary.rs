@@ -1,4 +1,4 @@
-//! What is said about a campaign when it is over, as plain data.
+//! The summary of a finished campaign, as plain data.
 
 use crate::analysis::{FailureMode, Interval, wilson};
 use crate::base::names;
@@ -6,36 +6,36 @@ use crate::history::{Repetition, RunDetail, RunRecord, RunStatus};
 use crate::report::{CaseSummary, GuidedSearch};
 use crate::verdict::{Counts, Judgement, Outcome, mean};
 
-/// A campaign in short.
+/// Summary of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CampaignSummary {
     /// Its id in the history.
     pub campaign: String,
     /// Its configuration, as the user named it.
     pub config: String,
-    /// Where the history lies, as the user named it.
+    /// Path of the history, as the user named it.
     pub history: String,
-    /// How the user calls this program, for the commands that show more.
+    /// How the user invoked this program; used in suggested commands.
     pub program: String,
-    /// Every property that was judged, in order: IRI, label, unit of its margin.
+    /// All judged properties in order: IRI, label, unit of the margin.
     pub properties: Vec<(String, String, Option<String>)>,
     /// The runs, by index.
     pub runs: Vec<RunSummary>,
-    /// How scenes were chosen, where counts of runs are no rates.
+    /// The guided search that chose the scenes, if any; counts of its runs are not failure rates.
     pub search: Option<GuidedSearch>,
     /// Runs that share the same set of failed properties, most frequent first.
     pub failure_modes: Vec<FailureMode>,
-    /// The project's cases, which ran first. They count for the exit code, and for nothing else.
+    /// The project's cases, which ran first. They only affect the exit code.
     pub regressions: Vec<CaseSummary>,
-    /// Whether a program that performs actions was told the truth, which no robot knows.
+    /// Whether a skill program received ground truth, which a real robot does not have.
     pub privileged: bool,
-    /// Runs that were asked for.
+    /// Number of planned runs.
     pub planned: u64,
-    /// Scenes that could not be built and were drawn again.
+    /// Number of scenes that could not be built and were sampled again.
     pub discards: u64,
-    /// The budget that ended it; nothing where it came to its planned runs or was interrupted.
+    /// The budget that ended it. `None` if it completed its planned runs or was interrupted.
     pub ended_by: Option<EndedBy>,
-    /// Whether it was stopped before its end.
+    /// Whether it was interrupted.
     pub interrupted: bool,
 }
 
@@ -44,26 +44,26 @@ pub struct CampaignSummary {
 pub struct EndedBy {
     /// `time`, `width` or `failures`.
     pub budget: &'static str,
-    /// In words.
+    /// The reason in words.
     pub told: String,
 }
 
-/// A run in short.
+/// Summary of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
     /// Its id in the history.
     pub id: String,
     /// Position in the campaign, from 0.
     pub index: u64,
-    /// Which run of which scene it is, where scenes are run more than once.
+    /// Scene and repetition number, if scenes are run more than once.
     pub repetition: Option<Repetition>,
-    /// Importance weight of its scene, where a search chose it.
+    /// Importance weight of its scene, if a search chose it.
     pub weight: Option<f64>,
     /// Names of its actions.
     pub test: String,
     /// How it ended.
     pub status: RunStatus,
-    /// Why, where it did not complete.
+    /// Why it did not complete, if it did not.
     pub reason: Option<String>,
     /// The paper's S.
     pub score: f64,
@@ -71,7 +71,7 @@ pub struct RunSummary {
     pub actions: Vec<ActionSummary>,
 }
 
-/// An action in short.
+/// Summary of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActionSummary {
     /// Local name.
@@ -82,24 +82,24 @@ pub struct ActionSummary {
     pub judgements: Vec<Judgement>,
 }
 
-/// A share of things counted, with its 95 % Wilson interval.
+/// A proportion with its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Share {
-    /// How many.
+    /// Numerator.
     pub count: u64,
-    /// Of how many.
+    /// Denominator.
     pub of: u64,
-    /// The share and its interval.
+    /// The proportion and its interval.
     pub interval: Interval,
 }
 
 impl Share {
-    /// The same with another interval, where there is one.
+    /// Replaces the interval if one is given.
     fn knowing(self, interval: Option<Interval>) -> Self {
         Self { interval: interval.unwrap_or(self.interval), ..self }
     }
 
-    /// The share of `count` in `of`; nothing where `of` is 0.
+    /// The proportion `count` / `of` with its Wilson interval. Returns `None` if `of` is 0.
     pub fn new(count: u64, of: u64) -> Option<Self> {
         Some(Self { count, of, interval: wilson(count, of)? })
     }
@@ -112,16 +112,16 @@ pub struct PropertyLine {
     pub property: String,
     /// Label.
     pub label: String,
-    /// All six outcomes.
+    /// Counts of all six outcomes.
     pub counts: Counts,
-    /// Share of passed among the decided, with its 95 % Wilson interval; nothing where none was decided.
+    /// Proportion of passed among decided outcomes, with its 95 % interval. `None` if none was decided.
     pub rate: Option<Share>,
-    /// Those of the passed that had held before the action already.
+    /// Number of passed outcomes whose property already held before the action.
     pub held_before: u64,
 }
 
 impl std::fmt::Display for Share {
-    /// Such as `80 % [55–93] (12 of 15)`.
+    /// Writes, for example, `80 % [55–93] (12 of 15)`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let interval = &self.interval;
         let (rate, low, high) = (interval.rate * 100.0, interval.low * 100.0, interval.high * 100.0);
@@ -130,7 +130,7 @@ impl std::fmt::Display for Share {
 }
 
 impl RunSummary {
-    /// The short form of a record.
+    /// Summarises a record.
     pub fn of(record: &RunRecord) -> Self {
         let actions = record
             .trace
@@ -157,7 +157,7 @@ impl RunSummary {
         }
     }
 
-    /// The short form of a run that is read from the history: the same as that of its record.
+    /// Summarises a run read from the history; equals the summary of its record.
     pub fn again(run: &RunDetail) -> Self {
         let actions = run.actions.iter().map(|action| ActionSummary {
             name: names::local(&action.action).to_owned(),
@@ -182,43 +182,43 @@ impl RunSummary {
         self.actions.iter().flat_map(|action| action.judgements.iter().map(|j| j.outcome))
     }
 
-    /// Whether something passed and everything else passed or did not apply.
+    /// Whether at least one property passed and all others passed or were inapplicable.
     pub fn passed(&self) -> bool {
         let counts = Counts::of(self.outcomes());
         counts.passed > 0 && counts.passed + counts.inapplicable == counts.total()
     }
 
-    /// Whether this property failed in one of its actions.
+    /// Whether the given property failed in any action.
     pub fn failed_property(&self, property: &str) -> bool {
         let judgements = self.actions.iter().flat_map(|action| &action.judgements);
         judgements.into_iter().any(|judgement| judgement.property == property && judgement.outcome == Outcome::Failed)
     }
 
-    /// Whether a property failed.
+    /// Whether any property failed.
     pub fn failed(&self) -> bool {
         self.outcomes().any(|outcome| outcome == Outcome::Failed)
     }
 }
 
 impl CampaignSummary {
-    /// The paper's T over all runs.
+    /// The paper's T over all runs. Returns `None` if there are no runs.
     pub fn total_score(&self) -> Option<f64> {
         mean(self.runs.iter().map(|run| run.score))
     }
 
-    /// T over the runs that simulation and tool did not spoil.
+    /// T over the runs that are not broken. Returns `None` if there are none.
     pub fn total_score_without_broken(&self) -> Option<f64> {
         mean(self.runs.iter().filter(|run| run.status != RunStatus::Broken).map(|run| run.score))
     }
 
-    /// Runs in which everything passed, among the runs that were not broken, with the interval.
+    /// Proportion of runs in which everything passed, among the runs that are not broken.
     pub fn pass_rate(&self) -> Option<Share> {
         let judged = self.runs.iter().filter(|run| run.status != RunStatus::Broken).count() as u64;
         let passed = self.runs.iter().filter(|run| run.passed()).count() as u64;
         Share::new(passed, judged).map(|rate| rate.knowing(self.interval_of_repeated(None)))
     }
 
-    /// All outcomes of all properties.
+    /// Outcome counts over all properties.
     pub fn counts(&self) -> Counts {
         Counts::of(self.runs.iter().flat_map(RunSummary::outcomes))
     }
@@ -228,8 +228,7 @@ impl CampaignSummary {
         self.lines_of(|_| true)
     }
 
-    /// Every action that was to be performed, in the order in which tests list them, with one line for each of its
-    /// properties.
+    /// All actions in the order in which the tests list them, each with one line per property.
     pub fn lines_by_action(&self) -> Vec<(String, Vec<PropertyLine>)> {
         let mut names: Vec<&String> = Vec::new();
         for action in self.runs.iter().flat_map(|run| &run.actions) {
@@ -244,7 +243,7 @@ impl CampaignSummary {
         names.into_iter().map(|name| (name.clone(), lines(name))).collect()
     }
 
-    /// One line for each property, over some of the actions.
+    /// One line for each property, over the actions that the filter accepts.
     fn lines_of(&self, counts: impl Fn(&ActionSummary) -> bool) -> Vec<PropertyLine> {
         let actions: Vec<&ActionSummary> =
             self.runs.iter().flat_map(|run| &run.actions).filter(|action| counts(action)).collect();
@@ -260,8 +259,8 @@ impl CampaignSummary {
         self.properties.iter().map(|(iri, label, _)| line(iri, label)).collect()
     }
 
-    /// 0: everything passed. 1: a property failed, in a run or a regression. 2: something could not be tested and nothing
-    /// failed.
+    /// 0: everything passed. 1: a property failed, in a run or in a case. 2: nothing failed, but something could not be
+    /// tested.
     pub fn exit_code(&self) -> u8 {
         let counts = self.counts();
         if counts.failed > 0 || self.regressions.iter().any(CaseSummary::fails) {

@@ -1,15 +1,15 @@
-//! One table, three formats.
+//! Tables that are printed as text, CSV or JSON.
 
 use comfy_table::{ContentArrangement, TableComponent, presets};
 use serde_json::{Map, Value};
 
-/// How a table is printed.
+/// Output format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TableFormat {
-    /// Lines and columns for people.
+    /// Aligned columns for people.
     #[default]
     Table,
-    /// Comma-separated values with a header line (RFC 4180, with `\n` as line end).
+    /// Comma-separated values with a header line (RFC 4180, but lines end in `\n`).
     Csv,
     /// A JSON array of objects.
     Json,
@@ -20,17 +20,17 @@ pub enum TableFormat {
 pub struct Table {
     /// Names of the columns.
     pub columns: Vec<String>,
-    /// One value a column in every row.
+    /// Rows, each with one value per column.
     pub rows: Vec<Vec<Value>>,
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub fn new<S: Into<String>>(columns: impl IntoIterator<Item = S>) -> Self {
         Self { columns: columns.into_iter().map(Into::into).collect(), rows: Vec::new() }
     }
 
-    /// The table in a format, with a line end at the end.
+    /// Renders the table, with a trailing newline.
     pub fn render(&self, format: TableFormat) -> String {
         match format {
             TableFormat::Table => self.text(),
@@ -63,7 +63,7 @@ impl Table {
         format!("{:#}\n", self.objects())
     }
 
-    /// A JSON array with one object a row.
+    /// Returns a JSON array with one object per row.
     pub(super) fn objects(&self) -> Value {
         let object = |row: &Vec<Value>| {
             let pairs = self.columns.iter().cloned().zip(row.iter().cloned());
@@ -73,7 +73,7 @@ impl Table {
     }
 }
 
-/// A table for the terminal: columns, and a rule below the header.
+/// Creates a terminal table with a rule below the header.
 pub(super) fn ruled() -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
     table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
@@ -81,7 +81,7 @@ pub(super) fn ruled() -> comfy_table::Table {
     table
 }
 
-/// A cell as text: strings without quotes, nothing for `null`.
+/// Formats a cell as text: strings without quotes, `null` as an empty string.
 fn plain(value: &Value) -> String {
     match value {
         Value::Null => String::new(),

@@ -1,4 +1,4 @@
-//! What a guided search says of failure rates: raw counts of its runs are none.
+//! Weighted failure rates of a guided search. Raw counts of its runs are not failure rates.
 
 use std::fmt::Write as _;
 
@@ -8,34 +8,34 @@ use crate::analysis::Interval;
 use crate::report::table::ruled;
 use crate::report::{CampaignSummary, Share};
 
-/// How a campaign's scenes were chosen, where counts of its runs are no rates.
+/// A guided search that chose a campaign's scenes; counts of its runs are not failure rates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GuidedSearch {
     /// Name of the strategy.
     pub strategy: String,
-    /// How often each property of each test fails; empty where too few runs were made.
+    /// How often each property of each test fails. Empty if there are too few runs.
     pub lines: Vec<WeightedLine>,
 }
 
-/// How often a property fails in scenes as the configuration draws them.
+/// How often a property fails in scenes sampled as configured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightedLine {
-    /// Names of the test's actions, joined by a space.
+    /// Names of the test's actions, separated by spaces.
     pub test: String,
     /// IRI of the property.
     pub property: String,
     /// Its label.
     pub label: String,
-    /// Share of the scenes in which it fails, with its 95 % interval.
+    /// Proportion of scenes in which it fails, with its 95 % interval.
     pub failing: Interval,
-    /// Scenes that this is known from: those of whole generations.
+    /// Number of scenes that the estimate uses: those of complete generations.
     pub scenes: u64,
-    /// Runs of the test in which it failed, of all: chosen for failing, so no rate.
+    /// Failed runs of all runs of the test. Not a rate, because the search prefers failures.
     pub raw: Option<Share>,
 }
 
 impl CampaignSummary {
-    /// Runs of a test in which a property failed, of all its runs.
+    /// Failed runs of all runs of a test, for one property. Returns `None` if the test has no runs.
     pub fn raw_failures(&self, test: &str, property: &str) -> Option<Share> {
         let own: Vec<_> = self.runs.iter().filter(|run| run.test == test).collect();
         let failed = own.iter().filter(|run| run.failed_property(property)).count() as u64;
@@ -43,15 +43,15 @@ impl CampaignSummary {
     }
 }
 
-/// The weighted rates beside the raw counts; nothing where scenes were drawn at random.
+/// Writes the weighted rates next to the raw counts. Writes nothing if scenes were sampled at random.
 pub(super) fn weighted_text(out: &mut String, summary: &CampaignSummary) {
     let Some(GuidedSearch { strategy, lines }) = &summary.search else { return };
     let _ = writeln!(
         out,
-        "scenes chosen by {strategy} search, which looks for failures: counts and shares of these runs are no rates"
+        "scenes chosen by {strategy} search, which looks for failures: counts and shares of these runs are not failure rates"
     );
     if lines.is_empty() {
-        let _ = writeln!(out, "no generation of scenes is whole, so there are no weighted rates\n");
+        let _ = writeln!(out, "no generation of scenes is complete, so there are no weighted rates\n");
         return;
     }
     let mut table = ruled();
@@ -60,7 +60,7 @@ pub(super) fn weighted_text(out: &mut String, summary: &CampaignSummary) {
         "test",
         "property",
         "fails in scenes as configured [95 % interval]",
-        "runs that failed (no rate)",
+        "runs that failed (not a rate)",
     ]);
     for line in lines {
         let [rate, low, high] = [line.failing.rate, line.failing.low, line.failing.high].map(|share| share * 100.0);
@@ -71,7 +71,7 @@ pub(super) fn weighted_text(out: &mut String, summary: &CampaignSummary) {
     let _ = writeln!(out, "{table}\n");
 }
 
-/// The same as JSON; `null` where scenes were drawn at random.
+/// Returns the weighted rates as JSON, or `null` if scenes were sampled at random.
 pub(super) fn weighted_json(summary: &CampaignSummary) -> Value {
     let Some(GuidedSearch { strategy, lines }) = &summary.search else { return Value::Null };
     let line = |line: &WeightedLine| {

@@ -1,8 +1,8 @@
-//! Results for Allure 2 and 3: one file for each property of each action of a run.
+//! Exports results for Allure 2 and 3: one file for each property of each action of a run.
 //!
-//! Allure takes results of the same history id for retries of one another and hides all but the last. Version 2 reads the id,
-//! version 3 makes its own of the test case and its parameters. So the scene and the number among its runs are in both: a
-//! repetition is a result like any other, and the same scene of another campaign continues the history.
+//! Allure treats results with the same history id as retries and hides all but the last. Version 2 reads the id;
+//! version 3 derives it from the test case and its parameters. Therefore both contain the scene and the repetition
+//! number: each repetition is a separate result, and the same scene in another campaign continues the history.
 
 use serde_json::{Value, json};
 
@@ -12,21 +12,21 @@ use crate::report::formats::identity::{case_name, scene};
 use crate::report::run_text;
 use crate::verdict::{Judgement, Outcome};
 
-/// Names of the files that stand beside the results.
+/// Names of the files in the results folder that do not belong to a result.
 pub const RESULTS_COMMON_FILES: [&str; 2] = ["categories.json", "environment.properties"];
 
-/// A file that is shown with results.
+/// A file attached to results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attachment {
-    /// IRI of the property that it is about, and the step of the action; nothing where it is about the whole run.
+    /// Step of the action and IRI of the property that it is about. `None` if it is about the whole run.
     pub about: Option<(u32, String)>,
-    /// What it is called.
+    /// Display name.
     pub name: String,
     /// Its media type.
     pub media_type: &'static str,
-    /// Ending of its file.
+    /// File extension.
     pub ending: &'static str,
-    /// What is in it.
+    /// Content.
     pub bytes: Vec<u8>,
 }
 
@@ -41,10 +41,10 @@ impl Attachment {
     }
 }
 
-/// The files of a run, with their names: a result for each property of each action, and what is shown with them.
+/// Returns the files of a run with their names: a result for each property of each action, and the attachments.
 ///
-/// `number` is that of the run among those of its scene ([`super::Repetitions`]). Times are simulated ones, from the moment at
-/// which the run began.
+/// `number` is the run's number among those of its scene ([`super::Repetitions`]). Times are simulated times, counted
+/// from the start of the run.
 pub fn allure_results(run: &RunDetail, number: u64, attachments: &[Attachment]) -> Vec<(String, Vec<u8>)> {
     let whole = Attachment {
         about: None,
@@ -105,7 +105,7 @@ fn result(
     })
 }
 
-/// Allure's word. It has five: what says nothing (inapplicable, untested) is skipped, and a spent budget is broken.
+/// Allure's status of an outcome. Inapplicable and untested become skipped; timeout becomes broken.
 fn status(outcome: Outcome) -> &'static str {
     match outcome {
         Outcome::Passed => "passed",
@@ -115,7 +115,7 @@ fn status(outcome: Outcome) -> &'static str {
     }
 }
 
-/// The outcome in our own word, by which the categories know it, and what proves it.
+/// The actcheck outcome, which the categories match, and the witness.
 fn message(judgement: &Judgement) -> String {
     format!("{}: {}", judgement.outcome, judgement.witness)
 }
@@ -125,7 +125,8 @@ fn details(judgement: &Judgement) -> String {
     format!("{}\n{margin}\nrule {}", message(judgement), judgement.rule_digest)
 }
 
-/// What sets a result apart (the scene, and which of its runs it is), and what else is good to know, which does not.
+/// Parameters that identify a result (scene and repetition), and further parameters that are excluded from the
+/// identity.
 fn parameters(run: &RunDetail, number: u64, scene: &str, judgement: &Judgement) -> Vec<Value> {
     let told = |name: &str, value: String| json!({ "name": name, "value": value, "excluded": true });
     let mut all = vec![
@@ -148,7 +149,7 @@ fn parameters(run: &RunDetail, number: u64, scene: &str, judgement: &Judgement) 
     all
 }
 
-/// The actions up to the judged one, which has a step more: the judgement itself.
+/// The actions up to the judged one, which has the judgement as an additional step.
 fn steps(run: &RunDetail, judged: &ActionDetail, judgement: &Judgement) -> Vec<Value> {
     let until_now = run.actions.iter().filter(|action| action.step <= judged.step);
     until_now
@@ -183,7 +184,7 @@ fn said(action: &ActionDetail) -> &str {
     }
 }
 
-/// How an action went by itself, whatever was judged of it.
+/// Status of an action itself, independent of its judgements.
 fn end(action: &ActionDetail) -> &'static str {
     match (action.end.as_str(), action.reported) {
         ("completed", Some(false)) => "failed",
@@ -193,7 +194,7 @@ fn end(action: &ActionDetail) -> &'static str {
     }
 }
 
-/// When an action began and ended. Unit: milliseconds since 1970.
+/// Start and end of an action. Unit: milliseconds since 1970.
 fn times(run: &RunDetail, step: u32) -> [i64; 2] {
     let began: jiff::Timestamp = run.row.started.parse().unwrap_or(jiff::Timestamp::UNIX_EPOCH);
     let simulated = |until: &dyn Fn(&ActionDetail) -> bool| -> f64 {
@@ -203,23 +204,23 @@ fn times(run: &RunDetail, step: u32) -> [i64; 2] {
     [after(simulated(&|action| action.step < step)), after(simulated(&|action| action.step <= step))]
 }
 
-/// The files that stand beside the results, whatever these are: the kinds of what did not pass, and who judged.
+/// Returns the common files of the results folder: the categories of results that did not pass, and the environment.
 pub fn allure_common(program: &str, campaigns: &[String]) -> Vec<(String, Vec<u8>)> {
     let category = |name: &str, status: &str, word: &str| json!({ "name": name, "matchedStatuses": [status], "messageRegex": format!("(?s)^{word}: .*") });
     let categories = json!([
         category("The robot failed a property", "failed", "failed"),
         category("Simulation or tool was at fault", "broken", "broken"),
         category("A budget was spent", "broken", "timeout"),
-        category("The property says nothing about this action", "skipped", "inapplicable"),
+        category("The property does not apply to this action", "skipped", "inapplicable"),
         category("The action was never reached", "skipped", "untested"),
     ]);
-    // Backslashes and line ends mean something in this format; ids and versions have none.
+    // Backslashes and newlines are special in this format, but ids and versions have none.
     let environment = format!("actcheck={program}\ncampaigns={}\n", campaigns.join(" "));
     let [first, second] = RESULTS_COMMON_FILES;
     vec![(first.to_owned(), format!("{categories:#}\n").into_bytes()), (second.to_owned(), environment.into_bytes())]
 }
 
-/// A name of the form that Allure's files have, the same for the same text.
+/// Derives a UUID, as used in Allure's file names, from a text.
 fn uuid(text: &str) -> String {
     let digest = digest_of(text);
     let part = |from: usize, to: usize| digest.get(from..to).unwrap_or_default();

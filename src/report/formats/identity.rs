@@ -1,4 +1,4 @@
-//! What makes a result the same as one of another day: the property, and the scene in which it was judged.
+//! Identity of results across campaigns: the property and the scene in which it was judged.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -6,41 +6,42 @@ use std::fmt::Write as _;
 use crate::base::{digest_of, names};
 use crate::history::{ActionDetail, RunDetail};
 
-/// Letters of a scene's name: enough for a million scenes without two alike, and few enough to read.
+/// Number of characters of a scene's name: enough for a million scenes without collisions, and short enough to read.
 const SCENE_LETTERS: usize = 12;
 
-/// A name of the scene of a run: what stands where, how heavy and how smooth it is, where the robot stands, and the test.
+/// Name of a run's scene: a digest of its objects with poses, masses, friction and restitution, the robot's pose, and
+/// the test.
 ///
-/// Noise is not part of it: runs of a scene differ by nothing else.
+/// Noise is not included: it is the only difference between runs of a scene.
 pub(super) fn scene(run: &RunDetail) -> String {
     let mut told = format!("{} {} {:?}", run.row.test, run.world, run.robot_base);
     for object in &run.objects {
         let (place, body) =
             ([object.x, object.y, object.z, object.yaw], [object.mass_kg, object.friction, object.restitution]);
-        // Writing to a text does not fail.
+        // Writing to a `String` does not fail.
         let _ = write!(told, " {} {} {:?} {place:?} {body:?}", object.id, object.model, object.role);
     }
     digest_of(&told).chars().take(SCENE_LETTERS).collect()
 }
 
-/// A property in an action of a test, as one name: `Pick Place/2 Place: ObjectReleased`.
+/// Name of a property of an action of a test: `Pick Place/2 Place: ObjectReleased`.
 pub(super) fn case_name(run: &RunDetail, action: &ActionDetail, property: &str) -> String {
     format!("{}/{} {}: {}", run.row.test, action.step, names::local(&action.action), names::local(property))
 }
 
-/// Numbers the runs of each scene, in the order in which they come, so that repetitions stay apart.
+/// Numbers the runs of each scene in the order of the calls, to distinguish repetitions.
 #[derive(Debug, Clone, Default)]
 pub struct Repetitions {
     seen: BTreeMap<String, u64>,
 }
 
 impl Repetitions {
-    /// None yet.
+    /// Creates an empty counter.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The number of a run among those of its scene so far, from 1.
+    /// Returns the number of a run among the runs of its scene, from 1.
     pub fn number(&mut self, run: &RunDetail) -> u64 {
         let seen = self.seen.entry(scene(run)).or_default();
         *seen += 1;

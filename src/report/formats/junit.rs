@@ -1,4 +1,4 @@
-//! Results as JUnit's XML, in the form that Jenkins, GitLab and GitHub's actions read.
+//! Exports results as JUnit XML, in the dialect that Jenkins, GitLab and GitHub Actions read.
 
 use std::fmt::Write as _;
 
@@ -8,8 +8,8 @@ use crate::verdict::{Counts, Judgement, Outcome};
 
 /// One suite for each campaign and test, one case for each property of each action of each run.
 ///
-/// JUnit has four results. What failed is a failure; what is broken or ran out of its budget is an error, with our word as its type; what
-/// says nothing (inapplicable, untested) is skipped, with our word in its text.
+/// JUnit has four results: passed, failure, error and skipped. Broken and timeout become errors with the outcome as
+/// their type; inapplicable and untested become skipped with the outcome in their text.
 #[derive(Debug, Clone, Default)]
 pub struct JunitReport {
     suites: Vec<Suite>,
@@ -27,7 +27,7 @@ struct Suite {
 }
 
 impl JunitReport {
-    /// A report without results.
+    /// Creates an empty report.
     pub fn new() -> Self {
         Self::default()
     }
@@ -44,7 +44,7 @@ impl JunitReport {
         self.suites[at].add(run);
     }
 
-    /// The whole file.
+    /// Returns the whole file.
     pub fn text(&self) -> String {
         let mut out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n".to_owned();
         self.suites.iter().enumerate().for_each(|(idx, suite)| suite.write(idx, &mut out));
@@ -66,7 +66,7 @@ impl Suite {
     }
 
     fn case(&mut self, run: &RunDetail, action: &ActionDetail, judgement: &Judgement) {
-        // The properties of an action share its time, so that sums over cases are right.
+        // The properties of an action share its duration equally, so that sums over cases are correct.
         let secs = action.duration_secs / action.judgements.len().max(1) as f64;
         let class = format!("{}.{}", run.row.test.replace(' ', "-"), names::local(&action.action));
         let name = format!("{} ({})", names::local(&judgement.property), run.row.run);
@@ -96,7 +96,7 @@ impl Suite {
             "  <testsuite id=\"{idx}\" name=\"{}\" package=\"{}\" hostname=\"localhost\" timestamp=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3}\">",
             attribute(&format!("{} {}", self.campaign, self.test)),
             attribute(&self.campaign),
-            // The schemas know no time zone here; times are in UTC.
+            // The schema does not allow a time zone here; times are in UTC.
             attribute(self.started.get(..19).unwrap_or_default()),
             self.counts.total(),
             count(Outcome::Failed),
@@ -119,7 +119,7 @@ impl Suite {
     }
 }
 
-/// JUnit's element for an outcome; none for what passed.
+/// JUnit's element for an outcome. Returns `None` for passed.
 fn element(outcome: Outcome) -> Option<&'static str> {
     match outcome {
         Outcome::Passed => None,
@@ -141,7 +141,7 @@ fn body(run: &RunDetail, action: &ActionDetail, judgement: &Judgement) -> String
     out
 }
 
-/// Characters of an element's text. XML 1.0 has no way to write most control characters: they become U+FFFD.
+/// Escapes the text of an element. XML 1.0 can't represent most control characters; they become U+FFFD.
 fn text(raw: &str) -> String {
     raw.chars().fold(String::with_capacity(raw.len()), |mut out, letter| {
         match letter {
@@ -157,7 +157,8 @@ fn text(raw: &str) -> String {
     })
 }
 
-/// Characters of an attribute's value, which loses line ends that are not written as numbers.
+/// Escapes an attribute's value. Line ends are written as character references, because parsers normalise them
+/// otherwise.
 fn attribute(raw: &str) -> String {
     text(raw).replace('"', "&quot;").replace('\t', "&#9;").replace('\n', "&#10;")
 }

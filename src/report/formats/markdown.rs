@@ -1,4 +1,4 @@
-//! A summary for a pull request, as the comment boxes of forges show it.
+//! Formats a summary in Markdown, for comments on pull requests.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -7,14 +7,14 @@ use crate::base::names;
 use crate::history::{CampaignRow, RunDetail, RunStatus, SkillRecord};
 use crate::verdict::{Counts, Judgement, Outcome, wilson};
 
-/// Failed runs that are told; the rest is counted.
+/// Maximum number of failed runs that are listed; the rest are counted.
 const MOST_FAILURES: usize = 10;
 
-/// What is gathered for the summary, run by run.
+/// Collects the data of the summary, run by run.
 #[derive(Debug, Clone, Default)]
 pub struct MarkdownReport {
     counts: Counts,
-    /// By action and property, in the order of the actions.
+    /// Outcome counts by action and property, in the order of the actions.
     properties: Vec<((String, String), Counts)>,
     campaigns: Vec<String>,
     statuses: BTreeMap<RunStatus, u64>,
@@ -26,12 +26,12 @@ pub struct MarkdownReport {
 }
 
 impl MarkdownReport {
-    /// A summary of nothing.
+    /// Creates an empty summary.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Notes which of the campaigns had a program that was told the truth.
+    /// Records which campaigns had a skill program that received ground truth.
     pub fn know(&mut self, campaigns: &[CampaignRow]) {
         let told = campaigns.iter().filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
         self.privileged = told.map(|row| row.id.clone()).collect();
@@ -71,7 +71,7 @@ impl MarkdownReport {
     }
 }
 
-/// The summary: counts first, then the properties with their intervals, then the first failures.
+/// Formats the summary: counts, then properties with intervals, then the first failures.
 pub fn markdown(report: &MarkdownReport) -> String {
     let runs = report.scores.len() as u64;
     let mut out = format!("## {}\n\n", headline(report));
@@ -162,7 +162,7 @@ fn word<'a>(count: u64, one: &'a str, several: &'a str) -> &'a str {
     if count == 1 { one } else { several }
 }
 
-/// Text as one line in which nothing is markup, in a table too.
+/// Escapes text as a single line without markup, also inside tables.
 pub fn plain(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -170,7 +170,7 @@ pub fn plain(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '&' => out.push_str("&amp;"),
-            // Whoever is named behind it would get a message.
+            // Otherwise, the forge would notify the user named after it.
             '@' => out.push_str("&#64;"),
             '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '#' | '~' | '!' => {
                 out.push('\\');
@@ -183,7 +183,7 @@ pub fn plain(text: &str) -> String {
     out
 }
 
-/// An id of ours in the font of programs.
+/// Formats an id as inline code.
 fn code(id: &str) -> String {
     format!("`{}`", id.replace('`', "'"))
 }

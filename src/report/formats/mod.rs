@@ -1,7 +1,7 @@
-//! What a history holds in the formats of other people's tools: one file each of Allure, JUnit, EARL, Markdown and JSON lines.
+//! Exports a history to third-party formats, one module for each: Allure, JUnit, EARL, Markdown and JSON Lines.
 //!
-//! Never: decides an outcome, reads a history, writes a file, or counts two of the six outcomes as one where the format has words
-//! for both.
+//! Never: decides an outcome, reads a history, writes a file, or merges two of the six outcomes if the format can
+//! distinguish them.
 
 mod allure;
 mod earl;

@@ -1,4 +1,4 @@
-//! A run as an observation of a property-based test, in the schema that Hypothesis defined for such and its viewers read.
+//! Exports a run as an observation of a property-based test, in the schema of Hypothesis.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,11 @@ use crate::report::formats::identity::scene;
 use crate::report::run_json;
 use crate::verdict::{Counts, Judgement, Outcome};
 
-/// One observation. `campaign_started` is when its campaign began (RFC 3339), by which the schema groups them.
+/// Returns the observation of a run. `campaign_started` is the start of its campaign (RFC 3339), by which viewers group
+/// observations.
 ///
-/// The schema has three results: `failed` where a property failed; `gave_up` where the run was broken or out of its budget, or
-/// nothing could be judged; `passed` otherwise. The counts of all six outcomes are among the features.
+/// The schema has three results: `failed` if a property failed; `gave_up` if the run was broken or timed out, or
+/// nothing could be judged; `passed` otherwise. The features include the counts of all six outcomes.
 pub fn observation(run: &RunDetail, campaign_started: &str) -> Value {
     let judgements = || run.actions.iter().flat_map(|action| &action.judgements);
     let counts = Counts::of(judgements().map(|judgement| judgement.outcome));
@@ -91,7 +92,7 @@ fn how(run: &RunDetail) -> String {
     format!("seed {}, run {}{weighted}{again}", run.seed, run.row.index + 1)
 }
 
-/// Time on the clock, shared by the actions as simulated time was.
+/// Wall-clock time, divided among the actions in proportion to their simulated time.
 fn timing(run: &RunDetail) -> BTreeMap<String, f64> {
     let simulated: f64 = run.actions.iter().map(|action| action.duration_secs).sum();
     let wall = run.wall_secs.max(0.0);

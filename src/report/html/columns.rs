@@ -1,4 +1,4 @@
-//! Every run as columns: what came of it, and the scene that it was in.
+//! Packs all runs as columns: their outcomes and the parameters of their scenes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use crate::report::FindingsSummary;
 use crate::report::html::pack::Pack;
 use crate::verdict::Outcome;
 
-/// Columns of the table that a page needs beside those that findings are made of and the parameters of scenes.
+/// Columns that a page needs in addition to those of the findings and the scene parameters.
 pub const HTML_COLUMNS: [&str; 9] = [
     "index",
     "repetition",
@@ -23,10 +23,10 @@ pub const HTML_COLUMNS: [&str; 9] = [
     "others_displacement_m",
 ];
 
-/// Stands for a property that a run does not have.
+/// Code for a property that a run does not have.
 const NO_OUTCOME: u8 = u8::MAX;
 
-/// One property of an action at a position in the test.
+/// A property of an action at a position in the test.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Slot {
     pub step: u32,
@@ -34,10 +34,10 @@ pub(super) struct Slot {
     pub property: String,
 }
 
-/// The properties that are shown, and which row of the table has which.
+/// The displayed properties, and the slot of each table row.
 pub(super) struct Slots {
     pub slots: Vec<Slot>,
-    /// For each row of the table.
+    /// Slot of each table row; `None` if its property is not displayed.
     of_row: Vec<Option<usize>>,
 }
 
@@ -65,7 +65,7 @@ impl Slots {
     }
 }
 
-/// All runs.
+/// Packs all runs.
 pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
     let mut pack = Pack::default();
     let runs = table.text("run");
@@ -99,8 +99,8 @@ pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
     pack.finish()
 }
 
-/// For each run the row that tells its scene: the one whose platform the target stands on, or nearest to; actions that go elsewhere
-/// have another platform.
+/// For each run, the row that describes its scene: the one whose surface is nearest to the target. Actions at another
+/// place refer to another surface.
 fn first_rows(table: &OutcomeTable) -> Vec<usize> {
     let runs = table.text("run");
     let (x, y) = (table.number("surface_x_m"), table.number("surface_y_m"));
@@ -124,7 +124,7 @@ fn of_rows(table: &OutcomeTable, name: &str, rows: &[usize]) -> Vec<f64> {
     rows.iter().map(|row| column.get(*row).copied().unwrap_or(f64::NAN)).collect()
 }
 
-/// Texts of some rows: each once, then which row has which, 0 for none. IRIs by their local names.
+/// Packs a text column: the distinct texts, then an index for each row (0: no text). IRIs are shortened to local names.
 fn kinds(table: &OutcomeTable, name: &str, rows: &[usize], pack: &mut Pack) -> Value {
     let column = table.text(name);
     let mut known = BTreeMap::new();
@@ -136,7 +136,7 @@ fn kinds(table: &OutcomeTable, name: &str, rows: &[usize], pack: &mut Pack) -> V
             Some(of) => *known.entry(of).or_insert_with(|| {
                 let text = &column.texts[of as usize];
                 texts.push(if name.ends_with("_category") { names::local(text) } else { text });
-                // A page has far fewer than 2^32 texts.
+                // A page has far fewer than 2³² texts.
                 texts.len() as u32
             }),
         })
@@ -145,7 +145,7 @@ fn kinds(table: &OutcomeTable, name: &str, rows: &[usize], pack: &mut Pack) -> V
     json!({ "kind": "texts", "texts": texts, "of": of_run })
 }
 
-/// Outcomes and margins, property by property, and what shows those that did not pass.
+/// Packs outcomes and margins for each property, and the witnesses of outcomes that did not pass.
 fn outcomes(table: &OutcomeTable, slots: &Slots, pack: &mut Pack) {
     let runs = table.text("run");
     let count = runs.texts.len();
@@ -177,7 +177,7 @@ fn outcomes(table: &OutcomeTable, slots: &Slots, pack: &mut Pack) {
     pack.say("witnesses", json!({ "at": places, "texts": shown_by.values().collect::<Vec<_>>() }));
 }
 
-/// What each action said of itself, and how long it took, step by step.
+/// Packs the message and duration of each action, step by step.
 fn steps(table: &OutcomeTable, pack: &mut Pack) {
     let runs = table.text("run");
     let steps = table.number("step");
@@ -191,7 +191,7 @@ fn steps(table: &OutcomeTable, pack: &mut Pack) {
     let told: Vec<Value> = rows
         .iter()
         .map(|rows| {
-            // A run without this step has the row behind the last, where there is nothing.
+            // Runs without this step refer to the row after the last, which is empty.
             let rows: Vec<usize> = rows.iter().map(|row| row.unwrap_or(table.len())).collect();
             let messages = kinds(table, "message", &rows, pack);
             let action = kinds(table, "action", &rows, pack);

@@ -1,4 +1,4 @@
-//! One action of a run that can be watched: its words, its outcomes with what explains them, and what happened when.
+//! One action of a replay: its messages, its outcomes with explanations, and its events.
 
 use serde_json::{Value, json};
 
@@ -9,7 +9,7 @@ use crate::report::html::Explained;
 use crate::report::moment::decided;
 use crate::verdict::Outcome;
 
-/// An action by its place in the run.
+/// Describes an action, given its index in the run.
 pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explained: &[Explained]) -> Value {
     let action = &run.actions[idx];
     let judged = action.judgements.iter().map(|judgement| {
@@ -32,7 +32,7 @@ pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explain
     told
 }
 
-/// What the trace says of an action: when it began, its phases, its contacts, what it perceived.
+/// Adds the events of an action from the trace: start, phases, contacts, percepts.
 fn events(told: &mut Value, trace: &Trace, idx: usize) {
     let Some(action) = trace.actions.get(idx) else { return };
     let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
@@ -51,7 +51,7 @@ fn events(told: &mut Value, trace: &Trace, idx: usize) {
     told["seen"] = asked.chain(things).collect();
 }
 
-/// Something that was perceived: the pose of its foot's middle, and its size.
+/// A perceived object: the pose of its bottom centre, and its size.
 fn seen(name: &str, pose: &Pose, size_m: [f64; 3]) -> Value {
     let at: Vec<f64> = pose.position.iter().chain(&pose.rotation).copied().collect();
     json!({ "name": name, "at": at, "size": size_m })

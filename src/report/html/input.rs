@@ -1,4 +1,4 @@
-//! What a page is made of.
+//! Input of a page.
 
 use std::collections::BTreeMap;
 
@@ -7,37 +7,37 @@ use crate::history::CampaignRow;
 use crate::report::FindingsSummary;
 use crate::report::html::Replays;
 
-/// Everything that a page shows.
+/// The content of a page.
 #[derive(Debug)]
 pub struct HtmlReport<'a> {
-    /// Version of the program that makes it.
+    /// Version of the program that generates it.
     pub version: &'a str,
-    /// When it is made (RFC 3339).
+    /// Generation time (RFC 3339).
     pub made: &'a str,
-    /// What analysis found; its properties are those that are shown.
+    /// Findings of the analysis; their properties are the ones displayed.
     pub findings: &'a FindingsSummary,
     /// The outcomes, with [`HTML_COLUMNS`](crate::report::HTML_COLUMNS) and the parameters of scenes.
     pub table: &'a OutcomeTable,
-    /// All campaigns of the history, by their start.
+    /// All campaigns of the history, in order of start.
     pub campaigns: &'a [CampaignRow],
-    /// What properties are called, by their IRIs.
+    /// Names of properties, by IRI.
     pub words: &'a BTreeMap<String, PropertyWords>,
-    /// Runs that can be watched.
+    /// Runs that can be played back.
     pub replays: &'a Replays,
 }
 
-/// What people call a property.
+/// Names and descriptions of a property.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PropertyWords {
     /// `rdfs:label`.
     pub label: String,
     /// `rdfs:comment`.
     pub comment: Option<String>,
-    /// The file of its rule, as the ontology names it.
+    /// Path of its rule file, as written in the ontology.
     pub rule: String,
 }
 
-/// Why an outcome is as it is: the proof, or what was missing.
+/// Explanation of an outcome: the proof, or the missing facts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Explained {
     /// Position of the action in the test, from 1.

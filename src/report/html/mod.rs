@@ -1,10 +1,10 @@
-//! What a history says, as one page that opens anywhere without a network.
+//! Generates an HTML report of a history: one self-contained page that works offline.
 //!
-//! Data travel as columns and quantised courses, packed ([`pack`]) so that 10,000 runs fit; scripts and style stand readable in `web/`,
-//! the library that draws in 3D with its licence in `vendor/`. Every word of a model, rule or message is in the packed data, and the
-//! scripts only ever make text of it: the page's policy forbids everything else to run.
+//! Data are packed as columns and quantised trajectories ([`pack`]), so that 10,000 runs fit. Scripts and styles are in
+//! `web/`, the 3D library and its licence in `vendor/`. All text from models, rules and messages is in the packed data,
+//! and the scripts only insert it as text nodes; the page's content security policy forbids all other scripts.
 //!
-//! Never: reads a history or a file, chooses what is judged, or writes a word of a user's into markup.
+//! Never: reads a history or a file, chooses what is judged, or writes user text into markup.
 
 mod columns;
 mod events;

@@ -1,4 +1,4 @@
-//! Which runs are worth watching first.
+//! Orders runs by how much they are worth watching.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,8 +6,9 @@ use crate::analysis::OutcomeTable;
 use crate::report::FindingsSummary;
 use crate::verdict::Outcome;
 
-/// Ids of the failed runs, so ordered that the first few show every failure mode and every property: one of each in turn. Behind them
-/// those that did not complete, then one run of each test in which nothing failed, to compare with.
+/// Returns run ids in the order in which they should be included as replays. Failed runs come first, taken in turn from
+/// each failure mode and each property, so that the first few cover all of them. Then come runs that did not complete,
+/// then one run of each test in which nothing failed, for comparison.
 pub fn replay_order(findings: &FindingsSummary, table: &OutcomeTable) -> Vec<String> {
     let runs = table.text("run");
     let mut queues: Vec<Vec<&str>> = findings
@@ -21,7 +22,7 @@ pub fn replay_order(findings: &FindingsSummary, table: &OutcomeTable) -> Vec<Str
         let subject = report.findings.examples.iter().map(|example| &example.row).filter(failed);
         subject.filter_map(|row| runs.get(*row as usize)).collect()
     }));
-    // Only what is shown counts as a failure: a property that was not asked for has no queue of its own.
+    // Failure modes may include properties that are not displayed. If so, use only the queues of displayed properties.
     let asked: BTreeSet<&str> = findings.properties.iter().map(|report| report.findings.property.as_str()).collect();
     let mut order = in_turn(&queues);
     if !findings.modes.iter().flat_map(|mode| &mode.failed).all(|property| asked.contains(property.as_str())) {
@@ -33,7 +34,7 @@ pub fn replay_order(findings: &FindingsSummary, table: &OutcomeTable) -> Vec<Str
     order.into_iter().filter(|run| seen.insert(*run)).map(str::to_owned).collect()
 }
 
-/// The next of each queue that no queue had, until all are empty.
+/// Takes the next unseen run of each queue in turn, until all are empty.
 fn in_turn<'a>(queues: &[Vec<&'a str>]) -> Vec<&'a str> {
     let mut seen = BTreeSet::new();
     let mut order = Vec::new();

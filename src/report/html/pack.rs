@@ -1,4 +1,5 @@
-//! Columns and courses as bytes that a browser unpacks by itself: a description in JSON, and behind it plain arrays.
+//! Packs columns and trajectories as bytes that a browser can unpack without a library: a JSON header followed by plain
+//! arrays.
 
 use std::io::Write as _;
 
@@ -8,14 +9,14 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use serde_json::{Map, Value, json};
 
-/// Stands for a number that is none.
+/// Code for a missing number.
 const NONE: u16 = u16::MAX;
-/// Numbers are told in so many steps between the smallest and the largest of their column.
+/// Number of quantisation steps between the smallest and the largest value of a column.
 const STEPS: f64 = 65_534.0;
-/// Arrays begin at multiples of this, as the browser's need to. Unit: bytes.
+/// Alignment of arrays, required by the browser's typed arrays. Unit: bytes.
 const ALIGNMENT: usize = 4;
 
-/// A description with arrays.
+/// A JSON header and arrays.
 #[derive(Debug, Default)]
 pub(super) struct Pack {
     head: Map<String, Value>,
@@ -23,17 +24,17 @@ pub(super) struct Pack {
 }
 
 impl Pack {
-    /// Says something in the description.
+    /// Sets an entry of the header.
     pub fn say(&mut self, name: &str, value: impl Into<Value>) {
         self.head.insert(name.to_owned(), value.into());
     }
 
-    /// Adds an array of bytes; returns where it is.
+    /// Adds an array of bytes and returns its descriptor.
     pub fn bytes(&mut self, values: &[u8]) -> Value {
         self.array("u8", values.len(), values)
     }
 
-    /// Adds an array of places in a list; returns where it is.
+    /// Adds an array of indices and returns its descriptor.
     pub fn places(&mut self, values: &[u32]) -> Value {
         let bytes: Vec<u8> = match values.iter().all(|value| *value <= u32::from(u16::MAX)) {
             true => values.iter().flat_map(|value| value.to_le_bytes().into_iter().take(2)).collect(),
@@ -43,7 +44,8 @@ impl Pack {
         self.array(kind, values.len(), &bytes)
     }
 
-    /// Adds a column of numbers, which it tells to 1/65534 of their range; returns where it is, or nothing where it has none.
+    /// Adds a column of numbers, quantised to 1/65534 of their range, and returns its descriptor. Returns `None` if it
+    /// has no numbers.
     pub fn numbers(&mut self, values: &[f64]) -> Option<Value> {
         let known = || values.iter().copied().filter(|value| value.is_finite());
         let (low, high) = (known().min_by(f64::total_cmp)?, known().max_by(f64::total_cmp)?);
@@ -62,8 +64,8 @@ impl Pack {
         Some(placed)
     }
 
-    /// Adds a course of whole numbers, each by its difference from where it would be going on as before: bodies move evenly. All lower
-    /// bytes stand before all higher ones, which are nearly always alike.
+    /// Adds columns of integers as second differences, which are small because bodies move smoothly. All low bytes
+    /// precede all high bytes, which are nearly always equal and so compress well.
     pub fn courses(&mut self, columns: &[Vec<i16>]) -> Value {
         let length = columns.first().map_or(0, Vec::len);
         let mut lower = Vec::with_capacity(columns.len() * length);
@@ -88,7 +90,7 @@ impl Pack {
         json!({ "kind": kind, "at": at, "length": length })
     }
 
-    /// All of it as letters that mean nothing in markup.
+    /// Returns the compressed pack in Base64, which is safe inside markup.
     pub fn finish(self) -> String {
         let mut head = Value::Object(self.head).to_string().into_bytes();
         head.resize(head.len().next_multiple_of(ALIGNMENT), b' ');
@@ -97,10 +99,10 @@ impl Pack {
     }
 }
 
-/// Bytes deflated, as letters that mean nothing in markup.
+/// Compresses bytes and encodes them in Base64, which is safe inside markup.
 pub(super) fn packed(bytes: &[u8]) -> String {
     let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 3), Compression::new(7));
-    // Writing into memory does not fail; were it to, the page would say that this part can't be read.
+    // Writing to memory does not fail. If it did, the page would report that it can't read this part.
     let deflated = encoder.write_all(bytes).and_then(|()| encoder.finish()).unwrap_or_default();
     STANDARD.encode(deflated)
 }

@@ -1,4 +1,4 @@
-//! The page: its frame, style and scripts, and the data behind them.
+//! Assembles the page from its frame, styles, scripts and data.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -10,9 +10,9 @@ use crate::report::html::pack::packed;
 use crate::report::html::scripts::{SCRIPT, SHELL, STYLE, THREE};
 use crate::report::html::summary::summary;
 
-/// The whole report as one page, which loads nothing from anywhere.
+/// Returns the report as one page that loads no external resources.
 ///
-/// The same report gives the same page. No word of a user's is in its markup: see the module.
+/// The same report gives the same page. Its markup has no user text: see the module.
 pub fn html(report: &HtmlReport<'_>) -> String {
     let script = format!("\"use strict\";\n{}", SCRIPT.join("\n"));
     let slots = Slots::of(report.table, report.findings);
@@ -42,12 +42,12 @@ pub fn html(report: &HtmlReport<'_>) -> String {
     page
 }
 
-/// Letters that are no script, for the script to read.
+/// A data element for the script to read; browsers do not execute it.
 fn data(id: &str, packed: &str) -> String {
     format!("<script type=\"text/plain\" id=\"data-{id}\">{packed}</script>\n")
 }
 
-/// What may run: this script alone, and the library that it unpacks. Nothing may be loaded.
+/// The content security policy: only this script and the library that it unpacks may run. Nothing may be loaded.
 fn policy(script: &str) -> String {
     let digest = STANDARD.encode(Sha256::digest(script.as_bytes()));
     format!(

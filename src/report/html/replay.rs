@@ -1,4 +1,4 @@
-//! Runs that can be watched: what is known of them and the courses of all bodies, in few bytes.
+//! Packs runs for playback: their details and the trajectories of all bodies.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +11,13 @@ use crate::report::html::events::action;
 use crate::report::html::pack::{Pack, packed};
 use crate::report::html::shapes::Shapes;
 
-/// The finest step of positions; coarser where a run spans more than 6.5 metres. Unit: metres. Traces are no finer.
+/// Smallest quantisation step of positions, which is the resolution of traces. The step is larger if a run spans more
+/// than 6.5 m. Unit: metres.
 const GRAIN_M: f64 = 1e-4;
-/// Steps of the components of quaternions, as in traces.
+/// Quantisation step of quaternion components, as in traces.
 const GRAIN_TURN: f64 = 2e-4;
 
-/// Runs that can be watched, packed.
+/// Packed runs for playback.
 #[derive(Debug, Default)]
 pub struct Replays {
     shapes: Shapes,
@@ -25,7 +26,7 @@ pub struct Replays {
 }
 
 impl Replays {
-    /// Adds a run; one without a state has nothing to be watched, and is told with what else is known.
+    /// Adds a run. A run without a trace can't be played back, but its details are included.
     pub fn add(&mut self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) {
         let mut pack = Pack::default();
         told(&mut pack, run);
@@ -40,22 +41,22 @@ impl Replays {
         self.runs.insert(run.row.run.clone(), packed);
     }
 
-    /// Bytes in a page.
+    /// Size in the page, in bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
     }
 
-    /// Ids of the runs with what is packed of each.
+    /// Ids of the runs, with their packed data.
     pub(super) fn runs(&self) -> impl Iterator<Item = (&str, &str)> {
         self.runs.iter().map(|(run, packed)| (run.as_str(), packed.as_str()))
     }
 
-    /// All forms, packed.
+    /// Returns all shapes, packed.
     pub(super) fn forms(&self) -> String {
         packed(json!(self.shapes.all()).to_string().as_bytes())
     }
 
-    /// The courses of all that moves, and what stands still.
+    /// Packs the trajectories of moving bodies, and the fixed bodies.
     fn course(&mut self, pack: &mut Pack, run: &RunDetail, trace: &Trace) {
         let forms: BTreeMap<&str, &Form> = trace.forms.iter().map(|form| (form.name.as_str(), form)).collect();
         let first = trace.snapshots.iter().take(1).flat_map(|state| &state.bodies);
@@ -65,7 +66,7 @@ impl Replays {
         let mut form = |name: &str| match (forms.get(name), bodies.get(name)) {
             (Some(form), _) => Some(self.shapes.of(form)),
             (None, Some(body)) => Some(self.shapes.around(body)),
-            // A link without a solid can't be seen.
+            // A link without geometry is invisible.
             (None, None) => None,
         };
         let frames = &trace.frames;
@@ -87,7 +88,7 @@ impl Replays {
     }
 }
 
-/// Where some tracks were over time, and what is needed to read it.
+/// Packs the trajectories of some tracks, with their scale and frame period.
 fn say_courses(pack: &mut Pack, trace: &Trace, slots: &[usize]) {
     let (columns, low, grain) = columns(&trace.frames.rows, slots);
     pack.say("period", trace.frames.period_secs);
@@ -98,7 +99,7 @@ fn say_courses(pack: &mut Pack, trace: &Trace, slots: &[usize]) {
     pack.say("courses", courses);
 }
 
-/// What is known of a run beside its actions.
+/// Packs the details of a run, except its actions.
 fn told(pack: &mut Pack, run: &RunDetail) {
     pack.say("run", run.row.run.as_str());
     pack.say("seed", run.seed);
@@ -122,13 +123,13 @@ fn told(pack: &mut Pack, run: &RunDetail) {
     pack.say("objects", objects);
 }
 
-/// What stands where the target is to be placed looks like all else that stands around.
+/// Name of a role. Objects at the place location are drawn like other objects.
 fn word(role: Role) -> &'static str {
     if role == Role::PlaceOther { Role::Other.word() } else { role.word() }
 }
 
-/// Seven columns of whole numbers for each track, with the lowest corner and the step of positions. What is not finite stays where it
-/// was before.
+/// Quantises seven columns for each track (position, quaternion). Returns the columns, the lowest corner and the
+/// position step. Values that are not finite repeat the previous one.
 fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64) {
     let value =
         |row: &Vec<f32>, column: usize| row.get(column).copied().filter(|value| value.is_finite()).map(f64::from);
@@ -137,7 +138,7 @@ fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64)
     let low = [0, 1, 2].map(|axis| along(axis).min_by(f64::total_cmp).unwrap_or_default());
     let extent = low.iter().enumerate().map(|(axis, low)| along(axis).map(|value| value - low).fold(0.0, f64::max));
     let grain = GRAIN_M.max(extent.fold(0.0, f64::max) / f64::from(u16::MAX));
-    // Positions are told from the lowest corner in grains, turns from nothing in theirs.
+    // Positions are relative to the lowest corner; quaternion components are absolute.
     let told = |part: usize, value: f64| match low.get(part) {
         Some(low) => (value - low) / grain,
         None => value / GRAIN_TURN,
@@ -147,7 +148,7 @@ fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64)
         let mut last = 0i16;
         let column = rows.iter().map(|row| {
             if let Some(value) = value(row, 7 * slot + part) {
-                // Positions use all sixteen bits without a sign, turns are within ±5000.
+                // Positions use all 16 bits as unsigned integers; quaternion components are within ±5000.
                 last = (told(part, value).round().clamp(-32_768.0, 65_535.0) as i32) as i16;
             }
             last

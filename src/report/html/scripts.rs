@@ -1,6 +1,6 @@
-//! The scripts and the style, each file with one idea, in the order in which they stand in the page.
+//! The scripts and style sheets, in the order in which they are in the page.
 
-/// How it looks: colours of both themes, the page, outcomes and plots, the list and a run.
+/// Style sheets: colours of both themes, the page, outcomes and plots, the list and the run view.
 pub(super) const STYLE: [&str; 4] = [
     include_str!("web/colours.css"),
     include_str!("web/page.css"),
@@ -8,7 +8,7 @@ pub(super) const STYLE: [&str; 4] = [
     include_str!("web/runs.css"),
 ];
 
-/// What runs. All of it shares one scope; the last one begins.
+/// Scripts. All share one scope; the last one starts the program.
 pub(super) const SCRIPT: [&str; 25] = [
     include_str!("web/dom.js"),
     include_str!("web/unpack.js"),
@@ -37,10 +37,10 @@ pub(super) const SCRIPT: [&str; 25] = [
     include_str!("web/main.js"),
 ];
 
-/// The frame of the page, with places for the rest.
+/// Template of the page, with placeholders.
 pub(super) const SHELL: &str = include_str!("web/page.html");
 
-/// three.js, which draws in 3D: its two modules. (MIT; licence beside them and at their beginning.)
+/// The two modules of three.js, which draws in 3D. (MIT; the licence is in their folder and header.)
 pub(super) const THREE: [(&str, &str); 2] = [
     ("three-core", include_str!("vendor/three/three.core.min.js")),
     ("three-module", include_str!("vendor/three/three.module.min.js")),
@@ -50,7 +50,7 @@ pub(super) const THREE: [(&str, &str); 2] = [
 mod tests {
     use super::*;
 
-    /// What would make markup of text, or run text.
+    /// Functions that parse text as markup or run it.
     const PARSERS: [&str; 10] = [
         "innerHTML",
         "outerHTML",
@@ -70,7 +70,7 @@ mod tests {
             for parser in PARSERS {
                 assert!(!script.contains(parser), "{parser} in {}", script.lines().next().unwrap_or_default());
             }
-            // It would end the element that the script stands in.
+            // It would end the script element.
             assert!(!script.to_lowercase().contains("</script"));
         }
     }
@@ -80,7 +80,7 @@ mod tests {
         for text in SCRIPT.iter().chain(&STYLE).chain([&SHELL]) {
             let hosts: Vec<&str> =
                 text.split("://").skip(1).map(|rest| rest.split(['/', '"']).next().unwrap_or_default()).collect();
-            // The namespace of drawings is a name, not an address.
+            // The SVG namespace is a name, not an address.
             assert!(hosts.iter().all(|host| *host == "www.w3.org"), "{hosts:?}");
         }
     }

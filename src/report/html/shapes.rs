@@ -1,4 +1,4 @@
-//! What bodies look like, each different form once.
+//! Shapes of bodies, without duplicates.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::history::{BodyState, Form, Part, Shape};
 
-/// Different forms, in the order in which they were met.
+/// Distinct shapes, in order of first use.
 #[derive(Debug, Default)]
 pub(super) struct Shapes {
     known: BTreeMap<String, usize>,
@@ -14,12 +14,13 @@ pub(super) struct Shapes {
 }
 
 impl Shapes {
-    /// Number of a form.
+    /// Returns the index of a shape.
     pub fn of(&mut self, form: &Form) -> usize {
         self.number(form.parts.iter().map(part).collect())
     }
 
-    /// Number of the box around a body that has no form. Frame: world, about the body's own origin.
+    /// Returns the index of the bounding box of a body without a shape. Frame: world axes, relative to the body's
+    /// origin.
     pub fn around(&mut self, body: &BodyState) -> usize {
         let size = [0, 1, 2].map(|axis| round(body.aabb_max[axis] - body.aabb_min[axis]));
         let middle = [0, 1, 2]
@@ -37,7 +38,7 @@ impl Shapes {
         number
     }
 
-    /// All forms, by number.
+    /// All shapes, by index.
     pub fn all(&self) -> &[Value] {
         &self.forms
     }
@@ -61,7 +62,7 @@ fn part(part: &Part) -> Value {
             "height": round(*height),
         }),
         Shape::Hull { points, .. } => hull(at, points),
-        // Traces hold the outermost points of a mesh alone.
+        // Traces only contain the outermost points of a mesh.
         Shape::Mesh { mesh } => hull(at, &mesh.vertices),
     }
 }
@@ -70,7 +71,7 @@ fn hull(at: [f64; 7], points: &[[f64; 3]]) -> Value {
     json!({ "at": at, "kind": "hull", "points": points.iter().map(|point| point.map(round)).collect::<Vec<_>>() })
 }
 
-/// To a tenth of a millimetre, which is finer than a pixel.
+/// Rounds to 0.1 mm, which is finer than a pixel.
 fn round(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

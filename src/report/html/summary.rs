@@ -1,4 +1,4 @@
-//! What a page says of all runs together.
+//! Packs the summary of all runs of a page.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::report::html::columns::{Slot, Slots};
 use crate::report::html::pack::Pack;
 use crate::verdict::{Outcome, mean, wilson};
 
-/// Findings, campaigns and properties. Runs go by their places.
+/// Packs findings, campaigns and properties. Runs are referred to by index.
 pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     let runs = &report.table.text("run").texts;
     let places: BTreeMap<&str, usize> = runs.iter().map(String::as_str).zip(0..).collect();
@@ -37,7 +37,7 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     pack.finish()
 }
 
-/// Ids of runs by their places: a tenth of the room.
+/// Replaces run ids by indices, which take a tenth of the space.
 fn number_runs(findings: &mut Value, places: &BTreeMap<&str, usize>) {
     let number = |runs: &mut Value| {
         let known = runs.as_array().into_iter().flatten().filter_map(|run| places.get(run.as_str()?));
@@ -51,7 +51,7 @@ fn number_runs(findings: &mut Value, places: &BTreeMap<&str, usize>) {
     }
 }
 
-/// The command that makes more scenes of each pattern.
+/// Adds to each pattern the command that generates more of its scenes.
 fn sentences(findings: &mut Value, report: &HtmlReport<'_>) {
     let summary = report.findings;
     for property in findings["properties"].as_array_mut().into_iter().flatten() {
@@ -69,7 +69,7 @@ fn sentences(findings: &mut Value, report: &HtmlReport<'_>) {
     }
 }
 
-/// T over all runs and over those that were not broken, and how many passed in everything.
+/// Computes T over all runs and over those that are not broken, and the number of runs in which everything passed.
 fn scores(report: &HtmlReport<'_>) -> Value {
     let table = report.table;
     let (runs, status, score) = (table.text("run"), table.text("status"), table.number("score"));

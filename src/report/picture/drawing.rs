@@ -1,4 +1,4 @@
-//! A picture as a list of shapes and words, before anything is written or filled.
+//! Vector drawings: a list of shapes and text, independent of the output format.
 
 /// A rectangle. Unit: pixels, y down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +22,7 @@ impl Rect {
         [self.left + self.width / 2.0, self.top + self.height / 2.0]
     }
 
-    /// Corners in order.
+    /// Corners in order around the rectangle.
     pub(super) fn corners(&self) -> Vec<[f64; 2]> {
         vec![[self.left, self.top], [self.right(), self.top], [self.right(), self.bottom()], [self.left, self.bottom()]]
     }
@@ -31,7 +31,7 @@ impl Rect {
         Self { left: self.left - by, top: self.top - by, width: self.width + 2.0 * by, height: self.height + 2.0 * by }
     }
 
-    /// Area that two rectangles share.
+    /// Area of the intersection of two rectangles.
     pub(super) fn shared(&self, other: &Self) -> f64 {
         let across = self.right().min(other.right()) - self.left.max(other.left);
         let down = self.bottom().min(other.bottom()) - self.top.max(other.top);
@@ -46,7 +46,7 @@ impl Rect {
     }
 }
 
-/// A colour (0xRRGGBB) and how much of what is below it hides, from 0 to 1.
+/// A colour (0xRRGGBB) and its opacity from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Paint {
     pub(super) rgb: u32,
@@ -63,12 +63,12 @@ impl Paint {
     }
 }
 
-/// How a line is drawn. Unit: pixels.
+/// Stroke style. Unit: pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Line {
     pub(super) paint: Paint,
     pub(super) width: f64,
-    /// Lengths of dash and gap.
+    /// Lengths of dashes and gaps; `None` for a solid line.
     pub(super) dash: Option<[f64; 2]>,
 }
 
@@ -82,7 +82,7 @@ impl Line {
     }
 }
 
-/// How a shape is drawn.
+/// Fill and stroke of a shape.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Style {
     pub(super) fill: Option<Paint>,
@@ -103,23 +103,23 @@ impl Style {
     }
 }
 
-/// Words in one line. Unit: pixels.
+/// A single line of text. Unit: pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Words {
     pub(super) text: String,
-    /// Left end of the line that the letters stand on.
+    /// Left end of the baseline.
     pub(super) at: [f64; 2],
     pub(super) size: f64,
     pub(super) bold: bool,
     pub(super) paint: Paint,
-    /// Whether a light rim sets them off from what is below.
+    /// Whether to draw a light outline for contrast with the background.
     pub(super) rim: bool,
 }
 
-/// One thing that is drawn.
+/// A drawn element.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Mark {
-    /// Polygons (where closed) or lines through points, drawn as one shape.
+    /// Polygons (if closed) or polylines, drawn as one shape.
     Shape {
         lines: Vec<Vec<[f64; 2]>>,
         closed: bool,
@@ -128,17 +128,17 @@ pub(super) enum Mark {
     Words(Words),
 }
 
-/// A picture: shapes and words over each other, the first below. Unit: pixels; origin at the upper left, y down.
+/// A picture: shapes and text, drawn in order. Unit: pixels; origin at the upper left, y down.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
     pub(super) width: f64,
     pub(super) height: f64,
-    /// Marks, each with the rectangle outside of which nothing of it is seen.
+    /// Marks, each with its clipping rectangle.
     pub(super) marks: Vec<(Option<Rect>, Mark)>,
     clip: Option<Rect>,
 }
 
-/// Farther away no coordinate is kept: simulations that went wrong have bodies anywhere. Unit: pixels.
+/// Coordinates are limited to this distance, because unstable simulations can place bodies anywhere. Unit: pixels.
 const FAR_PX: f64 = 20_000.0;
 
 impl Drawing {
@@ -146,7 +146,7 @@ impl Drawing {
         Self { width, height: 0.0, marks: Vec::new(), clip: None }
     }
 
-    /// From now on nothing is seen outside of a rectangle, or everything again.
+    /// Sets the clipping rectangle of later marks; `None` removes it.
     pub(super) fn clip(&mut self, within: Option<Rect>) {
         self.clip = within;
     }
@@ -165,7 +165,7 @@ impl Drawing {
         self.polygon(points.map(|a| [x + radius * libm::cos(a), y + radius * libm::sin(a)]).collect(), style);
     }
 
-    /// Polygons or lines as one shape: where they lie over each other, a translucent fill does not double.
+    /// Draws polygons or lines as one shape, so that translucent fills do not add up where they overlap.
     pub(super) fn shape(&mut self, lines: Vec<Vec<[f64; 2]>>, closed: bool, style: Style) {
         let near = |point: &[f64; 2]| point.iter().all(|value| value.abs() < FAR_PX);
         let lines: Vec<Vec<[f64; 2]>> =

@@ -1,6 +1,6 @@
-//! Letters: how wide words are, and their outlines.
+//! Measures text and returns its outlines.
 //!
-//! The fonts are parts of DejaVu Sans, carried in the program so that a picture needs nothing of the machine it is made on.
+//! The fonts are subsets of DejaVu Sans, embedded so that pictures do not depend on the fonts of the machine.
 
 use std::sync::OnceLock;
 
@@ -10,7 +10,7 @@ use zeno::{Command, PathBuilder, Vector};
 const REGULAR: &[u8] = include_bytes!("font/DejaVuSans.ttf");
 const BOLD: &[u8] = include_bytes!("font/DejaVuSans-Bold.ttf");
 
-/// What a letter that the font lacks is shown as.
+/// Replacement for characters that the font lacks.
 const MISSING: char = '\u{fffd}';
 
 fn face(bold: bool) -> Option<&'static Face<'static>> {
@@ -19,7 +19,7 @@ fn face(bold: bool) -> Option<&'static Face<'static>> {
     FACES[slot].get_or_init(|| Face::parse(bytes, 0).ok()).as_ref()
 }
 
-/// Glyphs of a text with their distance from its left end in units of the font, and the whole width.
+/// Glyphs of a text with their offsets from its left end, and the total width. Unit: font units.
 fn glyphs(face: &Face<'_>, text: &str) -> (Vec<(GlyphId, f32)>, f32) {
     let mut along = 0.0;
     let mut placed = Vec::new();
@@ -31,12 +31,12 @@ fn glyphs(face: &Face<'_>, text: &str) -> (Vec<(GlyphId, f32)>, f32) {
     (placed, along)
 }
 
-/// Width of a text. Unit: that of `size`.
+/// Width of a text. Unit: the unit of `size`.
 pub(super) fn width(text: &str, size: f64, bold: bool) -> f64 {
     face(bold).map_or(0.0, |face| f64::from(glyphs(face, text).1) * size / f64::from(face.units_per_em()))
 }
 
-/// Outline of a text whose line begins at a point. Unit: pixels, y down.
+/// Outline of a text whose baseline starts at a point. Unit: pixels, y down.
 pub(super) fn outline(text: &str, at: [f64; 2], size: f64, bold: bool) -> Vec<Command> {
     let Some(face) = face(bold) else { return Vec::new() };
     #[expect(clippy::cast_possible_truncation, reason = "pixels")]
@@ -50,7 +50,7 @@ pub(super) fn outline(text: &str, at: [f64; 2], size: f64, bold: bool) -> Vec<Co
     pen.path
 }
 
-/// Splits a text into lines no wider than `most`, between words where that is possible.
+/// Splits a text into lines of at most the width `most`, between words if possible.
 pub(super) fn wrapped(text: &str, size: f64, bold: bool, most: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
@@ -62,7 +62,7 @@ pub(super) fn wrapped(text: &str, size: f64, bold: bool, most: f64) -> Vec<Strin
                 break;
             }
             if line.is_empty() {
-                // A word that is wider than a line is broken.
+                // Break words that are wider than a line.
                 let fits = rest.char_indices().map(|(at, letter)| at + letter.len_utf8());
                 let end = fits.take_while(|end| width(&rest[..*end], size, bold) <= most).last();
                 let first = rest.chars().next().map_or(rest.len(), char::len_utf8);
@@ -79,7 +79,7 @@ pub(super) fn wrapped(text: &str, size: f64, bold: bool, most: f64) -> Vec<Strin
     lines
 }
 
-/// Turns the font's outlines, y up, into a path.
+/// Converts the font's outlines (y up) to a path.
 struct Pen {
     x: f32,
     y: f32,
@@ -127,7 +127,7 @@ mod tests {
     fn the_carried_fonts_have_letters_of_some_width() {
         for bold in [false, true] {
             assert!(face(bold).is_some());
-            // The widest letter, in shares of the size: 0.97 as it is and 1.04 bold.
+            // The widest letter, relative to the size: 0.97 regular and 1.04 bold.
             assert!((0.9..1.1).contains(&(width("mm", 12.0, bold) / 24.0)));
             assert!(outline("Ä→✗", [0.0, 0.0], 12.0, bold).len() > 20);
         }

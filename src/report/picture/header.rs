@@ -1,4 +1,4 @@
-//! What a picture says above its panels: which run, what was done, what failed.
+//! The header of a picture: the run, its actions and its failures.
 
 use std::collections::BTreeMap;
 
@@ -8,27 +8,27 @@ use crate::report::picture::drawing::{Drawing, Paint, Rect, Style, Words};
 use crate::report::picture::{font, paint};
 use crate::verdict::Outcome;
 
-/// Lines of failures at most: a picture is no report.
+/// Maximum number of failures listed; a picture is not a report.
 const MOST_FAILURES: usize = 8;
-/// Lines that one of them may take.
+/// Maximum number of lines of an entry.
 const MOST_LINES: usize = 2;
-/// Height of a line of words. Unit: pixels.
+/// Line height. Unit: pixels.
 const LINE_PX: f64 = 17.0;
-/// Room for the dots at the end of what is cut off. Unit: pixels.
+/// Space reserved for the ellipsis of truncated text. Unit: pixels.
 const ELLIPSIS_PX: f64 = 20.0;
-/// Size of the words. Unit: pixels.
+/// Font size. Unit: pixels.
 const SIZE_PX: f64 = 12.0;
 
-/// What is written above the panels.
+/// Text above the panels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Caption {
-    /// Which run it is.
+    /// Run, test, status and score.
     pub title: String,
-    /// What was done, a line for each action.
+    /// One line for each action.
     pub actions: Vec<String>,
-    /// What went wrong, a line for each property that failed, or how else the run ended.
+    /// One line for each failed property, preceded by the reason if the run did not complete.
     pub failures: Vec<String>,
-    /// What each object is there for, by its id.
+    /// Role of each object, by id.
     pub roles: BTreeMap<String, Role>,
 }
 
@@ -64,7 +64,7 @@ fn what_was_done(action: &ActionDetail) -> String {
     format!("{}. {name}: A = {:.2}, {:.1} s, {said}", action.step, action.score, action.duration_secs)
 }
 
-/// Writes the header from `top` on and returns where it ends.
+/// Draws the header from `top` on and returns its lower end.
 pub(super) fn draw(drawing: &mut Drawing, caption: &Caption, left: f64, top: f64, width: f64) -> f64 {
     let mut writer = Writer { drawing, left, width, y: top };
     writer.title(&caption.title);
@@ -114,7 +114,7 @@ impl Writer<'_> {
         }
     }
 
-    /// A square in the colour of an action's ways, before the line that comes next.
+    /// Draws a square in the colour of an action's paths, before the next line.
     fn swatch(&mut self, rgb: u32) {
         let square = Rect { left: self.left + 1.0, top: self.y + LINE_PX - 9.5, width: 10.0, height: 10.0 };
         self.drawing.polygon(square.corners(), Style::fill(Paint::solid(rgb)));

@@ -1,29 +1,29 @@
-//! Room for names: beside what they name, never over each other.
+//! Label placement: close to the labelled object, without overlaps between labels.
 
 use crate::report::picture::drawing::{Drawing, Line, Paint, Rect, Words};
 use crate::report::picture::font;
 use crate::report::picture::paint;
 
-/// Around a label nothing else is written. Unit: pixels.
+/// Margin around a label. Unit: pixels.
 const GAP_PX: f64 = 2.0;
-/// A label farther from its thing than this has a line to it. Unit: pixels.
+/// Labels farther than this from their object get a leader line. Unit: pixels.
 const LEADER_PX: f64 = 7.0;
 
-/// What is taken on one panel.
+/// The occupied areas of a panel.
 pub(super) struct Labels {
     panel: Rect,
     taken: Vec<Rect>,
-    /// What labels had better not hide.
+    /// Objects that labels should not hide.
     things: Vec<Rect>,
 }
 
-/// A name that wants a place.
+/// A label to place.
 pub(super) struct Label<'a> {
     pub(super) text: &'a str,
     pub(super) size: f64,
     pub(super) bold: bool,
     pub(super) rgb: u32,
-    /// What it names.
+    /// The labelled object.
     pub(super) at: Rect,
 }
 
@@ -37,9 +37,9 @@ impl Labels {
         self.taken.push(rect);
     }
 
-    /// Writes a label at the best free place, or not at all where the panel is full or does not show what it names.
+    /// Writes a label at the best free position. Skips it if the panel is full or does not show the object.
     pub(super) fn write(&mut self, drawing: &mut Drawing, label: &Label<'_>) {
-        // What is beside the panel is not seen, and has no name there.
+        // Objects outside of the panel get no label.
         if self.panel.shared(&label.at.grown(1.0)) == 0.0 {
             return;
         }
@@ -57,7 +57,7 @@ impl Labels {
         drawing.words(Words { text: label.text.to_owned(), at, size, bold, paint: Paint::solid(label.rgb), rim: true });
     }
 
-    /// Far away is worse, and so is what hides things (more so its own when it is small).
+    /// Cost of a position: the distance from the object, and the hidden area of objects relative to the label's area.
     fn cost(&self, place: &Rect, at: &Rect) -> f64 {
         let hidden: f64 = self.things.iter().map(|thing| thing.shared(place)).sum();
         let area = place.width * place.height;
@@ -65,14 +65,14 @@ impl Labels {
     }
 }
 
-/// Distance of two rectangles, 0 where they overlap.
+/// Distance between two rectangles; 0 if they overlap.
 fn gap(a: &Rect, b: &Rect) -> f64 {
     let across = (a.left - b.right()).max(b.left - a.right()).max(0.0);
     let down = (a.top - b.bottom()).max(b.top - a.bottom()).max(0.0);
     across.hypot(down)
 }
 
-/// Places for a label of some size: on its thing, around it, and on wider and wider rings.
+/// Candidate positions for a label: on its object, and around it at increasing distances.
 fn candidates(at: &Rect, width: f64, height: f64) -> Vec<Rect> {
     let [x, y] = at.middle();
     let centred = |x: f64, y: f64| Rect { left: x - width / 2.0, top: y - height / 2.0, width, height };
@@ -83,7 +83,7 @@ fn candidates(at: &Rect, width: f64, height: f64) -> Vec<Rect> {
         for step in 0..20 {
             let angle = std::f64::consts::TAU * f64::from(step) / 20.0;
             let (cos, sin) = (libm::cos(angle), libm::sin(angle));
-            // On the rectangle around the thing, not on an ellipse: so labels stand close at corners too.
+            // Rings are rectangles rather than ellipses, so that labels are close at corners too.
             let stretch = 1.0 / cos.abs().max(sin.abs());
             places.push(centred(x + half_width * cos * stretch, y + half_height * sin * stretch));
         }
@@ -91,7 +91,7 @@ fn candidates(at: &Rect, width: f64, height: f64) -> Vec<Rect> {
     places
 }
 
-/// A thin line from a label to its thing, where they are apart.
+/// Draws a thin line from a label to its object if they are apart.
 fn leader(drawing: &mut Drawing, at: &Rect, place: &Rect) {
     if gap(place, at) < LEADER_PX {
         return;

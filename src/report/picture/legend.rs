@@ -1,4 +1,4 @@
-//! What the colours and lines of a picture mean: only of those that are in it.
+//! The legend of a picture. It only has the colours and lines that occur.
 
 use crate::history::Role;
 use crate::report::picture::drawing::{Drawing, Paint, Rect, Style, Words};
@@ -6,11 +6,11 @@ use crate::report::picture::panel::Material;
 use crate::report::picture::paths::Mover;
 use crate::report::picture::{font, paint};
 
-/// Size of the words. Unit: pixels.
+/// Font size. Unit: pixels.
 const SIZE_PX: f64 = 11.5;
-/// Height of a line. Unit: pixels.
+/// Line height. Unit: pixels.
 const LINE_PX: f64 = 20.0;
-/// Width of a sample. Unit: pixels.
+/// Width of a symbol. Unit: pixels.
 const SAMPLE_PX: f64 = 22.0;
 
 enum Sample {
@@ -18,7 +18,7 @@ enum Sample {
     Way(Mover),
 }
 
-/// Writes the legend from `top` on and returns where it ends.
+/// Draws the legend from `top` on and returns its lower end.
 pub(super) fn draw(drawing: &mut Drawing, material: &Material<'_>, left: f64, top: f64, width: f64) -> f64 {
     let (mut x, mut y) = (left, top);
     for (sample, text) in entries(material) {
@@ -56,7 +56,7 @@ fn entries(material: &Material<'_>) -> Vec<(Sample, &'static str)> {
         (true, Sample::Area(paint::FURNITURE), "furniture"),
         (true, Sample::Area(paint::ROBOT), "robot"),
         (perceived, Sample::Area(paint::GLIMPSE), "perceived, where the robot believes it"),
-        (moved(Mover::Base), Sample::Way(Mover::Base), "way of the base, in the colour of its action"),
+        (moved(Mover::Base), Sample::Way(Mover::Base), "path of the base, in the colour of its action"),
         (moved(Mover::Hand), Sample::Way(Mover::Hand), "of the hand"),
         (moved(Mover::Target), Sample::Way(Mover::Target), "of the target"),
     ];

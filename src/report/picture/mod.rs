@@ -1,10 +1,11 @@
-//! A picture of a run without screen or graphics hardware: its scene before and after, from above and from the side.
+//! Draws a run without a screen or graphics hardware: its scene before and after, from above and from the side.
 //!
-//! From a run to pixels: [`run`] lays panels out, [`window`] says what each shows, [`outline`] and [`paths`] make lines of
-//! bodies and motions, [`labels`] finds room for names; [`drawing`] is all of it as plain shapes, which [`svg`] writes and
-//! [`png`] fills, with letters from [`font`]. [`patterns`] draws the runs of patterns with the same means.
+//! From a run to pixels: [`run`] lays out the panels, [`window`] selects the region that each shows, [`outline`] and
+//! [`paths`] compute the outlines of bodies and the paths of motions, and [`labels`] places names. The result is a
+//! [`drawing`] of plain shapes, which [`svg`] writes and [`png`] rasterises, with glyphs from [`font`]. [`patterns`]
+//! draws the runs of patterns in the same way.
 //!
-//! Never: reads or writes a file, or knows of a shape that the trace does not hold.
+//! Never: reads or writes a file, or uses a shape that is not in the trace.
 
 mod drawing;
 mod font;

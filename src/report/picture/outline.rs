@@ -1,4 +1,4 @@
-//! Outlines of bodies in a view: the hull of each convex part, laid over each other.
+//! Outlines of bodies in a view: the convex hull of each part.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,10 +7,10 @@ use nalgebra::{Isometry3, Point3};
 use crate::history::{Part, Shape};
 use crate::report::picture::window::Window;
 
-/// Corners of what is round.
+/// Number of corners that approximate a circle.
 const AROUND: u32 = 28;
 
-/// What is seen of a body made of parts: a polygon for each. Unit: pixels.
+/// Silhouette of a body: one polygon for each part. Unit: pixels.
 pub(super) fn silhouette(parts: &[Part], pose: &Isometry3<f64>, window: &Window) -> Vec<Vec<[f64; 2]>> {
     let seen = parts.iter().map(|part| {
         let placed = pose * part.pose.to_isometry();
@@ -19,7 +19,7 @@ pub(super) fn silhouette(parts: &[Part], pose: &Isometry3<f64>, window: &Window)
     seen.filter(|polygon| polygon.len() > 2).collect()
 }
 
-/// Points whose hull is the shape, or within a few percent of it. Frame: the shape's.
+/// Points whose convex hull is the shape, within a few percent. Frame: shape.
 fn corners(shape: &Shape) -> Vec<Point3<f64>> {
     match shape {
         Shape::Box { size } => {
@@ -40,24 +40,24 @@ fn corners(shape: &Shape) -> Vec<Point3<f64>> {
             )
         }
         Shape::Hull { points, .. } => points.iter().map(|point| Point3::from(*point)).collect(),
-        // Traces hold none: see `Form`.
+        // Traces contain no meshes: see `Form`.
         Shape::Mesh { .. } => Vec::new(),
     }
 }
 
-/// Cosines and sines from pole to pole.
+/// Cosines and sines of the latitudes, from pole to pole.
 fn latitudes() -> impl Iterator<Item = (f64, f64)> {
     (0..=8).map(|step| PI * (f64::from(step) / 8.0 - 0.5)).map(|angle| (libm::cos(angle), libm::sin(angle)))
 }
 
-/// Circles about z, by radius and height.
+/// Points on circles around z, given their radii and heights.
 fn rings(circles: impl IntoIterator<Item = (f64, f64)>) -> Vec<Point3<f64>> {
     let turns = || (0..AROUND).map(|idx| TAU * f64::from(idx) / f64::from(AROUND));
     let ring = |(radius, z)| turns().map(move |a| Point3::new(radius * libm::cos(a), radius * libm::sin(a), z));
     circles.into_iter().flat_map(ring).collect()
 }
 
-/// The convex hull of points of a plane, counter-clockwise where y is left of x (by Andrew's chains of lower and upper points).
+/// Convex hull of points in a plane, counter-clockwise if y is to the left of x (Andrew's monotone chain algorithm).
 pub(in crate::report) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.retain(|point| point.iter().all(|value| value.is_finite()));
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -73,7 +73,7 @@ pub(in crate::report) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     chain
 }
 
-/// One chain: points from one end to the other that turn the same way all along.
+/// One chain: the points from one end to the other that all turn in the same direction.
 fn half(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
     let mut chain: Vec<[f64; 2]> = Vec::new();
     for point in points {

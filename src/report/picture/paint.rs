@@ -1,25 +1,25 @@
-//! The colours of pictures, told apart by people who see red and green alike too.
+//! The colours of pictures, safe for red-green colour blindness.
 
 use crate::history::Role;
 use crate::report::picture::drawing::{Line, Paint, Style};
 use crate::report::picture::paths::Mover;
 
-/// Words and thin lines.
+/// Text and thin lines.
 pub(super) const INK: u32 = 0x1c_2430;
-/// Words of less weight.
+/// Secondary text.
 pub(super) const GREY: u32 = 0x5b_6472;
-/// What failed.
+/// Failures.
 pub(super) const FAILED: u32 = 0xc0_2b1d;
-/// What was perceived.
+/// Perceived objects.
 pub(super) const PERCEIVED: u32 = 0xa0_2c9a;
 /// The target.
 pub(super) const TARGET: u32 = 0x1f_5fc4;
 /// Obstacles on the floor.
 pub(super) const OBSTACLE: u32 = 0xb8_6b14;
-/// Everything else that can be moved.
+/// All other movable objects.
 pub(super) const OTHER: u32 = 0x6b_7582;
 
-/// One for each action, over again where there are more. (After Okabe and Ito's set.)
+/// One colour for each action, repeated if there are more actions. (After the Okabe-Ito palette.)
 const ACTIONS: [u32; 6] = [0xd5_5e00, 0x00_8a66, 0x7a_3fb0, 0xc4_8a00, 0x2a_8fc9, 0x84_3c39];
 
 pub(super) const FURNITURE: Style = Style::both(Paint::new(0xe6_d5b5, 0.9), Line::new(Paint::new(0xb0_9564, 1.0), 0.8));
@@ -46,7 +46,7 @@ pub(super) fn movable(role: Role) -> Style {
     Style::both(Paint::new(rgb, 0.5), Line::new(Paint::solid(rgb), 1.0))
 }
 
-/// The line of a way: base broad, hand thin, target dotted.
+/// Line style of a path: base wide, hand thin, target dotted.
 pub(super) fn way(mover: Mover, rgb: u32) -> Line {
     match mover {
         Mover::Base => Line::new(Paint::new(rgb, 0.45), 5.0),

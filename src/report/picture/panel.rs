@@ -1,4 +1,4 @@
-//! One panel: a state of the world in a window, with names.
+//! A panel: one state of the world in a window, with labels.
 
 use std::collections::BTreeMap;
 
@@ -11,10 +11,11 @@ use crate::report::picture::paths::{Mover, Way, pose_at};
 use crate::report::picture::window::{Bounds, Window};
 use crate::report::picture::{font, paint};
 
-/// Links reach no farther from their origins. Unit: metres. Those beside what a window is about are left out.
+/// Upper bound of a link's extent from its origin. Links farther than this outside of the window are omitted. Unit:
+/// metres.
 const LINK_REACH_M: f64 = 0.8;
 
-/// What all panels of a run draw from.
+/// Data shared by all panels of a run.
 pub(super) struct Material<'a> {
     pub(super) trace: &'a Trace,
     pub(super) ways: &'a [Way],
@@ -22,12 +23,12 @@ pub(super) struct Material<'a> {
     pub(super) forms: BTreeMap<&'a str, &'a Form>,
 }
 
-/// Which moment a panel shows.
+/// The moment that a panel shows.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Moment {
-    /// The state before the first action, with what was perceived of it.
+    /// The state before the first action, with percepts.
     Before,
-    /// The state after the last, with the ways there.
+    /// The state after the last action, with paths.
     After,
 }
 
@@ -45,7 +46,7 @@ impl Material<'_> {
     }
 }
 
-/// Draws a panel. A map shows places and the names of furniture; a close-up names what can be moved.
+/// Draws a panel. Maps show places and label furniture; close-ups label movable objects.
 pub(super) fn draw(drawing: &mut Drawing, material: &Material<'_>, moment: Moment, window: &Window, is_map: bool) {
     let Some(snapshot) = material.snapshot(moment) else { return };
     drawing.polygon(window.panel.corners(), paint::BACKGROUND);
@@ -86,7 +87,7 @@ fn fixed_style(body: &BodyState) -> Style {
     if is_wall(body) { paint::WALL } else { paint::FURNITURE }
 }
 
-/// Outline of a body: of its form, or of the box around it where the trace has none.
+/// Outline of a body's shape, or of its bounding box if the trace has no shape.
 fn form(material: &Material<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64; 2]>> {
     match material.forms.get(body.id.as_str()) {
         Some(form) => silhouette(&form.parts, &body.pose.to_isometry(), window),
@@ -94,7 +95,7 @@ fn form(material: &Material<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[
     }
 }
 
-/// The robot's links where they were in the first or last frame.
+/// Draws the robot's links as in the first or last frame.
 fn robot(drawing: &mut Drawing, material: &Material<'_>, moment: Moment, window: &Window) {
     let frames = &material.trace.frames;
     let row = if moment == Moment::Before { 0 } else { frames.rows.len().saturating_sub(1) };
@@ -109,7 +110,7 @@ fn robot(drawing: &mut Drawing, material: &Material<'_>, moment: Moment, window:
     drawing.shape(links.flatten().collect(), true, paint::ROBOT);
 }
 
-/// An arrow at the robot's base, seen from above.
+/// Draws an arrow at the robot's base, in views from above.
 fn heading(drawing: &mut Drawing, [x, y, heading]: [f64; 3], window: &Window) {
     if window.view.up != 1 {
         return;
@@ -133,7 +134,7 @@ fn rooms(drawing: &mut Drawing, trace: &Trace, window: &Window) {
     }
 }
 
-/// What was perceived, as boxes: things, planes, and what a skill looked up.
+/// Percepts as boxes: objects, planes, and objects that a skill queried.
 fn glimpse_parts(trace: &Trace) -> Vec<(String, Part)> {
     let standing = |pose: &crate::base::Pose, [x, y, z]: [f64; 3]| {
         let middle = pose.to_isometry() * nalgebra::Translation3::new(0.0, 0.0, z / 2.0);
@@ -163,7 +164,7 @@ fn glimpses(drawing: &mut Drawing, trace: &Trace, window: &Window) {
     }
 }
 
-/// Says as what things were perceived.
+/// Labels percepts with their recognised category.
 fn name_glimpses(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &mut Labels) {
     let seen = trace.actions.iter().filter_map(|action| action.perceived.as_ref());
     for thing in seen.flat_map(|perceived| &perceived.things) {
@@ -176,7 +177,7 @@ fn name_glimpses(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: 
 }
 
 fn ways(drawing: &mut Drawing, ways: &[Way], window: &Window) {
-    // From the side, the base only goes along the floor.
+    // In side views, the path of the base is only a line on the floor.
     for way in ways.iter().filter(|way| way.mover != Mover::Base || window.view.up == 1) {
         let points: Vec<[f64; 2]> = way.points.iter().map(|point| window.pixel(*point)).collect();
         let rgb = paint::action(way.action);
@@ -187,12 +188,12 @@ fn ways(drawing: &mut Drawing, ways: &[Way], window: &Window) {
     }
 }
 
-/// Rectangles of what can be moved: labels keep off them.
+/// Rectangles of movable objects, which labels should avoid.
 fn things(shown: &[&BodyState], window: &Window) -> Vec<Rect> {
     shown.iter().filter(|body| !body.fixed).map(|body| window.rect(&Bounds::of(body))).collect()
 }
 
-/// A bar of a round length in the lower left corner.
+/// Draws a scale bar of a round length in the lower left corner.
 fn ruler(drawing: &mut Drawing, window: &Window, labels: &mut Labels) {
     let lengths = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
     let length = lengths.into_iter().find(|metres| metres * window.scale >= 45.0).unwrap_or(5.0);
@@ -207,7 +208,7 @@ fn ruler(drawing: &mut Drawing, window: &Window, labels: &mut Labels) {
     labels.keep_out(Rect { left, top: bottom - 12.0, width: right - left + width + 8.0, height: 16.0 });
 }
 
-/// Rooms and locations.
+/// Labels rooms and locations.
 fn name_places(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &mut Labels) {
     for location in &trace.map.locations {
         let [x, y, heading] = location.at;
@@ -225,7 +226,7 @@ fn name_places(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &m
     }
 }
 
-/// Names of what can be moved, the target first, then of furniture.
+/// Labels movable objects, the target first, then furniture.
 fn name_bodies(
     drawing: &mut Drawing,
     material: &Material<'_>,
@@ -240,7 +241,7 @@ fn name_bodies(
     let rank = |role: Role| order.iter().position(|other| *other == role);
     named.sort_by_key(|(body, role)| (body.fixed, rank(*role)));
     for (body, role) in named {
-        // On a map, what stands on tables is too small to be named.
+        // On a map, objects on tables are too small to label.
         if is_map && !body.fixed && matches!(role, Role::Other | Role::PlaceOther) {
             continue;
         }
@@ -250,7 +251,7 @@ fn name_bodies(
     }
 }
 
-/// The same colour for words, which are thin.
+/// Darkens a colour for text, which has thin strokes.
 fn darker(rgb: u32) -> u32 {
     let [_, channels @ ..] = rgb.to_be_bytes();
     channels.into_iter().fold(0, |sum, channel| (sum << 8) | (u32::from(channel) * 2 / 3))

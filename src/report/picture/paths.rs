@@ -1,11 +1,11 @@
-//! The ways of base, hand and target through a run, one line for each action.
+//! Paths of base, hand and target during a run, one for each action.
 
 use nalgebra::{Isometry3, Point3};
 
 use crate::base::Pose;
 use crate::history::{Snapshot, Trace};
 
-/// Whose way it is.
+/// The body that moves along a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mover {
     Base,
@@ -13,7 +13,7 @@ pub(super) enum Mover {
     Target,
 }
 
-/// A way during one action.
+/// A path during one action.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Way {
     pub(super) mover: Mover,
@@ -23,12 +23,12 @@ pub(super) struct Way {
     pub(super) points: Vec<[f64; 3]>,
 }
 
-/// A way shorter than this is none. Unit: metres.
+/// Minimum length of a path. Unit: metres.
 const SHORTEST_M: f64 = 0.01;
-/// Frames are rounded, and the last one is up to a tenth of a second old. Unit: metres.
+/// Drift below this is not measurable, because frames are rounded and the last one is up to 0.1 s old. Unit: metres.
 const MEASURABLE_M: f64 = 0.003;
 
-/// All ways that are worth a line.
+/// All paths that are long enough to draw.
 pub(super) fn ways(trace: &Trace, target: Option<&str>) -> Vec<Way> {
     let followed = [
         (Mover::Base, base(trace)),
@@ -52,7 +52,7 @@ pub(super) fn ways(trace: &Trace, target: Option<&str>) -> Vec<Way> {
     ways
 }
 
-/// First and last frame of each action: the last of one is the first of the next.
+/// First and last frame of each action. The last frame of an action is the first of the next.
 fn spans(trace: &Trace) -> Vec<(usize, usize)> {
     let mut first = 0;
     let mut spans = Vec::new();
@@ -66,7 +66,7 @@ fn spans(trace: &Trace) -> Vec<(usize, usize)> {
     spans
 }
 
-/// Pose of a thing with a track in a frame.
+/// Pose of a track in a frame. Returns `None` if it is missing or not finite.
 pub(super) fn pose_at(trace: &Trace, row: usize, slot: usize) -> Option<Isometry3<f64>> {
     let values = trace.frames.rows.get(row)?.get(7 * slot..7 * slot + 7)?;
     let value = |idx: usize| f64::from(values[idx]);
@@ -79,12 +79,12 @@ fn slot(trace: &Trace, name: &str) -> Option<usize> {
     trace.frames.names.iter().position(|track| track == name)
 }
 
-/// The link that goes with the grasp frame, and where that is on it.
+/// The link that carries the grasp frame, and the frame's pose relative to it.
 fn hand(trace: &Trace) -> Option<(usize, Isometry3<f64>)> {
     carrier(trace, |snapshot| snapshot.robot.gripper.to_isometry())
 }
 
-/// The link that goes with the base, and where the base's middle is on it.
+/// The link that carries the base frame, and the frame's pose relative to it.
 fn base(trace: &Trace) -> Option<(usize, Isometry3<f64>)> {
     let base = |snapshot: &Snapshot| {
         let [x, y, heading] = snapshot.robot.base_true;
@@ -93,7 +93,8 @@ fn base(trace: &Trace) -> Option<(usize, Isometry3<f64>)> {
     carrier(trace, base)
 }
 
-/// The link that a frame is fixed to: its pose on it is the same at the beginning and at the end. Of several the nearest.
+/// The link to which a frame is fixed: the frame's relative pose is the same at the start and at the end. If there are
+/// several, the nearest.
 fn carrier(trace: &Trace, frame: impl Fn(&Snapshot) -> Isometry3<f64>) -> Option<(usize, Isometry3<f64>)> {
     let (first, last) = (frame(trace.snapshots.first()?), frame(trace.snapshots.last()?));
     let links = trace.frames.names.iter().enumerate().filter(|(_, name)| name.starts_with("robot/"));

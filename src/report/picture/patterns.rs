@@ -1,31 +1,35 @@
-//! Where patterns lie: the runs of each over two parameters of their scenes, failed ones crossed, the range marked.
+//! Draws patterns: scatter plots of runs over two scene parameters, with failures as crosses and the range of the
+//! pattern marked.
 
 use crate::analysis::{Condition, Parameter, Pattern, Subject, Values};
 use crate::report::FindingsSummary;
 use crate::report::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
 use crate::report::picture::{font, paint};
 
-/// Width of a picture, and of what is around and between panels. Unit: pixels.
+/// Width of a picture. Unit: pixels.
 const WIDTH_PX: f64 = 1200.0;
+/// Margin, and distance between panels. Unit: pixels.
 const GAP_PX: f64 = 18.0;
-/// Height of a panel, and room at its left and below it for numbers. Unit: pixels.
+/// Height of a panel. Unit: pixels.
 const PANEL_PX: f64 = 300.0;
+/// Space for axis numbers, to the left of and below a panel. Unit: pixels.
 const NUMBERS_PX: [f64; 2] = [46.0, 34.0];
-/// Size of words and height of their lines. Unit: pixels.
+/// Font size. Unit: pixels.
 const SIZE_PX: f64 = 12.0;
+/// Line height. Unit: pixels.
 const LINE_PX: f64 = 16.0;
-/// Half the size of a run. Unit: pixels.
+/// Half the size of a run's symbol. Unit: pixels.
 const RUN_PX: f64 = 2.6;
-/// Passed runs of a panel at most: more are one surface. Every so-many-th is drawn where there are more.
+/// Maximum number of passed runs drawn in a panel, to limit overplotting. If there are more, every n-th is drawn.
 const MOST_PASSED: usize = 3000;
-/// Share of a range that is left free around all runs.
+/// Margin around all runs, relative to the range.
 const ROOM: f64 = 0.04;
-/// Where things stand on a surface: what is drawn of a pattern with fewer than two ranges.
+/// Parameters that complete the axes of a pattern with fewer than two ranges.
 const USUAL: [&str; 6] =
     ["surface_x_m", "surface_y_m", "robot_distance_m", "target_turned_rad", "target_friction", "target_mass_kg"];
 const PASSED: u32 = 0x1a_8a6a;
 
-/// Draws every confirmed pattern, in the order in which `actcheck analyse` tells them; nothing where there is none that can be drawn.
+/// Draws all confirmed patterns, in the order of `actcheck analyse`. Returns `None` if no pattern can be drawn.
 pub fn patterns_picture(findings: &FindingsSummary) -> Option<Drawing> {
     let mut drawing = Drawing::new(WIDTH_PX);
     let width = (WIDTH_PX - 3.0 * GAP_PX) / 2.0;
@@ -55,7 +59,7 @@ pub fn patterns_picture(findings: &FindingsSummary) -> Option<Drawing> {
     (drawn > 0).then_some(drawing)
 }
 
-/// Writes a sentence from a corner on; returns where it ends.
+/// Writes a sentence from its upper left corner and returns its lower end.
 fn words(drawing: &mut Drawing, text: &str, [left, top]: [f64; 2], width: f64) -> f64 {
     font::wrapped(text, SIZE_PX, true, width).into_iter().fold(top, |y, text| {
         let paint = Paint::solid(paint::INK);
@@ -68,14 +72,14 @@ fn words(drawing: &mut Drawing, text: &str, [left, top]: [f64; 2], width: f64) -
 struct Axis<'a> {
     parameter: &'a Parameter,
     numbers: &'a [f64],
-    /// All runs are within.
+    /// Range that contains all runs, with a margin.
     range: [f64; 2],
-    /// What the pattern asks for.
+    /// Bounds of the pattern's condition.
     asked: [Option<f64>; 2],
 }
 
 impl<'a> Axis<'a> {
-    /// Nothing where the parameter has no number or one alone.
+    /// Returns `None` if the parameter has fewer than two distinct numbers.
     fn of(parameter: &'a Parameter, asked: [Option<f64>; 2]) -> Option<Self> {
         let Values::Numbers(numbers) = &parameter.values else { return None };
         let known = || numbers.iter().copied().filter(|number| number.is_finite());
@@ -84,7 +88,7 @@ impl<'a> Axis<'a> {
         (low < high).then_some(Self { parameter, numbers, range: [low - room, high + room], asked })
     }
 
-    /// From 0 to 1 in the panel.
+    /// Position in the panel, from 0 to 1.
     fn share(&self, value: f64) -> f64 {
         (value - self.range[0]) / (self.range[1] - self.range[0])
     }
@@ -93,7 +97,7 @@ impl<'a> Axis<'a> {
         self.parameter.name.replace('_', " ")
     }
 
-    /// Round numbers, about five.
+    /// About five round numbers.
     fn ticks(&self) -> Vec<f64> {
         let rough = (self.range[1] - self.range[0]) / 5.0;
         let power = libm::exp10(libm::floor(libm::log10(rough)));
@@ -104,13 +108,14 @@ impl<'a> Axis<'a> {
     }
 }
 
-/// What a panel shows: across and up.
+/// The axes of a panel: across and up.
 struct Plane<'a> {
     axes: [Axis<'a>; 2],
 }
 
 impl<'a> Plane<'a> {
-    /// The ranges of a pattern first, then where things stand.
+    /// Chooses the axes: the ranges of a pattern first, then the usual parameters. Returns `None` if there are fewer
+    /// than two.
     fn of(subject: &'a Subject, pattern: &Pattern) -> Option<Self> {
         let ranges = pattern.conditions.iter().filter_map(|condition| match condition {
             Condition::Range { parameter, low, high } => Axis::of(subject.parameters.get(*parameter)?, [*low, *high]),
@@ -136,7 +141,7 @@ impl<'a> Plane<'a> {
         self.numbers(drawing, panel);
         drawing.clip(Some(panel));
         self.asked(drawing, panel);
-        // Of a pattern about kinds, only runs of these kinds are told apart by their places.
+        // If the pattern has conditions on kinds, only draw runs of these kinds.
         let kinds = pattern.conditions.iter().filter(|condition| matches!(condition, Condition::Kind { .. }));
         let kinds: Vec<Vec<bool>> = kinds.map(|condition| condition.holds(subject)).collect();
         let shown = |run: &usize| kinds.iter().all(|holds| holds[*run]);
@@ -159,7 +164,7 @@ impl<'a> Plane<'a> {
         drawing.clip(None);
     }
 
-    /// The range that the pattern asks for.
+    /// Draws the range of the pattern.
     fn asked(&self, drawing: &mut Drawing, panel: Rect) {
         if self.axes.iter().all(|axis| axis.asked == [None, None]) {
             return;
@@ -172,7 +177,7 @@ impl<'a> Plane<'a> {
         drawing.polygon(vec![corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)], style);
     }
 
-    /// Lines at round numbers, the numbers, and what they are.
+    /// Draws the grid lines, their numbers and the axis names.
     fn numbers(&self, drawing: &mut Drawing, panel: Rect) {
         let grid = Line::new(Paint::new(paint::GREY, 0.22), 0.8);
         let write = |drawing: &mut Drawing, text: String, at: [f64; 2]| {
@@ -199,12 +204,12 @@ impl<'a> Plane<'a> {
     }
 }
 
-/// A small figure about a pixel.
+/// Corners of a small symbol around a pixel.
 fn corners<const N: usize>([x, y]: [f64; 2], figure: [[f64; 2]; N]) -> Vec<[f64; 2]> {
     figure.iter().map(|[right, down]| [x + RUN_PX * right, y + RUN_PX * down]).collect()
 }
 
-/// A round number without the digits that rounding adds.
+/// Formats a round number without rounding errors.
 fn shown(value: f64) -> String {
     let rounded = (value * 1e6).round() / 1e6;
     format!("{}", if rounded == 0.0 { 0.0 } else { rounded })

@@ -1,4 +1,4 @@
-//! A drawing as pixels, and those as PNG.
+//! Rasterises a drawing and encodes it as PNG.
 
 use std::io::Write as _;
 
@@ -9,14 +9,14 @@ use zeno::{Command, Fill, Join, Mask, PathBuilder, Stroke, Style as Brush};
 use crate::report::picture::drawing::{Drawing, Line, Mark, Paint, Rect};
 use crate::report::picture::font;
 
-/// Pixels of the file for each of the drawing: small letters stay sharp where a picture is looked at closely.
+/// Pixels of the file per pixel of the drawing, so that small text stays sharp when zoomed in.
 const DENSITY: u8 = 2;
 
 impl Drawing {
-    /// The drawing as a PNG file, twice as wide and high in pixels as in its own units.
+    /// Encodes the drawing as a PNG file, with twice its width and height in pixels.
     ///
     /// # Errors
-    /// What the compressor says; memory is all that it can lack.
+    /// The compressor fails; it writes to memory, so it can only run out of memory.
     pub fn to_png(&self) -> std::io::Result<Vec<u8>> {
         let mut canvas = Canvas::white(self.width, self.height);
         for (clip, mark) in &self.marks {
@@ -91,7 +91,7 @@ impl Canvas {
         self.draw(path, stroke.into(), line.paint, clip);
     }
 
-    /// Fills what a brush makes of a path.
+    /// Fills or strokes a path.
     fn draw(&mut self, path: &[Command], brush: Brush<'_>, paint: Paint, clip: Option<&Rect>) {
         let (cover, placed) = Mask::new(path).style(brush).render();
         let (columns, rows) = self.seen(clip);
@@ -110,7 +110,7 @@ impl Canvas {
         }
     }
 
-    /// Columns and rows that a clip leaves.
+    /// Columns and rows inside a clipping rectangle.
     fn seen(&self, clip: Option<&Rect>) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
         let whole = Rect { left: 0.0, top: 0.0, width: f64::INFINITY, height: f64::INFINITY };
         let Rect { left, top, width, height } = *clip.unwrap_or(&whole);
@@ -133,7 +133,7 @@ impl Canvas {
         }
     }
 
-    /// The file: a header, the compressed pixels and an end (PNG, third edition, §5 and §11.2).
+    /// Encodes the file: a header, the compressed pixels and an end chunk (PNG, third edition, §5 and §11.2).
     fn to_png(&self) -> std::io::Result<Vec<u8>> {
         let mut rows = Vec::with_capacity(self.height * (self.width * 3 + 1));
         for row in self.pixels.chunks(self.width * 3) {
@@ -142,7 +142,7 @@ impl Canvas {
         let mut compressor = ZlibEncoder::new(Vec::new(), Compression::default());
         compressor.write_all(&rows)?;
         let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX).to_be_bytes();
-        // Eight bits a channel, red, green and blue, no interlacing.
+        // Eight bits per channel, RGB, no interlacing.
         let header = [side(self.width).as_slice(), &side(self.height), &[8, 2, 0, 0, 0]].concat();
         let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
         for (kind, data) in [(b"IHDR", header), (b"IDAT", compressor.finish()?), (b"IEND", Vec::new())] {
@@ -152,7 +152,7 @@ impl Canvas {
     }
 }
 
-/// A row with the number of its filter before it: each byte as its difference from the pixel to the left.
+/// Filters a row with the `Sub` filter: the filter type, then the difference of each byte from the pixel to its left.
 fn filtered(row: &[u8]) -> Vec<u8> {
     const LEFT: u8 = 1;
     let mut out = Vec::with_capacity(row.len() + 1);

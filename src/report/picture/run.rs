@@ -1,4 +1,4 @@
-//! The whole picture of a run: header, panels side by side, legend.
+//! Lays out the picture of a run: header, panels, legend.
 
 use std::collections::BTreeSet;
 
@@ -12,18 +12,18 @@ use crate::report::picture::{header, legend, paint, panel};
 
 /// Width of a picture. Unit: pixels.
 const WIDTH_PX: f64 = 1200.0;
-/// Around everything and between panels. Unit: pixels.
+/// Margin, and distance between panels. Unit: pixels.
 const GAP_PX: f64 = 18.0;
 /// Height of a panel's title. Unit: pixels.
 const TITLE_PX: f64 = 20.0;
-/// A panel is no higher than that: the map, from above, from the side. Unit: pixels.
+/// Maximum panel heights: map, view from above, side view. Unit: pixels.
 const HIGHEST_PX: [f64; 3] = [330.0, 430.0, 340.0];
 
-/// Draws a run, or nothing where it has no state to draw.
+/// Draws a run. Returns `None` if it has no state to draw.
 ///
-/// On the left is the state before the first action with what was perceived of it, on the right that after the last with the
-/// ways of base, hand and target, in the colour of the action; above a map where the world is larger than the close-ups, then
-/// what the run is about from above and from the side.
+/// On the left is the state before the first action with percepts; on the right is the state after the last action with
+/// the paths of base, hand and target, in the colour of the action. The top row is a map, if the world is larger than
+/// the close-ups; below it are close-ups from above and from the side.
 pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     let of_role =
         |role: Role| caption.roles.iter().filter(move |(_, other)| **other == role).map(|(id, _)| id.as_str());
@@ -54,14 +54,15 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     Some(drawing)
 }
 
-/// The side view looks along the axis that the robot does not come from, so that hand and target don't hide each other.
+/// Horizontal axis of the side view: the axis along which the robot approaches, so that hand and target do not hide
+/// each other.
 fn across(trace: &Trace, about: &Bounds) -> usize {
     let base = trace.snapshots.first().map_or([0.0; 3], |snapshot| snapshot.robot.base_true);
     let way = |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();
     usize::from(way(1) > way(0))
 }
 
-/// Two panels of one view, before and after. Returns where they end.
+/// Draws two panels of one view, before and after. Returns their lower end.
 fn row(drawing: &mut Drawing, material: &Material<'_>, view: View, bounds: &[Bounds; 2], kind: usize, top: f64) -> f64 {
     let width = (WIDTH_PX - 3.0 * GAP_PX) / 2.0;
     let extent = |axis: usize| bounds[0].extent(axis).max(bounds[1].extent(axis));

@@ -1,11 +1,11 @@
-//! A drawing as SVG.
+//! Writes a drawing as SVG.
 
 use std::fmt::Write as _;
 
 use crate::report::picture::drawing::{Drawing, Line, Mark, Paint, Rect, Style, Words};
 
 impl Drawing {
-    /// The drawing as a text that browsers show and programs for vector graphics edit.
+    /// Formats the drawing as SVG.
     pub fn to_svg(&self) -> String {
         let (width, height) = (self.width, self.height);
         let mut out = format!(
@@ -81,7 +81,7 @@ fn text(out: &mut String, words: &Words) {
     );
 }
 
-/// Text that can't inject markup.
+/// Escapes text, so that it can't inject markup.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,11 +1,11 @@
-//! What of the world a panel shows.
+//! Selects the region of the world that a panel shows.
 
 use std::collections::BTreeSet;
 
 use crate::history::{BodyState, Snapshot, Trace};
 use crate::report::picture::drawing::Rect;
 
-/// A part of the world along its axes. Unit: metres. Shape: x, y, z.
+/// An axis-aligned box in the world. Unit: metres. Shape: x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
     pub(super) low: [f64; 3],
@@ -44,7 +44,7 @@ impl Bounds {
         f64::midpoint(self.low[axis], self.high[axis])
     }
 
-    /// Distance of two on the floor's plane, 0 where they overlap.
+    /// Horizontal distance between two boxes; 0 if they overlap.
     fn level_gap(&self, other: &Self) -> f64 {
         let gap = |axis: usize| (self.low[axis] - other.high[axis]).max(other.low[axis] - self.high[axis]).max(0.0);
         gap(0).hypot(gap(1))
@@ -55,7 +55,7 @@ impl Bounds {
     }
 }
 
-/// Which two axes a panel shows: across and up, by their indexes in x, y, z.
+/// The two axes that a panel shows, across and up, as indices of x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct View {
     pub(super) across: usize,
@@ -72,19 +72,19 @@ impl View {
     }
 }
 
-/// A part of the world on a panel.
+/// A region of the world shown on a panel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     pub(super) view: View,
-    /// What is in it, along all axes.
+    /// The region, along all axes.
     pub(super) bounds: Bounds,
-    /// Pixels for a metre.
+    /// Pixels per metre.
     pub(super) scale: f64,
     pub(super) panel: Rect,
 }
 
 impl Window {
-    /// Shows `bounds` in the middle of a panel.
+    /// Centres `bounds` in a panel.
     pub(super) fn new(view: View, bounds: Bounds, scale: f64, panel: Rect) -> Self {
         let mut wide = bounds;
         for (axis, pixels) in [(view.across, panel.width), (view.up, panel.height)] {
@@ -94,7 +94,7 @@ impl Window {
         Self { view, bounds: wide, scale, panel }
     }
 
-    /// Pixel of a point in the world.
+    /// Projects a point of the world to a pixel.
     pub(super) fn pixel(&self, point: [f64; 3]) -> [f64; 2] {
         let View { across, up } = self.view;
         let right = (point[across] - self.bounds.low[across]) * self.scale;
@@ -102,28 +102,29 @@ impl Window {
         [self.panel.left + right, self.panel.top + down]
     }
 
-    /// The rectangle that a box in the world covers.
+    /// Projects a box of the world to a rectangle.
     pub(super) fn rect(&self, bounds: &Bounds) -> Rect {
         let ([left, bottom], [right, top]) = (self.pixel(bounds.low), self.pixel(bounds.high));
         Rect { left, top, width: right - left, height: bottom - top }
     }
 
-    /// Whether a body is in front of or behind what the window is about, not far beside it.
+    /// Whether a body overlaps the window's region on all three axes.
     pub(super) fn is_about(&self, bounds: &Bounds) -> bool {
         [0, 1, 2].into_iter().all(|axis| bounds.meets(&self.bounds, axis))
     }
 }
 
-/// Neighbours within this distance of what the run is about are shown. Unit: metres.
+/// Movable objects within this distance of the subjects are shown. Unit: metres.
 const NEIGHBOURS_M: f64 = 0.6;
-/// The hand is shown as far as this from it. Unit: metres.
+/// The hand is shown within this distance of the subjects. Unit: metres.
 const HAND_M: f64 = 0.9;
-/// Room around all that. Unit: metres.
+/// Margin around the close-up. Unit: metres.
 const AROUND_M: f64 = 0.12;
-/// One close-up shows before and after where both together are no larger. Unit: metres.
+/// The same close-up shows before and after, if it is not larger than this. Unit: metres.
 const LARGEST_CLOSE_UP_M: f64 = 2.8;
 
-/// What close-ups show, before and after: the same wherever that fits.
+/// Regions of the close-ups before and after: the same region if it is small enough. Returns `None` if the trace has no
+/// states.
 pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>) -> Option<[Bounds; 2]> {
     let before = about(trace.snapshots.first()?, subjects, trace);
     let after = about(trace.snapshots.last()?, subjects, trace);
@@ -133,7 +134,7 @@ pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>) -> Option<[Bou
     for bounds in [&mut before, &mut after] {
         *bounds = limited(bounds.grown(AROUND_M));
     }
-    // Seen from the side, both begin at the floor and are equally high.
+    // In side views, both start at the floor and have the same height.
     let height = before.high[2].max(after.high[2]).clamp(0.4, 2.4);
     for bounds in [&mut before, &mut after] {
         (bounds.low[2], bounds.high[2]) = (-0.04, height);
@@ -141,7 +142,7 @@ pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>) -> Option<[Bou
     Some([before, after])
 }
 
-/// What a moment of a run is about: its subjects, what carries them, what stands beside them, and the hand.
+/// Region of interest at a moment: the subjects, the furniture below them, their neighbours, and the hand.
 fn about(snapshot: &Snapshot, subjects: &BTreeSet<&str>, trace: &Trace) -> Bounds {
     let bodies = || snapshot.bodies.iter();
     let base = Bounds::point([snapshot.robot.base_true[0], snapshot.robot.base_true[1], 0.5]);
@@ -163,7 +164,7 @@ fn about(snapshot: &Snapshot, subjects: &BTreeSet<&str>, trace: &Trace) -> Bound
     if core.level_gap(&hand) < HAND_M { shown.with(hand) } else { shown }
 }
 
-/// The middle of what is too large.
+/// Crops a region that is too large to its middle, and enlarges one that is too small.
 fn limited(mut bounds: Bounds) -> Bounds {
     for axis in 0..2 {
         let middle = bounds.middle(axis);
@@ -173,7 +174,8 @@ fn limited(mut bounds: Bounds) -> Bounds {
     bounds
 }
 
-/// The whole world where the close-ups leave something of it out: places, furniture or the way of the base.
+/// The whole world. Returns `None` if the close-ups already show nearly all of it: places, furniture and the path of
+/// the base.
 pub(super) fn overview(trace: &Trace, close_ups: &[Bounds; 2], ways: &[[f64; 3]]) -> Option<Bounds> {
     let rooms = trace
         .map

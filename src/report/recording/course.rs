@@ -1,4 +1,4 @@
-//! Where everything was over time: what stands still, the tracks of what moves, and what was perceived.
+//! Records positions over time: fixed bodies, tracks of moving bodies, and percepts.
 
 use std::collections::BTreeMap;
 
@@ -13,22 +13,22 @@ use crate::report::recording::look::Look;
 use crate::report::recording::solids::Drawn;
 use crate::report::recording::stream::{Recording, RecordingFault, place};
 
-/// Below it is all that is in 3D. Frame: world.
+/// Root entity of everything in 3D. Frame: world.
 const SCENE: &str = "scene";
-/// Below it are the objects, by their ids; links stand beside it, as `robot/LINK`.
+/// Parent entity of the objects, by id. Links are its siblings, as `robot/LINK`.
 const OBJECTS: &str = "objects";
-/// What perception returned is beside the bodies, so that it can be hidden.
+/// Entity of the perceived boxes; separate from the bodies, so that it can be hidden.
 const PERCEIVED: &str = "perceived";
 
 /// Records the bodies of a run.
 ///
 /// # Errors
-/// The library refuses a part.
+/// The rerun library rejects a component.
 pub(super) fn record(recording: &mut Recording<'_>, run: &RunDetail, trace: &Trace) -> Result<(), RecordingFault> {
     recording.still(place([SCENE]), &[&ViewCoordinates::RIGHT_HAND_Z_UP()])?;
     let known = Known::of(run, trace);
     for (slot, name) in trace.frames.names.iter().enumerate() {
-        // A link without a solid can't be seen.
+        // A link without geometry is invisible.
         let Some(solids) = known.solids(name) else { continue };
         recording.still(path(name), &references(&solids))?;
         let (positions, turns) = track(&trace.frames.rows, slot);
@@ -58,7 +58,7 @@ fn path(name: &str) -> EntityPath {
     }
 }
 
-/// What is known of bodies by their names.
+/// Lookup tables of bodies by name.
 struct Known<'a> {
     forms: BTreeMap<&'a str, &'a Form>,
     bodies: BTreeMap<&'a str, &'a BodyState>,
@@ -75,7 +75,7 @@ impl<'a> Known<'a> {
         }
     }
 
-    /// What a body looks like, or the box around it where that is not known; nothing where it can't be seen.
+    /// Returns the solids of a body, or its bounding box if its shape is unknown. Returns `None` if neither is known.
     fn solids(&self, name: &str) -> Option<Vec<Box<dyn AsComponents>>> {
         let body = self.bodies.get(name).copied();
         let drawn = match (self.forms.get(name), body) {
@@ -88,7 +88,8 @@ impl<'a> Known<'a> {
     }
 }
 
-/// Positions and turns of one track. Units: metres, unit quaternions. What is not finite stays where it was before.
+/// Positions and orientations of one track. Poses that are not finite repeat the previous one. Units: metres, unit
+/// quaternions.
 fn track(rows: &[Vec<f32>], slot: usize) -> (Vec<[f32; 3]>, Vec<Quaternion>) {
     let mut last = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
     let poses = rows.iter().map(|row| {
@@ -107,7 +108,7 @@ fn transform(pose: &Pose) -> Transform3D {
     Transform3D::from_translation(pose.position.map(|value| value as f32)).with_quaternion(turn)
 }
 
-/// What was perceived of things during each action, by the edges of its boxes from the end of the action on.
+/// Records the objects perceived during each action as wireframe boxes, shown from the end of the action on.
 fn perceived(recording: &mut Recording<'_>, trace: &Trace) -> Result<(), RecordingFault> {
     let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
     for (idx, action) in trace.actions.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What happened when, as the lines of a log.
+//! Records the events of a run as log lines.
 
 use re_sdk_types::archetypes::TextLog;
 
@@ -9,18 +9,18 @@ use crate::report::moment::decided;
 use crate::report::recording::stream::{Recording, RecordingFault, place};
 use crate::verdict::Outcome;
 
-/// A line, and since when it holds. Unit: seconds since the run began.
+/// A log line with its time. Unit: seconds since the run began.
 struct Line {
     secs: f64,
     level: &'static str,
     text: String,
 }
 
-/// Records what happened, below `events`: actions with their phases, contacts, and outcomes that are no pass. A run without a state
-/// says what it is known of it at its beginning.
+/// Records the events below `events`: actions with their phases, contacts, and outcomes other than passed. For a run
+/// without a trace, all known events are at the beginning.
 ///
 /// # Errors
-/// The library refuses a line.
+/// The rerun library rejects a line.
 pub(super) fn record(
     recording: &mut Recording<'_>,
     run: &RunDetail,
@@ -41,7 +41,7 @@ pub(super) fn record(
     Ok(())
 }
 
-/// When an action began, by its place in the run; the end of the run where it was never reached.
+/// Start time of an action, given its index in the run. Returns the end of the run if the action was never reached.
 fn begin(trace: Option<&Trace>, idx: usize) -> f64 {
     let Some(trace) = trace else { return 0.0 };
     let time = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
@@ -85,7 +85,7 @@ fn contacts(trace: Option<&Trace>) -> Vec<Line> {
     all.collect()
 }
 
-/// What did not pass: a failure at the moment that decided it, anything else at the end of its action.
+/// Outcomes other than passed. Failures are at the moment that decided them, all others at the end of the action.
 fn outcomes(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
     let mut lines = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {

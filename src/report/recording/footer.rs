@@ -1,4 +1,4 @@
-//! The list of recordings and their parts at the end of a file, by which programs fetch some of it.
+//! The manifest at the end of a file, which lists its recordings and chunks for random access.
 
 use re_log_encoding::{
     CodecError, Decodable as _, Encodable as _, EncodeError, MessageHeader, MessageKind, RawRrdManifest, StreamFooter,
@@ -8,11 +8,11 @@ use re_protos::log_msg::v1alpha1::RrdFooter;
 
 use crate::report::recording::stream::RecordingFault;
 
-/// A file with its list in order: recordings by their ids, columns by their names. The format leaves the order open, and the library's
-/// is another one each time.
+/// Sorts the manifest of a file: recordings by id, columns by name. The format does not define the order, and the
+/// library writes a different one each time.
 ///
 /// # Errors
-/// The file has no such list.
+/// The file has no manifest.
 pub(super) fn sorted(file: Vec<u8>) -> Result<Vec<u8>, RecordingFault> {
     Ok(with_sorted_list(file).map_err(EncodeError::from)?)
 }

@@ -1,15 +1,15 @@
-//! The surface of a convex solid of which only the corners are known.
+//! Computes the faces of a convex solid from its corners.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::report::picture::flat_hull;
 
-/// Points so near to a plane are on it. Unit: metres.
+/// Points closer than this to a plane are considered on it. Unit: metres.
 const FLAT_M: f64 = 1e-6;
-/// Corners that are looked at. Traces keep 26 of a solid at most.
+/// Maximum number of corners used. Traces have at most 26 per solid.
 const MOST_CORNERS: usize = 64;
 
-/// A flat face: its outward normal and its corners, counter-clockwise seen from outside.
+/// A planar face: its outward normal and its corners, counter-clockwise seen from outside.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Face {
     /// Unit vector.
@@ -18,10 +18,10 @@ pub(super) struct Face {
     pub corners: Vec<Point3<f64>>,
 }
 
-/// Faces of the hull of points: every plane through three of them that has none beyond it. Points that lie in one plane make
-/// its two sides; those on a line none.
+/// Computes the faces of the convex hull: all planes through three points with no point beyond them. Coplanar points
+/// give two faces, collinear points none.
 ///
-/// Takes the fourth power of their number.
+/// The complexity is O(n⁴).
 pub(super) fn faces(points: &[[f64; 3]]) -> Vec<Face> {
     let finite = points.iter().filter(|point| point.iter().all(|value| value.is_finite()));
     let points: Vec<Point3<f64>> = finite.take(MOST_CORNERS).map(|point| Point3::from(*point)).collect();
@@ -43,7 +43,7 @@ pub(super) fn faces(points: &[[f64; 3]]) -> Vec<Face> {
     faces
 }
 
-/// The face of points that lie as far along a normal as any.
+/// The face of the points that are farthest along a normal. Returns `None` if it has fewer than three corners.
 fn face(points: &[Point3<f64>], normal: Vector3<f64>, reach: f64) -> Option<Face> {
     let on = points.iter().filter(|point| normal.dot(&point.coords) >= reach - FLAT_M);
     let corners = around(&on.copied().collect::<Vec<_>>(), &normal);
@@ -55,7 +55,7 @@ fn is_same(face: &Face, normal: &Vector3<f64>, reach: f64) -> bool {
     face.normal.dot(normal) > 1.0 - 1e-6 && (corner - reach).abs() < 10.0 * FLAT_M
 }
 
-/// Corners of the hull of points of a plane, counter-clockwise seen from where its normal points to.
+/// Corners of the convex hull of coplanar points, counter-clockwise seen from the side to which the normal points.
 fn around(points: &[Point3<f64>], normal: &Vector3<f64>) -> Vec<Point3<f64>> {
     let Some(first) = points.first() else { return Vec::new() };
     let Some(u) = points.iter().find_map(|point| (point - first).try_normalize(FLAT_M)) else { return Vec::new() };
@@ -73,7 +73,7 @@ mod tests {
         (0..8).map(|idx| [x * f64::from(idx & 1), y * f64::from(idx >> 1 & 1), z * f64::from(idx >> 2)]).collect()
     }
 
-    /// Volume within faces, and their area. Both are wrong where a face is missing, there twice, or the wrong way round.
+    /// Volume enclosed by the faces, and their area. Both are wrong if a face is missing, duplicated or inverted.
     fn measured(faces: &[Face]) -> (f64, f64) {
         let triangles =
             faces.iter().flat_map(|face| face.corners[1..].windows(2).map(|pair| (face.corners[0], pair[0], pair[1])));

@@ -1,4 +1,4 @@
-//! Colours of bodies, those of the replay in the page (`web/solids.js`).
+//! Colours of bodies, the same as in the HTML replay (`web/solids.js`).
 
 use crate::base::names;
 use crate::history::{BodyState, Role};
@@ -6,23 +6,23 @@ use crate::history::{BodyState, Role};
 /// How a body is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Look {
-    /// Red, green, blue, and what can't be seen through.
+    /// Colour as 0xRRGGBBAA.
     pub rgba: u32,
-    /// Whether its faces are filled; only its edges are drawn where not.
+    /// Whether its faces are filled. If `false`, only edges are drawn.
     pub filled: bool,
 }
 
 impl Look {
     /// A link of the robot.
     pub const ROBOT: Self = Self::filled(0x86a5_c6ff);
-    /// What perception returned.
+    /// A perceived object.
     pub const PERCEIVED: Self = Self { rgba: 0xb43c_b0ff, filled: false };
 
     const fn filled(rgba: u32) -> Self {
         Self { rgba, filled: true }
     }
 
-    /// An object of a scene by what it is there for. Walls would hide what is behind them.
+    /// The look of an object by its role. Walls are not filled, because they would hide objects behind them.
     pub fn of(role: Option<Role>, body: Option<&BodyState>) -> Self {
         match role {
             _ if body.is_some_and(|body| names::local(&body.category) == "Wall") => {

@@ -1,4 +1,4 @@
-//! Flat faces as the triangles that the viewer draws.
+//! Triangulates planar faces for the viewer.
 
 use std::f64::consts::TAU;
 
@@ -8,10 +8,10 @@ use re_sdk_types::components::AlbedoFactor;
 
 use crate::report::recording::hull::Face;
 
-/// Sides of what is round.
+/// Number of sides that approximate a circle.
 const AROUND: u32 = 32;
 
-/// Triangles, each corner with the normal of its face.
+/// Triangles; each corner has the normal of its face.
 #[derive(Debug, Default)]
 pub(super) struct Mesh {
     positions: Vec<[f32; 3]>,
@@ -20,7 +20,7 @@ pub(super) struct Mesh {
 }
 
 impl Mesh {
-    /// Adds faces whose frame lies somewhere in that of the mesh.
+    /// Adds faces; `at` is the pose of their frame in the frame of the mesh.
     pub fn add(&mut self, faces: &[Face], at: &Isometry3<f64>) {
         for face in faces {
             let first = self.positions.len() as u32;
@@ -32,7 +32,7 @@ impl Mesh {
         }
     }
 
-    /// What the viewer draws; nothing where there is no triangle.
+    /// Converts to a mesh of the viewer. Returns `None` if there are no triangles.
     pub fn drawn(self, rgba: u32) -> Option<Mesh3D> {
         let mesh = || {
             Mesh3D::new(self.positions)
@@ -44,15 +44,15 @@ impl Mesh {
     }
 }
 
-/// As exact as the viewer's numbers are.
+/// Converts to the viewer's single precision.
 fn single(vector: Vector3<f64>) -> [f32; 3] {
     vector.map(|value| value as f32).into()
 }
 
-/// Faces of a hollow wall about z, open above and below. Unit: metres. Radii are those of its outside.
+/// Faces of a hollow wall around z, open at both ends. Radii are outer radii. Unit: metres.
 pub(super) fn tube(radius_low: f64, radius_high: f64, wall: f64, height: f64) -> Vec<Face> {
     let top = height / 2.0;
-    // Around the wall's cross-section: outside, rim above, inside, rim below.
+    // Cross-section of the wall: outside, upper rim, inside, lower rim.
     let profile = [(radius_low, -top), (radius_high, top), (radius_high - wall, top), (radius_low - wall, -top)];
     let at = |(radius, z): (f64, f64), step: u32| {
         let angle = TAU * f64::from(step % AROUND) / f64::from(AROUND);
@@ -64,7 +64,7 @@ pub(super) fn tube(radius_low: f64, radius_high: f64, wall: f64, height: f64) ->
         (0..AROUND).map(move |step| vec![at(*a, step), at(*a, step + 1), at(*b, step + 1), at(*b, step)])
     });
     let face = |corners: Vec<Point3<f64>>| {
-        // Where a wall has no thickness, two corners of its rim are the same.
+        // If the wall has no thickness, two corners of its rim coincide.
         let turned = (corners[2] - corners[0]).cross(&(corners[3] - corners[1]));
         Some(Face { normal: turned.try_normalize(1e-12)?, corners })
     };

@@ -1,9 +1,9 @@
-//! Runs as recordings for the viewer of rerun (`.rrd`): every body in 3D over simulated time, what happened when, and what came of it.
+//! Exports runs as recordings for the rerun viewer (`.rrd`): all bodies in 3D over simulated time, events and outcomes.
 //!
-//! One file has one recording for each run, named by it. Ids within a recording are counted and its only time is simulated time: the
-//! same runs make the same bytes.
+//! A file has one recording for each run, named after the run. Ids within a recording are sequential and its only
+//! timeline is simulated time, so the same runs give the same bytes.
 //!
-//! Never: reads a history, writes a file, chooses a run, looks at a clock, or draws an id by chance.
+//! Never: reads a history, writes a file, chooses a run, reads a clock, or generates random ids.
 
 mod course;
 mod events;

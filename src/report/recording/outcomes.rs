@@ -1,4 +1,4 @@
-//! What came of a run, as a document beside its bodies.
+//! Records the outcomes of a run as a text document.
 
 use std::fmt::Write as _;
 
@@ -9,12 +9,13 @@ use crate::report::formats::plain;
 use crate::report::html::Explained;
 use crate::verdict::{Judgement, Outcome};
 
-/// What a recording is called.
+/// Name of a recording.
 pub(super) fn title(run: &RunDetail) -> String {
     Caption::of(run).title
 }
 
-/// Outcomes of all properties with witness, margin and explanation (Markdown). No word of a model, rule or message is markup.
+/// Formats the outcomes of all properties with witness, margin and explanation (Markdown). Text of models, rules and
+/// messages is escaped.
 pub(super) fn document(run: &RunDetail, explained: &[Explained]) -> String {
     let caption = Caption::of(run);
     let mut out = format!("# {}\n", plain(&caption.title));
@@ -43,7 +44,7 @@ fn told_of(out: &mut String, action: &ActionDetail, judgement: &Judgement, expla
     out.push('\n');
     let why = explained.iter().find(|why| why.step == action.step && why.property == judgement.property);
     if let Some(why) = why {
-        // Indented text is shown as it is.
+        // Indented text is shown verbatim.
         out.push('\n');
         why.text.lines().for_each(|line| {
             let _ = writeln!(out, "      {line}");

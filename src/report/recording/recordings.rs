@@ -1,4 +1,4 @@
-//! Recordings of runs in one file.
+//! A file of recordings.
 
 use re_log_encoding::{CrateVersion, Encoder, EncodingOptions};
 use re_log_types::EntityPath;
@@ -9,7 +9,7 @@ use crate::report::html::Explained;
 use crate::report::recording::stream::{Recording, RecordingFault, place};
 use crate::report::recording::{course, events, footer, outcomes};
 
-/// Recordings, one for each run that was added.
+/// Recordings of the added runs, one for each run.
 pub struct Recordings {
     encoder: Encoder<Vec<u8>>,
     runs: usize,
@@ -17,17 +17,17 @@ pub struct Recordings {
 }
 
 impl Recordings {
-    /// None yet.
+    /// Creates an empty file.
     ///
     /// # Errors
-    /// The beginning of a file can't be encoded.
+    /// The file header can't be encoded.
     pub fn new() -> Result<Self, RecordingFault> {
         let options = EncodingOptions::PROTOBUF_COMPRESSED;
         let encoder = Encoder::new_eager(CrateVersion::LOCAL, options, Vec::new())?;
         Ok(Self { encoder, runs: 0, bytes: 0 })
     }
 
-    /// Adds a run. One without a state has nothing to be seen in 3D; its outcomes are told all the same.
+    /// Adds a run. A run without a trace has no 3D content, but its outcomes are included.
     ///
     /// # Errors
     /// A part of it can't be encoded.
@@ -50,20 +50,20 @@ impl Recordings {
         Ok(())
     }
 
-    /// How many runs they are of.
+    /// Number of runs.
     pub fn runs(&self) -> usize {
         self.runs
     }
 
-    /// Bytes of all of them.
+    /// Total size in bytes.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// The file.
+    /// Returns the file's bytes.
     ///
     /// # Errors
-    /// The end of a file can't be encoded.
+    /// The file footer can't be encoded.
     pub fn finish(mut self) -> Result<Vec<u8>, RecordingFault> {
         self.encoder.finish()?;
         footer::sorted(self.encoder.into_inner()?)

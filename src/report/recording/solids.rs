@@ -1,4 +1,4 @@
-//! What bodies look like: the viewer's own solids, and a mesh of what it has none for.
+//! Draws bodies with the viewer's own solids, and with a mesh for all other shapes.
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use re_sdk_types::AsComponents;
@@ -12,7 +12,7 @@ use crate::report::recording::hull::faces;
 use crate::report::recording::look::Look;
 use crate::report::recording::mesh::{Mesh, tube};
 
-/// Solids of one kind: sizes, where their middles are, and how they are turned. Frame: the body's.
+/// Solids of one kind: sizes, centres and orientations. Frame: body.
 #[derive(Debug)]
 struct Solids<const N: usize> {
     sizes: Vec<[f32; N]>,
@@ -38,7 +38,7 @@ impl<const N: usize> Solids<N> {
     }
 }
 
-/// All parts of a body, by the kind of solid that the viewer draws.
+/// Parts of a body, by kind of solid.
 #[derive(Debug, Default)]
 pub(super) struct Drawn {
     boxes: Solids<3>,
@@ -49,14 +49,14 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// Parts of a body.
+    /// Draws the parts of a body.
     pub fn of(parts: &[Part]) -> Self {
         let mut drawn = Self::default();
         parts.iter().for_each(|part| drawn.add(part));
         drawn
     }
 
-    /// The box around a body that has no form. Frame: world, about the body's own origin.
+    /// Draws the bounding box of a body without a shape. Frame: world axes, relative to the body's origin.
     pub fn around(body: &BodyState) -> Self {
         let middle =
             [0, 1, 2].map(|axis| f64::midpoint(body.aabb_max[axis], body.aabb_min[axis]) - body.pose.position[axis]);
@@ -68,7 +68,7 @@ impl Drawn {
         drawn
     }
 
-    /// Adds a box by its middle.
+    /// Adds a box, given the pose of its centre.
     pub fn box_at(&mut self, pose: &Pose, size: [f64; 3]) {
         self.boxes.add(&pose.to_isometry(), size);
     }
@@ -78,7 +78,7 @@ impl Drawn {
         match &part.shape {
             Shape::Box { size } => self.boxes.add(&at, *size),
             Shape::Cylinder { radius, height } => self.cylinders.add(&at, [*height, *radius]),
-            // The viewer's capsules begin with the middle of their lower ball.
+            // The origin of the viewer's capsules is the centre of their lower hemisphere.
             Shape::Capsule { radius, height } => {
                 self.capsules.add(&(at * Translation3::new(0.0, 0.0, -height / 2.0)), [*height, *radius]);
             }
@@ -87,12 +87,12 @@ impl Drawn {
                 self.mesh.add(&tube(*radius_low, *radius_high, *wall, *height), &at);
             }
             Shape::Hull { points, .. } => self.mesh.add(&faces(points), &at),
-            // Traces hold the outermost points of a mesh alone.
+            // Traces only contain the outermost points of a mesh.
             Shape::Mesh { mesh } => self.mesh.add(&faces(&mesh.vertices), &at),
         }
     }
 
-    /// Boxes that stand for something that is not there, by their edges.
+    /// Returns the boxes as wireframes, for objects that are not physically present (percepts).
     pub fn boxes(self, look: Look) -> Boxes3D {
         let fill = if look.filled { FillMode::Solid } else { FillMode::MajorWireframe };
         Boxes3D::from_centers_and_sizes(self.boxes.middles, self.boxes.sizes)
@@ -101,7 +101,7 @@ impl Drawn {
             .with_fill_mode(fill)
     }
 
-    /// What is to be recorded of it.
+    /// Returns the components to record.
     pub fn recorded(mut self, look: Look) -> Vec<Box<dyn AsComponents>> {
         let fill = if look.filled { FillMode::Solid } else { FillMode::MajorWireframe };
         let colour = [Color::from(look.rgba)];

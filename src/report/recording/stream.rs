@@ -1,30 +1,30 @@
-//! One recording as the format has it: messages with chunks of rows.
+//! Writes one recording as a stream of messages with chunks of rows.
 
 use re_chunk::{Chunk, ChunkError, ChunkId, RowId, TimeColumn, TimePoint, Timeline};
 use re_log_encoding::{EncodeError, Encoder};
 use re_log_types::{EntityPath, EntityPathPart, LogMsg, SetStoreInfo, StoreId, StoreInfo, StoreSource};
 use re_sdk_types::{AsComponents, SerializationError, SerializedComponentColumn};
 
-/// Recordings of one application share how they are looked at.
+/// Application id; recordings of one application share their viewer settings.
 const APPLICATION: &str = "actcheck";
-/// The name of the only time line: simulated time since the run began.
+/// Name of the only timeline: simulated time since the run began.
 const SIM_TIME: &str = "sim_time";
 
-/// Why something can't be recorded. (No run can bring it about; the library has it all the same.)
+/// Why something can't be recorded. No run should cause these errors, but the library can return them.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingFault {
-    /// Values have no form in columns.
-    #[error("values can't be laid out in columns: {0}")]
+    /// Values can't be converted to columns.
+    #[error("can't convert values to columns: {0}")]
     Values(#[from] SerializationError),
-    /// Columns don't belong together.
-    #[error("columns don't fit together: {0}")]
+    /// Columns are inconsistent.
+    #[error("inconsistent columns: {0}")]
     Columns(#[from] ChunkError),
-    /// The file has no room for it.
-    #[error("a message can't be encoded: {0}")]
+    /// A message can't be encoded.
+    #[error("can't encode a message: {0}")]
     Message(#[from] EncodeError),
 }
 
-/// A recording that is being written. Ids are counted: they need to differ within a recording only.
+/// A recording that is being written. Its ids are sequential, because they only need to be unique within a recording.
 pub(super) struct Recording<'a> {
     encoder: &'a mut Encoder<Vec<u8>>,
     store: StoreId,
@@ -34,7 +34,7 @@ pub(super) struct Recording<'a> {
 }
 
 impl<'a> Recording<'a> {
-    /// Begins the recording of a run.
+    /// Starts the recording of a run.
     ///
     /// # Errors
     /// The message can't be encoded.
@@ -46,23 +46,23 @@ impl<'a> Recording<'a> {
         Ok(Self { encoder, store, chunks: 0, rows: 0, bytes })
     }
 
-    /// Bytes that it took so far.
+    /// Number of bytes written so far.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Says what holds at all times.
+    /// Logs static components.
     ///
     /// # Errors
-    /// It can't be laid out or encoded.
+    /// The components can't be converted or encoded.
     pub fn still(&mut self, at: EntityPath, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
         self.since(at, TimePoint::STATIC, what)
     }
 
-    /// Says what holds from a moment on. Unit: seconds since the run began.
+    /// Logs components that hold from a moment on. Unit: seconds since the run began.
     ///
     /// # Errors
-    /// It can't be laid out or encoded.
+    /// The components can't be converted or encoded.
     pub fn from(&mut self, at: EntityPath, secs: f64, what: &dyn AsComponents) -> Result<(), RecordingFault> {
         self.since(at, TimePoint::default().with(Timeline::new_duration(SIM_TIME), nanos(secs)), &[what])
     }
@@ -74,10 +74,10 @@ impl<'a> Recording<'a> {
         self.write(&chunk.build()?)
     }
 
-    /// Says what holds from each of some moments on. Columns have a row for each moment. Unit: seconds since the run began.
+    /// Logs a time series of components. Columns have one row for each moment. Unit: seconds since the run began.
     ///
     /// # Errors
-    /// It can't be laid out or encoded.
+    /// The components can't be converted or encoded.
     pub fn course(
         &mut self,
         at: EntityPath,
@@ -109,12 +109,12 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Whole nanoseconds. What is no number is the beginning.
+/// Converts seconds to whole nanoseconds. NaN becomes 0.
 fn nanos(secs: f64) -> i64 {
     (secs * 1e9).round() as i64
 }
 
-/// Where something stands in the tree of a recording. Names are taken as they are, whatever letters they have.
+/// Entity path of the given parts. Names are used verbatim, whatever characters they contain.
 pub(super) fn place<'a>(names: impl IntoIterator<Item = &'a str>) -> EntityPath {
     names.into_iter().map(EntityPathPart::new).collect()
 }

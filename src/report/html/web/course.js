@@ -1,4 +1,4 @@
-// Where everything was at a moment of a run. The counterpart of `replay.rs`.
+// Poses of all bodies at a moment of a run. The counterpart of `replay.rs`.
 
 class Course {
   constructor(replay) {
@@ -18,7 +18,7 @@ class Course {
     return part < 3 ? this.low[part] + (told & 0xffff) * this.grain : told * this.turn;
   }
 
-  /** Position and turn of a track between two frames: straight, and the shorter way around. */
+  /** Pose of a track, interpolated between two frames: linear, with the shorter rotation. */
   pose(slot, secs) {
     const exact = Math.min(this.frames - 1, Math.max(0, secs / this.period));
     const frame = Math.min(Math.floor(exact), Math.max(0, this.frames - 2)), part = exact - frame;
@@ -33,7 +33,7 @@ class Course {
     return slot === undefined ? null : this.pose(slot, secs).slice(0, 3);
   }
 
-  /** Middle of the robot's links. */
+  /** Mean position of the robot's links. */
   robot(secs) {
     const links = this.tracks.map((track, slot) => [track, slot]).filter(([track]) => track.name.startsWith("robot/"));
     if (!links.length) return null;

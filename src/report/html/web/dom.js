@@ -1,9 +1,9 @@
-// Elements from plain calls. Text only ever becomes text: nothing here, or anywhere in these scripts, parses markup.
+// Creates DOM elements. Strings are always inserted as text: none of these scripts parses markup.
 
 const SVG_NAMES = new Set(["svg", "g", "path", "rect", "line", "circle", "text", "polyline", "polygon", "title", "defs",
   "pattern", "clipPath"]);
 
-/** An element: `make("button", { class: "flat", onclick: go }, "words", other)`. Empty children are left out. */
+/** Creates an element: `make("button", { class: "flat", onclick: go }, "words", other)`. Empty children are skipped. */
 function make(name, attributes = {}, ...children) {
   const element = name !== "title" && SVG_NAMES.has(name) || attributes.svg
     ? document.createElementNS("http://www.w3.org/2000/svg", name)
@@ -18,7 +18,7 @@ function make(name, attributes = {}, ...children) {
   return element;
 }
 
-/** Adds children: elements, words, lists of them. */
+/** Appends children: elements, strings, or lists of them. */
 function put(element, ...children) {
   for (const child of children.flat(Infinity)) {
     if (child === undefined || child === null || child === false || child === "") continue;
@@ -26,14 +26,14 @@ function put(element, ...children) {
   }
 }
 
-/** The children of an element, made anew. */
+/** Replaces the children of an element. */
 function fill(element, ...children) {
   element.replaceChildren();
   put(element, ...children);
   return element;
 }
 
-/** What is behind the last `#` or `/` of an IRI. */
+/** Local name of an IRI: the part after the last `#` or `/`. */
 function local(iri) {
   return String(iri ?? "").replace(/^.*[#/]/, "");
 }

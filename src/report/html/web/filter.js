@@ -1,4 +1,4 @@
-// Which runs are shown: one choice for the list and the map.
+// The filter of runs, shared by the list and the map.
 
 const ANY = { text: "", outcome: "", slot: "", campaign: "", mode: "", replay: false, pattern: null, sort: "order" };
 
@@ -43,7 +43,7 @@ class Filter {
     return found;
   }
 
-  /** The controls; they follow the filter wherever it is set. */
+  /** The controls. They follow the filter, even if it is set elsewhere. */
   bar() {
     const { runs } = this;
     const choice = (name, label, options) => {
@@ -52,7 +52,7 @@ class Filter {
       return select;
     };
     const search = make("input", {
-      type: "search", placeholder: "Search runs, things, messages …", "aria-label": "Search", "data-filter": "text",
+      type: "search", placeholder: "Search runs, objects, messages …", "aria-label": "Search", "data-filter": "text",
       oninput: () => this.set({ text: search.value }),
     });
     const modes = runs.summary.findings.failure_modes;

@@ -1,4 +1,4 @@
-// The matrix of runs × properties: only the rows that can be seen exist.
+// The matrix of runs × properties. Only the visible rows are in the DOM.
 
 const ROW = 32;
 const MORE = 12;
@@ -21,7 +21,7 @@ function runList(runs, filter) {
       ?? runs.steps.map((step) => runs.text(step.message, run)).filter(Boolean).at(-1) ?? "";
     return make("a", { class: "row", role: "row", href: `#/run/${encodeURIComponent(id)}`, tabindex: "-1", id: `row-${at}`,
       "aria-rowindex": at + 1, style: { top: `${at * ROW}px` } },
-      make("span", { class: "id", role: "rowheader" }, id, runs.replayed.has(id) && make("span", { class: "can", title: "can be watched" }, "▶")),
+      make("span", { class: "id", role: "rowheader" }, id, runs.replayed.has(id) && make("span", { class: "can", title: "can be played back" }, "▶")),
       make("span", { class: "score", role: "gridcell" }, Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)),
       runs.slots.map((slot, i) => {
         const outcome = runs.outcome(run, i);
@@ -55,7 +55,7 @@ function runList(runs, filter) {
     active = -1;
     list.scrollTop = 0;
     draw(0);
-    // What can't be seen yet waits until the rest is on the screen.
+    // Rows that are not visible yet are added after the visible ones are drawn.
     requestAnimationFrame(() => setTimeout(drawMore));
   };
   list.addEventListener("scroll", () => requestAnimationFrame(drawMore), { passive: true });

@@ -1,12 +1,12 @@
-// From data to what is shown, and from addresses to views.
+// Loads the data and maps addresses to views.
 
 const VIEWS = [["", "Overview"], ["properties", "Properties"], ["modes", "Failure modes"], ["patterns", "Patterns"], ["map", "From above"],
   ["history", "History"], ["runs", "Runs"]];
 
-/** Runs whose letters are gathered in an idle moment: a few milliseconds, so that no click waits for more. */
+/** Number of runs indexed for search in one idle period: a few milliseconds, so that clicks are not delayed. */
 const AT_A_TIME = 400;
 
-/** The parts of a view, what follows the filter, and what ends it. */
+/** The elements of a view, its reaction to the filter, and its clean-up. */
 function view(report, [name, chosen]) {
   switch (name) {
     case "properties": return { parts: properties(report, chosen) };
@@ -29,13 +29,13 @@ function frame(summary, main) {
     make("a", { class: "mark", href: "#/" }, "actcheck"),
     make("span", { class: "faint whence" }, `${summary.history} · ${moment(summary.made)}`), themeButton(),
     make("nav", { "aria-label": "Views" }, links));
-  const footer = make("footer", { class: "faint" }, `actcheck ${summary.version} · made ${summary.made} from ${summary.history}. Drawn in 3D by three.js (MIT).`);
+  const footer = make("footer", { class: "faint" }, `actcheck ${summary.version} · generated ${summary.made} from ${summary.history}. Drawn in 3D by three.js (MIT).`);
   document.body.prepend(make("a", { class: "skip", href: "#main", onclick: (event) => { event.preventDefault(); main.focus(); } }, "To the report"), header);
   main.after(footer);
   return links;
 }
 
-/** Makes a search's letters ready, a few runs in each idle moment: no filter waits for them, and the first search hardly does. */
+/** Builds the search index in idle periods, a few runs at a time, so that filters do not wait for it and the first search hardly does. */
 function gatherLetters(runs) {
   const later = window.requestIdleCallback ?? setTimeout;
   const some = () => runs.gather(AT_A_TIME) || later(some);
@@ -73,7 +73,7 @@ async function main() {
     document.documentElement.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
     fill(element, make("h1", {}, "The report can't be read"), make("p", {}, error.message),
-      make("p", {}, "The file may be cut off, or this browser older than 2023."));
+      make("p", {}, "The file may be truncated, or the browser may be older than 2023."));
     throw error;
   }
 }

@@ -1,10 +1,10 @@
-// The table from above: where every run's target stood, and what came of it.
+// The table from above: the target position and the outcome of every run.
 
 function tableMap({ runs, filter, open }) {
   const known = planes(runs);
   if (!known.length) return [make("h1", {}, "From above"), make("p", {}, "These scenes have no target whose place varies.")];
   let plane = known[0], by = "";
-  const [element, draw] = scatter(runs, { height: Math.max(360, Math.min(620, innerHeight - 320)), open, label: "Where targets stood, by outcome" });
+  const [element, draw] = scatter(runs, { height: Math.max(360, Math.min(620, innerHeight - 320)), open, label: "Target positions, by outcome" });
   const shown = () => new Set(filter.shown);
   const again = () => {
     const chosen = shown();
@@ -22,7 +22,7 @@ function tableMap({ runs, filter, open }) {
     runs.slots.map((slot, i) => make("option", { value: i }, `coloured by ${slot.action} · ${slot.property}`)));
   requestAnimationFrame(again);
   return {
-    parts: [make("h1", {}, "From above"), make("p", { class: "lead" }, "Where the target of every run stood. A dot opens its run."), bar,
+    parts: [make("h1", {}, "From above"), make("p", { class: "lead" }, "The target position of every run. Click a dot to open its run."), bar,
       make("p", { class: "filter" }, planeChoice, colour), element,
       make("p", { class: "legend" }, OUTCOMES.map((word) => badge(word)))],
     follow: () => { follow(); again(); },

@@ -1,4 +1,4 @@
-// Runs that fail alike, and which failure leads to which.
+// Failure modes, and failures that are associated with later failures.
 
 function modeBars(summary, filter, most = Infinity) {
   const modes = summary.findings.failure_modes;
@@ -15,7 +15,7 @@ function modes({ runs, summary, filter }) {
   const judged = ({ step, action, property }) => `${step}. ${local(action)}: ${local(property)}`;
   return [
     make("h1", {}, "Failure modes"),
-    make("p", { class: "lead" }, "Runs in which the same properties failed, and what share of the runs that tested anything they are."),
+    make("p", { class: "lead" }, "Runs that share the same set of failed properties, and their share of all runs that tested anything."),
     make("section", {}, modeBars(summary, filter)),
     make("section", {}, make("h2", {}, "See one of each"), make("ul", { class: "examples" },
       summary.findings.failure_modes.filter((mode) => mode.failed.length).map((mode) => {
@@ -24,8 +24,8 @@ function modes({ runs, summary, filter }) {
         return make("li", {}, make("a", { href: `#/run/${encodeURIComponent(runs.runs[run])}` }, runs.runs[run]),
           " ", slot !== undefined && runs.why(run, slot));
       }))),
-    cascades.length > 0 && make("section", {}, make("h2", {}, "What leads to what"),
-      make("p", { class: "lead" }, "Failures of a later action that come more often where an earlier one failed (Fisher's exact test, corrected for all pairs)."),
+    cascades.length > 0 && make("section", {}, make("h2", {}, "Cascades"),
+      make("p", { class: "lead" }, "Failures of a later action that are more frequent if an earlier one failed (Fisher's exact test, corrected for all pairs)."),
       make("div", { class: "scroll", tabindex: "0" }, make("table", {},
         make("thead", {}, make("tr", {}, ["when this fails", "then this fails", "in", "otherwise in", "q"].map((word) => make("th", { scope: "col" }, word)))),
         make("tbody", {}, cascades.map(({ first, later, table, q }) => make("tr", {},

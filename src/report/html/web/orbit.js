@@ -1,4 +1,4 @@
-// A camera that goes around what is looked at: by mouse, fingers or keys.
+// An orbit camera, controlled by mouse, touch or keys.
 
 class Orbit {
   constructor(camera, element, changed) {

@@ -1,11 +1,11 @@
-// The six outcomes: never folded into two, and told by form as well as by colour.
+// The six outcomes: never merged, and distinguished by symbol as well as by colour.
 
 const OUTCOMES = ["passed", "failed", "inapplicable", "broken", "timeout", "untested"];
 const SIGNS = { passed: "✓", failed: "✕", inapplicable: "–", broken: "!", timeout: "◷", untested: "·" };
 const MEANING = {
-  passed: "it holds",
-  failed: "it does not hold, and that is the robot's doing",
-  inapplicable: "it says nothing about this action",
+  passed: "the property holds",
+  failed: "the property does not hold, and the robot caused it",
+  inapplicable: "the property does not apply to this action",
   broken: "simulation, transport or the tool was at fault",
   timeout: "a budget was spent",
   untested: "the action was never reached",
@@ -13,17 +13,17 @@ const MEANING = {
 const [PASSED, FAILED, , BROKEN, TIMEOUT] = [0, 1, 2, 3, 4];
 const NO_OUTCOME = 255;
 
-/** A small tile with the sign of an outcome. */
+/** A small tile with the symbol of an outcome. */
 function sign(outcome, title = outcome) {
   return make("span", { class: `sign ${outcome}`, title, role: "img", "aria-label": title }, SIGNS[outcome]);
 }
 
-/** A word on the colour of an outcome. */
+/** A label in the colour of an outcome. */
 function badge(outcome, words = outcome) {
   return make("span", { class: `badge ${outcome}` }, make("span", { "aria-hidden": "true" }, SIGNS[outcome] ?? "✓"), ` ${words}`);
 }
 
-/** Shares of the outcomes, as one bar. */
+/** The shares of the outcomes, as a stacked bar. */
 function shares(counts, label) {
   const total = OUTCOMES.reduce((sum, word) => sum + counts[word], 0);
   const told = OUTCOMES.filter((word) => counts[word]).map((word) => `${word} ${counts[word]}`).join(", ");
@@ -32,7 +32,7 @@ function shares(counts, label) {
   return make("div", { class: "shares", role: "img", "aria-label": `${label}: ${told || "nothing"}` }, parts);
 }
 
-/** The colour of an outcome in the theme of the moment. */
+/** The colour of an outcome in the current theme. */
 function colourOf(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }

@@ -1,4 +1,4 @@
-// The first thing that is read: counts, then scores, then what fails most.
+// The start page: counts, then scores, then the most frequent failures.
 
 function overview({ runs, summary, filter, open }) {
   const all = Array.from({ length: runs.count }, (_, run) => run);
@@ -15,7 +15,7 @@ function overview({ runs, summary, filter, open }) {
   return [
     make("section", {},
       make("h1", {}, `${counted(scores.runs, "run")}, ${findings.properties.length === 1 ? "one property" : `${count(findings.properties.length)} properties`}`),
-      make("p", { class: "lead" }, `Every property of every action of every run came to one of six outcomes. Runs: ${statuses}.`),
+      make("p", { class: "lead" }, `Every property of every action of every run has one of six outcomes. Runs: ${statuses}.`),
       make("div", { class: "tiles" }, OUTCOMES.map(tile)),
       shares(counts, "Outcomes"),
       summary.campaigns.filter((row) => row.privileged).map((row) => make("p", {}, `In ${row.id} ${summary.privileged}.`))),
@@ -27,14 +27,14 @@ function overview({ runs, summary, filter, open }) {
     make("section", { class: "card" }, make("h2", {}, "Properties"), propertyTable(summary),
       make("p", { class: "more" }, make("a", { href: "#/properties" }, "margins and heat maps →"))),
     make("div", { class: "columns" },
-      make("section", {}, make("h2", {}, "How runs fail"), modeBars(summary, filter, 6),
+      make("section", {}, make("h2", {}, "Failure modes"), modeBars(summary, filter, 6),
         make("p", { class: "more" }, make("a", { href: "#/modes" }, "all failure modes →"))),
-      make("section", {}, make("h2", {}, "When they fail"), patternList(summary, 6),
+      make("section", {}, make("h2", {}, "Patterns"), patternList(summary, 6),
         make("p", { class: "more" }, make("a", { href: "#/patterns" }, "patterns with plots →")))),
   ];
 }
 
-/** One line for each property: pass rate with its interval and the six counts. */
+/** One row for each property: the pass rate with its interval, and the six counts. */
 function propertyTable(summary) {
   const passing = ({ failing }) => failing && { rate: 1 - failing.rate, low: 1 - failing.high, high: 1 - failing.low };
   return make("div", { class: "scroll", tabindex: "0" }, make("table", { class: "properties" },
@@ -51,7 +51,7 @@ function propertyTable(summary) {
 function patternList(summary, most) {
   const found = summary.findings.properties.flatMap((property) => property.patterns.found.filter((pattern) => pattern.confirmed));
   if (!found.length) {
-    return make("p", {}, "No condition on scenes goes with failures beyond chance, in these runs. More runs show more: `actcheck run --runs N`.");
+    return make("p", {}, "No condition on scenes is significantly associated with failures in these runs. More runs may show one: `actcheck run --runs N`.");
   }
   return make("ul", { class: "sentences" }, found.sort((a, b) => b.wracc - a.wracc).slice(0, most).map((pattern) => make("li", {}, pattern.sentence)));
 }

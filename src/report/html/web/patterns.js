@@ -1,13 +1,13 @@
-// When things fail: conditions on scenes, with the evidence, and a picture of where they lie.
+// Patterns: conditions on scenes, with their evidence and a plot.
 
 function patterns({ runs, summary, filter, open }) {
   const cards = summary.findings.properties.flatMap((property, of) =>
     property.patterns.found.filter((pattern) => pattern.confirmed).map((pattern) => patternCard(runs, property, of, pattern, filter, open)));
   const tried = summary.findings.properties.reduce((sum, property) => sum + property.patterns.tried, 0);
   return [
-    make("h1", {}, "When they fail"),
-    make("p", { class: "lead" }, `Conditions on scenes under which a property fails more often than elsewhere: corrected for all ${count(tried)} that were tried, and confirmed on a third of the runs that took no part in finding them.`),
-    cards.length ? cards : make("p", {}, "There is none that holds, in these runs."),
+    make("h1", {}, "Patterns"),
+    make("p", { class: "lead" }, `Conditions on scenes under which a property fails more often than elsewhere: corrected for all ${count(tried)} conditions tried, and confirmed on a held-out third of the runs.`),
+    cards.length ? cards : make("p", {}, "No condition was confirmed in these runs."),
   ];
 }
 
@@ -30,7 +30,7 @@ function patternCard(runs, property, of, pattern, filter, open) {
     pattern.more && make("p", { class: "faint" }, "More such scenes: ", make("code", {}, pattern.more), " prints the rule for ", make("code", {}, "[scene] require"), "."));
 }
 
-/** Failed and other runs over the parameters of the pattern, or over the surface where it has fewer than two numbers. */
+/** Failed and other runs over the parameters of the pattern, or over other usual parameters if it has fewer than two ranges. */
 function patternPlot(runs, of, pattern, open) {
   const ranges = pattern.conditions.filter((condition) => !("kind" in condition) && varies(runs.parameter.get(condition.parameter)));
   const box = Object.fromEntries(ranges.map((range) => [range.parameter, range]));
@@ -43,7 +43,7 @@ function patternPlot(runs, of, pattern, open) {
   if (!axes) return null;
   const within = new Set(pattern.runs);
   const slots = runs.slots.map((slot, at) => [slot, at]).filter(([slot]) => slot.of === of).map(([, at]) => at);
-  // Runs that a kind leaves out would hide what the ranges show.
+  // Runs excluded by a condition on kinds would hide the effect of the ranges.
   const kinds = pattern.conditions.filter((condition) => "kind" in condition);
   const shown = (run) => !kinds.length || within.has(run) || ranges.length > 0;
   const outcome = (run) => {
@@ -52,8 +52,8 @@ function patternPlot(runs, of, pattern, open) {
     return found.includes(PASSED) ? "passed" : null;
   };
   const kindOf = (run) => !kinds.length || within.has(run) ? outcome(run) : ranges.length ? null : null;
-  const [element, draw] = scatter(runs, { height: 300, open, box, label: `Where it lies: ${pattern.sentence}` });
+  const [element, draw] = scatter(runs, { height: 300, open, box, label: `Plot of the pattern: ${pattern.sentence}` });
   requestAnimationFrame(() => draw(axes[0], axes[1], false, kinds.length ? (run) => shown(run) && kindOf(run) : outcome));
   return make("figure", {}, element, make("figcaption", { class: "faint" },
-    `${kinds.length ? `Runs with ${kinds.map((condition) => condition.kind).join(" and ")} that the pattern holds for` : "All runs"}: crosses failed, dots passed${ranges.length ? "; marked is the range" : ""}. A dot opens its run.`));
+    `${kinds.length ? `Runs with ${kinds.map((condition) => condition.kind).join(" and ")} that the pattern applies to` : "All runs"}: crosses failed, dots passed${ranges.length ? "; the marked area is the range" : ""}. Click a dot to open its run.`));
 }

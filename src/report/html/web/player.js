@@ -1,8 +1,8 @@
-// Watching a run: the stage, the slider, the timeline, before and after.
+// The player of a run: stage, slider, timeline, and pictures before and after.
 
 async function player(replay) {
   const forms = await formsOf();
-  const canvas = make("canvas", { class: "stage", tabindex: "0", "aria-label": "The run in 3D: drag or arrow keys turn, wheel or + and − zoom" });
+  const canvas = make("canvas", { class: "stage", tabindex: "0", "aria-label": "The run in 3D: drag or use the arrow keys to rotate, the wheel or + and − to zoom" });
   const slider = make("input", { type: "range", min: 0, step: "any", value: 0, "aria-label": "Moment of the run", class: "slider" });
   const play = make("button", { type: "button", class: "play", "aria-label": "Play" }, "▶");
   const clock = make("output", { class: "clock" });
@@ -45,7 +45,7 @@ async function player(replay) {
   const element = make("div", { class: "player" },
     make("div", { class: "stagebox" }, canvas),
     make("div", { class: "controls" }, play, slider, clock, pace,
-      stage.seen.children.length > 0 && make("label", { class: "check" }, sight, " what it perceived")),
+      stage.seen.children.length > 0 && make("label", { class: "check" }, sight, " percepts")),
     make("div", { class: "scroll" }, line),
     make("div", { class: "pictures" }, pictures.map(([name, picture]) => make("figure", {},
       make("button", { type: "button", class: "flat", onclick: () => { set(false); seek(name === "before" ? 0 : seconds); } }, picture), make("figcaption", {}, name)))));

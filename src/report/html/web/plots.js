@@ -1,6 +1,6 @@
-// Plots of lines and boxes: intervals, distributions, heat maps, trends.
+// Plots: intervals, distributions, heat maps, trends.
 
-/** A share with its interval on a line from 0 to 1. */
+/** A proportion with its interval on an axis from 0 to 1. */
 function intervalPlot(found, outcome = "passed") {
   if (!found) return make("span", { class: "faint" }, "never decided");
   const x = (share) => 4 + share * 152;
@@ -11,7 +11,7 @@ function intervalPlot(found, outcome = "passed") {
     make("circle", { class: "dot", cx: x(found.rate), cy: 8, r: 4 }));
 }
 
-/** How numbers are spread, below and above zero in the colours of what that means. */
+/** A histogram of margins: negative values in the colour of failed, positive ones in that of passed. */
 function histogram(values, unit, label) {
   const known = values.filter((value) => Number.isFinite(value)).sort((a, b) => a - b);
   if (known.length < 2) return null;
@@ -24,7 +24,7 @@ function histogram(values, unit, label) {
   high -= cut;
   for (const value of known) sums[Math.min(bins - 1, Math.max(0, Math.floor((value - low) / step)))]++;
   const most = Math.max(...sums), width = 560, height = 120, x = (value) => ((value - low) / (high - low)) * width;
-  return make("svg", { class: "histogram", viewBox: `0 -6 ${width} ${height + 26}`, role: "img", "aria-label": `${label}: how margins are spread` },
+  return make("svg", { class: "histogram", viewBox: `0 -6 ${width} ${height + 26}`, role: "img", "aria-label": `${label}: distribution of margins` },
     sums.map((sum, i) => sum > 0 && make("rect", {
       class: low + (i + 0.5) * step < 0 ? "failed" : "passed", x: i * width / bins + 0.5, width: width / bins - 1,
       y: height - Math.max(1.5, sum / most * height), height: Math.max(1.5, sum / most * height),
@@ -36,7 +36,7 @@ function histogram(values, unit, label) {
     make("text", { x: width, y: height + 16, "text-anchor": "end" }, number(high, unit)));
 }
 
-/** Failures by two parameters. */
+/** A heat map of failures by two parameters. */
 function heatMap(map) {
   const cell = ({ runs, failed, failing }) => {
     if (!runs) return make("td", { class: "none" }, "");
@@ -52,7 +52,7 @@ function heatMap(map) {
       make("tbody", {}, map.down.map((name, i) => make("tr", {}, make("th", { scope: "row" }, name), map.cells[i].map(cell)))))));
 }
 
-/** Shares of failures from campaign to campaign, with the places where they changed. */
+/** Failure rates from campaign to campaign, with the points where they changed. */
 function trendPlot(trend) {
   const { campaigns, changes } = trend;
   const width = 640, height = 150, left = 40;

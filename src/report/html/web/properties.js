@@ -1,4 +1,4 @@
-// Each property: what it means, its outcomes, its margins, where it fails, and how that went over time.
+// Properties: description, outcomes, margins, heat maps and trend.
 
 function properties({ runs, summary, filter }, chosen) {
   const cards = summary.findings.properties.map((property, i) => {
@@ -20,7 +20,7 @@ function properties({ runs, summary, filter }, chosen) {
         margins.some((value) => !Number.isNaN(value)) && make("figure", {},
           make("figcaption", {}, `Margins${unit ? ` in ${unit}` : ""}: how far from flipping; below 0 it failed`), histogram(margins, unit, local(property.property))),
         property.maps.map(heatMap)),
-      property.flaky.scenes > 0 && make("p", {}, `Of ${count(property.flaky.scenes)} scenes that were run more than once, ${count(property.flaky.both_ways.length)} went both ways.`));
+      property.flaky.scenes > 0 && make("p", {}, `Of ${count(property.flaky.scenes)} scenes that were run more than once, ${count(property.flaky.both_ways.length)} both passed and failed.`));
     return card;
   });
   queueMicrotask(() => chosen !== undefined && document.getElementById(`property-${chosen}`)?.scrollIntoView());

@@ -1,4 +1,4 @@
-// One run: what failed and why, what happened when, its scene, and the run itself.
+// The view of one run: failures with explanations, timeline, scene and 3D replay.
 
 function runView({ runs, summary, filter }, id) {
   const run = runs.place.get(id);
@@ -29,7 +29,7 @@ function runView({ runs, summary, filter }, id) {
   }
   put(place, make("p", { class: "waiting" }, "Unpacking the run …"));
   watch(known, place, details, { runs, run, id }).catch((error) =>
-    fill(place, make("p", { class: "note" }, `It can't be shown in 3D here: ${error.message}`), notHere(summary, id)));
+    fill(place, make("p", { class: "note" }, `Can't show this run in 3D: ${error.message}`), notHere(summary, id)));
   return { parts, end: () => known.end() };
 }
 
@@ -42,7 +42,7 @@ async function watch(known, place, details, { runs, run, id }) {
   const told = (judged) => judged.outcome === "failed" && asked.has(judged.property);
   fill(details, replay.actions.map((action) => action.judged.filter(told).map((judged) => explained(action, judged, seek))), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
   if (!replay.courses || !replay.courses.frames) {
-    fill(place, make("p", { class: "note" }, replay.reason ? `It was ${runs.text(runs.status, run)}: ${replay.reason}` : "Its trace is missing or damaged, or an earlier version of the program wrote it."));
+    fill(place, make("p", { class: "note" }, replay.reason ? `The run was ${runs.text(runs.status, run)}: ${replay.reason}` : "The trace of this run is missing, corrupt, or was written by an earlier version of the program."));
     return;
   }
   const made = await player(replay);
@@ -54,14 +54,14 @@ async function watch(known, place, details, { runs, run, id }) {
   place.dataset.ready = "true";
 }
 
-/** A failed property as the tables tell it. */
+/** A failed property, with the data of the tables. */
 function failure(runs, run, slot, i) {
   return make("section", { class: "card failure" }, make("h2", {}, sign("failed"), make("small", {}, ` ${slot.action} `), slot.property),
     make("p", {}, runs.why(run, i)),
     make("p", { class: "faint" }, slot.comment || slot.label, runs.margins[i] && !Number.isNaN(runs.margins[i][run]) && ` · margin ${number(runs.margins[i][run])}`));
 }
 
-/** The same with its explanation and its moment. */
+/** A failed property with its explanation and its moment, from the replay. */
 function explained(action, judged, seek) {
   return make("section", { class: "card failure" },
     make("h2", {}, sign("failed"), make("small", {}, ` ${local(action.action)} `), local(judged.property)),
@@ -71,7 +71,7 @@ function explained(action, judged, seek) {
     judged.why && make("details", {}, make("summary", {}, "Why"), make("div", { class: "proof", tabindex: "0" }, judged.why.split("\n").filter((line) => line.trim()).map(proofLine))));
 }
 
-/** A line of an explanation: what is missing stands out, what is cited steps back. */
+/** A line of an explanation: missing facts are highlighted, citations are dimmed. */
 function proofLine(line) {
   const text = line.trimStart(), depth = (line.length - text.length) / 2;
   const kind = /^(missing|missed|blocked)/.test(text) ? "missing" : /^ok /.test(text) ? "ok" : /^nearest/.test(text) ? "nearest" : "";
@@ -99,14 +99,14 @@ function allOutcomes(runs, run) {
 function objectTable(replay) {
   return make("section", {}, make("h2", {}, "Scene"), make("p", { class: "faint" }, `world ${replay.world}, seed ${replay.seed}, program ${replay.program}`),
     make("div", { class: "scroll", tabindex: "0" }, make("table", {},
-      make("thead", {}, make("tr", {}, ["thing", "kind", "role", "mass (kg)", "friction", "came from its place (m)", "tilt (rad)"].map((word) => make("th", { scope: "col" }, word)))),
+      make("thead", {}, make("tr", {}, ["object", "kind", "role", "mass (kg)", "friction", "displacement (m)", "tilt (rad)"].map((word) => make("th", { scope: "col" }, word)))),
       make("tbody", {}, replay.objects.map((object) => make("tr", { class: object.role === "target" ? "strong" : "" },
         make("th", { scope: "row" }, object.id), make("td", {}, object.kind), make("td", {}, object.role),
         [object.mass, object.friction, object.moved, object.tilt].map((value) => make("td", {}, number(value)))))))));
 }
 
 function discards(replay) {
-  return replay.discards.length > 0 && make("p", { class: "faint" }, `${replay.discards.length} scenes before it could not be used: ${[...new Set(replay.discards)].join("; ")}`);
+  return replay.discards.length > 0 && make("p", { class: "faint" }, `${replay.discards.length} scenes before it were discarded: ${[...new Set(replay.discards)].join("; ")}`);
 }
 
 function parameterTable(runs, run) {
@@ -115,9 +115,9 @@ function parameterTable(runs, run) {
     make("dt", {}, parameter.name.replace(/_(m|rad|kg)$/, "").replaceAll("_", " ")), make("dd", {}, typeof value === "number" ? number(value, parameter.unit) : value)))));
 }
 
-/** What shows a run that this file has no room for. */
+/** The commands that show a run that is not in this file. */
 function notHere(summary, id) {
   const { program, history } = summary, asked = `${quoted(id)} --history ${quoted(history)}`;
-  return make("div", { class: "note card" }, make("p", {}, "This run is not in the file, which has room for some of each failure mode and property. These show it:"),
+  return make("div", { class: "note card" }, make("p", {}, "This run has no replay in this file, which only has space for some runs of each failure mode and property. To see it, run:"),
     [`show ${asked} --picture ${quoted(`${id}.png`)}`, `why ${asked}`, `replay ${asked}`].map((words) => make("p", {}, make("code", {}, `${program} ${words}`))));
 }

@@ -1,4 +1,4 @@
-// All runs as columns, and what is asked of one of them.
+// All runs as columns, with queries on single runs.
 
 class Runs {
   constructor(columns, summary) {
@@ -17,7 +17,7 @@ class Runs {
     const none = new Float64Array(this.count).fill(NaN);
     this.score ??= none;
     this.index ??= none;
-    // By campaign, then as they were drawn: ids in the order of their letters are in none.
+    // By campaign, then by index. Alphabetical order of ids would be neither.
     this.order = Array.from({ length: this.count }, (_, run) => run)
       .sort((a, b) => this.campaign.of[a] - this.campaign.of[b] || this.index[a] - this.index[b] || a - b);
     this.worst = Uint8Array.from({ length: this.count }, (_, run) => this.worstOf(run));
@@ -27,7 +27,7 @@ class Runs {
     return this.outcomes[slot * this.count + run];
   }
 
-  /** What a run as a whole came to: failed where anything did, else what kept it from being judged, else passed. */
+  /** Outcome of a whole run: failed if any property failed, else the outcome that kept it from being judged, else passed. */
   worstOf(run) {
     const seen = new Set();
     for (let slot = 0; slot < this.slots.length; slot++) seen.add(this.outcome(run, slot));
@@ -40,7 +40,7 @@ class Runs {
     return place ? column.texts[place - 1] : "";
   }
 
-  /** A parameter of a run: a text or a number. */
+  /** A parameter of a run: a string or a number. */
   value(name, run) {
     const parameter = this.parameter.get(name);
     if (!parameter) return NaN;
@@ -55,7 +55,7 @@ class Runs {
     return this.witness.get(slot * this.count + run) ?? "";
   }
 
-  /** How often each outcome occurs in some runs, over all properties or in one. */
+  /** Counts of each outcome in some runs, over all properties or for one. */
   counts(runs, only) {
     const sums = new Float64Array(256);
     for (let slot = 0; slot < this.slots.length; slot++) {
@@ -66,13 +66,13 @@ class Runs {
     return Object.fromEntries(OUTCOMES.map((word, i) => [word, sums[i]]));
   }
 
-  /** Letters of all runs that a search looks through, in lower case; those that are missing are made now. */
+  /** Searchable text of all runs, in lower case. Builds missing entries. */
   letters() {
     this.gather(this.count);
     return this.searched;
   }
 
-  /** Makes the letters of some more runs. Tells whether all are there. */
+  /** Builds the searchable text of some more runs. Returns whether all are done. */
   gather(some) {
     const end = Math.min(this.count, this.searched.length + some);
     for (let run = this.searched.length; run < end; run++) this.searched.push(this.lettersOf(run));

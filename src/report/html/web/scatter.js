@@ -1,8 +1,8 @@
-// Many runs as dots: the table from above, and where a pattern lies.
+// Scatter plots of runs, for the table from above and for patterns.
 
 const DOT = { failed: 3.4, other: 2.4 };
 
-/** The axes that a plot of places can have, where runs have them. */
+/** The pairs of axes for plots of positions, if the runs have these parameters. */
 function planes(runs) {
   return [
     ["on its surface", "surface_x_m", "surface_y_m", true],
@@ -18,7 +18,7 @@ function varies(parameter) {
 }
 
 /**
- * Dots over two parameters. `dots`: how each run is shown (`null`: not), as a name of an outcome; `box`: ranges that are marked.
+ * Dots over two parameters. `dots`: the outcome by which each run is drawn (`null`: hidden); `box`: ranges to mark.
  * Returns the element and a function that draws it anew.
  */
 function scatter(runs, { height = 420, open, box = {}, label }) {
@@ -88,7 +88,7 @@ function scatter(runs, { height = 420, open, box = {}, label }) {
   return [element, draw];
 }
 
-/** A cross: failures are told from the rest without colour. */
+/** A cross, so that failures are recognisable without colour. */
 function cross(pen, x, y, radius) {
   pen.lineWidth = radius * 0.75;
   pen.strokeStyle = pen.fillStyle;
@@ -100,7 +100,7 @@ function cross(pen, x, y, radius) {
   pen.stroke();
 }
 
-/** Draws axes, grid and marked ranges, and says where each run goes. */
+/** Draws axes, grid and marked ranges, and returns the position of each run. */
 function axes(pen, runs, x, y, equal, width, height, box) {
   const [xs, ys] = [runs.parameter.get(x), runs.parameter.get(y)];
   const inner = { left: 52, top: 12, width: width - 66, height: height - 54 };
@@ -166,7 +166,7 @@ function rangeOf(values) {
   return [low - room, high + room];
 }
 
-/** Round numbers in a range, about as many as asked for. */
+/** Round numbers in a range, about as many as requested. */
 function ticks([low, high], wanted) {
   const rough = (high - low) / Math.max(2, wanted), power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((times) => times * power).find((step) => step >= rough);

@@ -1,6 +1,6 @@
-// Forms to what three.js draws. The counterpart of `shapes.rs`. Lengths in metres, z up.
+// Converts shapes to three.js geometry. The counterpart of `shapes.rs`. Unit: metres; z up.
 
-/** The geometry of one part of a form, in the part's own frame. */
+/** The geometry of one part of a shape, in the part's frame. */
 function geometryOf(three, part) {
   const upright = (geometry) => geometry.rotateX(Math.PI / 2);
   switch (part.kind) {
@@ -20,7 +20,7 @@ function tube(three, { low, high, wall, height }) {
     corner(low - wall, -height / 2), corner(low, -height / 2)], 32);
 }
 
-/** The hull of a few points: every plane through three of them that has no point beyond it. */
+/** The convex hull of a few points: all planes through three points with no point beyond them. */
 function hull(three, points) {
   const at = points.map((point) => new three.Vector3(...point));
   const middle = at.reduce((sum, point) => sum.add(point), new three.Vector3()).divideScalar(Math.max(1, at.length));
@@ -43,7 +43,7 @@ function hull(three, points) {
   return geometry;
 }
 
-/** Triangles of a flat convex face, counter-clockwise seen from outside. */
+/** Triangulates a planar convex face, counter-clockwise seen from outside. */
 function fan(three, points, normal) {
   const middle = points.reduce((sum, point) => sum.add(point), new three.Vector3()).divideScalar(points.length);
   const u = new three.Vector3().subVectors(points[0], middle).normalize(), v = new three.Vector3().crossVectors(normal, u);
@@ -57,7 +57,7 @@ const LOOKS = {
   obstacle: [0xd08a2e, 0.6, 0.0], platform: [0xd9c29a, 0.8, 0.0], wall: [0xb9c0c9, 0.9, 0.0],
 };
 
-/** A body with its form: a group to be moved. */
+/** A body with its shape, as a movable group. */
 function bodyOf(three, form, look) {
   const [colour, roughness, metalness] = LOOKS[look] ?? LOOKS.other;
   const material = new three.MeshStandardMaterial({ color: colour, roughness, metalness, side: three.DoubleSide });

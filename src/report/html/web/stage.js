@@ -1,4 +1,4 @@
-// A run in 3D: what stands still, what moves, light and a camera.
+// A run in 3D: fixed bodies, moving bodies, lights and a camera.
 
 class Stage {
   constructor(three, replay, forms, canvas) {
@@ -60,7 +60,7 @@ class Stage {
     scene.add(this.seen, this.trail());
   }
 
-  /** The floor's tiles, half a metre wide. */
+  /** The floor's tiles, 0.5 m wide. */
   tiles() {
     const tile = make("canvas", { width: 256, height: 256 }), pen = tile.getContext("2d");
     pen.fillStyle = "#fff";
@@ -76,14 +76,14 @@ class Stage {
     return texture;
   }
 
-  /** The way of the target. */
+  /** The path of the target. */
   trail() {
     const { three, course, target } = this;
     const points = target ? Array.from({ length: course.frames }, (_, frame) => new three.Vector3(...course.position(target, frame * course.period))) : [];
     return new three.Line(new three.BufferGeometry().setFromPoints(points), new three.LineBasicMaterial({ color: LOOKS.target[0], transparent: true, opacity: 0.7 }));
   }
 
-  /** What is worth looking at: the target while the robot is near it, else the robot. */
+  /** The camera's focus: the target while the robot is near it, else the robot. */
   focus(secs) {
     const robot = this.course.robot(secs), target = this.target && this.course.position(this.target, secs);
     if (!robot) return target ?? [0, 0, 0.5];
@@ -91,7 +91,7 @@ class Stage {
     return target.map((value, i) => value + (robot[i] - value) * (i < 2 ? 0.36 : 0.1));
   }
 
-  /** The first view: from the side of the way from the robot to the target. */
+  /** The initial view: from the side of the line from the robot to the target. */
   begin() {
     const robot = this.course.robot(0) ?? [0, 0, 0], target = (this.target && this.course.position(this.target, 0)) ?? [1, 0, 0];
     const way = Math.atan2(target[1] - robot[1], target[0] - robot[0]);
@@ -141,7 +141,7 @@ class Stage {
     this.renderer.render(this.scene, this.camera);
   }
 
-  /** A moment as a picture, in its own view. */
+  /** Renders a moment as a picture, with its own camera. */
   picture(secs, into) {
     const before = [this.secs ?? 0, this.orbit.centre, this.near];
     this.near = false;

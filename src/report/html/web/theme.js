@@ -1,4 +1,4 @@
-// Light and dark: as the system has it, until one is chosen.
+// Light and dark theme: the system's preference until the user chooses one.
 
 function themeButton() {
   const dark = matchMedia("(prefers-color-scheme: dark)");

@@ -1,4 +1,4 @@
-// three.js out of the page: two modules that know each other by name, unpacked when first needed.
+// Loads three.js from the page: two modules, one importing the other by name, unpacked on first use.
 
 let threeLoaded;
 

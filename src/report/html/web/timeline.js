@@ -1,9 +1,9 @@
-// What happened when: actions with their phases, contacts with their forces, and the moments that decided.
+// The timeline: actions with phases, contacts with forces, and the moments that decided failures.
 
 const LANE = 15;
 const MOST_LANES = 12;
 
-/** Contacts worth a lane: of the robot with things, and of things that move with others; the same pair in one. */
+/** Contacts that get a lane: between the robot and objects, and between moving objects and others; one lane per pair. */
 function lanes(replay, seconds) {
   const found = new Map();
   for (const action of replay.actions) {
@@ -19,12 +19,12 @@ function lanes(replay, seconds) {
     }
   }
   return [...found.values()]
-    // What touches all the time tells nothing.
+    // Permanent contacts are not informative.
     .filter((lane) => lane.robot || lane.length < 0.9 * seconds)
     .sort((a, b) => b.robot - a.robot || b.most - a.most).slice(0, MOST_LANES);
 }
 
-/** The timeline and a function that marks a moment. `seek` is told where it is clicked. */
+/** Returns the timeline and a function that marks a moment. A click calls `seek` with its time. */
 function timeline(replay, seconds, seek) {
   const rows = lanes(replay, seconds), left = 150, width = 1000, inner = width - left - 10;
   const x = (secs) => left + (seconds ? secs / seconds : 0) * inner;

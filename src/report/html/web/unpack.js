@@ -1,9 +1,9 @@
-// Packed data to arrays. The counterpart of `pack.rs`.
+// Unpacks data to arrays. The counterpart of `pack.rs`.
 
 const NO_NUMBER = 65535;
 
 async function inflated(id) {
-  // Replays stand at the end of the file, which may still be on its way.
+  // Replays are at the end of the file, which may still be loading.
   if (!document.getElementById(`data-${id}`) && document.readyState === "loading") {
     await new Promise((done) => document.addEventListener("DOMContentLoaded", done, { once: true }));
   }
@@ -21,7 +21,7 @@ async function unpackText(id) {
   return new TextDecoder().decode(await inflated(id));
 }
 
-/** The description of a part; what it says of arrays is replaced by them. */
+/** The header of a part, with its array descriptors replaced by the arrays. */
 async function unpack(id) {
   const buffer = await inflated(id);
   const length = new DataView(buffer).getUint32(0, true);
@@ -45,11 +45,11 @@ function array(told, buffer, body) {
     case "u32": return new Uint32Array(buffer, at, told.length);
     case "number": return numbers(new Uint16Array(buffer, at, told.length), told);
     case "courses": return { bytes: new Uint8Array(buffer, at), frames: told.length };
-    default: throw new Error(`${told.kind} is no array`);
+    default: throw new Error(`unknown array kind ${told.kind}`);
   }
 }
 
-/** Numbers, NaN where there is none. */
+/** Numbers, with NaN for missing values. */
 function numbers(codes, { low, step, whole }) {
   const values = new Float64Array(codes.length);
   for (let i = 0; i < codes.length; i++) {
@@ -59,7 +59,7 @@ function numbers(codes, { low, step, whole }) {
   return values;
 }
 
-/** Columns of whole numbers from their differences: lower bytes first, then higher ones. */
+/** Decodes columns of integers from second differences: all low bytes, then all high bytes. */
 function columnsOf({ bytes, frames }, count) {
   const total = frames * count;
   const columns = [];

@@ -1,8 +1,8 @@
-// Numbers, shares and names as people read them.
+// Formats numbers, proportions and names.
 
 const THIN = "\u2009";
 
-/** A number with four digits that mean something. */
+/** A number with four significant digits. */
 function number(value, unit = "") {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   const digits = Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(4)));
@@ -10,7 +10,7 @@ function number(value, unit = "") {
   return unit && unit !== "1" ? `${shown}${THIN}${unit}` : shown;
 }
 
-/** A count with its thousands apart. */
+/** A count with a thousands separator. */
 function count(value) {
   return String(value).replace(/\B(?=(\d{3})+$)/g, THIN);
 }
@@ -31,7 +31,7 @@ function interval(found) {
   return `${percent(found.rate)} [${(found.low * 100).toFixed(0)}–${(found.high * 100).toFixed(0)}]`;
 }
 
-/** Wilson's score interval of 95 % (1927), as everywhere in actcheck. */
+/** The 95 % Wilson score interval (1927), as everywhere in actcheck. */
 function wilson(successes, trials) {
   if (!trials) return null;
   const z = 1.959963984540054;
@@ -41,7 +41,7 @@ function wilson(successes, trials) {
   return { rate, low: rate === 0 ? 0 : Math.max(0, centre - half), high: rate === 1 ? 1 : Math.min(1, centre + half) };
 }
 
-/** `ObjectInGripper` as `Object In Gripper` with places where a line may break. */
+/** Inserts line break opportunities into a name, such as between `Object`, `In` and `Gripper`. */
 function breakable(name) {
   return name.replace(/([a-z0-9])([A-Z])/g, "$1\u200b$2").replace(/_/g, "_\u200b");
 }
@@ -50,7 +50,7 @@ function moment(text) {
   return String(text ?? "").replace("T", " ").replace(/:\d\d(\.\d+)?Z$/, "");
 }
 
-/** A word for a shell. */
+/** Quotes a word for a shell. */
 function quoted(word) {
   return /^[\w./:@%+=,-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
