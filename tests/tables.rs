@@ -147,7 +147,7 @@ fn named_queries_answer(here: &Path) {
     for query in listed.as_array().unwrap() {
         let name = query["name"].as_str().unwrap();
         let answer = json(here, &["query", "--named", name, "--format", "json"]);
-        let may_be_empty = query["description"].as_str().unwrap().contains("Empty where")
+        let may_be_empty = query["description"].as_str().unwrap().contains("Empty if")
             || query["description"].as_str().unwrap().contains("Empty without");
         assert!(may_be_empty || !answer.as_array().unwrap().is_empty(), "{name} finds nothing");
     }

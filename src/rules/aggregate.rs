@@ -1,4 +1,4 @@
-//! Groups of a body's matches to rows of a head.
+//! Aggregation: groups the matches of a body into rows of the head.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,13 +10,13 @@ use crate::rules::program::{AggregateKind, Aggregation, Operand, Rule, Variable}
 use crate::rules::universe::Universe;
 use crate::rules::values::{Number, double_term, is_beyond_64_bits};
 
-/// What of a match an aggregation looks at: the group, then each aggregate's input and distinct variables.
+/// Returns the operands that an aggregation reads: the group, then each aggregate's input and distinct variables.
 pub(crate) fn projection(aggregation: &Aggregation) -> Vec<Operand> {
     let inputs = aggregation.aggregates.iter().flat_map(|a| std::iter::once(&a.input).chain(&a.distinct));
     aggregation.group.iter().chain(inputs).map(|variable| Operand::Variable(*variable)).collect()
 }
 
-/// The head rows of an aggregating rule. `matches`: rows of the projection.
+/// Returns the head rows of an aggregating rule. `matches`: rows of the projection.
 pub(crate) fn aggregate(
     rule: &Rule,
     aggregation: &Aggregation,
@@ -49,7 +49,7 @@ fn bind(binding: &mut [TermId], variables: &[Variable], values: &[TermId]) {
     }
 }
 
-/// Computes the aggregates of a group and what depends on them.
+/// Computes the aggregates of a group and the variables that depend on them.
 fn fill(
     aggregation: &Aggregation,
     rows: &[&[TermId]],
@@ -61,7 +61,7 @@ fn fill(
         let end = start + 1 + part.distinct.len();
         let distinct: BTreeSet<&[TermId]> = rows.iter().map(|row| &row[start..end]).collect();
         let inputs = distinct.iter().map(|row| universe.term(row[0]));
-        // What can't be computed with must not be passed over as if it were no number.
+        // Integers beyond 64 bits can't be computed with, and must not be skipped like non-numbers.
         if part.kind != AggregateKind::Count && inputs.clone().any(is_beyond_64_bits) {
             return None;
         }
@@ -76,7 +76,7 @@ fn fill(
     Some(())
 }
 
-/// The value of an aggregate; nothing where none of its inputs is a number that it needs.
+/// Computes the value of an aggregate. Returns `None` if it needs numbers and no input is one.
 fn combine<'a>(kind: AggregateKind, inputs: impl Iterator<Item = &'a Term>) -> Option<Term> {
     match kind {
         AggregateKind::Count => Some(Term::Integer(i64::try_from(inputs.count()).ok()?)),
@@ -96,8 +96,8 @@ fn extreme<'a>(inputs: impl Iterator<Item = &'a Term>, better: fn(std::cmp::Orde
     best.cloned()
 }
 
-/// Integers add up to an integer; a double among them makes a double. Doubles are added in order of size, so that
-/// the sum does not depend on the order in which tuples were found.
+/// Sums numbers: the result is an integer if all are integers, otherwise a double. Doubles are added in sorted order,
+/// so that the sum does not depend on the order of the tuples.
 fn sum<'a>(inputs: impl Iterator<Item = &'a Term>) -> Option<Term> {
     let (mut whole, mut parts, mut any) = (0i64, Vec::new(), false);
     for term in inputs {

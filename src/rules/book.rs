@@ -23,9 +23,9 @@ pub struct RuleBook {
     pub(crate) predicates: Predicates,
     pub(crate) indexes: Indexes,
     pub(crate) given: Given,
-    /// Rules that read the ontology only: evaluated when the book is prepared.
+    /// Tuples of the rules that read only the ontology, evaluated when the book is prepared.
     pub(crate) fixed: Tables,
-    /// The ontology's statements alone, of those that rules read.
+    /// The ontology statements that rules read, without derived tuples.
     pub(crate) fixed_facts: Tables,
     pub(crate) fixed_rules: Planned,
     pub(crate) libraries: Planned,
@@ -40,14 +40,14 @@ impl std::fmt::Debug for RuleBook {
     }
 }
 
-/// How one property is judged.
+/// The prepared rules of one property.
 pub(crate) struct Judge {
     pub(crate) digest: String,
     pub(crate) label: String,
     pub(crate) rules: JudgeRules,
 }
 
-/// In which language.
+/// Rules by language.
 pub(crate) enum JudgeRules {
     Datalog { planned: Box<Planned>, verdict: Verdict },
     Sparql(Box<Query>),
@@ -57,22 +57,23 @@ impl RuleBook {
     /// Parses, checks and plans the rule file of every property with all libraries.
     ///
     /// # Errors
-    /// All faults of all files, each with its place.
+    /// All errors of all files, each with its place.
     pub fn prepare(ontology: &Ontology) -> Result<Self, Diagnostics> {
         Self::prepare_within(ontology, &Budget::default())
     }
 
-    /// Prepares a book as [`RuleBook::prepare`] does; each evaluation over the ontology alone stays within the budget.
+    /// Like [`RuleBook::prepare`], with a budget for each evaluation over the ontology alone.
     ///
     /// # Errors
-    /// All faults of all files, each with its place; a budget that was spent.
+    /// All errors of all files, each with its place, or an exceeded budget.
     pub fn prepare_within(ontology: &Ontology, budget: &Budget) -> Result<Self, Diagnostics> {
         Preparing::within(budget).run(ontology)
     }
 
-    /// Judges an action by some properties, named by IRI: the libraries once, then each property.
+    /// Judges an action by the given properties (IRIs). Evaluates the libraries once, then each property.
     ///
-    /// A property that spends the budget or stumbles over a value has a fault instead of findings; the others don't suffer.
+    /// A property that exceeds the budget or meets an invalid value gets a fault instead of findings. The others are
+    /// not affected.
     pub fn judge(
         &self,
         facts: &ActionFacts<'_>,
@@ -88,7 +89,7 @@ impl RuleBook {
         let mut results = BTreeMap::new();
         for iri in properties {
             let result = match self.properties.get(iri) {
-                None => Err(RuleFault::Value(format!("no property {iri} is known"))),
+                None => Err(RuleFault::Value(format!("unknown property {iri}"))),
                 Some(Judge { rules: JudgeRules::Datalog { planned, verdict }, .. }) => {
                     self.datalog(planned, verdict, &derived, &mut universe, budget)
                 }
@@ -102,8 +103,8 @@ impl RuleBook {
         results
     }
 
-    /// Judges the state before an action as if nothing had happened since: a property that holds even so proves nothing about
-    /// the action.
+    /// Judges the state before an action as if it were also the state after. If a property already holds there, its
+    /// success proves nothing about the action.
     pub fn held_before(
         &self,
         facts: &ActionFacts<'_>,
@@ -114,9 +115,10 @@ impl RuleBook {
         self.judge(&unchanged, properties, budget)
     }
 
-    /// Whether a property states what must have come about (`success`, `ASK`), not what must not (`violation`, `SELECT`).
+    /// Returns whether a property requires a result (`success`, `ASK`); otherwise it forbids an event (`violation`,
+    /// `SELECT`).
     ///
-    /// What must not happen has not happened before an action: that it held then is no news.
+    /// A forbidden event can't have happened before the action, so that such a property held before is not informative.
     pub fn states_success(&self, property: &str) -> bool {
         match self.properties.get(property).map(|judge| &judge.rules) {
             Some(JudgeRules::Datalog { verdict, .. }) => verdict.decisive.as_ref().is_some_and(|it| it.positive),
@@ -125,17 +127,17 @@ impl RuleBook {
         }
     }
 
-    /// Digest of a property's rule file together with all libraries; empty for a property that the ontology lacks.
+    /// Returns the digest of a property's rule file and all libraries; empty for an unknown property.
     pub fn digest(&self, property: &str) -> &str {
         self.properties.get(property).map_or("", |judge| &judge.digest)
     }
 
-    /// What is odd about the rules but no fault.
+    /// Returns the warnings about the rules.
     pub fn warnings(&self) -> &Diagnostics {
         &self.warnings
     }
 
-    /// The facts of an action with what the libraries derive from them.
+    /// Returns the facts of an action with the tuples that the libraries derive from them.
     pub(crate) fn enriched(
         &self,
         facts: &ActionFacts<'_>,
@@ -166,7 +168,7 @@ impl RuleBook {
     }
 }
 
-/// A fault that names the rule.
+/// Returns the fault of a stopped evaluation, with the rule's name and place.
 pub(crate) fn fault(meter: &Meter, stopped: Stopped, planned: &Planned) -> RuleFault {
     meter.fault(stopped.stop, stopped.rule.map(|rule| &planned.rules[rule]))
 }

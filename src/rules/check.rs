@@ -1,4 +1,4 @@
-//! Syntax to checked rules: names, arities, safety, vocabulary, what a property must define.
+//! Checks the syntax tree: names, arities, safety, vocabulary, and the predicates that a property must define.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,19 +11,19 @@ use crate::rules::program::{MAX_ARITY, Predicate, Predicates, Program, Scope};
 use crate::rules::syntax::{AtomSyntax, LiteralSyntax, Statement, Syntax};
 use crate::rules::translate::translate;
 
-/// What a file is for.
+/// The role of a rule file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Role {
-    /// Its predicates serve every rule.
+    /// Every rule may use its predicates.
     Library,
-    /// It verifies a property; its predicates are its own.
+    /// It verifies a property; its predicates are visible in this file only.
     Property(Scope),
-    /// A program of its own, without anything given.
+    /// A standalone program without given predicates.
     Standalone,
 }
 
 impl Role {
-    /// Where this file's predicates are known.
+    /// Returns the scope of this file's predicates.
     pub(crate) fn scope(self) -> Scope {
         match self {
             Self::Library | Self::Standalone => 0,
@@ -32,19 +32,19 @@ impl Role {
     }
 }
 
-/// What all files share while they are checked.
+/// State shared by all files while they are checked.
 pub(crate) struct Checking<'a> {
     pub(crate) terms: &'a mut Terms,
     pub(crate) predicates: Predicates,
     pub(crate) vocabulary: Option<&'a Vocabulary>,
-    /// Whether a constant property counts as part of the predicate: not where a rule derives `state` for a variable property.
+    /// Whether a constant property is part of the predicate: `false` if a rule derives `state` for a variable property.
     pub(crate) split: bool,
-    /// Properties that some library derives: known to all rules like the vocabulary's own.
+    /// Properties that a library derives. All rules may use them like those of the vocabulary.
     pub(crate) derived_terms: BTreeSet<String>,
-    /// Where each predicate was first defined, and whether by a head (otherwise by an import or a use).
+    /// Where each predicate was first defined.
     pub(crate) defined: BTreeMap<(Scope, String), Definition>,
     pub(crate) diagnostics: Diagnostics,
-    /// How many errors were noted so far.
+    /// Number of errors reported so far.
     pub(crate) errors: usize,
 }
 
@@ -58,7 +58,7 @@ pub(crate) struct Definition {
 }
 
 impl Definition {
-    /// File and line. Only looked up for a fault, because counting lines takes time.
+    /// Returns file and line. Only called for errors, because counting lines takes time.
     pub(crate) fn place(&self) -> String {
         format!("{}:{}", self.source.name, self.source.line_and_column(self.start).0)
     }
@@ -103,7 +103,7 @@ impl<'a> Checking<'a> {
         }
     }
 
-    /// First pass: which predicates the heads of a file define.
+    /// First pass: collects the predicates that the heads of a file define.
     pub(crate) fn define(&mut self, syntax: &Syntax, role: Role) {
         let source = &syntax.source;
         let (mut rules, before) = (0, self.errors);
@@ -134,7 +134,7 @@ impl<'a> Checking<'a> {
                 }
                 Statement::Transfer(transfer) if role != Role::Standalone => {
                     let word = if transfer.import { "@import" } else { "@export" };
-                    let help = "facts come from the run; `actcheck datalog` runs programs with imports and exports";
+                    let help = "facts come from the run; use `actcheck datalog` for programs with imports and exports";
                     let message = format!("`{word}` is not possible in the rules of a property");
                     self.error("R030", source, &transfer.span, message, help);
                 }
@@ -158,19 +158,19 @@ impl<'a> Checking<'a> {
         }
         let elsewhere = self.defined.get(&(0, name.to_owned())).filter(|_| role.scope() != 0);
         if let Some(definition) = elsewhere {
-            let message = format!("`{name}` is defined by a library already ({})", definition.place());
+            let message = format!("`{name}` is already defined by a library ({})", definition.place());
             return self.error("R038", source, &head.name_span, message, "choose another name, or use the library's");
         }
         self.define_predicate(source, name, head.args.len(), &head.span, role);
     }
 
-    /// Notes a predicate with its arity.
+    /// Registers a predicate with its arity.
     pub(crate) fn define_predicate(&mut self, source: &Source, name: &str, arity: usize, span: &Span, role: Role) {
         let key = (role.scope(), name.to_owned());
         if let Some(known) = self.defined.get(&key) {
             if known.arity != arity {
                 let message = format!("`{name}` has {} here and {} in {}", counted(arity), known.arity, known.place());
-                self.error("R022", source, span, message, "give it the same number everywhere, or another name");
+                self.error("R022", source, span, message, "use the same number everywhere, or another name");
             }
             return;
         }
@@ -189,7 +189,7 @@ impl<'a> Checking<'a> {
         });
     }
 
-    /// A head that adds to the snapshots.
+    /// Checks a head that adds facts to the snapshots.
     fn define_given(&mut self, source: &Source, head: &AtomSyntax, role: Role) {
         let name = head.predicate.as_str();
         let addable = matches!(name, "state" | "before" | "after" | "during");
@@ -197,7 +197,7 @@ impl<'a> Checking<'a> {
             let (message, help) = if addable {
                 (
                     format!("only a library may derive `{name}`"),
-                    "put this rule in a file that the ontology names with `act:ruleLibrary`, or derive a predicate of your own",
+                    "move this rule to a library (`act:ruleLibrary`), or derive a predicate of your own",
                 )
             } else {
                 (format!("`{name}` is given and can't be derived"), "derive a predicate of your own")
@@ -214,10 +214,10 @@ impl<'a> Checking<'a> {
         }
     }
 
-    /// Second pass: the rules of a file, checked.
+    /// Second pass: checks and translates the rules of a file.
     pub(crate) fn rules(&mut self, syntax: &Syntax, role: Role) -> Program {
         let program = translate(self, syntax, role);
-        // What a text with syntax errors seems to lack may be in the part that could not be read.
+        // After a syntax error, a missing definition may be in the part that was not parsed.
         if let Role::Property(scope) = role
             && syntax.whole
         {
@@ -226,13 +226,13 @@ impl<'a> Checking<'a> {
         program
     }
 
-    /// A property's file says what success is, in one of two ways.
+    /// Checks that a property's file defines exactly one of `success` and `violation`.
     fn verdict(&mut self, syntax: &Syntax, scope: Scope) {
         let has = |name: &str| self.defined.contains_key(&(scope, name.to_owned()));
         let (success, violation) = (has("success"), has("violation"));
         let source = &syntax.source;
         if success && violation {
-            let help = "keep one: `success` for \"there is\", `violation` for \"for all\"";
+            let help = "keep one: `success` for \"there is a …\", `violation` for \"for all …\"";
             let span = place_of(syntax, "violation");
             self.error("R025", source, &span, "the file defines both `success` and `violation`", help);
         } else if !success && !violation {
@@ -240,7 +240,7 @@ impl<'a> Checking<'a> {
                 self.defined.keys().filter(|(known, _)| *known == scope).map(|(_, name)| name.clone()).collect();
             let near = own.iter().find(|name| crate::base::nearest(name, ["success", "violation"]).is_some());
             let help = match near {
-                Some(name) => format!("`{name}` is none of them: {}", did_you_mean(name, ["success", "violation"])),
+                Some(name) => format!("`{name}` is neither of them: {}", did_you_mean(name, ["success", "violation"])),
                 None => "add a rule such as `success(?o) :- parameter(act:pickObject, ?o), … .`".to_owned(),
             };
             self.diagnostics.push(
@@ -260,7 +260,7 @@ impl<'a> Checking<'a> {
         }
     }
 
-    /// An IRI of a namespace that the ontology describes must be one that it describes.
+    /// Checks that an IRI in one of the ontology's namespaces is described there.
     pub(crate) fn vocabulary(&mut self, source: &Source, iri: &str, span: &Span, as_property: bool) {
         let Some(vocabulary) = self.vocabulary else { return };
         if self.derived_terms.contains(iri) || is_phase(iri) {
@@ -268,8 +268,8 @@ impl<'a> Checking<'a> {
         }
         match vocabulary.terms.get(iri) {
             Some(term) if as_property && !term.is_property => {
-                let help = "a property stands between subject and object, such as `w:mass`";
-                let message = format!("`{}` is no property", names::shorten(iri));
+                let help = "write a property, such as `w:mass`";
+                let message = format!("`{}` is not a property", names::shorten(iri));
                 self.error("R029", source, span, message, help);
             }
             Some(_) => {}
@@ -293,7 +293,7 @@ impl<'a> Checking<'a> {
         }
     }
 
-    /// Names that an atom may have in a file, for "did you mean".
+    /// Returns the predicate names that a file may use, for "did you mean".
     pub(crate) fn known_names(&self, role: Role) -> Vec<String> {
         let own = self
             .defined
@@ -305,7 +305,7 @@ impl<'a> Checking<'a> {
     }
 }
 
-/// The same without repetitions: a rule with several heads is checked once for each.
+/// Removes duplicates: a rule with several heads is checked once for each head.
 pub(crate) fn unique(diagnostics: Diagnostics) -> Diagnostics {
     let mut seen = BTreeSet::new();
     let mut kept = Diagnostics::new();
@@ -317,18 +317,18 @@ pub(crate) fn unique(diagnostics: Diagnostics) -> Diagnostics {
     kept
 }
 
-/// "1 argument", "2 arguments".
+/// Formats a number of arguments: "1 argument", "2 arguments".
 pub(crate) fn counted(arguments: usize) -> String {
     if arguments == 1 { "1 argument".to_owned() } else { format!("{arguments} arguments") }
 }
 
-/// The graphs of an action are named by terms that need no description.
+/// Returns whether an IRI names a graph of an action. Graph names need no description in the ontology.
 fn is_phase(iri: &str) -> bool {
     iri.strip_prefix(names::ACT)
         .is_some_and(|local| matches!(local, "before" | "after" | "during" | "parameters" | "ontology"))
 }
 
-/// The first head with a name, or the start of the file.
+/// Returns the span of the first head with a name, or the start of the file.
 fn place_of(syntax: &Syntax, name: &str) -> Span {
     syntax
         .statements
@@ -342,7 +342,7 @@ fn place_of(syntax: &Syntax, name: &str) -> Span {
         .unwrap_or(0..0)
 }
 
-/// Predicates that the bodies of a file use.
+/// Returns the predicates that the bodies of a file use.
 pub(crate) fn used_names(syntax: &Syntax) -> BTreeSet<&str> {
     let mut used = BTreeSet::new();
     for statement in &syntax.statements {

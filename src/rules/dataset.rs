@@ -1,4 +1,4 @@
-//! One action's facts as a SPARQL dataset: sorted numbers, looked up in place, nothing copied from the ontology.
+//! One action's facts as a SPARQL dataset: sorted term ids, searched in place, without copying the ontology.
 
 use std::convert::Infallible;
 use std::hash::{Hash, Hasher};
@@ -11,11 +11,11 @@ use crate::rules::ledger::{Entry, Ledger};
 use crate::rules::universe::Universe;
 use crate::rules::values;
 
-/// Statements in the two orders that lookups need.
+/// Statements in the two orders that lookups use.
 #[derive(Debug, Default)]
 pub(crate) struct Graph {
     by_subject: Vec<[TermId; 3]>,
-    /// Property, object, subject.
+    /// Columns: property, object, subject.
     by_property: Vec<[TermId; 3]>,
 }
 
@@ -28,7 +28,7 @@ impl Graph {
         Self { by_subject: triples, by_property }
     }
 
-    /// Statements with the given parts.
+    /// Returns the statements that match the given parts; `None` matches any term.
     fn find(&self, s: Option<TermId>, p: Option<TermId>, o: Option<TermId>) -> Vec<[TermId; 3]> {
         let fits = |[a, b, c]: &[TermId; 3]| {
             s.is_none_or(|s| s == *a) && p.is_none_or(|p| p == *b) && o.is_none_or(|o| o == *c)
@@ -43,7 +43,7 @@ impl Graph {
     }
 }
 
-/// Rows that begin with one or two numbers.
+/// Returns the rows that begin with the given one or two ids.
 fn range(rows: &[[TermId; 3]], first: TermId, second: Option<TermId>) -> &[[TermId; 3]] {
     let key = |row: &[TermId; 3]| (row[0], second.map_or(0, |_| row[1]));
     let wanted = (first, second.unwrap_or(0));
@@ -52,21 +52,21 @@ fn range(rows: &[[TermId; 3]], first: TermId, second: Option<TermId>) -> &[[Term
     &rows[start..start + length]
 }
 
-/// The named graphs of one action. The default graph is all of them together.
+/// The named graphs of one action. The default graph is their union.
 #[derive(Debug)]
 pub(crate) struct Snapshot {
     /// Name and statements.
     pub(crate) graphs: Vec<(TermId, Graph)>,
 }
 
-/// What never changes: the ontology's statements and the name of their graph.
+/// The constant part of the dataset: the ontology's statements and the graph names.
 #[derive(Debug)]
 pub(crate) struct Statements {
     pub(crate) name: TermId,
     pub(crate) graph: Graph,
-    /// Name of the graph of designators.
+    /// Name of the graph with the designators.
     pub(crate) parameters: TermId,
-    /// Property between a designator and its value.
+    /// Property that links a designator to its value.
     pub(crate) value: TermId,
 }
 
@@ -81,7 +81,7 @@ impl Statements {
     }
 }
 
-/// A view of both, with the ledger of all terms that it hands out.
+/// A view of both, with the ledger that counts the terms it returns.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
     pub(crate) snapshot: &'a Snapshot,
@@ -90,14 +90,14 @@ pub(crate) struct View<'a> {
     pub(crate) ledger: &'a Ledger,
 }
 
-/// A term in the evaluator's hands. Copying it may end the evaluation.
+/// A term held by the evaluator. Copying it may stop the evaluation.
 #[derive(Debug, Clone)]
 pub(crate) struct ViewTerm<'a> {
     value: Value,
     _entry: Entry<'a>,
 }
 
-/// A term of the dataset by its number, or one that the query made.
+/// A term of the dataset by id, or a term created by the query.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 enum Value {
     Known(TermId),
@@ -105,7 +105,7 @@ enum Value {
 }
 
 impl ViewTerm<'_> {
-    /// The number, where a pattern can match at all.
+    /// Returns the id, or `None` for a term created by the query, which matches no statement.
     fn id(&self) -> Option<TermId> {
         match self.value {
             Value::Known(id) => Some(id),
@@ -150,7 +150,7 @@ impl<'a> QueryableDataset<'a> for View<'a> {
         object: Option<&ViewTerm<'a>>,
         graph_name: Option<Option<&ViewTerm<'a>>>,
     ) -> impl Iterator<Item = Result<InternalQuad<ViewTerm<'a>>, Infallible>> + use<'a> {
-        // A pattern that finds nothing hands nothing out, and yet takes its time.
+        // A lookup without results returns no counted terms but takes time, so check the clock here.
         self.ledger.look();
         let mut found = Vec::new();
         let parts = [subject, predicate, object];
@@ -196,7 +196,7 @@ impl<'a> QueryableDataset<'a> for View<'a> {
     }
 }
 
-/// oxigraph's form of a term.
+/// Converts a term to oxigraph's type.
 pub(crate) fn to_rdf(term: &Term) -> RdfTerm {
     let iri = |iri: &str| NamedNode::new_unchecked(iri);
     match term {
@@ -214,7 +214,7 @@ pub(crate) fn to_rdf(term: &Term) -> RdfTerm {
     }
 }
 
-/// Our form of one of oxigraph's terms.
+/// Converts one of oxigraph's terms to ours.
 pub(crate) fn from_rdf(term: &RdfTerm) -> Term {
     match term {
         RdfTerm::NamedNode(node) => Term::iri(node.as_str()),

@@ -29,7 +29,7 @@ impl Tables {
         self.list.get(predicate)?.as_deref()
     }
 
-    /// The rows of a predicate, taken out.
+    /// Removes and returns the rows of a predicate.
     pub(crate) fn take_rows(&mut self, predicate: PredicateId) -> Vec<TermId> {
         self.list.get_mut(predicate).and_then(Option::take).map_or(Vec::new(), |table| table.index(0).to_vec())
     }
@@ -42,10 +42,10 @@ impl Tables {
     }
 }
 
-/// Finished tuples in layers: what is not in the own tables is looked up in those below.
+/// Finished tuples in layers: a predicate missing from the own tables is looked up in the layers below.
 pub(crate) struct Layers<'a> {
     pub(crate) own: Tables,
-    /// The nearest first.
+    /// Nearest layer first.
     pub(crate) below: Vec<&'a Tables>,
 }
 
@@ -54,7 +54,7 @@ impl Layers<'_> {
         self.own.get(predicate).or_else(|| self.below.iter().find_map(|tables| tables.get(predicate)))
     }
 
-    /// The rows of a predicate, sorted; none where it has no tuples.
+    /// Returns the sorted rows of a predicate; empty if it has no tuples.
     pub(crate) fn rows(&self, predicate: PredicateId) -> &[TermId] {
         self.get(predicate).map_or(&[], |table| table.index(0))
     }
@@ -65,7 +65,7 @@ impl Layers<'_> {
 pub(crate) struct Planned {
     pub(crate) rules: Vec<Rule>,
     pub(crate) strata: Vec<Stratum>,
-    /// Facts of the text: rows one behind the other.
+    /// Facts of the text, as rows stored one after another.
     pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,
     plans: Vec<Option<RulePlan>>,
 }
@@ -87,12 +87,12 @@ impl Planned {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stopped {
     pub(crate) stop: Stop,
-    /// Index of the rule, where it was one's doing.
+    /// Index of the rule being evaluated, if known.
     pub(crate) rule: Option<usize>,
 }
 
-/// The round in which each tuple of a recursive stratum was first derived, counted over all strata. A proof that takes
-/// premises of smaller rounds only can't go in circles.
+/// The round in which each tuple of a recursive stratum was first derived, counted over all strata. A proof that uses
+/// only premises of earlier rounds can't be circular.
 #[derive(Debug, Default)]
 pub(crate) struct Rounds {
     of: HashMap<(PredicateId, Vec<TermId>), u32>,
@@ -100,13 +100,13 @@ pub(crate) struct Rounds {
 }
 
 impl Rounds {
-    /// The round of a tuple; nothing for one of a stratum that does not read itself.
+    /// Returns the round of a tuple, or `None` if its stratum is not recursive.
     pub(crate) fn of(&self, predicate: PredicateId, row: &[TermId]) -> Option<u32> {
         self.of.get(&(predicate, row.to_vec())).copied()
     }
 }
 
-/// Evaluates a program over what is in the layers; its results go to the layers' own tables.
+/// Evaluates a program over the tuples in the layers. The results go to the layers' own tables.
 pub(crate) fn evaluate(
     planned: &Planned,
     predicates: &Predicates,
@@ -118,7 +118,7 @@ pub(crate) fn evaluate(
     evaluate_noting(planned, predicates, indexes, layers, universe, meter, None)
 }
 
-/// Evaluates a program and notes the round of each tuple, for explanations.
+/// Evaluates a program and, for explanations, records the round of each tuple.
 pub(crate) fn evaluate_noting(
     planned: &Planned,
     predicates: &Predicates,
@@ -141,7 +141,7 @@ pub(crate) fn evaluate_noting(
     Ok(())
 }
 
-/// Matches of an aggregating rule's body that are kept at once. Unit: 4 bytes; 1 GiB.
+/// Maximum size of the matches kept at once for an aggregating rule. Unit: terms of 4 bytes (1 GiB).
 const AGGREGATE_LIMIT: usize = 1 << 28;
 
 struct Run<'a, 'u, 't> {
@@ -157,7 +157,7 @@ struct Run<'a, 'u, 't> {
 type Grown = Vec<Box<dyn Growing>>;
 
 impl Run<'_, '_, '_> {
-    /// Facts of the text join what is there already.
+    /// Adds the facts of the text to the existing tuples.
     fn facts(&mut self, layers: &mut Layers<'_>) {
         for (predicate, facts) in &self.planned.facts {
             let mut rows = layers.rows(*predicate).to_vec();
@@ -171,7 +171,7 @@ impl Run<'_, '_, '_> {
         layers.own.set(predicate, finished(width, rows, self.indexes.of(predicate).clone()));
     }
 
-    /// A stratum that does not read itself: each rule once.
+    /// Evaluates a stratum without recursion: each rule once.
     fn once(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let Some(predicate) = stratum.predicates.first().copied() else { return Ok(()) };
         let mut rows = layers.rows(predicate).to_vec();
@@ -188,7 +188,7 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// A stratum that reads itself: rounds, each with what the one before found.
+    /// Evaluates a recursive stratum in rounds, each over the tuples found in the previous one.
     fn recursive(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let mut grown = self.grow(stratum, layers);
         for rule in &stratum.rules {
@@ -218,7 +218,7 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// Notes the round of what is recent, where somebody wants to know.
+    /// Records the round of the recent tuples, if rounds are requested.
     fn note(&mut self, stratum: &Stratum, grown: &Grown) {
         let Some(rounds) = &mut self.rounds else { return };
         rounds.next += 1;
@@ -236,7 +236,7 @@ impl Run<'_, '_, '_> {
         self.planned.plans[rule].as_ref().is_some_and(|plan| plan.variants.iter().any(|variant| variant.recent))
     }
 
-    /// The stratum's predicates with what is known of them, ready to grow.
+    /// Creates the growing tuples of the stratum's predicates, with the known tuples inserted.
     fn grow(&self, stratum: &Stratum, layers: &Layers<'_>) -> Grown {
         let mut wanted: Vec<Vec<bool>> =
             stratum.predicates.iter().map(|p| vec![false; self.indexes.of(*p).len()]).collect();
@@ -261,7 +261,7 @@ impl Run<'_, '_, '_> {
         grown
     }
 
-    /// Adds what one rule finds: with recent tuples, or before there are any.
+    /// Adds the tuples derived by the variants of one rule that read recent tuples, or by those that don't.
     fn insert_all(
         &mut self,
         rule: usize,
@@ -289,7 +289,7 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// The rows that each step of a variant reads, and their widths; nothing where an atom has none to match.
+    /// Returns the rows that each step of a variant reads, and their widths. Returns `None` if an atom has no rows.
     fn sources<'b>(
         &self,
         variant: &Variant,
@@ -324,7 +324,7 @@ impl Run<'_, '_, '_> {
         Some((batches, widths))
     }
 
-    /// The head rows that one variant finds.
+    /// Returns the head rows that one variant derives.
     fn variant(
         &mut self,
         rule: usize,

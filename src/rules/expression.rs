@@ -1,4 +1,4 @@
-//! Computations of a checked rule, and their values under a binding of its variables.
+//! Checked expressions and their evaluation under a binding of the rule's variables.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -14,7 +14,7 @@ use crate::rules::universe::Universe;
 pub(crate) enum Expr {
     /// A constant.
     Constant(Term),
-    /// A variable, bound before this is evaluated.
+    /// A variable, bound before the expression is evaluated.
     Variable(Variable),
     /// A built-in.
     Call(&'static Builtin, Vec<Expr>),
@@ -25,7 +25,7 @@ pub(crate) enum Expr {
 }
 
 impl Expr {
-    /// Adds the variables that occur in it.
+    /// Appends the variables that occur in the expression.
     pub(crate) fn variables(&self, found: &mut Vec<Variable>) {
         match self {
             Self::Constant(_) => {}
@@ -35,7 +35,7 @@ impl Expr {
         }
     }
 
-    /// Its value; nothing where a built-in has no result for its arguments.
+    /// Computes the value. Returns `None` if a built-in has no result for its arguments.
     pub(crate) fn value<'a>(&'a self, binding: &[TermId], terms: &'a Universe<'_>) -> Option<Value<'a>> {
         match self {
             Self::Constant(term) => Some(Cow::Borrowed(term)),
@@ -67,7 +67,7 @@ impl Expr {
     }
 }
 
-/// Whether a comparison holds. What can't be compared does not hold.
+/// Returns whether a comparison holds; `false` for terms that can't be ordered.
 pub(crate) fn holds(op: Comparison, left: &Term, right: &Term) -> bool {
     let ordered = |wanted: fn(Ordering) -> bool| builtins::compare(left, right).is_some_and(wanted);
     match op {

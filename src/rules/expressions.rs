@@ -1,4 +1,4 @@
-//! Expressions and aggregates of one rule, from their syntax to checked computations.
+//! Translates the expressions and aggregates of one rule from syntax to checked expressions.
 
 use crate::base::{Span, Term, did_you_mean};
 use crate::rules::builtins;
@@ -9,7 +9,7 @@ use crate::rules::syntax::{Expression, ExpressionKind};
 use crate::rules::translate::Translation;
 
 impl Translation<'_, '_> {
-    /// An expression of a head around aggregates: the variables outside of them group.
+    /// Translates a head expression that contains aggregates. Variables outside the aggregates are grouping variables.
     pub(crate) fn aggregated(&mut self, expression: &Expression, aggregation: &mut Aggregation) -> Option<Expr> {
         match &expression.kind {
             ExpressionKind::Aggregate(name, args) => self.aggregate(name, args, &expression.span, aggregation),
@@ -57,8 +57,8 @@ impl Translation<'_, '_> {
             return None;
         };
         if let Some(inner) = args.iter().find(|arg| contains_aggregate(arg)) {
-            let help = "compute the inner one in a rule of its own";
-            self.error("R032", &inner.span, "an aggregate in an aggregate", help);
+            let help = "compute the inner aggregate in a separate rule";
+            self.error("R032", &inner.span, "nested aggregate", help);
             return None;
         }
         let mut inputs = Vec::new();
@@ -74,7 +74,7 @@ impl Translation<'_, '_> {
             });
         }
         let Some((input, distinct)) = inputs.split_first() else {
-            self.error("R032", span, format!("`#{name}` of nothing"), format!("write `#{name}(?x)`"));
+            self.error("R032", span, format!("`#{name}` has no arguments"), format!("write `#{name}(?x)`"));
             return None;
         };
         let output = self.made_variable(span);
@@ -82,7 +82,7 @@ impl Translation<'_, '_> {
         Some(Expr::Variable(output))
     }
 
-    /// A checked expression; nothing where a fault was noted.
+    /// Translates an expression. Returns `None` if an error was reported.
     pub(crate) fn expression(&mut self, expression: &Expression) -> Option<Expr> {
         let span = &expression.span;
         match &expression.kind {
@@ -127,17 +127,17 @@ impl Translation<'_, '_> {
         match &expression.kind {
             ExpressionKind::Anonymous => self.error("R035", span, "`_` has no value to compute with", "use a variable"),
             ExpressionKind::Existential(name) => {
-                let help = "this engine derives facts about known things only: existential rules are not supported";
-                self.error("R039", span, format!("existential variable `!{name}`"), help);
+                let help = "a rule can't create new terms: use a variable of the body";
+                self.error("R039", span, format!("existential variable `!{name}` is not supported"), help);
             }
             ExpressionKind::Aggregate(name, _) => {
-                let help = "aggregates stand in heads: derive the value in a rule of its own and use that here";
-                self.error("R032", span, format!("`#{name}` in a body"), help);
+                let help = "write aggregates in heads: derive the value in a separate rule and use it here";
+                self.error("R032", span, format!("aggregate `#{name}` in a body"), help);
             }
             ExpressionKind::Tuple(_) => {
                 self.error("R012", span, "tuples are not supported", "use one argument for each part")
             }
-            // The parser has said it already.
+            // The parser has already reported it.
             _ => self.faulty = true,
         }
         None
@@ -146,7 +146,7 @@ impl Translation<'_, '_> {
     pub(crate) fn call(&mut self, name: &str, args: Vec<Expr>, span: &Span) -> Option<Expr> {
         let Some(builtin) = builtins::builtin(name) else {
             if name.starts_with("geo3d:") {
-                // The prefix is unknown, which the parser has said.
+                // The prefix is unknown, which the parser has reported.
                 self.faulty = true;
                 return None;
             }
@@ -172,12 +172,7 @@ impl Translation<'_, '_> {
             return match builtins::compile_pattern(pattern) {
                 Ok(pattern) => args.into_iter().next().map(|text| Expr::Matches(Box::new(text), Box::new(pattern))),
                 Err(reason) => {
-                    self.error(
-                        "R033",
-                        span,
-                        format!("the pattern can't be read: {reason}"),
-                        "see https://docs.rs/regex/#syntax",
-                    );
+                    self.error("R033", span, format!("invalid pattern: {reason}"), "see https://docs.rs/regex/#syntax");
                     None
                 }
             };
@@ -186,7 +181,7 @@ impl Translation<'_, '_> {
     }
 }
 
-/// Adds a variable that is not there yet.
+/// Appends a variable unless the list contains it.
 pub(crate) fn push_new(list: &mut Vec<Variable>, variable: Variable) {
     if !list.contains(&variable) {
         list.push(variable);
@@ -202,7 +197,7 @@ fn operator(symbol: char) -> &'static str {
     }
 }
 
-/// Whether an aggregate occurs anywhere in it.
+/// Returns whether an expression contains an aggregate.
 pub(crate) fn contains_aggregate(expression: &Expression) -> bool {
     match &expression.kind {
         ExpressionKind::Aggregate(..) => true,

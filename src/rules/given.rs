@@ -1,10 +1,10 @@
-//! The predicates that rules are given: the snapshots, the designators, the ontology.
+//! The given predicates: the snapshots, the designators, the ontology.
 
 use crate::base::Term;
 use crate::base::{TermId, Terms, names};
 use crate::rules::program::{Predicate, PredicateId, Predicates};
 
-/// Given predicates with their arguments, as people read them.
+/// Name, signature and arity of each given predicate.
 pub(crate) const GIVEN: [(&str, &str, usize); 6] = [
     ("state", "state(phase, subject, property, object)", 4),
     ("before", "before(subject, property, object)", 3),
@@ -14,16 +14,16 @@ pub(crate) const GIVEN: [(&str, &str, usize); 6] = [
     ("parameter", "parameter(designator, value)", 2),
 ];
 
-/// What a property's file may define for the verdict: name and meaning.
+/// The predicates of a property's file that determine the verdict: name and meaning.
 pub(crate) const VERDICT: [(&str, &str); 5] = [
     ("success", "its tuples prove that the property holds"),
     ("violation", "its tuples prove that the property does not hold"),
     ("margin", "how far the outcome is from flipping, in the property's unit"),
-    ("applicable", "where it is defined and empty, the property is inapplicable"),
+    ("applicable", "if it is defined and has no tuples, the property is inapplicable"),
     ("because", "the author's words for the outcome"),
 ];
 
-/// The place of the property among the arguments, for predicates that are split by it.
+/// Returns the index of the property argument. Returns `None` for predicates that are not split by property.
 pub(crate) fn property_place(name: &str) -> Option<usize> {
     match name {
         "state" => Some(2),
@@ -32,12 +32,12 @@ pub(crate) fn property_place(name: &str) -> Option<usize> {
     }
 }
 
-/// IRI of the phase that a shorthand stands for.
+/// Returns the IRI of the phase for a shorthand predicate such as `before`. Returns `None` for other predicates.
 pub(crate) fn phase_of(shorthand: &str) -> Option<String> {
     matches!(shorthand, "before" | "after" | "during").then(|| names::act(shorthand))
 }
 
-/// Numbers of the three phases.
+/// Ids of the three phases.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Phases {
     pub(crate) before: TermId,
@@ -52,7 +52,7 @@ impl Phases {
     }
 }
 
-/// The predicate of a given name, for one property or for all.
+/// Adds the given predicate of a name, for one property or for any.
 pub(crate) fn add_given(predicates: &mut Predicates, name: &str, property: Option<TermId>) -> PredicateId {
     let arity = GIVEN.iter().find(|(given, ..)| *given == name).map_or(0, |(_, _, arity)| *arity);
     let width = arity - usize::from(property.is_some());

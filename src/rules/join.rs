@@ -1,4 +1,4 @@
-//! One variant of one rule: all bindings that satisfy its conditions, found by looking up sorted rows.
+//! Evaluates one variant of a rule: finds all bindings that satisfy its conditions by lookups in sorted rows.
 
 use crate::base::{Term, TermId};
 use crate::rules::expression::holds;
@@ -8,21 +8,21 @@ use crate::rules::program::{MAX_ARITY, Operand};
 use crate::rules::relation::Batch;
 use crate::rules::universe::Universe;
 
-/// Rows that a rule makes.
+/// Collects the rows that a rule derives.
 #[derive(Debug, Default)]
 pub(crate) struct Sink {
-    /// What of a binding makes a row.
+    /// The operands that form a row.
     pub(crate) operands: Vec<Operand>,
-    /// Rows one behind the other.
+    /// Rows, one after another.
     pub(crate) rows: Vec<TermId>,
 }
 
 /// The evaluation of one variant.
 pub(crate) struct Join<'a, 'u, 't> {
     pub(crate) ops: &'a [Op],
-    /// Sorted rows for each step that reads some.
+    /// Sorted rows for each step; empty for steps that read none.
     pub(crate) batches: &'a [Vec<Batch<'a>>],
-    /// Columns of what each step reads.
+    /// Number of columns that each step reads.
     pub(crate) widths: &'a [usize],
     pub(crate) binding: Vec<TermId>,
     pub(crate) universe: &'u mut Universe<'t>,
@@ -32,11 +32,11 @@ pub(crate) struct Join<'a, 'u, 't> {
     pub(crate) flush: &'u mut dyn FnMut(&mut Sink) -> Result<(), Stop>,
 }
 
-/// Numbers in a sink before it is flushed. Unit: 4 bytes; 64 MiB.
+/// Maximum length of a sink before it is flushed. Unit: terms of 4 bytes (64 MiB).
 const SINK_LIMIT: usize = 1 << 24;
 
 impl Join<'_, '_, '_> {
-    /// Goes through the steps from one on, for every way to satisfy them.
+    /// Runs the steps from `at` on, for every binding that satisfies them.
     pub(crate) fn run(&mut self, at: usize) -> Result<(), Stop> {
         let ops = self.ops;
         match ops.get(at) {
@@ -123,7 +123,7 @@ impl Join<'_, '_, '_> {
     }
 }
 
-/// Where the rows begin that are not smaller than a key. Unit: numbers, not rows.
+/// Returns the start of the first row that is not less than a key. Unit: terms, not rows.
 fn lower_bound(rows: &[TermId], width: usize, key: &[TermId]) -> usize {
     let (mut low, mut high) = (0, rows.len() / width);
     if let [first] = key {

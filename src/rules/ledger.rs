@@ -1,9 +1,9 @@
-//! Holds a SPARQL evaluation to its budget: every term that the evaluator copies is entered here.
+//! Enforces the budget of a SPARQL evaluation by counting every term that the evaluator copies.
 //!
-//! The evaluator forms products, groups and sorted lists inside itself and asks nobody whether it may go on; its
-//! cancellation is looked at only where statements are read. But whatever it forms is made of copied terms. The copy that
-//! finds the budget spent unwinds the stack up to [`Ledger::hold`], as rust-analyzer's database (salsa) unwinds a query
-//! that is cancelled. That is no panic: no hook runs, and nothing of the evaluation is looked at afterwards.
+//! The evaluator checks its cancellation token only when it reads statements, not while it builds products, groups and
+//! sorted lists. All of these consist of copied terms, however. A copy that exceeds the budget unwinds the stack up to
+//! [`Ledger::hold`], as rust-analyzer's database (salsa) unwinds a cancelled query. This is not a panic: no hook runs,
+//! and no state of the evaluation is used afterwards.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -11,38 +11,38 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use crate::rules::findings::Budget;
 use crate::rules::meter::{Stop, Watch};
 
-/// Terms copied between two looks at the clock: under 0.1 ms.
+/// Terms copied between two checks of the clock: under 0.1 ms.
 const COPIES_PER_LOOK: u32 = 1024;
 
-/// What a query has in its hands, and how long it may go on.
+/// The number of terms that a query holds, and its time limit.
 #[derive(Debug)]
 pub(crate) struct Ledger {
     watch: Watch,
-    /// Terms that may be held at once.
+    /// Maximum number of terms held at once.
     limit: usize,
     held: Cell<usize>,
     copies: Cell<u32>,
 }
 
 impl Ledger {
-    /// Time begins now. A query may hold as many terms at once as rules may derive tuples.
+    /// Starts the clock. A query may hold as many terms at once as rules may derive tuples.
     pub(crate) fn new(budget: &Budget) -> Self {
         Self { watch: Watch::new(budget), limit: budget.tuples, held: Cell::new(0), copies: Cell::new(0) }
     }
 
-    /// Does some work over this ledger's entries, as far as the budget goes.
+    /// Runs some work within the budget.
     ///
     /// # Errors
-    /// Why it ended before its end.
+    /// The reason why the work was stopped.
     pub(crate) fn hold<T>(&self, work: impl FnOnce() -> T) -> Result<T, Stop> {
-        // Nothing that the work has touched is used after it was given up.
+        // After an unwind, no state touched by the work is used.
         catch_unwind(AssertUnwindSafe(work)).map_err(|thrown| match thrown.downcast::<Stop>() {
             Ok(stop) => *stop,
             Err(other) => resume_unwind(other),
         })
     }
 
-    /// Looks at the clock; gives up where time is over.
+    /// Checks the clock and unwinds if the time is over.
     pub(crate) fn look(&self) {
         if let Err(stop) = self.watch.look() {
             resume_unwind(Box::new(stop));
@@ -50,12 +50,12 @@ impl Ledger {
     }
 }
 
-/// The entry of one term in the ledger, for as long as the term is held.
+/// Counts one term in the ledger for as long as the term is held.
 #[derive(Debug)]
 pub(crate) struct Entry<'a>(&'a Ledger);
 
 impl<'a> Entry<'a> {
-    /// Enters a term, or gives the work up.
+    /// Counts a term, or unwinds if the budget is exceeded.
     pub(crate) fn new(ledger: &'a Ledger) -> Self {
         ledger.copies.set(ledger.copies.get() + 1);
         if ledger.copies.get() >= COPIES_PER_LOOK {

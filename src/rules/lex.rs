@@ -1,9 +1,9 @@
-//! Rule text to tokens with their places.
+//! Lexer: splits a rule text into tokens with source spans.
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span};
 use crate::rules::limits::FAULT_LIMIT;
 
-/// What a token is. Texts are decoded already: no quotes, no indicators.
+/// A token. Text is already decoded: without quotes and without sigils such as `?` or `$`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Token {
     /// A bare name: predicate, constant, built-in, format.
@@ -14,7 +14,7 @@ pub enum Token {
     Iri(String),
     /// `?x`.
     Variable(String),
-    /// `!x`: a variable that stands for something new.
+    /// `!x`: an existential variable.
     Existential(String),
     /// `$x`: a parameter of the program.
     Global(String),
@@ -24,15 +24,15 @@ pub enum Token {
     Blank(String),
     /// A string, with escapes resolved.
     String(String),
-    /// `@en` right behind a string.
+    /// `@en` directly after a string.
     Language(String),
     /// The pieces of an f-string.
     Format(Vec<FormatPiece>),
     /// A number as written, without sign.
     Number(String),
-    /// `@import` and the like.
+    /// A directive, for example `@import`.
     Directive(String),
-    /// `#count` and the like.
+    /// An aggregate, for example `#count`.
     Aggregate(String),
     /// `#[`.
     AttributeOpen,
@@ -45,22 +45,22 @@ pub enum Token {
 /// One piece of an f-string.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FormatPiece {
-    /// Text that stands for itself.
+    /// Literal text.
     Text(String),
     /// An expression: its tokens, closed by [`Token::End`].
     Code(Vec<Spanned>),
 }
 
-/// A token and its place.
+/// A token with its place in the source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spanned {
-    /// What it is.
+    /// The token.
     pub token: Token,
-    /// Where it is. Unit: bytes of the source.
+    /// Its place. Unit: bytes of the source.
     pub span: Span,
 }
 
-/// Cuts a text into tokens. Faults are noted and skipped; the last token is always [`Token::End`].
+/// Splits a text into tokens. Errors are reported and skipped; the last token is always [`Token::End`].
 pub fn lex(source: &Source, diagnostics: &mut Diagnostics) -> Vec<Spanned> {
     Lexer { source, text: &source.text, at: 0, end: source.text.len(), depth: 0, diagnostics }.run()
 }
@@ -74,7 +74,7 @@ pub(crate) struct Lexer<'a> {
     diagnostics: &'a mut Diagnostics,
 }
 
-/// Longest first where one begins another.
+/// A symbol comes before its own prefixes, so that the longest one matches.
 const SYMBOLS: [&str; 25] = [
     ":-", ">=", "<=", "!=", "^^", "(", ")", "{", "}", "[", "]", ",", ".", "~", "=", "<", ">", "+", "-", "*", "/", ":",
     "|", ";", "&",
@@ -123,7 +123,7 @@ impl Lexer<'_> {
         }
     }
 
-    /// White space and comments of every form.
+    /// Skips white space and comments of both forms.
     pub(crate) fn skip_blank(&mut self) {
         loop {
             self.take_while(char::is_whitespace);
@@ -203,7 +203,7 @@ impl Lexer<'_> {
         let c = self.peek()?;
         self.at += c.len_utf8();
         let help = match c {
-            '\'' => "strings stand in double quotes",
+            '\'' => "write strings in double quotes",
             '!' => "write `~` before an atom for \"not\", `!=` for \"differs from\"",
             _ => "remove it, or put it in a string",
         };
@@ -213,7 +213,7 @@ impl Lexer<'_> {
 
     fn name(&mut self) -> Token {
         let name = self.name_with_escapes();
-        // `p:local` and `p:`, but not the arrow of `p:-`.
+        // Matches `p:local` and `p:`, but not the arrow in `p:-`.
         if self.peek() == Some(':') && self.peek_second() != Some('-') {
             self.at += 1;
             let local = self.name_with_escapes();
@@ -222,7 +222,7 @@ impl Lexer<'_> {
         Token::Name(name)
     }
 
-    /// A name in which `%20` and the like may stand. (Any other `%` begins a comment.)
+    /// Reads a name, which may contain percent escapes such as `%20`. (Any other `%` begins a comment.)
     fn name_with_escapes(&mut self) -> String {
         let mut name = self.take_while(continues_name);
         while self.rest().starts_with('%')
@@ -235,7 +235,7 @@ impl Lexer<'_> {
         name
     }
 
-    /// `<` opens an IRI when its `>` comes before any blank; otherwise it compares.
+    /// Reads an IRI if the matching `>` comes before any white space; otherwise `<` is the operator.
     fn iri_or_less(&mut self) -> Option<Token> {
         let inside = &self.rest()[1..];
         let length = inside.find(|c: char| c == '>' || c.is_whitespace() || "<\"{}|^`".contains(c));
@@ -269,7 +269,7 @@ impl Lexer<'_> {
         Some(Token::Aggregate(name))
     }
 
-    /// Digits, fraction, exponent and type mark; or `0b`, `0o`, `0x`.
+    /// Reads digits, fraction, exponent and type suffix; or an integer that begins with `0b`, `0o` or `0x`.
     fn number(&mut self) -> Token {
         let start = self.at;
         for (prefix, radix) in [("0b", 2), ("0o", 8), ("0x", 16)] {

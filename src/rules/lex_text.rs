@@ -1,8 +1,8 @@
-//! Strings of a rule text: escapes, several lines, f-strings with code in them.
+//! Lexer for strings: escapes, multi-line strings, and f-strings with embedded expressions.
 
 use crate::rules::lex::{FormatPiece, Lexer, Spanned, Token};
 
-/// F-strings in f-strings deeper than this are refused.
+/// Maximum nesting depth of f-strings.
 const FORMAT_DEPTH: usize = 8;
 
 impl Lexer<'_> {
@@ -30,7 +30,7 @@ impl Lexer<'_> {
                 }
             }
         }
-        let help = "close it with `\"`; a string over several lines stands in `\"\"\"`";
+        let help = "close it with `\"`; write a string of several lines in `\"\"\"`";
         self.error("R003", start..start + 1, "string has no end".into(), help);
         Some(Token::String(out))
     }
@@ -59,13 +59,13 @@ impl Lexer<'_> {
         match u32::from_str_radix(&hex, 16).ok().filter(|_| hex.len() == digits).and_then(char::from_u32) {
             Some(c) => out.push(c),
             None => {
-                let help = "give the number of a Unicode character in 4 (\\u) or 8 (\\U) hexadecimal digits";
-                self.error("R004", start..self.at, "no such character".into(), help);
+                let help = "write a Unicode code point with 4 (\\u) or 8 (\\U) hexadecimal digits";
+                self.error("R004", start..self.at, "the escape is not a Unicode character".into(), help);
             }
         }
     }
 
-    /// `f"…{code}…"`; `{{` and `}}` stand for braces.
+    /// Reads `f"…{code}…"`; `{{` and `}}` are escaped braces.
     pub(crate) fn format(&mut self) -> Option<Token> {
         let start = self.at;
         let triple = self.rest().starts_with("f\"\"\"");
@@ -103,20 +103,20 @@ impl Lexer<'_> {
         Some(Token::Format(pieces))
     }
 
-    /// The tokens between `{` and its `}`.
+    /// Returns the tokens between `{` and its `}`.
     fn format_code(&mut self) -> Option<Vec<Spanned>> {
         let start = self.at;
         self.at += 1;
         if self.depth >= FORMAT_DEPTH {
             self.at = self.end;
-            let help = "compute the inner text in an assignment of its own";
+            let help = "compute the inner text in a separate assignment";
             self.error("R005", start..start + 1, "f-strings are nested too deeply".into(), help);
             return None;
         }
         self.depth += 1;
         let mut tokens: Vec<Spanned> = Vec::new();
         let mut open = 0usize;
-        // The closing brace, or nothing where it is missing: a place must not cut a character.
+        // The span of the closing brace; empty if it is missing, because a span must not split a character.
         let close = loop {
             self.skip_blank();
             let at = self.at;

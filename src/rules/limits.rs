@@ -1,22 +1,22 @@
-//! The most that a rule text may hold, so that everything behind the parser stays fast and shallow on any input.
+//! Size limits of rule texts, so that the stages after the parser stay fast and their recursion shallow on any input.
 //!
-//! Each is far out of a sound rule's way; what is above it gets a fault that names it.
+//! Each limit is far above realistic rules. Exceeding one is reported as an error that names the limit.
 
-/// Larger texts are refused. Unit: bytes. (The largest rule file we know of is a hundredth of it.)
+/// Maximum size of a text. Unit: bytes. (The largest rule file we know of is a hundredth of it.)
 pub(crate) const SIZE_LIMIT: usize = 32 << 20;
-/// Faults noted per file by each stage; more help nobody.
+/// Maximum number of errors reported per file by each stage; more would not help.
 pub(crate) const FAULT_LIMIT: usize = 50;
-/// Warnings noted in all.
+/// Maximum number of warnings in total.
 pub(crate) const WARNING_LIMIT: usize = 200;
-/// Prefixes of one file.
+/// Maximum number of prefixes in one file.
 pub(crate) const PREFIX_LIMIT: usize = 1_000;
-/// Rules of a property's file or a library; programs of their own may have more.
+/// Maximum number of rules in a property's file or a library; standalone programs may have more.
 pub(crate) const RULE_LIMIT: usize = 20_000;
-/// Conditions of one rule.
+/// Maximum number of conditions in one rule.
 pub(crate) const LITERAL_LIMIT: usize = 256;
-/// Variables of one rule, those among them that stand for a computed argument.
+/// Maximum number of variables in one rule, including generated ones.
 pub(crate) const VARIABLE_LIMIT: usize = 1_024;
-/// Arguments of one function or atom, as they are written.
+/// Maximum number of arguments of one function or atom, as written.
 pub(crate) const ARGUMENT_LIMIT: usize = 1_024;
-/// Predicates shown of a cycle.
+/// Maximum number of predicates shown in a cycle.
 pub(crate) const CYCLE_SHOWN: usize = 12;

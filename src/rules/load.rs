@@ -1,4 +1,4 @@
-//! The facts of one action as rows of the given predicates, with no detour through an RDF store.
+//! Loads the facts of one action directly into rows of the given predicates, without an RDF store.
 
 use std::collections::HashMap;
 
@@ -11,16 +11,16 @@ use crate::rules::program::{PredicateId, Predicates};
 use crate::rules::relation::finished;
 use crate::rules::universe::Universe;
 
-/// Which predicates some rules read facts from.
+/// The given predicates that the rules read.
 #[derive(Debug, Clone)]
 pub(crate) struct Given {
     phases: Phases,
-    /// `state` of one property.
+    /// `state` for one property each.
     state: HashMap<TermId, PredicateId>,
-    /// `state` of all properties.
+    /// `state` for any property.
     any_state: Option<PredicateId>,
     parameter: Option<PredicateId>,
-    /// `ontology` of one property.
+    /// `ontology` for one property each.
     ontology: HashMap<TermId, PredicateId>,
     any_ontology: Option<PredicateId>,
 }
@@ -51,7 +51,7 @@ impl Given {
         given
     }
 
-    /// Rows of the ontology's statements.
+    /// Loads the ontology's statements.
     pub(crate) fn load_ontology(&self, triples: &[[TermId; 3]], predicates: &Predicates, indexes: &Indexes) -> Tables {
         let mut rows: HashMap<PredicateId, Vec<TermId>> = HashMap::new();
         for [s, p, o] in triples {
@@ -65,7 +65,7 @@ impl Given {
         tables(rows, predicates, indexes)
     }
 
-    /// Rows of an action's facts, of those predicates only that somebody reads.
+    /// Loads an action's facts into the predicates that some rule reads.
     pub(crate) fn load(
         &self,
         facts: &ActionFacts<'_>,
@@ -100,23 +100,23 @@ impl Given {
         tables
     }
 
-    /// The three snapshots with the number of their phase.
+    /// Returns the three snapshots, each with the id of its phase.
     pub(crate) fn graphs<'a>(&self, facts: &ActionFacts<'a>) -> [(TermId, &'a [Triple]); 3] {
         [(self.phases.before, facts.before), (self.phases.after, facts.after), (self.phases.during, facts.during)]
     }
 
-    /// `state` predicates of single properties, with their property.
+    /// Returns the `state` predicates for single properties, each with its property.
     pub(crate) fn states(&self) -> impl Iterator<Item = (TermId, PredicateId)> + '_ {
         self.state.iter().map(|(property, predicate)| (*property, *predicate))
     }
 
-    /// `state` of all properties, where some rule reads or derives it.
+    /// Returns `state` for any property, or `None` if no rule reads or derives it.
     pub(crate) fn any_state(&self) -> Option<PredicateId> {
         self.any_state
     }
 }
 
-/// Which predicate reads the facts of a property; looked up once for each property of a run.
+/// Caches which predicate reads the facts of each property of a run.
 struct Readers<'a> {
     given: &'a Given,
     of_property: Vec<Option<Option<PredicateId>>>,

@@ -1,4 +1,4 @@
-//! How much an evaluation may still do, and why it stopped.
+//! Enforces the budget of an evaluation.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,29 +10,29 @@ use crate::rules::program::Rule;
 /// Why an evaluation stopped before its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stop {
-    /// Too many tuples.
+    /// Too many derived tuples.
     Tuples,
-    /// Too long.
+    /// The time limit was exceeded.
     Time,
-    /// Somebody asked for it.
+    /// The caller requested a stop.
     Asked,
 }
 
-/// How long an evaluation may still go on when somebody has asked for its end. A pick's properties take about a
-/// millisecond: runs in flight are judged whole, and what takes longer ends before anybody gets impatient.
+/// Minimum running time before a requested stop takes effect. The properties of a pick take about a millisecond, so
+/// runs in progress are judged completely, and longer evaluations still stop quickly.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// Time and the wish of others, as an evaluation looks at them now and then.
+/// The time limit and stop request of an evaluation, checked from time to time.
 #[derive(Debug)]
 pub(crate) struct Watch {
-    /// Nothing where the budget is too long for the clock.
+    /// `None` if the time limit is beyond the range of the clock.
     deadline: Option<Instant>,
     patience: Option<Instant>,
     asked: Arc<AtomicBool>,
 }
 
 impl Watch {
-    /// Begins now.
+    /// Starts the clock.
     pub(crate) fn new(budget: &Budget) -> Self {
         let now = Instant::now();
         let time = Duration::try_from_secs_f64(budget.secs.max(0.0)).ok();
@@ -43,7 +43,7 @@ impl Watch {
         }
     }
 
-    /// Whether the evaluation may go on.
+    /// Returns an error if the evaluation must stop.
     pub(crate) fn look(&self) -> Result<(), Stop> {
         let now = Instant::now();
         let late = |moment: Option<Instant>| moment.is_some_and(|moment| now > moment);
@@ -57,7 +57,7 @@ impl Watch {
     }
 }
 
-/// A budget while it is being spent. One meter serves everything that is evaluated for one property.
+/// Tracks how much of a budget is spent. One meter covers everything that is evaluated for one property.
 #[derive(Debug)]
 pub(crate) struct Meter {
     budget: Budget,
@@ -66,7 +66,7 @@ pub(crate) struct Meter {
     steps: u32,
 }
 
-/// Steps between two looks at the clock: some 0.1 ms.
+/// Steps between two checks of the clock: about 0.1 ms.
 const STEPS_PER_LOOK: u32 = 16_384;
 
 impl Meter {
@@ -74,7 +74,7 @@ impl Meter {
         Self { budget: budget.clone(), watch: Watch::new(budget), tuples: 0, steps: 0 }
     }
 
-    /// One more row was looked at.
+    /// Counts one row read.
     pub(crate) fn step(&mut self) -> Result<(), Stop> {
         self.steps += 1;
         if self.steps < STEPS_PER_LOOK {
@@ -84,23 +84,23 @@ impl Meter {
         self.look()
     }
 
-    /// Looks at the clock.
+    /// Checks the clock and the stop request.
     pub(crate) fn look(&self) -> Result<(), Stop> {
         self.watch.look()
     }
 
-    /// So many new tuples were derived.
+    /// Counts newly derived tuples.
     pub(crate) fn derived(&mut self, count: usize) -> Result<(), Stop> {
         self.tuples = self.tuples.saturating_add(count);
         if self.tuples > self.budget.tuples { Err(Stop::Tuples) } else { Ok(()) }
     }
 
-    /// How many tuples may still be derived.
+    /// Returns how many more tuples may be derived.
     pub(crate) fn tuples_left(&self) -> usize {
         self.budget.tuples.saturating_sub(self.tuples)
     }
 
-    /// The fault that tells a user where the evaluation stopped.
+    /// Returns the fault that reports why the evaluation stopped, and in which rule.
     pub(crate) fn fault(&self, stop: Stop, rule: Option<&Rule>) -> RuleFault {
         let place = rule.map_or(String::new(), |rule| match &rule.origin.name {
             Some(name) => format!(" in rule {name:?} at {}", rule.origin.place()),

@@ -1,6 +1,6 @@
-//! Rules, from their text to what they find: parsed, checked, stratified, planned, closed over the facts of an action.
+//! Rules: parsed, checked, stratified, planned, and evaluated over the facts of an action.
 //!
-//! Two languages see the same facts: Datalog in `.rls` files (the language of Nemo) and SPARQL in `.rq` files.
+//! Two languages query the same facts: Datalog in `.rls` files (Nemo's dialect) and SPARQL in `.rq` files.
 //! The stages in order: `lex` and `parse`, `check` with `translate` and `safety`, `stratify`, `plan`, `evaluate`
 //! (and `naive`, its oracle), `reading`.
 //!

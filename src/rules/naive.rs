@@ -1,6 +1,6 @@
-//! The evaluator that is obviously right: nested loops over sets, again and again until nothing is new.
+//! A naive evaluator that is obviously correct: nested loops over sets, repeated until there are no new tuples.
 //!
-//! It reads the checked rules and nothing of their plans, and serves as the oracle of the fast one.
+//! It reads the checked rules without their plans, and serves as the test oracle of the fast evaluator.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,7 +16,7 @@ use crate::rules::universe::Universe;
 /// Tuples by predicate.
 pub(crate) type Sets = BTreeMap<PredicateId, BTreeSet<Vec<TermId>>>;
 
-/// Adds to `sets` all that the rules derive from it.
+/// Adds all tuples that the rules derive to `sets`.
 pub(crate) fn close(
     rules: &[Rule],
     strata: &[Stratum],
@@ -46,7 +46,7 @@ pub(crate) fn close(
     Ok(())
 }
 
-/// All head rows of one rule.
+/// Returns all head rows of one rule.
 fn derive(rule: &Rule, sets: &Sets, universe: &mut Universe<'_>, meter: &mut Meter) -> Result<Vec<Vec<TermId>>, Stop> {
     let mut bindings = Vec::new();
     let mut binding = vec![None; rule.variables.len()];
@@ -72,7 +72,7 @@ fn derive(rule: &Rule, sets: &Sets, universe: &mut Universe<'_>, meter: &mut Met
     })
 }
 
-/// Every binding that satisfies the conditions, which stand in an order in which each can be looked at.
+/// Collects every binding that satisfies the conditions, which are ordered so that their inputs are bound.
 fn matches(
     body: &[Literal],
     sets: &Sets,
@@ -126,7 +126,7 @@ fn matches(
     matches(rest, sets, universe, binding, found, meter)
 }
 
-/// Whether a row fits an atom; what was unbound is bound then.
+/// Returns whether a row matches an atom, and binds the atom's unbound variables.
 pub(crate) fn unify(atom: &Atom, row: &[TermId], binding: &mut [Option<TermId>]) -> bool {
     atom.args.iter().zip(row).all(|(arg, value)| match arg {
         Operand::Any => true,

@@ -1,4 +1,4 @@
-//! Values that a program sets once: parameters, and the options of imports and exports.
+//! Values known before evaluation: parameters, and the options of imports and exports.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use crate::rules::check::{Checking, Role};
 use crate::rules::syntax::{Expression, ExpressionKind, Statement, Syntax, Transfer};
 use crate::rules::translate::Translation;
 
-/// The values of a file's parameters, each computed from those above it.
+/// Computes the values of a file's parameters. Each may use the parameters above it.
 pub(crate) fn globals(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> BTreeMap<String, Term> {
     let mut globals: BTreeMap<String, Term> = BTreeMap::new();
     for statement in &syntax.statements {
@@ -26,13 +26,13 @@ pub(crate) fn globals(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) 
     globals
 }
 
-/// The values of an import's or export's options, after its assignments.
+/// Computes the values of an import's or export's options, with its assignments applied.
 pub(crate) fn options(
     checking: &mut Checking<'_>,
     syntax: &Syntax,
     transfer: &Transfer,
 ) -> BTreeMap<String, OptionValue> {
-    // What is wrong with a parameter is said when the rules are translated.
+    // Errors in parameters are reported when the rules are translated.
     let before = std::mem::take(&mut checking.diagnostics);
     let globals = globals(checking, syntax, Role::Standalone);
     checking.diagnostics = before;
@@ -66,7 +66,7 @@ pub(crate) enum OptionValue {
     Many(Vec<Term>),
 }
 
-/// An expression with known variables replaced by their values.
+/// Replaces the known variables of an expression by their values.
 fn substituted(expression: &Expression, known: &BTreeMap<String, Term>) -> Expression {
     let all = |args: &[Expression]| args.iter().map(|arg| substituted(arg, known)).collect::<Vec<_>>();
     let one = |arg: &Expression| Box::new(substituted(arg, known));

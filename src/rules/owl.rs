@@ -1,4 +1,4 @@
-//! The ontology closed under OWL 2 RL, by rules in our own language.
+//! Closure of the ontology under OWL 2 RL, computed by rules in our own language.
 
 use std::path::Path;
 
@@ -6,14 +6,14 @@ use crate::base::{Diagnostic, Diagnostics, Files, Term, names};
 use crate::rules::findings::Budget;
 use crate::rules::standalone::{Engine, Program};
 
-/// The rules, as every copy of the program carries them.
+/// The rule file, embedded in the program.
 const RULES: &str = "rules/lib/owl-rl.rls";
-/// Contradictions told; each comes with its proof.
+/// Maximum number of contradictions reported; each has its proof.
 const TOLD: usize = 5;
 
-/// Everything that follows from some statements under OWL 2 RL, themselves included, sorted.
+/// Returns all statements that follow from the given ones under OWL 2 RL, including these, sorted.
 ///
-/// What is true of any term (`?x owl:sameAs ?x`) and what RDF can't say (a literal as subject) is left out.
+/// Leaves out statements true of any term (`?x owl:sameAs ?x`) and those not allowed in RDF (a literal as subject).
 ///
 /// # Errors
 /// `R080` for each contradiction, with the rule of the W3C profile that finds it and its proof.
@@ -21,7 +21,7 @@ pub fn owl_closure(triples: &[[Term; 3]]) -> Result<Vec<[Term; 3]>, Diagnostics>
     owl_closure_within(triples, &Budget::default())
 }
 
-/// The closure as [`owl_closure`] gives it, as far as the budget goes.
+/// Like [`owl_closure`], with a budget.
 pub(crate) fn owl_closure_within(triples: &[[Term; 3]], budget: &Budget) -> Result<Vec<[Term; 3]>, Diagnostics> {
     let unusable = |reason: String| Diagnostics::from(Diagnostic::error("R090", reason));
     let source = Files::Shipped.read(Path::new(RULES)).map_err(|reason| unusable(format!("{RULES}: {reason}")))?;
@@ -58,9 +58,8 @@ fn told(program: &Program, contradictions: &[Vec<Term>]) -> Diagnostics {
             .explain(&format!("contradiction({})", args.join(", ")), &Budget::default())
             .map_or(String::new(), |explanation| explanation.to_text());
         let message = format!("the ontology contradicts itself about {about} (rule {rule} of OWL 2 RL)");
-        diagnostics.push(
-            Diagnostic::error("R080", message).help(format!("take back one of the facts of this proof:\n{proof}")),
-        );
+        diagnostics
+            .push(Diagnostic::error("R080", message).help(format!("remove one of the facts in this proof:\n{proof}")));
     }
     diagnostics
 }

@@ -1,4 +1,4 @@
-//! Tokens to statements: goes on after a fault, so that one reading finds several.
+//! Parser: turns tokens into statements. It continues after an error, so that one pass reports several.
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 use crate::rules::lex::{Spanned, Token, lex};
@@ -10,10 +10,10 @@ use crate::rules::syntax::{
 /// Directives of the language.
 const DIRECTIVES: [&str; 7] = ["base", "declare", "export", "import", "output", "parameter", "prefix"];
 
-/// A fault was noted; the statement is given up.
+/// An error was reported and the statement is abandoned.
 pub(crate) struct Lost;
 
-/// Parses a rule text. Never fails: what can't be read is left out, and noted in the diagnostics.
+/// Parses a rule text. Never fails: statements with errors are left out and reported in the diagnostics.
 pub fn parse(source: &Source) -> (Syntax, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
     let mut syntax =
@@ -59,7 +59,7 @@ impl Parser<'_> {
         self.tokens[self.at].span.clone()
     }
 
-    /// End of the token before this one.
+    /// Returns the end of the previous token.
     pub(crate) fn end(&self) -> usize {
         self.at.checked_sub(1).map_or(0, |at| self.tokens[at].span.end)
     }
@@ -100,16 +100,16 @@ impl Parser<'_> {
     pub(crate) fn unexpected(&mut self, wanted: &str) -> Lost {
         let message = format!("expected {wanted}, found {}", describe(self.token()));
         let help = match self.token() {
-            Token::End => "a statement ends with `.`",
+            Token::End => "end the statement with `.`",
             Token::Symbol(":-") => "a rule has one `:-`; the statement before it may lack its final `.`",
             Token::Symbol(";") => "write one rule for each alternative",
-            _ => "a rule reads `head(?x) :- atom(?x), ~atom(?x), ?x > 1 .`",
+            _ => "a rule has the form `head(?x) :- atom(?x), ~atom(?x), ?x > 1 .`",
         };
         let span = self.span();
         self.fault("R010", span, message, help)
     }
 
-    /// Skips to behind the next dot, or to a token that can only begin a statement.
+    /// Skips past the next dot, or to a token that can only begin a statement.
     fn recover(&mut self, start: usize) {
         if self.at == start {
             self.advance();
@@ -131,7 +131,7 @@ impl Parser<'_> {
         self.rule(name).map(|rule| Some(Statement::Rule(rule)))
     }
 
-    /// `#[name("…")]` and others, which only mark and are skipped.
+    /// Parses attributes and returns the text of `#[name("…")]`. Other attributes are skipped.
     fn attributes(&mut self) -> Result<Option<String>, Lost> {
         let mut name = None;
         while matches!(self.token(), Token::AttributeOpen) {
@@ -173,7 +173,7 @@ impl Parser<'_> {
         Ok(RuleSyntax { name, heads, body, span: start..self.end(), comment })
     }
 
-    /// The comment lines that end right above a place.
+    /// Returns the comment lines directly above a place, joined. Returns `None` if there are none.
     fn comment_above(&self, start: usize) -> Option<String> {
         let before = self.source.text.get(..start)?.trim_end_matches([' ', '\t']);
         if !before.ends_with('\n') {
@@ -194,7 +194,7 @@ impl Parser<'_> {
 
     fn literal(&mut self) -> Result<LiteralSyntax, Lost> {
         if self.take("~") {
-            return Ok(LiteralSyntax::Negated(self.atom("an atom behind `~`")?));
+            return Ok(LiteralSyntax::Negated(self.atom("an atom after `~`")?));
         }
         let start = self.at;
         let left = self.expression()?;
@@ -224,12 +224,12 @@ impl Parser<'_> {
     pub(crate) fn atom(&mut self, wanted: &str) -> Result<AtomSyntax, Lost> {
         let name_span = self.span();
         let predicate = self.predicate(wanted)?;
-        self.expect("(", &format!("behind the predicate `{predicate}`"))?;
+        self.expect("(", &format!("after the predicate `{predicate}`"))?;
         let args = self.expressions(")")?;
         Ok(AtomSyntax { predicate, args, span: name_span.start..self.end(), name_span })
     }
 
-    /// A name, prefixed name or IRI in a predicate's place.
+    /// Parses a predicate: a name, prefixed name or IRI.
     pub(crate) fn predicate(&mut self, wanted: &str) -> Result<String, Lost> {
         let span = self.span();
         let predicate = match self.token().clone() {
@@ -263,7 +263,7 @@ impl Parser<'_> {
 
     fn prefix(&mut self) -> Result<Option<Statement>, Lost> {
         let Token::Prefixed(prefix, local) = self.token().clone() else {
-            // `@prefix : <…>` has a colon of its own.
+            // In `@prefix : <…>` the colon is a token of its own.
             if self.take(":") {
                 return self.namespace(String::new());
             }
@@ -312,19 +312,19 @@ impl Parser<'_> {
 
     fn transfer(&mut self, import: bool, start: usize) -> Result<Transfer, Lost> {
         let predicate = self.predicate("a predicate")?;
-        self.expect(":-", "behind the predicate")?;
+        self.expect(":-", "after the predicate")?;
         let Token::Name(format) = self.token().clone() else {
             return Err(self.unexpected("a format such as `csv`"));
         };
         self.advance();
-        self.expect("{", "behind the format")?;
+        self.expect("{", "after the format")?;
         let mut options = Vec::new();
         while !self.take("}") {
             let Token::Name(key) = self.token().clone() else {
                 return Err(self.unexpected("an option such as `resource`"));
             };
             self.advance();
-            self.expect("=", "behind the option's name")?;
+            self.expect("=", "after the option's name")?;
             options.push((key, self.option_value()?));
             if !self.is("}") {
                 self.expect(",", "between options")?;
@@ -336,7 +336,7 @@ impl Parser<'_> {
                 return Err(self.unexpected("an assignment such as `?x = 1`"));
             };
             self.advance();
-            self.expect("=", "behind the variable")?;
+            self.expect("=", "after the variable")?;
             bindings.push((variable, self.expression()?));
         }
         Ok(Transfer { import, predicate, format, options, bindings, span: start..self.end() })
@@ -352,7 +352,7 @@ impl Parser<'_> {
 
     fn declare(&mut self, start: usize) -> Result<Statement, Lost> {
         let name = self.predicate("a predicate")?;
-        self.expect("(", "behind the predicate")?;
+        self.expect("(", "after the predicate")?;
         let mut columns = 1;
         while !self.take(")") {
             match self.token() {
@@ -366,7 +366,7 @@ impl Parser<'_> {
     }
 }
 
-/// A token in words, for messages.
+/// Describes a token in a message.
 pub(crate) fn describe(token: &Token) -> String {
     match token {
         Token::Name(name) => format!("`{name}`"),

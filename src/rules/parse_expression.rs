@@ -1,4 +1,4 @@
-//! Tokens to expressions: terms, calls, arithmetic.
+//! Parser for expressions: terms, calls, arithmetic.
 
 use crate::base::{Span, Term, did_you_mean, names};
 use crate::rules::builtins;
@@ -8,13 +8,13 @@ use crate::rules::parse::{Lost, Parser};
 use crate::rules::syntax::{Expression, ExpressionKind};
 use crate::rules::values::{double_term, integer, literal};
 
-/// Expressions nested deeper are refused; recursion over them is then safe everywhere.
+/// Maximum nesting depth of expressions, so that recursion over them is safe everywhere.
 const DEPTH_LIMIT: usize = 64;
-/// Operators in one chain (`a + b + …`): the tree they make is that deep on its left side.
+/// Maximum number of operators in one chain (`a + b + …`), which is the depth of its tree on the left side.
 const CHAIN_LIMIT: usize = 256;
 
 impl Parser<'_> {
-    /// A sum of products.
+    /// Parses a sum of products.
     pub(crate) fn expression(&mut self) -> Result<Expression, Lost> {
         self.depth += 1;
         if self.depth > DEPTH_LIMIT {
@@ -106,14 +106,14 @@ impl Parser<'_> {
             }
             Token::Aggregate(name) => {
                 self.advance();
-                self.expect("(", "behind the aggregate")?;
+                self.expect("(", "after the aggregate")?;
                 let args = self.expressions(")")?;
                 let span = span.start..self.end();
                 return Ok(Expression { kind: ExpressionKind::Aggregate(name, args), span });
             }
             Token::Name(_) | Token::Prefixed(..) => return self.name_or_call(),
             Token::Symbol("{") => {
-                let help = "maps belong to JSON imports, which this engine does not have; import CSV, TSV or RDF";
+                let help = "maps are for JSON imports, which are not supported; import CSV, TSV or RDF";
                 return Err(self.fault("R012", span, "maps are not supported", help));
             }
             _ => return Err(self.unexpected("a term")),
@@ -122,7 +122,7 @@ impl Parser<'_> {
         Ok(Expression { kind, span })
     }
 
-    /// A constant, or a call where a parenthesis follows.
+    /// Parses a constant, or a call if a parenthesis follows.
     fn name_or_call(&mut self) -> Result<Expression, Lost> {
         let span = self.span();
         let token = self.token().clone();
@@ -145,7 +145,7 @@ impl Parser<'_> {
         Ok(Expression { kind: ExpressionKind::Constant(term), span })
     }
 
-    /// Expressions separated by commas (one more at the end does no harm) up to a closing symbol.
+    /// Parses expressions separated by commas up to a closing symbol. A trailing comma is allowed.
     pub(crate) fn expressions(&mut self, close: &'static str) -> Result<Vec<Expression>, Lost> {
         let mut found = Vec::new();
         while !self.take(close) {
@@ -162,7 +162,7 @@ impl Parser<'_> {
         Ok(found)
     }
 
-    /// The value of an import's option: an expression or a tuple of them.
+    /// Parses the value of an import option: an expression or a tuple of expressions.
     pub(crate) fn option_value(&mut self) -> Result<Expression, Lost> {
         let start = self.span().start;
         if self.is("(") {
@@ -173,7 +173,7 @@ impl Parser<'_> {
         self.expression()
     }
 
-    /// A string with what may follow it: a language or a datatype.
+    /// Parses the optional language tag or datatype after a string.
     fn string(&mut self, text: String, start: usize) -> Expression {
         let term = match self.token().clone() {
             Token::Language(tag) => {
@@ -182,7 +182,7 @@ impl Parser<'_> {
             }
             Token::Symbol("^^") => {
                 self.advance();
-                match self.predicate("a datatype behind `^^`") {
+                match self.predicate("a datatype after `^^`") {
                     Ok(datatype) => literal(&text, &datatype),
                     Err(Lost) => return Expression { kind: ExpressionKind::Broken, span: start..self.end() },
                 }
@@ -249,7 +249,7 @@ impl Parser<'_> {
         }
     }
 
-    /// The IRI of a prefixed name. An undeclared prefix is a fault; the result then keeps the spelling.
+    /// Returns the IRI of a prefixed name. Reports an undeclared prefix and then returns the name as written.
     pub(crate) fn expand(&mut self, prefix: &str, local: &str, span: Span) -> String {
         let declared = self.prefixes.iter().find(|(known, _)| known == prefix).map(|(_, namespace)| namespace.clone());
         let known = || names::PREFIXES.iter().find(|(known, _)| *known == prefix).map(|(_, n)| (*n).to_owned());
@@ -275,7 +275,7 @@ impl Parser<'_> {
         }
     }
 
-    /// An IRI against the base, where there is one and the IRI is relative.
+    /// Resolves a relative IRI against the base, if one is declared.
     pub(crate) fn resolve(&self, iri: &str) -> String {
         let absolute = iri.split_once(':').is_some_and(|(scheme, _)| {
             !scheme.is_empty() && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
@@ -287,8 +287,8 @@ impl Parser<'_> {
     }
 }
 
-/// An integer in binary, octal or hexadecimal. Over 64 bits its datatype is the text `xsd:integer` and no IRI, as in Nemo,
-/// whose published tables want it so.
+/// Converts an integer written in binary, octal or hexadecimal. Above 64 bits the datatype is the text `xsd:integer`
+/// instead of an IRI, as in Nemo's published test tables.
 fn encoded_integer(value: i128) -> Term {
     match i64::try_from(value) {
         Ok(value) => Term::Integer(value),

@@ -1,4 +1,4 @@
-//! How each rule is evaluated: the order of its conditions, and the indexes that this takes.
+//! Plans the evaluation of each rule: the order of its conditions and the indexes it needs.
 
 use std::sync::Arc;
 
@@ -8,27 +8,27 @@ use crate::rules::program::{Atom, Literal, Operand, PredicateId, Predicates, Rul
 use crate::rules::stratify::Stratum;
 use crate::rules::syntax::Comparison;
 
-/// Columns of a predicate in the order of one index.
+/// The columns of a predicate in the order of one index.
 pub(crate) type Order = Vec<usize>;
 
-/// The indexes of each predicate; the first is always the order as written.
+/// The indexes of each predicate. The first one always has the columns in the order as written.
 #[derive(Debug, Clone)]
 pub(crate) struct Indexes {
     orders: Vec<Arc<Vec<Order>>>,
 }
 
 impl Indexes {
-    /// Every predicate with the order as written only.
+    /// Creates only the first index of every predicate.
     pub(crate) fn new(predicates: &Predicates) -> Self {
         Self { orders: predicates.list.iter().map(|p| Arc::new(vec![(0..p.width).collect()])).collect() }
     }
 
-    /// The orders of one predicate.
+    /// Returns the column orders of one predicate.
     pub(crate) fn of(&self, predicate: PredicateId) -> &Arc<Vec<Order>> {
         &self.orders[predicate]
     }
 
-    /// An index that begins with some columns (in any order).
+    /// Finds or adds an index that begins with the given columns (in any order).
     fn beginning_with(&mut self, predicate: PredicateId, columns: &[usize]) -> usize {
         let orders = Arc::make_mut(&mut self.orders[predicate]);
         let begins = |order: &Order| order[..columns.len()].iter().all(|column| columns.contains(column));
@@ -43,41 +43,41 @@ impl Indexes {
     }
 }
 
-/// Which tuples of a predicate of the stratum itself a condition looks at.
+/// Which tuples a condition reads from a predicate of its own stratum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Part {
-    /// Those of all rounds.
+    /// Tuples of all rounds.
     All,
-    /// Those of rounds before the last.
+    /// Tuples of the rounds before the last.
     Old,
-    /// Those of the last round.
+    /// Tuples of the last round.
     Recent,
 }
 
-/// What happens to a column that is not part of the key.
+/// How a column outside the key is matched.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Column {
-    /// The variable gets its value.
+    /// Binds the variable to the column's value.
     Bind(Variable),
-    /// It must equal the variable, which an earlier column of the same atom has bound.
+    /// The value must equal the variable, which an earlier column of the same atom has bound.
     Same(Variable),
 }
 
 /// One step of a rule's evaluation.
 #[derive(Debug, Clone)]
 pub(crate) enum Op {
-    /// For each tuple that begins with the key.
+    /// Continues for each tuple that begins with the key.
     Scan {
         predicate: PredicateId,
         part: Part,
         index: usize,
         key: Vec<Operand>,
-        /// Offsets in the index's order, with what to do there.
+        /// Offsets in the index's order, with how to match each.
         columns: Vec<(usize, Column)>,
-        /// Nothing that it binds is needed: one match is as good as all.
+        /// None of the bound variables is read later, so one match is enough.
         once: bool,
     },
-    /// Only if no tuple begins with the key.
+    /// Continues only if no tuple begins with the key.
     Absent {
         predicate: PredicateId,
         index: usize,
@@ -97,11 +97,11 @@ pub(crate) enum Op {
     },
 }
 
-/// One way to evaluate a rule: with all tuples, or with one condition restricted to recent ones.
+/// One way to evaluate a rule: over all tuples, or with one condition restricted to recent tuples.
 #[derive(Debug, Clone)]
 pub(crate) struct Variant {
     pub(crate) ops: Vec<Op>,
-    /// Whether some condition is restricted to recent tuples.
+    /// Whether a condition is restricted to recent tuples.
     pub(crate) recent: bool,
 }
 
@@ -111,7 +111,7 @@ pub(crate) struct RulePlan {
     pub(crate) variants: Vec<Variant>,
 }
 
-/// Expected number of tuples of a predicate, where anything is known.
+/// Expected number of tuples of a predicate; `None` if unknown.
 pub(crate) type Sizes<'a> = &'a dyn Fn(PredicateId) -> Option<usize>;
 
 /// Plans a rule of a stratum.
@@ -133,7 +133,7 @@ pub(crate) fn plan_rule(rule: &Rule, stratum: &Stratum, indexes: &mut Indexes, s
     let variants = own
         .iter()
         .map(|delta| {
-            // A pair of recent tuples is found once: by the first of the two conditions.
+            // A pair of recent tuples is found only once: by the first of the two conditions.
             let part = |idx: usize| match idx.cmp(delta) {
                 std::cmp::Ordering::Equal => Part::Recent,
                 std::cmp::Ordering::Less if own.contains(&idx) => Part::Old,
@@ -145,7 +145,7 @@ pub(crate) fn plan_rule(rule: &Rule, stratum: &Stratum, indexes: &mut Indexes, s
     RulePlan { variants }
 }
 
-/// Orders the conditions greedily: what only tests comes as soon as it can, then the atom that is bound best.
+/// Orders the conditions greedily: tests as early as possible, then the atom with the fewest expected matches.
 fn order(
     rule: &Rule,
     first: Option<usize>,
@@ -170,15 +170,15 @@ fn order(
     ops
 }
 
-/// Whether a condition only tests or computes, and can do so now.
+/// Returns whether a condition only tests or computes, and all its inputs are bound.
 fn tests(literal: &Literal, bound: &[bool]) -> bool {
     !matches!(literal, Literal::Positive(_)) && literal.needs().iter().all(|v| bound[*v])
 }
 
-/// The atom with the fewest expected matches; among equals the first.
+/// Returns the atom with the fewest expected matches; the first one of equals.
 fn best_atom(rule: &Rule, left: &[usize], bound: &[bool], sizes: Sizes<'_>) -> Option<usize> {
     let expected = |atom: &Atom| {
-        // What is unknown is taken as middling. A constant or a bound variable keeps one tuple of ten, at a guess.
+        // Unknown sizes count as 1000 tuples. A constant or bound variable is assumed to keep one tuple of ten.
         let size = sizes(atom.predicate).unwrap_or(1000) as f64;
         let fixed = atom
             .args
@@ -219,7 +219,7 @@ fn step(literal: &Literal, part: Part, bound: &mut [bool], indexes: &mut Indexes
     }
 }
 
-/// The index whose order begins with the fixed columns of an atom, and the key in that order.
+/// Returns the index whose order begins with the fixed columns of an atom, and the key in that order.
 fn lookup(atom: &Atom, bound: &[bool], indexes: &mut Indexes) -> (usize, Vec<Operand>) {
     let fixed: Vec<usize> = (0..atom.args.len())
         .filter(|column| match atom.args[*column] {
@@ -251,12 +251,12 @@ fn scan(atom: &Atom, part: Part, bound: &mut [bool], indexes: &mut Indexes) -> O
     Op::Scan { predicate: atom.predicate, part, index, key, columns, once: false }
 }
 
-/// A scan whose variables nobody reads afterwards needs one match only.
+/// Marks the scans that need only one match because their variables are not read afterwards.
 fn mark_once(rule: &Rule, ops: &mut [Op]) {
     let mut read = vec![false; rule.variables.len()];
     let mut mark = |variables: &[Variable]| variables.iter().for_each(|v| read[*v] = true);
     match &rule.aggregation {
-        // Aggregates count distinct values, so the same holds for them.
+        // This also holds for aggregates, because they use distinct values.
         Some(aggregation) => {
             mark(&aggregation.group);
             aggregation.aggregates.iter().for_each(|a| {
@@ -300,7 +300,7 @@ fn operand_variables(args: &[Operand]) -> Vec<Variable> {
         .collect()
 }
 
-/// The value of an operand under a binding; [`Operand::Any`] is never part of a key or a head.
+/// Returns the value of an operand under a binding. [`Operand::Any`] is never part of a key or a head.
 pub(crate) fn operand_value(operand: Operand, binding: &[TermId]) -> TermId {
     match operand {
         Operand::Constant(id) => id,

@@ -1,4 +1,4 @@
-//! From an ontology to its rule book: every file parsed and checked, what nobody needs left out, the rest planned.
+//! Prepares the rule book of an ontology: parses and checks every file, drops unused rules and plans the rest.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,9 +29,9 @@ use crate::rules::universe::Universe;
 pub(crate) struct Preparing {
     terms: Terms,
     diagnostics: Diagnostics,
-    /// Properties that libraries add to the snapshots.
+    /// Properties that libraries derive in the snapshots.
     derived: BTreeSet<String>,
-    /// Of each evaluation over the ontology alone.
+    /// Budget of each evaluation over the ontology alone.
     budget: Budget,
 }
 
@@ -69,7 +69,7 @@ impl Preparing {
         self.assemble(ontology, phases, library, programs, &properties, predicates)
     }
 
-    /// The syntax of all libraries and of all properties in Datalog; these with a scope each, from 1 on.
+    /// Parses all libraries and all Datalog properties. Each property gets a scope, numbered from 1.
     fn parse<'o>(&mut self, ontology: &'o Ontology) -> (Vec<Syntax>, Vec<(usize, &'o Property, Syntax)>) {
         let mut libraries = Vec::new();
         for file in &ontology.libraries {
@@ -146,7 +146,7 @@ impl Preparing {
         })
     }
 
-    /// Notes values that can't be and units that don't match, in the libraries and in every property.
+    /// Reports impossible values and mismatched units in the libraries and in every property.
     fn types_and_units(
         &mut self,
         ontology: &Ontology,
@@ -172,7 +172,7 @@ impl Preparing {
         }
     }
 
-    /// The ontology's statements with all that follows from them.
+    /// Returns the ontology's statements with their OWL 2 RL closure.
     fn closed(&mut self, ontology: &Ontology) -> Vec<[TermId; 3]> {
         let closed = owl_closure_within(&ontology.triples, &self.budget).unwrap_or_else(|found| {
             self.diagnostics.extend(found);
@@ -181,7 +181,7 @@ impl Preparing {
         closed.into_iter().map(|triple| triple.map(|term| self.terms.intern(term))).collect()
     }
 
-    /// The properties in SPARQL.
+    /// Prepares the SPARQL properties.
     fn queries(&mut self, ontology: &Ontology) -> BTreeMap<String, Judge> {
         let mut judges = BTreeMap::new();
         for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
@@ -196,7 +196,7 @@ impl Preparing {
         judges
     }
 
-    /// The library, or nothing where it can't be stratified: faults of rules that nobody needs are faults all the same.
+    /// Checks that the whole library can be stratified, including unused rules. Returns an empty program if it can't.
     fn stratified(&mut self, library: Program, predicates: &Predicates) -> Program {
         match stratify(&library.rules, predicates, &Universe::new(&self.terms, None)) {
             Ok(_) => library,
@@ -218,7 +218,7 @@ impl Preparing {
         }
     }
 
-    /// Evaluates what only the ontology decides. Terms that this makes become terms of the book.
+    /// Evaluates the rules that depend on the ontology only. Terms created here become terms of the book.
     fn close_fixed(
         &mut self,
         fixed: &Planned,
@@ -232,11 +232,11 @@ impl Preparing {
         let mut meter = Meter::new(&self.budget);
         if let Err(stopped) = evaluate(fixed, predicates, indexes, &mut layers, &mut universe, &mut meter) {
             let message = fault(&meter, stopped, fixed).to_string();
-            let help = "the rules over the ontology alone must come to an end";
+            let help = "rules that read only the ontology must finish within this budget";
             self.diagnostics.push(Diagnostic::error("R090", message).help(help));
             return Err(std::mem::take(&mut self.diagnostics));
         }
-        // Made terms follow the book's in the same order, so their numbers stay right.
+        // Created terms follow the book's terms in the same order, so their ids stay valid.
         for term in universe.into_made() {
             self.terms.intern(term);
         }
@@ -261,7 +261,7 @@ fn judge(ontology: &Ontology, property: &Property, rules: JudgeRules) -> Judge {
     Judge { digest: digest.finish(), label: property.label.clone(), rules }
 }
 
-/// Where some rule reads `state` or `ontology` for a variable property, what is derived for single ones counts too:
+/// If a rule reads `state` for a variable property, it also needs the facts derived for single properties:
 ///
 /// ```prolog
 /// state(?phase, ?s, p, ?o) :- state_p(?phase, ?s, ?o) .
@@ -296,7 +296,7 @@ fn gather(predicates: &mut Predicates) -> Vec<Rule> {
     rules
 }
 
-/// The library's rules that some property reads, directly or through each other. SPARQL reads all snapshots.
+/// Keeps the library's rules that some property reads, directly or indirectly. SPARQL reads all snapshots.
 fn needed<'p>(
     mut library: Program,
     properties: impl Iterator<Item = &'p Program>,
@@ -326,7 +326,7 @@ fn needed<'p>(
     library
 }
 
-/// Rules that read the ontology only, directly or through each other, and the rest.
+/// Splits the rules into those that read only the ontology, directly or indirectly, and the rest.
 fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) {
     let mut moving: BTreeSet<usize> = (0..predicates.len())
         .filter(|id| predicates.get(*id).given && predicates.get(*id).name != "ontology")
@@ -354,7 +354,7 @@ fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) 
     (fixed, rest)
 }
 
-/// Predicates of a property's file that nothing reads and no verdict needs.
+/// Warns about predicates of a property's file that no rule reads and that are not part of the verdict.
 fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
     let used = used_names(syntax);
     let verdict = crate::rules::given::VERDICT.map(|(name, _)| name);
@@ -372,7 +372,7 @@ fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
         let known = checking.defined.contains_key(&(scope, name.clone()));
         if known {
             let help = crate::base::did_you_mean(&name, verdict);
-            checking.warning("R040", &syntax.source, &span, format!("nothing uses `{name}`"), help);
+            checking.warning("R040", &syntax.source, &span, format!("`{name}` is never used"), help);
         }
     }
 }

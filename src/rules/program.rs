@@ -1,4 +1,4 @@
-//! Checked rules: predicates and variables are numbers, every variable is bound, every name is known.
+//! Checked rules: predicates and variables are indices, every variable is bound, every name is resolved.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -6,31 +6,31 @@ use crate::base::{Source, Span, TermId};
 use crate::rules::expression::Expr;
 use crate::rules::syntax::Comparison;
 
-/// Number of a predicate in [`Predicates`].
+/// Index of a predicate in [`Predicates`].
 pub(crate) type PredicateId = usize;
-/// Number of a variable within its rule.
+/// Index of a variable within its rule.
 pub(crate) type Variable = usize;
 
-/// Where a predicate's name is known: 0 everywhere, otherwise only in one property's file.
+/// Scope of a predicate's name: 0 is global, any other value is the file of one property.
 pub(crate) type Scope = usize;
 
-/// Most columns of a predicate.
+/// Maximum number of columns of a predicate.
 pub(crate) const MAX_ARITY: usize = 16;
 
 /// A predicate, or the part of `state` or `ontology` that belongs to one property.
 #[derive(Debug, Clone)]
 pub(crate) struct Predicate {
-    /// As people write it.
+    /// Name as written in the rules.
     pub(crate) name: String,
-    /// Where it is known.
+    /// Where the name is visible.
     pub(crate) scope: Scope,
-    /// The constant in the property's place, which counts as part of the predicate.
+    /// The constant property argument, which is part of the predicate's identity.
     pub(crate) property: Option<TermId>,
     /// Number of arguments as written.
     pub(crate) arity: usize,
-    /// Columns kept: without a constant property; at least one.
+    /// Number of stored columns: without the constant property, and at least one.
     pub(crate) width: usize,
-    /// Whether facts come in from outside.
+    /// Whether its facts are input, not only derived.
     pub(crate) given: bool,
 }
 
@@ -72,7 +72,7 @@ pub(crate) enum Operand {
     Constant(TermId),
     /// A variable of the rule.
     Variable(Variable),
-    /// Anything.
+    /// Matches any value.
     Any,
 }
 
@@ -93,14 +93,14 @@ pub(crate) enum Literal {
     Negative(Atom),
     /// A variable gets a value.
     Assign { variable: Variable, value: Expr, span: Span },
-    /// Two values compare so.
+    /// The comparison of two values holds.
     Compare { op: Comparison, left: Expr, right: Expr, span: Span },
-    /// A built-in yields true.
+    /// A built-in returns `true`.
     Test { value: Expr, span: Span },
 }
 
 impl Literal {
-    /// The atom of a positive or negative literal.
+    /// Returns the atom of a positive or negative literal.
     pub(crate) fn atom(&self) -> Option<&Atom> {
         match self {
             Self::Positive(atom) | Self::Negative(atom) => Some(atom),
@@ -108,7 +108,7 @@ impl Literal {
         }
     }
 
-    /// Where it stands.
+    /// Returns its place in the source.
     pub(crate) fn span(&self) -> &Span {
         match self {
             Self::Positive(atom) | Self::Negative(atom) => &atom.span,
@@ -116,7 +116,7 @@ impl Literal {
         }
     }
 
-    /// Variables that must have a value before this literal is looked at.
+    /// Returns the variables that must be bound before this literal is evaluated.
     pub(crate) fn needs(&self) -> Vec<Variable> {
         let mut found = Vec::new();
         match self {
@@ -135,7 +135,7 @@ impl Literal {
     }
 }
 
-/// What an aggregate computes.
+/// The function of an aggregate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AggregateKind {
     Count,
@@ -144,7 +144,7 @@ pub(crate) enum AggregateKind {
     Max,
 }
 
-/// One aggregate of a head: over the distinct values of its input and distinct variables in a group.
+/// One aggregate of a head, computed over the distinct combinations of `input` and `distinct` in a group.
 #[derive(Debug, Clone)]
 pub(crate) struct Aggregate {
     pub(crate) kind: AggregateKind,
@@ -153,24 +153,24 @@ pub(crate) struct Aggregate {
     pub(crate) output: Variable,
 }
 
-/// How the matches of a body become groups and groups become heads.
+/// How the matches of a body are grouped, and how each group yields a head.
 #[derive(Debug, Clone)]
 pub(crate) struct Aggregation {
-    /// Matches that agree on these are one group.
+    /// Matches with equal values of these variables form one group.
     pub(crate) group: Vec<Variable>,
     pub(crate) aggregates: Vec<Aggregate>,
     /// Computed from the group's variables and the aggregates' outputs, in order.
     pub(crate) after: Vec<(Variable, Expr)>,
 }
 
-/// Where a rule stands.
+/// Where a rule was written.
 #[derive(Debug, Clone)]
 pub(crate) struct Origin {
     pub(crate) source: Source,
     pub(crate) span: Span,
     /// `#[name("…")]`.
     pub(crate) name: Option<String>,
-    /// The comment right above it.
+    /// The comment directly above it.
     pub(crate) comment: Option<String>,
 }
 
@@ -187,9 +187,9 @@ pub(crate) struct Rule {
     pub(crate) head: Atom,
     pub(crate) body: Vec<Literal>,
     pub(crate) aggregation: Option<Aggregation>,
-    /// Names of the variables; made ones are empty.
+    /// Names of the variables; empty for generated variables.
     pub(crate) variables: Vec<String>,
-    /// Names of the head's arguments as written: a variable's name, or nothing.
+    /// Names of the head's arguments: the variable's name, or an empty string for any other argument.
     pub(crate) head_names: Vec<String>,
     pub(crate) origin: Origin,
 }
@@ -198,6 +198,6 @@ pub(crate) struct Rule {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Program {
     pub(crate) rules: Vec<Rule>,
-    /// Facts that stand in the text or were read from files: rows one behind the other.
+    /// Facts from the text or from imported files, as rows stored one after another.
     pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,
 }

@@ -1,4 +1,4 @@
-//! A look at a SPARQL text: its words, IRIs and variables with their places, and where its groups are.
+//! A light scanner of SPARQL text: words, IRIs and variables with their places, and the groups.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,15 +7,15 @@ use crate::base::{Span, names};
 /// A word of the text.
 #[derive(Debug, Clone)]
 pub(crate) struct Word {
-    /// As written.
+    /// The word as written.
     pub(crate) word: String,
-    /// The IRI that it stands for: of a prefixed name or of `<…>`.
+    /// The IRI of a prefixed name or of `<…>`.
     pub(crate) iri: Option<String>,
     /// Its place.
     pub(crate) span: Span,
 }
 
-/// The words of a query, comments and strings left out.
+/// Returns the words of a query, without comments and strings.
 pub(crate) fn scan(text: &str) -> Vec<Word> {
     let mut prefixes: BTreeMap<String, String> =
         names::PREFIXES.iter().map(|(prefix, iri)| ((*prefix).to_owned(), (*iri).to_owned())).collect();
@@ -71,17 +71,17 @@ fn string_end(text: &str, start: usize, quote: char) -> usize {
     text.len()
 }
 
-/// Names of the variables in a query.
+/// Returns the names of the variables in a query.
 pub(crate) fn variables(text: &str) -> BTreeSet<String> {
     scan(text).into_iter().filter_map(|word| word.word.strip_prefix(['?', '$']).map(str::to_owned)).collect()
 }
 
-/// Offset of the first `{` that is no part of a string, an IRI or a comment.
+/// Returns the offset of the first `{` outside strings, IRIs and comments.
 pub(crate) fn first_group(text: &str) -> Option<usize> {
     braces(text).into_iter().find(|(_, open)| *open).map(|(at, _)| at)
 }
 
-/// Every `{ … }`, from its opening to behind its closing brace, in the order of opening.
+/// Returns the span of every `{ … }`, braces included, in the order of the opening braces.
 pub(crate) fn groups(text: &str) -> Vec<Span> {
     let mut found: Vec<Span> = Vec::new();
     let mut open = Vec::new();
@@ -96,7 +96,7 @@ pub(crate) fn groups(text: &str) -> Vec<Span> {
     found
 }
 
-/// Offsets of braces outside of strings, IRIs and comments, and whether they open.
+/// Returns the offsets of braces outside strings, IRIs and comments, and whether each is an opening brace.
 fn braces(text: &str) -> Vec<(usize, bool)> {
     let mut found = Vec::new();
     let mut at = 0;

@@ -1,4 +1,4 @@
-//! Conditions that no fact can satisfy, because the ontology gives the property's values another type.
+//! Reports conditions that no fact can satisfy, because the ontology declares another type for the property's values.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,14 +8,14 @@ use crate::rules::expression::Expr;
 use crate::rules::program::{Atom, Literal, Operand, Predicates, Rule, Variable};
 use crate::rules::syntax::Comparison;
 
-/// The one datatype of each property's values, by the property's IRI; of properties whose values are literals.
+/// The types of property values, as declared by the ontology.
 pub(crate) struct Ranges {
     datatypes: BTreeMap<String, String>,
-    /// Properties whose values are things.
+    /// Object properties: their values are individuals.
     of_things: BTreeSet<String>,
 }
 
-/// Literal types that facts are written in: a constant of another one is never equal to a fact's value.
+/// Literal types used in facts: a constant of another type never equals a fact's value.
 const TYPES: [&str; 4] = ["double", "integer", "boolean", "string"];
 
 impl Ranges {
@@ -34,10 +34,10 @@ impl Ranges {
         ranges
     }
 
-    /// Notes `R043` for each condition of some rules that can't hold.
+    /// Reports `R043` for each condition that can't hold.
     pub(crate) fn check(&self, rules: &[Rule], predicates: &Predicates, terms: &Terms, diagnostics: &mut Diagnostics) {
         for rule in rules {
-            // Where a variable gets its values from: the property, with its only type.
+            // The property that each variable gets its value from, with its datatype.
             let mut typed: BTreeMap<Variable, (&str, &str)> = BTreeMap::new();
             for atom in rule.body.iter().filter_map(Literal::atom) {
                 let Some(property) = self.property(atom, predicates, terms) else { continue };
@@ -69,7 +69,7 @@ impl Ranges {
         }
     }
 
-    /// The property that an atom is about.
+    /// Returns the constant property of an atom.
     fn property<'t>(&self, atom: &Atom, predicates: &Predicates, terms: &'t Terms) -> Option<&'t str> {
         let property: TermId = predicates.get(atom.predicate).property?;
         terms.term(property).as_iri()
@@ -90,8 +90,9 @@ impl Ranges {
                 never(property, datatype, term)
             }
             None if literal && self.of_things.contains(property) => {
-                let message = format!("this can never hold: the values of `{}` are things", names::shorten(property));
-                Diagnostic::error("R043", message).help("write a thing, such as `obj:glass_1`, or a variable")
+                let message =
+                    format!("this can never hold: the values of `{}` are individuals", names::shorten(property));
+                Diagnostic::error("R043", message).help("write an individual, such as `obj:glass_1`, or a variable")
             }
             _ => return,
         };
@@ -99,7 +100,7 @@ impl Ranges {
     }
 }
 
-/// Small integers have narrower types of their own, but are integers.
+/// Returns whether an integer term matches `xsd:integer`: small integers have narrower datatypes.
 fn same_integer(term: &Term, datatype: &str) -> bool {
     matches!(term, Term::Integer(_)) && datatype.ends_with("#integer")
 }
@@ -107,7 +108,7 @@ fn same_integer(term: &Term, datatype: &str) -> bool {
 fn never(property: &str, datatype: &str, term: &Term) -> Diagnostic {
     let local = names::shorten(datatype);
     let message =
-        format!("this can never hold: the values of `{}` are {local}, `{term}` is none", names::shorten(property));
+        format!("this can never hold: the values of `{}` are {local}, but `{term}` is not", names::shorten(property));
     let help = match (datatype.rsplit('#').next(), term) {
         (Some("double"), Term::Integer(value)) => {
             format!("`=` compares terms: write `{value}.0`, or compare with `<=` and `>=`")

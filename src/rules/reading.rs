@@ -1,4 +1,4 @@
-//! From the tuples of a property's rules to its findings.
+//! Reads a property's findings from the tuples of its rules.
 
 use crate::base::Term;
 use crate::rules::evaluate::Layers;
@@ -7,7 +7,7 @@ use crate::rules::program::{PredicateId, Predicates, Program};
 use crate::rules::universe::Universe;
 use crate::rules::values::{Number, lexical};
 
-/// Which of a property's predicates speak for the verdict.
+/// The predicates of a property that determine the verdict.
 #[derive(Debug, Clone)]
 pub(crate) struct Verdict {
     /// `success` or `violation`.
@@ -17,13 +17,13 @@ pub(crate) struct Verdict {
     pub(crate) because: Option<PredicateId>,
 }
 
-/// The predicate that decides.
+/// The predicate that decides the outcome.
 #[derive(Debug, Clone)]
 pub(crate) struct Decisive {
     pub(crate) predicate: PredicateId,
-    /// `success`: its tuples prove that the property holds; otherwise that it does not.
+    /// `true` for `success`, whose tuples prove that the property holds; `false` for `violation`.
     pub(crate) positive: bool,
-    /// Arguments as written.
+    /// Number of arguments as written.
     pub(crate) arity: usize,
     /// Names of the arguments in the first rule's head.
     pub(crate) names: Vec<String>,
@@ -42,7 +42,7 @@ impl Verdict {
     }
 }
 
-/// What a property's tuples say.
+/// Reads the findings of a property.
 pub(crate) fn findings(verdict: &Verdict, layers: &Layers<'_>, universe: &Universe<'_>) -> Result<Findings, RuleFault> {
     let Some(decisive) = &verdict.decisive else {
         return Err(RuleFault::Value("the rules define neither success nor violation".into()));
@@ -83,7 +83,7 @@ fn margin(verdict: &Verdict, layers: &Layers<'_>, universe: &Universe<'_>) -> Re
     for id in verdict.margin.map_or(&[][..], |predicate| layers.rows(predicate)) {
         let term = universe.term(*id);
         let number = Number::of(term).map(Number::double).filter(|value| !value.is_nan());
-        let number = number.ok_or_else(|| RuleFault::Value(format!("margin {term} is no number")))?;
+        let number = number.ok_or_else(|| RuleFault::Value(format!("margin {term} is not a number")))?;
         smallest = Some(smallest.map_or(number, |least| least.min(number)));
     }
     Ok(smallest)

@@ -1,4 +1,4 @@
-//! Tuples of one predicate as datafrog relations, whatever their width, in all the orders that rules ask for.
+//! Tuples of one predicate as datafrog relations of any width, in every column order that the rules use.
 
 use std::cell::Ref;
 use std::ops::Deref;
@@ -9,31 +9,31 @@ use datafrog::{Iteration, Relation, Variable};
 use crate::base::TermId;
 use crate::rules::plan::{Order, Part};
 
-/// Tuples that will not change any more. Rows lie one behind the other, sorted in the order of the index.
+/// Tuples that no longer change. Rows are stored one after another, sorted by the index's column order.
 pub(crate) trait Finished: Send + Sync {
-    /// The rows in the order of an index, which is made when it is first asked for.
+    /// Returns the rows in the order of an index. The index is built on first use.
     fn index(&self, index: usize) -> &[TermId];
 }
 
-/// Tuples of a predicate that its own rules still add to.
+/// Tuples of a predicate whose rules are still being evaluated.
 pub(crate) trait Growing {
-    /// Adds rows, which count from the next round on.
+    /// Adds rows, which take effect in the next round. Returns their number without duplicates among them.
     fn insert(&self, rows: Vec<TermId>) -> usize;
-    /// Begins a round: what was added since the last, and is new, is recent now. False where nothing is.
+    /// Begins a round: new tuples added since the last round become recent. Returns `false` if there are none.
     fn changed(&mut self) -> bool;
-    /// How many tuples are recent.
+    /// Returns the number of recent tuples.
     fn recent_len(&self) -> usize;
-    /// The rows of a part in the order of an index, in sorted batches.
+    /// Appends the rows of a part in the order of an index, as sorted batches.
     fn batches<'a>(&'a self, part: Part, index: usize, found: &mut Vec<Batch<'a>>);
-    /// The tuples, when nothing changes any more.
+    /// Converts to finished tuples at the fixpoint.
     fn complete(self: Box<Self>) -> Box<dyn Finished>;
 }
 
 /// A sorted run of rows.
 pub(crate) enum Batch<'a> {
-    /// Of finished tuples.
+    /// Rows of finished tuples.
     Plain(&'a [TermId]),
-    /// Of growing ones.
+    /// Rows of growing tuples.
     Held(Ref<'a, [TermId]>),
 }
 
@@ -73,8 +73,8 @@ impl<const W: usize> Finished for FinishedOf<W> {
     }
 }
 
-/// One order of growing tuples: a datafrog variable with an iteration of its own, so that all orders of a
-/// predicate move from round to round together.
+/// One column order of growing tuples: a datafrog variable with its own iteration, so that all orders of a
+/// predicate advance from round to round together.
 struct Grown<const W: usize> {
     iteration: Iteration,
     variable: Variable<[TermId; W]>,
@@ -83,7 +83,7 @@ struct Grown<const W: usize> {
 impl<const W: usize> Grown<W> {
     fn new(distinct: bool) -> Self {
         let mut iteration = Iteration::new();
-        // An order of distinct rows is distinct by itself.
+        // A permutation of distinct rows needs no deduplication.
         let variable = if distinct { iteration.variable("") } else { iteration.variable_indistinct("") };
         Self { iteration, variable }
     }
@@ -96,7 +96,7 @@ struct GrowingOf<const W: usize> {
 }
 
 impl<const W: usize> GrowingOf<W> {
-    /// `wanted`: the indexes that rules of the stratum read while it grows.
+    /// `wanted`: the indexes that the stratum's rules read while the tuples grow.
     fn new(orders: Arc<Vec<Order>>, wanted: &[bool]) -> Self {
         let indexes = wanted.iter().map(|wanted| wanted.then(|| Grown::new(false))).collect();
         Self { orders, indexes, primary: Grown::new(true) }
@@ -150,7 +150,7 @@ impl<const W: usize> Growing for GrowingOf<W> {
     }
 }
 
-/// Rows with their columns in another order, sorted.
+/// Permutes the columns of rows and sorts the result.
 fn permuted<const W: usize>(rows: &[[TermId; W]], order: &[usize]) -> Relation<[TermId; W]> {
     let mut out: Vec<[TermId; W]> = rows.iter().map(|row| std::array::from_fn(|column| row[order[column]])).collect();
     sort(&mut out);
@@ -164,7 +164,7 @@ fn relation_of<const W: usize>(rows: Vec<TermId>) -> Relation<[TermId; W]> {
     Relation { elements: rows }
 }
 
-/// Sorts rows; two columns as one number, which is much faster than comparing them one by one.
+/// Sorts rows. Two or three columns are compared as one number, which is much faster than column by column.
 fn sort<const W: usize>(rows: &mut [[TermId; W]]) {
     match W {
         2 => rows.sort_unstable_by_key(|row| (u64::from(row[0]) << 32) | u64::from(row[1])),
@@ -174,7 +174,7 @@ fn sort<const W: usize>(rows: &mut [[TermId; W]]) {
     }
 }
 
-/// Calls a function with the width of a predicate as a constant.
+/// Calls a function with the width of a predicate as a const generic.
 macro_rules! with_width {
     ($width:expr, $call:ident ( $($arg:expr),* )) => {
         match $width {
@@ -206,12 +206,12 @@ fn boxed_growing<const W: usize>(orders: Arc<Vec<Order>>, wanted: &[bool]) -> Bo
     Box::new(GrowingOf::<W>::new(orders, wanted))
 }
 
-/// Finished tuples from rows in any order.
+/// Creates finished tuples from rows in any order.
 pub(crate) fn finished(width: usize, rows: Vec<TermId>, orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
     with_width!(width, boxed_finished(rows, orders))
 }
 
-/// A predicate that begins to grow.
+/// Creates an empty set of growing tuples.
 pub(crate) fn growing(width: usize, orders: Arc<Vec<Order>>, wanted: &[bool]) -> Box<dyn Growing> {
     with_width!(width, boxed_growing(orders, wanted))
 }

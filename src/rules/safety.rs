@@ -1,12 +1,12 @@
-//! Every variable of a rule gets its value from somewhere; comparisons and assignments come after what they need.
+//! Safety: checks that every variable of a rule is bound, and orders comparisons and assignments after their inputs.
 
 use crate::rules::expression::Expr;
 use crate::rules::program::{Aggregation, Atom, Literal, Operand, Variable};
 use crate::rules::syntax::{Comparison, RuleSyntax};
 use crate::rules::translate::Translation;
 
-/// Turns equalities that give a variable its value into assignments, orders them by need, and settles negations.
-/// Notes a fault for each variable that has no value; false where there was one.
+/// Turns equalities that bind a variable into assignments, orders the conditions by dependency, and resolves negations.
+/// Reports an error for each unbound variable. Returns `false` if there was one.
 pub(crate) fn order(
     rule: &mut Translation<'_, '_>,
     syntax: &RuleSyntax,
@@ -46,7 +46,7 @@ pub(crate) fn order(
     safe
 }
 
-/// Notes a fault for each variable of the head, or of its aggregates, that has no value.
+/// Reports an error for each unbound variable of the head or of its aggregates. Returns `false` if there was one.
 fn head_bound(rule: &mut Translation<'_, '_>, head: &Atom, aggregation: Option<&Aggregation>, bound: &[bool]) -> bool {
     let derived: Vec<Variable> = aggregation
         .iter()
@@ -80,7 +80,7 @@ fn mark(atom: &Atom, bound: &mut [bool]) {
     }
 }
 
-/// Moves what has all it needs, again and again, until nothing moves.
+/// Moves the literals whose variables are bound to `sorted`, until no more can be moved.
 fn settle(waiting: &mut Vec<Literal>, bound: &mut [bool], sorted: &mut Vec<Literal>) {
     loop {
         let mut moved = false;
@@ -123,7 +123,7 @@ fn all_bound(expr: &Expr, bound: &[bool]) -> bool {
     variables.iter().all(|v| bound[*v])
 }
 
-/// Notes the first variable of a literal that has no value. (A made one stands for the expression around it.)
+/// Reports the first unbound variable of a literal. Skips generated variables, which have no name to report.
 fn unbound(rule: &mut Translation<'_, '_>, literal: &Literal, bound: &[bool]) -> bool {
     let mut needed = literal.needs();
     if let Literal::Assign { variable, .. } = literal {
@@ -133,12 +133,13 @@ fn unbound(rule: &mut Translation<'_, '_>, literal: &Literal, bound: &[bool]) ->
     if let Some(variable) = missing {
         let name = rule.variables[variable].0.clone();
         let help = format!("use `?{name}` in a positive atom of the body, or give it a value with `?{name} = …`");
-        rule.error("R021", literal.span(), format!("variable `?{name}` has no value here"), help);
+        rule.error("R021", literal.span(), format!("variable `?{name}` is not bound here"), help);
     }
     false
 }
 
-/// Variables that occur only here stand for anything; where one occurs twice, a helper rule says that both are the same.
+/// Replaces unbound variables of a negated atom by [`Operand::Any`]. If one of them occurs twice in the atom, a helper
+/// rule checks that both values are equal.
 fn settle_negation(rule: &mut Translation<'_, '_>, atom: Atom, bound: &[bool]) -> Atom {
     let free: Vec<Variable> = atom
         .args
@@ -164,7 +165,7 @@ fn settle_negation(rule: &mut Translation<'_, '_>, atom: Atom, bound: &[bool]) -
     Atom { args, ..atom }
 }
 
-/// A variable that occurs once is often a typing error.
+/// Warns about variables that occur once, which are often typing errors.
 fn warn_lonely(rule: &mut Translation<'_, '_>, syntax: &RuleSyntax) {
     let text = rule.source.text.get(syntax.span.clone()).unwrap_or_default().to_owned();
     for (name, span) in rule.variables.clone() {
@@ -173,7 +174,7 @@ fn warn_lonely(rule: &mut Translation<'_, '_>, syntax: &RuleSyntax) {
             .match_indices(&word)
             .filter(|(at, _)| !text[at + word.len()..].starts_with(|c: char| c.is_alphanumeric() || c == '_'));
         if !name.is_empty() && uses.count() == 1 {
-            let help = "write `_` where any value will do";
+            let help = "write `_` if any value will do";
             let source = rule.source.clone();
             rule.checking.warning("R041", &source, &span, format!("variable `{word}` occurs only once"), help);
         }

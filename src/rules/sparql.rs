@@ -1,4 +1,4 @@
-//! Properties written in SPARQL: prepared once, evaluated over an action's named graphs.
+//! SPARQL properties: prepared once, evaluated over an action's named graphs.
 
 use std::collections::BTreeSet;
 
@@ -22,14 +22,14 @@ use crate::rules::values::{Number, lexical};
 /// A prepared query.
 pub(crate) struct Query {
     prepared: PreparedSparqlQuery,
-    /// Whether it is an `ASK`, which holds when true.
+    /// Whether it is an `ASK` query, which passes if it is true.
     pub(crate) asks: bool,
     /// Name of its file.
     file: String,
 }
 
 impl Query {
-    /// Parses a query, checks its terms, and binds designators that it uses as variables.
+    /// Parses a query, checks its terms, and binds the designators that it uses as variables.
     pub(crate) fn prepare(
         source: &Source,
         ontology: &Ontology,
@@ -43,7 +43,7 @@ impl Query {
         }
         let text = bind_designators(&source.text, &ontology.designators);
         let prepared = evaluator().parse_query(&text).map_err(|error| {
-            let help = "a variable with the name of a designator is bound to its value; use it in the first group";
+            let help = "a variable named like a designator is bound to its value; use it in the first group";
             Diagnostics::from(Diagnostic::error("R060", error.to_string()).in_source(source).help(help))
         })?;
         let form = form(&source.text);
@@ -55,7 +55,7 @@ impl Query {
         diagnostics.or(Self { prepared, asks: form == Some(Form::Ask), file: source.name.to_string() })
     }
 
-    /// Judges an action: `ASK` holds when true, `SELECT` when it has no row.
+    /// Judges an action: `ASK` passes if it is true, `SELECT` if it has no rows.
     pub(crate) fn judge(
         &self,
         book: &RuleBook,
@@ -83,7 +83,7 @@ impl Query {
         }
     }
 
-    /// Every row is a violation.
+    /// Reads the findings of a `SELECT` query, whose rows are violations.
     fn rows_found(&self, rows: QuerySolutionIter<'_>, budget: &Budget) -> Result<Findings, RuleFault> {
         let mut witness = Vec::new();
         let (mut margin, mut because) = (None::<f64>, BTreeSet::new());
@@ -98,7 +98,7 @@ impl Query {
                 match variable.as_str() {
                     "margin" => {
                         let value = Number::of(&term).map(Number::double).filter(|value| !value.is_nan());
-                        let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is no number")))?;
+                        let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is not a number")))?;
                         margin = Some(margin.map_or(value, |least| least.min(value)));
                     }
                     "because" => {
@@ -125,13 +125,13 @@ impl Query {
     }
 
     fn budget_spent(&self, how: &str) -> RuleFault {
-        let advice = "patterns that share no variable multiply: let each share one with those before it";
+        let advice = "patterns without shared variables multiply: let each share a variable with an earlier one";
         RuleFault::BudgetSpent(format!("the query in {} {how}; {advice}", self.file))
     }
 }
 
 impl RuleBook {
-    /// The named graphs of an action: its facts and what the libraries added to them.
+    /// Returns the named graphs of an action: its facts and those that the libraries derive.
     pub(crate) fn snapshot(&self, facts: &ActionFacts<'_>, derived: &Tables, universe: &mut Universe<'_>) -> Snapshot {
         let mut graphs: Vec<(TermId, Vec<[TermId; 3]>)> = self
             .given
@@ -154,7 +154,7 @@ impl RuleBook {
                 add(row[0], [row[1], row[2], row[3]]);
             }
         }
-        // A designator with its value reads as a statement about the action.
+        // A designator and its value become the statement `designator act:value value`.
         let parameters = facts
             .parameters
             .iter()
@@ -168,11 +168,11 @@ impl RuleBook {
     }
 }
 
-/// An evaluator with the known prefixes and the geometry functions.
+/// Creates an evaluator with the known prefixes and the geometry functions.
 fn evaluator() -> SparqlEvaluator {
     let mut evaluator = SparqlEvaluator::new();
     for (prefix, namespace) in names::PREFIXES {
-        // The namespaces are constants; should one of them be no IRI, queries that use it say so.
+        // The namespaces are constants. If one were not a valid IRI, queries with its prefix would report it.
         evaluator = match evaluator.clone().with_prefix(prefix, namespace) {
             Ok(evaluator) => evaluator,
             Err(_) => evaluator,
@@ -199,7 +199,7 @@ fn fault(error: &QueryEvaluationError) -> RuleFault {
     RuleFault::Value(error.to_string())
 }
 
-/// Binds each designator that the query uses as a variable, at the start of every group that uses it:
+/// Binds each designator that the query uses as a variable, at the start of every group that uses it, for example:
 ///
 /// ```sparql
 /// GRAPH act:parameters { act:pickObject act:value ?pickObject }
@@ -207,7 +207,7 @@ fn fault(error: &QueryEvaluationError) -> RuleFault {
 fn bind_designators(text: &str, designators: &BTreeSet<String>) -> String {
     let act = names::ACT;
     let mut out = text.to_owned();
-    // From the last group to the first, so that places stay right.
+    // From the last group to the first, so that earlier offsets stay valid.
     for group in groups(text).into_iter().rev() {
         let used = variables(&text[group.clone()]);
         let bound: String = designators
@@ -220,14 +220,14 @@ fn bind_designators(text: &str, designators: &BTreeSet<String>) -> String {
     out
 }
 
-/// The forms of a query that can judge.
+/// The query forms allowed for properties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Form {
     Ask,
     Select,
 }
 
-/// The form of a query; nothing where it is another one.
+/// Returns the form of a query, or `None` for any other form.
 fn form(text: &str) -> Option<Form> {
     let group = first_group(text)?;
     scan(text).into_iter().take_while(|token| token.span.start < group).find_map(|token| {
@@ -239,7 +239,7 @@ fn form(text: &str) -> Option<Form> {
     })
 }
 
-/// A fault of the parser, whose words name line and column.
+/// Converts a message of the SPARQL parser, which contains line and column, to a diagnostic.
 fn syntax_fault(source: &Source, message: &str) -> Diagnostic {
     let place = message.strip_prefix("error at ").and_then(|rest| {
         let (line, rest) = rest.split_once(':')?;
@@ -252,16 +252,16 @@ fn syntax_fault(source: &Source, message: &str) -> Diagnostic {
             let start: usize = source.text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
             let offset: usize = source.text[start..].chars().take(column.saturating_sub(1)).map(char::len_utf8).sum();
             let at = (start + offset).min(source.text.len());
-            Diagnostic::error("R060", "the query can't be read from here on").at(source, at..at).help(help)
+            Diagnostic::error("R060", "syntax error in the query").at(source, at..at).help(help)
         }
         None => {
             let help = "see https://www.w3.org/TR/sparql11-query/";
-            Diagnostic::error("R060", format!("the query can't be read: {message}")).in_source(source).help(help)
+            Diagnostic::error("R060", format!("invalid query: {message}")).in_source(source).help(help)
         }
     }
 }
 
-/// The words and signs among what the parser expected; its classes of characters help nobody.
+/// Returns the keywords and symbols that the parser expected, without its character classes, which don't help users.
 fn expected(message: &str) -> String {
     let words: Vec<&str> = message
         .trim_start_matches("expected ")
@@ -273,7 +273,7 @@ fn expected(message: &str) -> String {
     if words.is_empty() { "something else".to_owned() } else { words.join(" or ") }
 }
 
-/// Terms of our namespaces must be in the vocabulary, as in Datalog.
+/// Checks that terms of our namespaces are in the vocabulary, as in Datalog.
 fn check_vocabulary(
     source: &Source,
     vocabulary: &Vocabulary,

@@ -1,4 +1,4 @@
-//! Rules in an order in which nothing is negated or counted before it is complete.
+//! Stratification: orders rules so that a predicate is complete before it is negated or aggregated.
 
 use std::collections::BTreeSet;
 
@@ -10,27 +10,27 @@ use crate::rules::universe::Universe;
 /// Rules that are evaluated together.
 #[derive(Debug, Clone)]
 pub(crate) struct Stratum {
-    /// Indices of its rules.
+    /// Indices of the rules.
     pub(crate) rules: Vec<usize>,
-    /// Predicates that it completes, sorted.
+    /// Predicates that the stratum completes, sorted.
     pub(crate) predicates: Vec<PredicateId>,
-    /// Whether some rule reads what the stratum derives.
+    /// Whether a rule reads a predicate that the stratum derives.
     pub(crate) recursive: bool,
 }
 
-/// One dependence: the head's predicate on a body's.
+/// A dependency of the head's predicate on a predicate of the body.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     to: PredicateId,
-    /// Under negation, or inside an aggregate.
+    /// Whether it is negated or aggregated.
     strict: bool,
     rule: usize,
 }
 
-/// The strata of some rules, each after those that it reads.
+/// Computes the strata of the rules, each after the strata that it reads.
 ///
 /// # Errors
-/// `R050` for each predicate that depends on its own negation or aggregate, with the way around.
+/// `R050` for each predicate that depends on its own negation or aggregate, with the cycle.
 pub(crate) fn stratify(
     rules: &[Rule],
     predicates: &Predicates,
@@ -85,8 +85,8 @@ fn graph(rules: &[Rule], predicates: usize) -> Vec<Vec<Edge>> {
     graph
 }
 
-/// The strongly connected component of each predicate, numbered so that what is read has the smaller number
-/// (Tarjan's algorithm, with a stack of its own: chains of rules may be long).
+/// Computes the strongly connected component of each predicate, numbered in dependency order (Tarjan's algorithm,
+/// iterative because chains of rules may be long).
 fn components(graph: &[Vec<Edge>]) -> Vec<usize> {
     const NEW: usize = usize::MAX;
     let n = graph.len();
@@ -133,7 +133,7 @@ fn components(graph: &[Vec<Edge>]) -> Vec<usize> {
     component
 }
 
-/// The fault of a strict edge inside a component, with the shortest way back.
+/// Reports a strict edge inside a component, with the shortest cycle through it.
 fn cycle_fault(
     from: PredicateId,
     edge: &Edge,
@@ -168,7 +168,7 @@ fn cycle_fault(
         .help(format!("the cycle is {cycle}; break it with a predicate that does not depend on `{name}`"))
 }
 
-/// Predicates on a shortest way inside one component, both ends included.
+/// Returns the predicates on a shortest path inside one component, both ends included.
 fn way_back(start: PredicateId, goal: PredicateId, graph: &[Vec<Edge>], component: &[usize]) -> Vec<PredicateId> {
     let mut came_from = vec![None; graph.len()];
     let mut queue = std::collections::VecDeque::from([start]);
@@ -192,7 +192,7 @@ fn way_back(start: PredicateId, goal: PredicateId, graph: &[Vec<Edge>], componen
     way
 }
 
-/// A predicate's name, with the property that is part of it.
+/// Formats a predicate's name with its constant property, if it has one.
 pub(crate) fn shown(predicates: &Predicates, id: PredicateId, terms: &Universe<'_>) -> String {
     let predicate = predicates.get(id);
     match predicate.property.map(|property| terms.term(property)) {

@@ -1,4 +1,4 @@
-//! What a rule text says, as a tree with places; nothing of it is checked yet.
+//! The syntax tree of a rule text, with source spans. Nothing in it is checked yet.
 
 use crate::base::{Source, Span};
 
@@ -7,17 +7,17 @@ use crate::base::{Source, Span};
 pub struct Syntax {
     /// The text.
     pub source: Source,
-    /// Prefixes that it declares, in order: prefix, namespace.
+    /// Declared prefixes with their namespaces, in order.
     pub prefixes: Vec<(String, String)>,
-    /// What `@base` says last.
+    /// The IRI of the last `@base`.
     pub base: Option<String>,
     /// Its statements in order.
     pub statements: Vec<Statement>,
-    /// Whether all of it could be read.
+    /// Whether the whole text was parsed without errors.
     pub whole: bool,
 }
 
-/// One statement. Directives that only name things (`@prefix`, `@base`) are resolved by the parser.
+/// One statement. The parser resolves `@prefix` and `@base`, so they do not appear here.
 #[derive(Debug, Clone)]
 pub enum Statement {
     /// A rule, or a fact (a rule without body).
@@ -26,7 +26,7 @@ pub enum Statement {
     Parameter {
         /// Name without `$`.
         name: String,
-        /// Its value; nothing where one must be given from outside.
+        /// Its value; `None` if the text gives no value.
         value: Option<Expression>,
         /// The whole directive.
         span: Span,
@@ -49,14 +49,14 @@ pub enum Statement {
     },
 }
 
-/// `@import p :- csv{resource="f"}, … .` and its mirror image.
+/// `@import p :- csv{resource="f"}, … .`, or the corresponding `@export`.
 #[derive(Debug, Clone)]
 pub struct Transfer {
-    /// Whether it reads; otherwise it writes.
+    /// Whether this is an import; otherwise it is an export.
     pub import: bool,
     /// Predicate.
     pub predicate: String,
-    /// Format, such as `csv`.
+    /// File format, for example `csv`.
     pub format: String,
     /// Options by name.
     pub options: Vec<(String, Expression)>,
@@ -71,13 +71,13 @@ pub struct Transfer {
 pub struct RuleSyntax {
     /// `#[name("…")]`.
     pub name: Option<String>,
-    /// What it derives.
+    /// The atoms it derives.
     pub heads: Vec<AtomSyntax>,
-    /// What must hold.
+    /// The conditions that must hold.
     pub body: Vec<LiteralSyntax>,
     /// From the first head to the final dot.
     pub span: Span,
-    /// Comment lines right above it, joined.
+    /// Comment lines directly above it, joined.
     pub comment: Option<String>,
 }
 
@@ -97,7 +97,7 @@ pub struct AtomSyntax {
 /// One condition of a body.
 #[derive(Debug, Clone)]
 pub enum LiteralSyntax {
-    /// An atom, or a built-in that looks like one.
+    /// An atom, or a call of a built-in, which has the same syntax.
     Atom(AtomSyntax),
     /// `~p(…)`.
     Negated(AtomSyntax),
@@ -119,7 +119,7 @@ pub enum LiteralSyntax {
 pub enum Comparison {
     /// `=`: the same term.
     Equal,
-    /// `!=`: another term.
+    /// `!=`: a different term.
     Unequal,
     /// `<`, of numbers.
     Less,
@@ -132,7 +132,7 @@ pub enum Comparison {
 }
 
 impl Comparison {
-    /// How it is written.
+    /// Returns the operator as written.
     pub fn symbol(self) -> &'static str {
         match self {
             Self::Equal => "=",
@@ -148,9 +148,9 @@ impl Comparison {
 /// A term or a computation.
 #[derive(Debug, Clone)]
 pub struct Expression {
-    /// What it is.
+    /// Its kind, with its operands.
     pub kind: ExpressionKind,
-    /// Where it is.
+    /// Its place in the source.
     pub span: Span,
 }
 
@@ -175,10 +175,10 @@ pub enum ExpressionKind {
     Format(Vec<Expression>),
     /// `#count(v, distinct…)`.
     Aggregate(String, Vec<Expression>),
-    /// `!x`, kept so that one clear fault can say what it is.
+    /// `!x`: not supported, but parsed so that a clear error can name it.
     Existential(String),
     /// A tuple `(a, b)`, only in options of imports.
     Tuple(Vec<Expression>),
-    /// What could not be parsed; a fault was noted.
+    /// Text that could not be parsed; the error has been reported.
     Broken,
 }

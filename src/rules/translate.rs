@@ -1,4 +1,4 @@
-//! One rule's syntax to one checked rule for each of its heads.
+//! Translates the syntax of a rule to one checked rule for each of its heads.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use crate::rules::syntax::{
 };
 use crate::rules::universe::Universe;
 
-/// The rules and facts of a file, checked. What has faults is left out; the faults are noted.
+/// Translates the rules and facts of a file. Statements with errors are reported and left out.
 pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> Program {
     let mut program = Program::default();
     let globals = globals(checking, syntax, role);
@@ -27,7 +27,7 @@ pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role
             break;
         }
         match statement {
-            // Said when its heads were defined.
+            // Already reported when its heads were defined.
             Statement::Rule(rule) if rule.body.len() > LITERAL_LIMIT => {}
             Statement::Rule(rule) if rule.body.is_empty() => {
                 for head in &rule.heads {
@@ -55,13 +55,13 @@ pub(crate) struct Translation<'c, 'a> {
     pub(crate) source: &'c Source,
     role: Role,
     pub(crate) globals: &'c BTreeMap<String, Term>,
-    /// Name and first place of each variable; made ones have no name.
+    /// Name and first place of each variable; the name of a generated variable is empty.
     pub(crate) variables: Vec<(String, Span)>,
     pub(crate) body: Vec<Literal>,
-    /// Rules for what a body atom can't say by itself.
+    /// Helper rules for negated atoms with repeated variables.
     extra: Vec<Rule>,
     pub(crate) faulty: bool,
-    /// Whether too many variables were told.
+    /// Whether too many variables have been reported.
     overfull: bool,
 }
 
@@ -96,7 +96,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         self.checking.error(code, self.source, span, message, help);
     }
 
-    /// The checked rule, after the helper rules that it needs; nothing where a fault was noted.
+    /// Returns the helper rules followed by the checked rule; empty if an error was reported.
     fn rule(mut self, rule: &RuleSyntax, head: &AtomSyntax) -> Vec<Rule> {
         for literal in &rule.body {
             self.literal(literal);
@@ -144,26 +144,26 @@ impl<'c, 'a> Translation<'c, 'a> {
         Some((predicate, row))
     }
 
-    /// The value of an expression without variables.
+    /// Evaluates an expression without variables. Returns `None` if an error was reported.
     pub(crate) fn ground(&mut self, expression: &Expression) -> Option<Term> {
         let expr = self.expression(expression)?;
         let mut variables = Vec::new();
         expr.variables(&mut variables);
         if let Some(variable) = variables.first() {
             let name = self.variables[*variable].0.clone();
-            let help = "a fact has constants only; a rule has a body behind `:-`";
+            let help = "a fact may contain only constants; for a rule, write a body after `:-`";
             self.error("R020", &expression.span, format!("variable `?{name}` in a fact"), help);
             return None;
         }
         let nothing = Terms::new();
         let value = expr.value(&[], &Universe::new(&nothing, None)).map(|value| value.into_owned());
         if value.is_none() {
-            self.error("R037", &expression.span, "the expression has no value", "look at the types of its arguments");
+            self.error("R037", &expression.span, "the expression has no value", "check the types of its arguments");
         }
         value
     }
 
-    /// An atom of no columns keeps one, with the same constant always.
+    /// Adds the constant column of an atom without arguments.
     fn pad(&mut self, predicate: PredicateId, mut args: Vec<Operand>) -> Vec<Operand> {
         if args.is_empty() && self.checking.predicates.get(predicate).width == 1 {
             args.push(Operand::Constant(unit(self.checking.terms)));
@@ -171,7 +171,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         args
     }
 
-    /// Number of a variable by name.
+    /// Returns the index of a variable, adding it if it is new.
     pub(crate) fn variable(&mut self, name: &str, span: &Span) -> Variable {
         match self.variables.iter().position(|(known, _)| known == name) {
             Some(variable) => variable,
@@ -183,7 +183,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         self.add_variable("", span)
     }
 
-    /// A rule with too many of them is faulty; its variables then mean nothing.
+    /// Adds a variable. A rule with too many variables is marked as faulty and returns a dummy index.
     fn add_variable(&mut self, name: &str, span: &Span) -> Variable {
         if self.variables.len() == VARIABLE_LIMIT {
             if !self.overfull {
@@ -226,13 +226,13 @@ impl<'c, 'a> Translation<'c, 'a> {
         }
     }
 
-    /// A built-in in an atom's place, unless a predicate has its name.
+    /// Returns whether an atom is a call of a built-in: a predicate of the same name takes precedence.
     fn is_test(&self, atom: &AtomSyntax) -> bool {
         let defined = |scope| self.checking.defined.contains_key(&(scope, atom.predicate.clone()));
         builtins::builtin(&atom.predicate).is_some() && !defined(0) && !defined(self.role.scope())
     }
 
-    /// The predicate of an atom and those of its arguments that are columns.
+    /// Returns the predicate of an atom and the arguments that are columns. Returns `None` if an error was reported.
     fn predicate<'e>(
         &mut self,
         atom: &'e AtomSyntax,
@@ -246,7 +246,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         {
             if args.len() != *arity {
                 let message = format!("`{name}` has {}, needs {arity}", counted(args.len()));
-                self.error("R022", &atom.span, message, format!("it reads `{form}`"));
+                self.error("R022", &atom.span, message, format!("write `{form}`"));
                 return None;
             }
             return Some(self.given(atom, args));
@@ -261,7 +261,7 @@ impl<'c, 'a> Translation<'c, 'a> {
                         definition.arity,
                         definition.place()
                     );
-                    self.error("R022", &atom.span, message, "give it the same number everywhere, or another name");
+                    self.error("R022", &atom.span, message, "use the same number everywhere, or another name");
                 }
                 self.faulty = true;
                 return None;
@@ -278,7 +278,7 @@ impl<'c, 'a> Translation<'c, 'a> {
     fn undefined(&mut self, atom: &AtomSyntax) {
         let name = atom.predicate.as_str();
         if self.role == Role::Standalone {
-            // A program may ask for facts that nobody gives: the predicate is empty.
+            // A standalone program may use a predicate without facts or rules: it is empty.
             return;
         }
         let known = self.checking.known_names(self.role);
@@ -286,7 +286,7 @@ impl<'c, 'a> Translation<'c, 'a> {
         self.error("R023", &atom.name_span, format!("no rule defines `{name}`"), help);
     }
 
-    /// A given predicate: shorthands become `state`, a constant property becomes part of the predicate.
+    /// Resolves a given predicate: shorthands become `state`, a constant property becomes part of the predicate.
     fn given<'e>(
         &mut self,
         atom: &'e AtomSyntax,
@@ -327,7 +327,7 @@ impl<'c, 'a> Translation<'c, 'a> {
                 if self.role != Role::Standalone {
                     return None;
                 }
-                // Nobody defines it: an empty predicate.
+                // An undefined predicate is empty.
                 self.faulty = false;
                 self.checking.define_predicate(self.source, &atom.predicate, atom.args.len(), &atom.span, self.role);
                 let id = self.checking.predicates.find(0, &atom.predicate, None)?;
@@ -365,7 +365,7 @@ impl<'c, 'a> Translation<'c, 'a> {
     fn head_argument(&mut self, arg: &Expression, aggregation: Option<&mut Aggregation>) -> Option<Operand> {
         match &arg.kind {
             ExpressionKind::Anonymous => {
-                self.error("R035", &arg.span, "`_` in a head", "a head says what is derived: name the value");
+                self.error("R035", &arg.span, "`_` in a head", "write a variable or a constant instead of `_`");
                 None
             }
             ExpressionKind::Variable(name) => {
@@ -396,7 +396,8 @@ impl<'c, 'a> Translation<'c, 'a> {
         }
     }
 
-    /// A helper rule that keeps what a negated atom says about the variables that are bound elsewhere.
+    /// Adds a helper rule that projects a negated atom to its bound variables. Returns the helper's head, to be negated
+    /// instead.
     pub(crate) fn helper(&mut self, negated: Atom, bound: &[Variable]) -> Atom {
         let name =
             format!("{}~{}", self.checking.predicates.get(negated.predicate).name, self.checking.predicates.len());
@@ -420,7 +421,7 @@ impl<'c, 'a> Translation<'c, 'a> {
     }
 }
 
-/// The term in the only column of predicates without arguments.
+/// Returns the constant in the only column of predicates without arguments.
 pub(crate) fn unit(terms: &mut Terms) -> TermId {
     terms.intern(Term::Boolean(true))
 }

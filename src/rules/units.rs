@@ -1,4 +1,4 @@
-//! Units of rules' values, from the vocabulary: a length is not compared with a mass.
+//! Checks the units of values in rules, based on the vocabulary: a length can't be compared with a mass.
 
 use std::collections::HashMap;
 
@@ -8,19 +8,19 @@ use crate::rules::expression::Expr;
 use crate::rules::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
 use crate::rules::syntax::Comparison;
 
-/// Powers of metre, kilogram, second and radian.
+/// Exponents of metre, kilogram, second and radian.
 type Dimension = [i8; 4];
 
-/// What is known of a value's unit: nothing of constants, and of whatever no property's unit tells.
+/// The unit of a value; `None` if it is unknown, as for constants.
 type Unit = Option<Dimension>;
 
 const NONE: Dimension = [0; 4];
 const RADIAN: Dimension = [0, 0, 0, 1];
 
-/// Passes over the rules: units travel through so many predicates in a row at least.
+/// Passes over the rules: units propagate through at least this many predicates in a row.
 const PASSES: usize = 4;
 
-/// The dimension of a unit as the vocabulary writes it: symbols and `/`, such as `m/s`.
+/// Parses a unit of the vocabulary: symbols and `/`, for example `m/s`. Returns `None` if a symbol is unknown.
 fn dimension(text: &str) -> Unit {
     let (above, below) = text.split_once('/').unwrap_or((text, "1"));
     let [above, below] = [above, below].map(|part| {
@@ -44,7 +44,7 @@ fn combine(a: Dimension, b: Dimension, sign: i8) -> Dimension {
     std::array::from_fn(|idx| a[idx].saturating_add(b[idx].saturating_mul(sign)))
 }
 
-/// A dimension in words.
+/// Formats a dimension.
 fn shown(dimension: Dimension) -> String {
     let part = |wanted: fn(i8) -> bool| -> String {
         let symbols = ["m", "kg", "s", "rad"].into_iter().zip(dimension).filter(|(_, power)| wanted(*power));
@@ -59,12 +59,12 @@ fn shown(dimension: Dimension) -> String {
     }
 }
 
-/// Checks the units in all rules of a book.
+/// Checks the units in the rules of a book.
 pub(crate) struct Units<'a> {
     predicates: &'a Predicates,
     vocabulary: &'a Vocabulary,
     terms: &'a Terms,
-    /// Units of the columns of derived predicates, as far as they are known.
+    /// Known units of the columns of derived predicates.
     columns: HashMap<(PredicateId, usize), Unit>,
 }
 
@@ -73,7 +73,7 @@ impl<'a> Units<'a> {
         Self { predicates, vocabulary, terms, columns: HashMap::new() }
     }
 
-    /// Learns what units the predicates of some rules have. (What is wrong is said by [`Units::check`].)
+    /// Infers the units of the rules' head predicates. ([`Units::check`] reports the errors.)
     pub(crate) fn learn(&mut self, rules: &[Rule]) {
         for _ in 0..PASSES {
             for rule in rules {
@@ -83,7 +83,7 @@ impl<'a> Units<'a> {
                         Operand::Variable(variable) => units[*variable],
                         _ => None,
                     };
-                    // Where rules disagree, nothing is known.
+                    // If rules disagree, the unit is unknown.
                     let known = self.columns.entry((rule.head.predicate, column)).or_insert(unit);
                     if unit.is_some() && *known != unit {
                         *known = known.xor(unit);
@@ -93,26 +93,26 @@ impl<'a> Units<'a> {
         }
     }
 
-    /// Notes `R042` where units don't match.
+    /// Reports `R042` if units don't match.
     pub(crate) fn check(&self, rules: &[Rule], diagnostics: &mut Diagnostics) {
         for rule in rules {
             self.rule(rule, diagnostics);
         }
     }
 
-    /// Notes `R042` where the margin is not in the property's unit.
+    /// Reports `R042` if the margin is not in the property's unit.
     pub(crate) fn check_margin(&self, rules: &[Rule], margin: PredicateId, unit: &str, diagnostics: &mut Diagnostics) {
         let (Some(Some(found)), Some(wanted)) = (self.columns.get(&(margin, 0)), dimension(unit)) else { return };
         let rule = rules.iter().find(|rule| rule.head.predicate == margin);
         if let Some(rule) = rule.filter(|_| *found != wanted) {
-            let message = format!("the margin is in {}, the ontology says {}", shown(*found), shown(wanted));
+            let message = format!("the margin is in {}, but the property's unit is {}", shown(*found), shown(wanted));
             let help = "change `act:unit` of the property, or convert the margin";
             diagnostics
                 .push(Diagnostic::error("R042", message).at(&rule.origin.source, rule.head.span.clone()).help(help));
         }
     }
 
-    /// The unit of a column of an atom.
+    /// Returns the unit of a column of an atom.
     fn column(&self, atom: &Atom, column: usize) -> Unit {
         let predicate = self.predicates.get(atom.predicate);
         match predicate.property {
@@ -124,7 +124,7 @@ impl<'a> Units<'a> {
         }
     }
 
-    /// The units of a rule's variables. Faults are noted on the way.
+    /// Infers the units of a rule's variables and reports mismatches.
     fn rule(&self, rule: &Rule, diagnostics: &mut Diagnostics) -> Vec<Unit> {
         let mut seen = Seen { rule, units: vec![None; rule.variables.len()], diagnostics };
         for literal in &rule.body {
@@ -165,7 +165,7 @@ impl<'a> Units<'a> {
     }
 }
 
-/// What has been seen of one rule.
+/// The units inferred so far for one rule.
 struct Seen<'a> {
     rule: &'a Rule,
     units: Vec<Unit>,
@@ -174,12 +174,12 @@ struct Seen<'a> {
 
 impl Seen<'_> {
     fn fault(&mut self, message: String, span: &Span) {
-        let help = "units of properties stand in ontology/world.ttl; numbers in the text fit every unit";
+        let help = "units of properties are declared in ontology/world.ttl; a number in the rule text fits every unit";
         let fault = Diagnostic::error("R042", message).at(&self.rule.origin.source, span.clone()).help(help);
         self.diagnostics.push(fault);
     }
 
-    /// A variable has this unit, too.
+    /// Records the unit of a variable and reports a conflict with its known unit.
     fn both(&mut self, variable: usize, unit: Unit, span: &Span) {
         match (self.units[variable], unit) {
             (Some(known), Some(unit)) if known != unit => {
@@ -232,7 +232,7 @@ impl Seen<'_> {
             | "geo3d:distance2d" | "geo3d:norm" | "geo3d:boxDistance" => first,
             "SIN" | "COS" | "TAN" => {
                 if let Some(unit) = first.filter(|unit| *unit != RADIAN && *unit != NONE) {
-                    self.fault(format!("{name} of {}", shown(unit)), span);
+                    self.fault(format!("{name} takes an angle in rad, not {}", shown(unit)), span);
                 }
                 Some(NONE)
             }

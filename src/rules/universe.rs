@@ -1,13 +1,13 @@
-//! One numbering over the terms of the rules, of a run's facts, and those that an evaluation makes.
+//! Common term ids for the rules, the facts of a run, and the terms created by an evaluation.
 
 use crate::base::{Term, TermId, Terms};
 
-/// Terms of three origins under one numbering; the first two are shared and never copied.
+/// Terms of three origins with common ids. The terms of the rules and of the run are borrowed, not copied.
 #[derive(Debug)]
 pub(crate) struct Universe<'a> {
     book: &'a Terms,
     run: Option<&'a Terms>,
-    /// Number here of each term of the run, or [`UNKNOWN`] while nobody has asked.
+    /// Common id of each term of the run, or [`UNKNOWN`] until first used.
     run_ids: Vec<TermId>,
     made: Terms,
 }
@@ -15,7 +15,7 @@ pub(crate) struct Universe<'a> {
 const UNKNOWN: TermId = TermId::MAX;
 
 impl<'a> Universe<'a> {
-    /// The terms of the rules, and those of a run where there is one.
+    /// Creates a universe of the rules' terms and, optionally, the terms of a run.
     pub(crate) fn new(book: &'a Terms, run: Option<&'a Terms>) -> Self {
         Self { book, run, run_ids: vec![UNKNOWN; run.map_or(0, Terms::len)], made: Terms::new() }
     }
@@ -28,7 +28,7 @@ impl<'a> Universe<'a> {
         self.book.len() + self.run_ids.len()
     }
 
-    /// The number here of a term of the run.
+    /// Returns the common id of a term of the run.
     pub(crate) fn of_run(&mut self, id: TermId) -> TermId {
         let known = self.run_ids[id as usize];
         if known != UNKNOWN {
@@ -40,7 +40,7 @@ impl<'a> Universe<'a> {
         found
     }
 
-    /// The term of a number.
+    /// Returns the term of a common id.
     pub(crate) fn term(&self, id: TermId) -> &Term {
         let idx = id as usize;
         if idx < self.run_start() {
@@ -52,7 +52,7 @@ impl<'a> Universe<'a> {
         }
     }
 
-    /// The number of a term, if any origin has it.
+    /// Returns the common id of a term, or `None` if no origin contains it.
     pub(crate) fn id(&self, term: &Term) -> Option<TermId> {
         self.book
             .id(term)
@@ -60,12 +60,12 @@ impl<'a> Universe<'a> {
             .or_else(|| Some(number(self.made_start() + self.made.id(term)? as usize)))
     }
 
-    /// The terms that the evaluation made, in the order of their numbers.
+    /// Returns the terms created by the evaluation, ordered by id.
     pub(crate) fn into_made(self) -> Vec<Term> {
         (0..self.made.len()).map(|idx| self.made.term(number(idx)).clone()).collect()
     }
 
-    /// The number of a term, given to it now if it had none.
+    /// Returns the common id of a term, adding the term if it is new.
     pub(crate) fn intern(&mut self, term: Term) -> TermId {
         if let Some(id) = self.book.id(&term) {
             return id;

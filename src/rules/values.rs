@@ -1,20 +1,20 @@
-//! Values of terms: literals in their canonical form, numbers, lexical forms.
+//! Values of terms: canonical literals, numbers, lexical forms.
 
 use crate::base::{Term, names};
 
-/// A number with its type kept.
+/// A number with its type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Number {
     /// `xsd:integer`.
     Integer(i64),
     /// `xsd:float`.
     Float(f32),
-    /// `xsd:double`; decimals are taken as such when they are computed with.
+    /// `xsd:double`; decimals are converted to it for computation.
     Double(f64),
 }
 
 impl Number {
-    /// The number of a term, if it is one.
+    /// Returns the number of a term, or `None` if the term is not a number.
     pub(crate) fn of(term: &Term) -> Option<Self> {
         match term {
             Term::Integer(value) => Some(Self::Integer(*value)),
@@ -27,7 +27,7 @@ impl Number {
         }
     }
 
-    /// Its value as a double.
+    /// Returns the value as a double.
     pub(crate) fn double(self) -> f64 {
         match self {
             Self::Integer(value) => value as f64,
@@ -36,7 +36,7 @@ impl Number {
         }
     }
 
-    /// Its term; nothing where the value is no finite number, because a computation that leaves the numbers has no result.
+    /// Returns the term. Returns `None` if the value is not finite, because such a computation has no result.
     pub(crate) fn term(self) -> Option<Term> {
         match self {
             Self::Integer(value) => Some(Term::Integer(value)),
@@ -48,12 +48,12 @@ impl Number {
     }
 }
 
-/// A double as a term; `-0.0` becomes `0.0`, so that equal results are the same term.
+/// Converts a double to a term; `-0.0` becomes `0.0`, so that equal results are the same term.
 pub(crate) fn double_term(value: f64) -> Term {
     Term::Double(if value == 0.0 { 0.0 } else { value })
 }
 
-/// The integer types of XML Schema, whose values are all kept as integers.
+/// The integer types of XML Schema, all stored as integers.
 const INTEGER_TYPES: [&str; 13] = [
     "integer",
     "int",
@@ -70,7 +70,7 @@ const INTEGER_TYPES: [&str; 13] = [
     "unsignedByte",
 ];
 
-/// The term of a literal with a datatype, in its canonical form where the form is known and right.
+/// Converts a literal to a term: canonical if the datatype is known and the text is valid, otherwise unchanged.
 pub(crate) fn literal(text: &str, datatype: &str) -> Term {
     let other = || Term::Literal(text.into(), datatype.into());
     let Some(local) = datatype.strip_prefix(names::XSD) else { return other() };
@@ -95,15 +95,15 @@ pub(crate) fn literal(text: &str, datatype: &str) -> Term {
     }
 }
 
-/// The term of an integer of any length, in decimal digits with or without a sign; nothing for another text.
+/// Converts an integer of any length, in decimal digits with an optional sign. Returns `None` for any other text.
 ///
-/// One that 64 bits don't hold is, as in Nemo, an `xsd:integer` literal in canonical form: equal to itself alone, exact, and
-/// no number to compute with, because a double in its place would be rounded.
+/// An integer that does not fit in 64 bits becomes, as in Nemo, an `xsd:integer` literal in canonical form. It is exact
+/// and equal only to itself, but not a number for computation, because a double would be rounded.
 pub(crate) fn integer(text: &str) -> Option<Term> {
     if text.contains('.') { None } else { whole(&decimal(text)?) }
 }
 
-/// The same for a canonical decimal; nothing where it has a fraction.
+/// Converts a canonical decimal to an integer term. Returns `None` if it has a fraction.
 fn whole(canonical: &str) -> Option<Term> {
     match canonical.parse() {
         Ok(value) => Some(Term::Integer(value)),
@@ -112,7 +112,7 @@ fn whole(canonical: &str) -> Option<Term> {
     }
 }
 
-/// Whether a term is an integer that 64 bits don't hold.
+/// Returns whether a term is an integer that does not fit in 64 bits.
 pub(crate) fn is_beyond_64_bits(term: &Term) -> bool {
     matches!(term, Term::Literal(text, datatype)
         if (datatype.strip_prefix(names::XSD) == Some("integer") || datatype.as_ref() == "xsd:integer") && integer(text).is_some())
@@ -128,7 +128,8 @@ fn xsd_float(text: &str) -> Option<f64> {
     }
 }
 
-/// Digits with one dot at most, without needless zeros; without the dot where nothing is behind it.
+/// Returns the canonical form of a decimal: no redundant zeros, and no dot without a fraction. Returns `None` if the
+/// text is not a decimal.
 fn decimal(text: &str) -> Option<String> {
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
@@ -146,7 +147,7 @@ fn decimal(text: &str) -> Option<String> {
     Some(if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") })
 }
 
-/// The text of a term's value, as `STR` gives it.
+/// Returns the lexical form of a term, as `STR` does.
 pub(crate) fn lexical(term: &Term) -> String {
     match term {
         Term::Iri(text) | Term::Blank(text) | Term::String(text) | Term::LangString(text, _) | Term::Decimal(text) => {
@@ -161,7 +162,7 @@ pub(crate) fn lexical(term: &Term) -> String {
     }
 }
 
-/// IRI of a term's datatype, as `DATATYPE` gives it.
+/// Returns the IRI of a term's datatype, as `DATATYPE` does.
 pub(crate) fn datatype(term: &Term) -> String {
     let local = match term {
         Term::Iri(_) => "anyURI",
@@ -178,7 +179,7 @@ pub(crate) fn datatype(term: &Term) -> String {
     format!("{}{local}", names::XSD)
 }
 
-/// The canonical spelling of a term with its type, as `fullStr` gives it and exports write it.
+/// Returns the canonical form of a term with its type, as in `fullStr` and exports.
 pub(crate) fn full(term: &Term) -> String {
     match term {
         Term::Iri(iri) => iri.to_string(),

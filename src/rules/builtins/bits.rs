@@ -26,7 +26,7 @@ pub(super) fn xor(args: &[Value<'_>]) -> Option<Term> {
     fold(args, 0, |a, b| a ^ b)
 }
 
-/// Number and places; no result for fewer than 0 or more than 63 places.
+/// Returns the number and the shift distance. Returns `None` if the distance is not from 0 to 63.
 fn places(args: &[Value<'_>]) -> Option<(i64, u32)> {
     Some((integer(&args[0])?, u32::try_from(integer(&args[1])?).ok().filter(|places| *places < 64)?))
 }
@@ -39,7 +39,7 @@ pub(super) fn shr(args: &[Value<'_>]) -> Option<Term> {
     places(args).map(|(value, places)| Term::Integer(value >> places))
 }
 
-/// Zeros come in from the left.
+/// Shifts right, filling with zeros.
 pub(super) fn shru(args: &[Value<'_>]) -> Option<Term> {
     places(args).map(|(value, places)| Term::Integer((value.cast_unsigned() >> places).cast_signed()))
 }

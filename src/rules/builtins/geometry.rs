@@ -1,4 +1,4 @@
-//! Geometry in space: an extension, so a file that uses it declares its prefix. Units: metres and radians.
+//! 3D geometry functions, an extension: a file that uses them must declare the prefix. Units: metres and radians.
 
 use crate::base::{Pose, Term};
 use crate::rules::builtins::Value;
@@ -23,13 +23,13 @@ fn length(x: f64, y: f64, z: f64) -> f64 {
     libm::sqrt(x * x + y * y + z * z)
 }
 
-/// Distance of two points: x1, y1, z1, x2, y2, z2.
+/// Distance between two points: x1, y1, z1, x2, y2, z2.
 pub(super) fn distance(args: &[Value<'_>]) -> Option<Term> {
     let [x1, y1, z1, x2, y2, z2] = numbers(args)?;
     finite(length(x2 - x1, y2 - y1, z2 - z1))
 }
 
-/// Distance of two points in the plane: x1, y1, x2, y2.
+/// Distance between two points in the plane: x1, y1, x2, y2.
 pub(super) fn distance2d(args: &[Value<'_>]) -> Option<Term> {
     let [x1, y1, x2, y2] = numbers(args)?;
     finite(length(x2 - x1, y2 - y1, 0.0))
@@ -41,13 +41,13 @@ pub(super) fn norm(args: &[Value<'_>]) -> Option<Term> {
     finite(length(x, y, z))
 }
 
-/// Inner product of two vectors.
+/// Dot product of two vectors: x1, y1, z1, x2, y2, z2.
 pub(super) fn dot(args: &[Value<'_>]) -> Option<Term> {
     let [x1, y1, z1, x2, y2, z2] = numbers(args)?;
     finite(x1 * x2 + y1 * y2 + z1 * z2)
 }
 
-/// Angle between two vectors, in [0, π]; no result for a vector without length.
+/// Angle between two vectors, in [0, π]. Returns `None` if a vector has zero length.
 pub(super) fn angle(args: &[Value<'_>]) -> Option<Term> {
     let [x1, y1, z1, x2, y2, z2] = numbers(args)?;
     let (dot, cross) = (x1 * x2 + y1 * y2 + z1 * z2, length(y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2));
@@ -55,7 +55,7 @@ pub(super) fn angle(args: &[Value<'_>]) -> Option<Term> {
     if lengths > 0.0 { finite(libm::atan2(cross, dot)) } else { None }
 }
 
-/// Smallest turn from one heading to another, in (−π, π].
+/// Signed difference from one heading to another, wrapped to (−π, π].
 pub(super) fn angle_difference(args: &[Value<'_>]) -> Option<Term> {
     let [from, to] = numbers(args)?;
     let turn = libm::remainder(to - from, std::f64::consts::TAU);
@@ -73,49 +73,49 @@ fn pose(args: &[Value<'_>]) -> Option<Pose> {
     Some(Pose { position: [0.0; 3], rotation: numbers(args)? })
 }
 
-/// Heading of a quaternion's x axis about the vertical: x, y, z, w.
+/// Yaw of a unit quaternion's x axis about the vertical: x, y, z, w.
 pub(super) fn yaw(args: &[Value<'_>]) -> Option<Term> {
     finite(pose(args)?.yaw())
 }
 
-/// Angle between a quaternion's z axis and the vertical: x, y, z, w.
+/// Angle between a unit quaternion's z axis and the vertical: x, y, z, w.
 pub(super) fn tilt(args: &[Value<'_>]) -> Option<Term> {
     finite(pose(args)?.tilt())
 }
 
-/// Whether a point (x, y, z) is in a box (smallest x, y, z, largest x, y, z), its faces included.
+/// Whether a point (x, y, z) is in an axis-aligned box (min x, y, z, max x, y, z), including its faces.
 pub(super) fn inside_box(args: &[Value<'_>]) -> Option<Term> {
     let [x, y, z, x0, y0, z0, x1, y1, z1] = numbers(args)?;
     let inside = (x0..=x1).contains(&x) && (y0..=y1).contains(&y) && (z0..=z1).contains(&z);
     Some(Term::Boolean(inside))
 }
 
-/// Gap between two intervals; negative where they overlap.
+/// Gap between two intervals; negative if they overlap.
 fn gap(low1: f64, high1: f64, low2: f64, high2: f64) -> f64 {
     (low2 - high1).max(low1 - high2)
 }
 
-/// Distance of two boxes (smallest and largest corner each); 0 where they overlap.
+/// Distance between two axis-aligned boxes (min and max corner each); 0 if they overlap.
 pub(super) fn box_distance(args: &[Value<'_>]) -> Option<Term> {
     let [ax0, ay0, az0, ax1, ay1, az1, bx0, by0, bz0, bx1, by1, bz1] = numbers(args)?;
     let (x, y, z) = (gap(ax0, ax1, bx0, bx1), gap(ay0, ay1, by0, by1), gap(az0, az1, bz0, bz1));
     finite(length(x.max(0.0), y.max(0.0), z.max(0.0)))
 }
 
-/// Whether two boxes (smallest and largest corner each) have a point in common.
+/// Whether two axis-aligned boxes (min and max corner each) have a point in common.
 pub(super) fn boxes_overlap(args: &[Value<'_>]) -> Option<Term> {
     let [ax0, ay0, az0, ax1, ay1, az1, bx0, by0, bz0, bx1, by1, bz1] = numbers(args)?;
     let gaps = [gap(ax0, ax1, bx0, bx1), gap(ay0, ay1, by0, by1), gap(az0, az1, bz0, bz1)];
     Some(Term::Boolean(gaps.into_iter().all(|gap| gap <= 0.0)))
 }
 
-/// Common area of two rectangles in the plane: smallest x, y, largest x, y, each. Unit: m².
+/// Area of the intersection of two axis-aligned rectangles: min x, y, max x, y each. Unit: m².
 pub(super) fn overlap_area(args: &[Value<'_>]) -> Option<Term> {
     let [ax0, ay0, ax1, ay1, bx0, by0, bx1, by1] = numbers(args)?;
     finite((-gap(ax0, ax1, bx0, bx1)).max(0.0) * (-gap(ay0, ay1, by0, by1)).max(0.0))
 }
 
-/// Radians as degrees, for people to read.
+/// Converts radians to degrees, for messages.
 pub(super) fn degrees(args: &[Value<'_>]) -> Option<Term> {
     let [radians] = numbers(args)?;
     finite(radians.to_degrees())

@@ -1,6 +1,6 @@
 //! The built-in functions of the rule language, by name.
 //!
-//! Never: knows a predicate, a rule or a fact; a function sees its arguments and nothing else.
+//! Never: depends on a predicate, a rule or a fact; a function depends only on its arguments.
 
 mod bits;
 mod geometry;

@@ -1,4 +1,4 @@
-//! Arithmetic: integers stay integers, mixed arguments become doubles, what leaves the numbers has no result.
+//! Arithmetic: integers stay integers, mixed arguments become doubles; overflow and non-finite values have no result.
 
 use std::cmp::Ordering;
 
@@ -6,12 +6,12 @@ use crate::base::Term;
 use crate::rules::builtins::Value;
 use crate::rules::values::Number::{self, Double, Float, Integer};
 
-/// Whether two values are the same term.
+/// Returns whether two values are the same term.
 pub(crate) fn equal(a: &Term, b: &Term) -> bool {
     a == b
 }
 
-/// Order of two numbers by value; nothing where one is no number.
+/// Compares two numbers by value. Returns `None` if one is not a number.
 pub(crate) fn compare(a: &Term, b: &Term) -> Option<Ordering> {
     match (Number::of(a)?, Number::of(b)?) {
         (Integer(a), Integer(b)) => Some(a.cmp(&b)),
@@ -23,7 +23,7 @@ pub(super) fn ordered(args: &[Value<'_>], holds: fn(Ordering) -> bool) -> Option
     compare(&args[0], &args[1]).map(|order| Term::Boolean(holds(order)))
 }
 
-/// Applies to two numbers of one type, or to both as doubles.
+/// Applies an operation to two numbers of the same type, otherwise to both as doubles.
 fn pair(a: &Term, b: &Term, integers: fn(i64, i64) -> Option<i64>, doubles: fn(f64, f64) -> f64) -> Option<Number> {
     Some(match (Number::of(a)?, Number::of(b)?) {
         (Integer(a), Integer(b)) => Integer(integers(a, b)?),
@@ -41,7 +41,7 @@ fn single(a: &Term, integer: fn(i64) -> Option<i64>, double: fn(f64) -> f64) -> 
     .term()
 }
 
-/// Folds any number of arguments, all of one type or all as doubles.
+/// Folds any number of arguments of the same type, otherwise all as doubles.
 fn fold(args: &[Value<'_>], integers: fn(i64, i64) -> Option<i64>, doubles: fn(f64, f64) -> f64) -> Option<Term> {
     let numbers: Vec<Number> = args.iter().map(|a| Number::of(a)).collect::<Option<_>>()?;
     let first = *numbers.first()?;
@@ -75,7 +75,7 @@ pub(super) fn max(args: &[Value<'_>]) -> Option<Term> {
     fold(args, |a, b| Some(a.max(b)), f64::max)
 }
 
-/// Łukasiewicz' t-norm: how far the sum is above what all but one could give, at least 0.
+/// Łukasiewicz t-norm of n numbers: max(0, sum − (n − 1)).
 pub(super) fn lukasiewicz(args: &[Value<'_>]) -> Option<Term> {
     let numbers: Vec<Number> = args.iter().map(|a| Number::of(a)).collect::<Option<_>>()?;
     let sum: f64 = numbers.iter().map(|n| n.double()).sum();

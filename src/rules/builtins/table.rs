@@ -1,22 +1,22 @@
-//! Names of the built-ins, how many arguments they take, and where they are.
+//! Table of the built-ins: name, number of arguments, function.
 
 use std::borrow::Cow;
 
 use crate::base::Term;
 use crate::rules::builtins::{bits, geometry, numeric, text, types};
 
-/// An argument or result: borrowed where it is an interned term.
+/// An argument or result; borrowed if it is an interned term.
 pub(crate) type Value<'a> = Cow<'a, Term>;
 
-/// A built-in function. It has no result (`None`) where its arguments are not of its domain.
+/// A built-in function.
 pub(crate) struct Builtin {
-    /// As it is written in messages.
+    /// Name as written in messages.
     pub(crate) name: &'static str,
-    /// Fewest arguments.
+    /// Minimum number of arguments.
     pub(crate) least: usize,
-    /// Most arguments.
+    /// Maximum number of arguments.
     pub(crate) most: usize,
-    /// The function.
+    /// The function. Returns `None` if the arguments are outside its domain.
     pub(crate) apply: fn(&[Value<'_>]) -> Option<Term>,
 }
 
@@ -32,7 +32,7 @@ const fn entry(name: &'static str, least: usize, most: usize, apply: fn(&[Value<
     Builtin { name, least, most, apply }
 }
 
-/// Every built-in. The first six have operators, too.
+/// Every built-in. The first six are also written as operators.
 static BUILTINS: [Builtin; 87] = [
     entry("SUM", 1, MANY, numeric::sum),
     entry("MINUS", 2, 2, numeric::minus),
@@ -123,7 +123,7 @@ static BUILTINS: [Builtin; 87] = [
     entry("geo3d:degrees", 1, 1, geometry::degrees),
 ];
 
-/// The built-in of a name, whatever the case of its letters; geometry by its full IRI.
+/// Finds a built-in by name, ignoring case; geometry functions by their full IRI. Returns `None` if it is unknown.
 pub(crate) fn builtin(name: &str) -> Option<&'static Builtin> {
     if let Some(local) = name.strip_prefix(geometry::GEO3D) {
         return BUILTINS.iter().find(|b| b.name.strip_prefix("geo3d:") == Some(local));
@@ -131,12 +131,12 @@ pub(crate) fn builtin(name: &str) -> Option<&'static Builtin> {
     BUILTINS.iter().find(|b| b.name.eq_ignore_ascii_case(name) && !b.name.contains(':'))
 }
 
-/// All names, for "did you mean".
+/// Returns all names, for "did you mean".
 pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> + Clone {
     BUILTINS.iter().map(|b| b.name)
 }
 
-/// The built-in of a name as [`builtin_names`] gives it.
+/// Finds a built-in by the exact name that [`builtin_names`] returns.
 pub(crate) fn builtin_in_words(name: &str) -> Option<&'static Builtin> {
     BUILTINS.iter().find(|b| b.name == name)
 }

@@ -1,14 +1,14 @@
-//! Strings. Positions count characters from 1; a language tag is kept where it can be.
+//! String functions. Positions count characters from 1. Results keep the language tag if possible.
 
 use std::sync::Arc;
 
 use crate::base::Term;
 use crate::rules::builtins::Value;
 
-/// A pattern's compiled program is kept under this. Unit: bytes.
+/// Maximum size of a compiled pattern. Unit: bytes.
 const PATTERN_LIMIT: usize = 1 << 20;
 
-/// Text and language of a string.
+/// Returns the text and language of a string, or `None` for another term.
 fn parts(term: &Term) -> Option<(&str, Option<&Arc<str>>)> {
     match term {
         Term::String(text) => Some((text, None)),
@@ -17,7 +17,7 @@ fn parts(term: &Term) -> Option<(&str, Option<&Arc<str>>)> {
     }
 }
 
-/// Two strings that may be compared: the second has no language, or the same.
+/// Returns two comparable strings: the second has no language, or the same as the first. Returns `None` otherwise.
 fn pair<'a>(args: &'a [Value<'_>]) -> Option<(&'a str, &'a str)> {
     let (a, tag_a) = parts(&args[0])?;
     let (b, tag_b) = parts(&args[1])?;
@@ -113,13 +113,13 @@ pub(super) fn regex(args: &[Value<'_>]) -> Option<Term> {
     Some(Term::Boolean(compile_pattern(pattern).ok()?.is_match(text)))
 }
 
-/// A pattern, ready to match; matching takes time linear in the text.
+/// Compiles a pattern. Matching takes time linear in the text.
 ///
 /// # Errors
-/// Why it is no pattern.
+/// The reason why the pattern is invalid.
 pub(crate) fn compile_pattern(pattern: &str) -> Result<regex::Regex, String> {
     regex::RegexBuilder::new(pattern).size_limit(PATTERN_LIMIT).build().map_err(|error| {
-        error.to_string().lines().last().unwrap_or("it can't be read").trim_start_matches("error: ").to_owned()
+        error.to_string().lines().last().unwrap_or("syntax error").trim_start_matches("error: ").to_owned()
     })
 }
 

@@ -1,4 +1,4 @@
-//! What kind of term something is, conversions between kinds, and truth values.
+//! Type tests, conversions between types, and boolean functions.
 
 use crate::base::Term;
 use crate::rules::builtins::Value;
@@ -37,7 +37,7 @@ pub(super) fn full_str(args: &[Value<'_>]) -> Option<Term> {
 
 pub(super) fn int(args: &[Value<'_>]) -> Option<Term> {
     let whole = |value: f64| {
-        // Doubles of this size and over are whole, but not all of them are integers of 64 bits.
+        // Doubles of this magnitude are whole, but may not fit in 64 bits.
         (value.fract() == 0.0 && value.abs() < 9.0e18).then_some(Term::Integer(value as i64))
     };
     match args[0].as_ref() {

@@ -12,26 +12,25 @@ use crate::rules::program::Rule;
 use crate::rules::reading::{Verdict, findings};
 use crate::rules::universe::Universe;
 
-/// Proofs shown; the rest are like them.
+/// Maximum number of proofs shown.
 pub(super) const PROOFS_SHOWN: usize = 3;
 
 impl RuleBook {
-    /// Why a property (by IRI) holds in an action, or why not.
+    /// Explains why a property (by IRI) holds in an action, or why not.
     ///
     /// # Errors
-    /// The property is unknown, a value is wrong, or the budget was spent.
+    /// The property is unknown, a value is invalid, or the budget was exceeded.
     pub fn explain(&self, facts: &ActionFacts<'_>, property: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
-        let judge = self
-            .properties
-            .get(property)
-            .ok_or_else(|| RuleFault::Value(format!("no property {property} is known")))?;
+        let judge =
+            self.properties.get(property).ok_or_else(|| RuleFault::Value(format!("unknown property {property}")))?;
         match &judge.rules {
             JudgeRules::Datalog { planned, verdict } => {
                 self.explain_datalog(facts, &judge.label, planned, verdict, budget)
             }
             JudgeRules::Sparql(_) => {
                 let results = self.judge(facts, &[property.to_owned()], budget).remove(property);
-                let findings = results.unwrap_or_else(|| Err(RuleFault::Value("nothing was judged".into())))?;
+                let findings =
+                    results.unwrap_or_else(|| Err(RuleFault::Value("the property was not judged".into())))?;
                 Ok(of_query(&judge.label, findings))
             }
         }
@@ -80,7 +79,7 @@ impl RuleBook {
     }
 }
 
-/// Facts that stand in the texts of rules.
+/// Returns the facts written in the rule texts.
 fn stated(programs: &[&Planned], book: &RuleBook) -> Tables {
     let mut tables = Tables::default();
     for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
@@ -108,13 +107,13 @@ fn explained(label: &str, findings: Findings, verdict: &Verdict, ground: &Ground
         }
     }
     if !findings.applicable {
-        explanation.notes.push("it is inapplicable here: `applicable` has no tuple".to_owned());
+        explanation.notes.push("the property is inapplicable here: `applicable` has no tuples".to_owned());
     }
     explanation.findings = Some(findings);
     explanation
 }
 
-/// A query has no proof tree: its rows speak.
+/// Explains a query by its rows: it has no proof tree.
 fn of_query(label: &str, findings: Findings) -> Explanation {
     let notes = findings
         .witness
@@ -123,7 +122,7 @@ fn of_query(label: &str, findings: Findings) -> Explanation {
             let values: Vec<String> = row.values.iter().map(|(name, term)| format!("?{name} = {term}")).collect();
             format!("row: {}", values.join(", "))
         })
-        .chain(["a SPARQL property is explained by its rows; in Datalog it would have a proof".to_owned()])
+        .chain(["a SPARQL property is explained by its rows; only Datalog properties have proofs".to_owned()])
         .collect();
     Explanation { title: label.to_owned(), findings: Some(findings), proofs: Vec::new(), miss: None, notes }
 }

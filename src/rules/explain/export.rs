@@ -1,4 +1,4 @@
-//! An explanation as JSON and as a Graphviz drawing.
+//! Exports an explanation as JSON and as a Graphviz graph.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::rules::explain::model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};
 
 impl Explanation {
-    /// The same as plain data.
+    /// Returns the explanation as JSON.
     pub fn to_json(&self) -> Value {
         json!({
             "title": self.title,
@@ -20,7 +20,7 @@ impl Explanation {
         })
     }
 
-    /// A drawing in the language of Graphviz' `dot`: statements are boxes, facts are grey, what is missing is dashed.
+    /// Returns a graph in Graphviz's DOT language: statements are boxes, facts are grey, missing conditions are dashed.
     pub fn to_dot(&self) -> String {
         let mut drawing = Drawing::default();
         let root = drawing.node(&self.title, "shape=oval");
@@ -84,7 +84,7 @@ fn miss(of: &Miss) -> Value {
     })
 }
 
-/// Nodes and edges as they are written.
+/// Writes nodes and edges.
 #[derive(Default)]
 struct Drawing {
     text: String,
@@ -114,7 +114,7 @@ impl Drawing {
             for premise in premises {
                 let child = match premise {
                     Premise::Proof(proof) => self.proof(proof),
-                    Premise::Absent(text) => self.node(&format!("nothing like {text}"), "style=dotted"),
+                    Premise::Absent(text) => self.node(&format!("no match for {text}"), "style=dotted"),
                     Premise::Computed(text) => self.node(text, "shape=plaintext"),
                 };
                 self.edge(node, child);

@@ -1,4 +1,4 @@
-//! Why something does not hold: the rule that came closest, how far it got, and what stopped it.
+//! Explains why a goal does not hold: the closest rule, the conditions it satisfied, and the one that failed.
 
 use std::cell::Cell;
 
@@ -10,26 +10,26 @@ use crate::rules::naive::unify;
 use crate::rules::program::{Atom, Literal, Operand, PredicateId, Rule};
 use crate::rules::values::Number;
 
-/// Misses inside of misses are followed so far.
+/// Maximum nesting depth of misses.
 const DEPTH_LIMIT: usize = 5;
-/// Facts shown as the nearest.
+/// Maximum number of nearest facts shown.
 const NEAREST_SHOWN: usize = 3;
 
-/// How far one rule got.
+/// The progress of one rule towards the goal.
 struct Attempt<'a> {
     rule: &'a Rule,
-    /// Indices of its conditions in the order in which they were looked at.
+    /// Indices of its conditions in evaluation order.
     order: Vec<usize>,
-    /// Conditions satisfied.
+    /// Number of conditions satisfied.
     depth: usize,
     /// The binding at that point.
     binding: Binding,
-    /// By how much the comparison that failed was missed.
+    /// Difference between the two sides of the failed comparison.
     distance: Option<f64>,
 }
 
 impl Attempt<'_> {
-    /// Share of the conditions that were satisfied.
+    /// Returns the fraction of the conditions that were satisfied.
     fn share(&self) -> f64 {
         self.depth as f64 / self.order.len().max(1) as f64
     }
@@ -44,7 +44,8 @@ impl Attempt<'_> {
 }
 
 impl<'a> Ground<'a> {
-    /// How near the rules came to a pattern: a predicate with some arguments known.
+    /// Returns the closest attempt to derive a pattern: a predicate with some arguments known. Returns `None` if no
+    /// rule derives it.
     pub(super) fn miss(&self, predicate: PredicateId, known: &[Option<TermId>], depth: usize) -> Option<Miss> {
         let rules: Vec<&'a Rule> = self.rules_of(predicate).collect();
         let steps = Cell::new(0);
@@ -59,7 +60,7 @@ impl<'a> Ground<'a> {
         best.map(|attempt| self.told(&attempt, known, depth))
     }
 
-    /// Follows a rule as far as it goes.
+    /// Evaluates a rule and returns the attempt that satisfied the largest fraction of its conditions.
     fn attempt(&self, rule: &'a Rule, binding: Binding, steps: &Cell<usize>) -> Attempt<'a> {
         let order = reading_order(rule, &binding);
         let mut best = Attempt { rule, order: order.clone(), depth: 0, binding: binding.clone(), distance: None };
@@ -74,7 +75,8 @@ impl<'a> Ground<'a> {
         best
     }
 
-    /// Tells `stopped` about every dead end: how many conditions held, under which binding, and how near it was.
+    /// Calls `stopped` for every dead end with the number of satisfied conditions, the binding, and the distance of a
+    /// failed comparison.
     fn follow(
         &self,
         rule: &Rule,
@@ -110,7 +112,7 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// By how much a comparison of numbers is missed.
+    /// Returns the absolute difference of the two sides of a numeric comparison, or `None` for another condition.
     fn distance(&self, literal: &Literal, binding: &Binding) -> Option<f64> {
         let Literal::Compare { left, right, .. } = literal else { return None };
         let side = |expr| Number::of(&self.value(expr, binding)?).map(Number::double);
@@ -172,7 +174,7 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// The binding of a rule's variables when some of its head's arguments are known; nothing where a constant differs.
+/// Binds a rule's variables to the known arguments of its head. Returns `None` if an argument does not match.
 fn open_binding(head: &Atom, known: &[Option<TermId>], variables: usize) -> Option<Binding> {
     let mut binding = vec![None; variables];
     for (arg, value) in head.args.iter().zip(known) {

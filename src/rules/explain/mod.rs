@@ -1,6 +1,6 @@
-//! Why something holds, as a proof down to facts; and why it does not, as the rule that came closest and what it lacked.
+//! Explanations: the proof of a goal that holds, or the closest rule and its failed condition for one that does not.
 //!
-//! Never: changes what is derived, decides an outcome, or costs anything while nobody asks.
+//! Never: changes a result, decides an outcome, or costs time unless an explanation is requested.
 
 mod book;
 mod export;

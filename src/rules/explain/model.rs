@@ -1,68 +1,68 @@
-//! What an explanation says.
+//! Data model of an explanation.
 
 use crate::rules::findings::Findings;
 
-/// Why a property holds or does not.
+/// Explains why a property or goal holds or does not hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// The property's label, or the goal as written.
     pub title: String,
-    /// What was found.
+    /// The property's findings; `None` for a goal of a standalone program.
     pub findings: Option<Findings>,
-    /// Proofs of the tuples that decide, the first few.
+    /// Proofs of the first few deciding tuples.
     pub proofs: Vec<Proof>,
-    /// Where nothing decides: how near the rules came.
+    /// The closest attempt, if there are no deciding tuples.
     pub miss: Option<Miss>,
-    /// Remarks, such as that a query has no proof.
+    /// Remarks, for example that a query has no proof.
     pub notes: Vec<String>,
 }
 
-/// A statement and what supports it.
+/// A statement with its support.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proof {
-    /// Such as `after(obj:glass_1, w:x, 0.9)`.
+    /// The statement, for example `after(obj:glass_1, w:x, 0.9)`.
     pub statement: String,
-    /// What supports it.
+    /// Its support.
     pub support: Support,
 }
 
-/// What supports a statement.
+/// The support of a statement.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Support {
-    /// It was given.
+    /// It is a given fact.
     Fact,
-    /// An instance of a rule.
+    /// It is derived by an instance of a rule.
     Rule {
         /// The rule.
         rule: RuleRef,
-        /// Its conditions under the binding, in the order of the text.
+        /// Its conditions under the binding, in textual order.
         premises: Vec<Premise>,
     },
-    /// An aggregate over matches of a rule's body.
+    /// It is derived by aggregating matches of a rule's body.
     Aggregate {
         /// The rule.
         rule: RuleRef,
-        /// How many matches there are.
+        /// Number of matches.
         matches: usize,
-        /// The conditions of the first few matches, one behind the other.
+        /// The conditions of the first few matches, one match after another.
         premises: Vec<Premise>,
     },
-    /// It is proved elsewhere in this explanation, or the proof was cut for its length.
+    /// It is proved elsewhere in this explanation, or the proof was cut because it is too long.
     Cut,
 }
 
-/// One condition of a rule that holds.
+/// One satisfied condition of a rule.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Premise {
     /// A statement with its own proof.
     Proof(Proof),
-    /// Nothing of this form holds.
+    /// No tuple matches this pattern.
     Absent(String),
-    /// A comparison, assignment or test with its values.
+    /// A comparison, assignment or test, with its values.
     Computed(String),
 }
 
-/// A rule, for people to find.
+/// A reference to a rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RuleRef {
     /// `#[name("…")]`.
@@ -71,41 +71,41 @@ pub struct RuleRef {
     pub comment: Option<String>,
     /// `file:line`.
     pub place: String,
-    /// Its text.
+    /// The rule's text.
     pub text: String,
 }
 
-/// How near the rules came to a goal that does not hold.
+/// The closest attempt to derive a goal that does not hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Miss {
-    /// The goal, with `_` for what was left open.
+    /// The goal, with `_` for unbound arguments.
     pub goal: String,
-    /// The rule that came closest; nothing where no rule derives the goal.
+    /// The closest rule, or `None` if no rule derives the goal.
     pub rule: Option<RuleRef>,
-    /// The conditions that could be satisfied together, with their values.
+    /// The conditions that were satisfied together, with their values.
     pub satisfied: Vec<String>,
-    /// The first condition that could not, with its values.
+    /// The first condition that failed, with its values.
     pub failed: String,
-    /// Why.
+    /// The reason why it failed.
     pub failure: Failure,
 }
 
 /// Why a condition could not be satisfied.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Failure {
-    /// No fact and no rule gives it.
+    /// No fact or derived tuple matches.
     NoMatch {
-        /// Facts that differ in the fewest places.
+        /// Tuples that agree in the most arguments.
         nearest: Vec<String>,
-        /// Where rules derive it: how near they came.
+        /// The closest attempt of the rules that derive it, if any.
         because: Option<Box<Miss>>,
     },
     /// A comparison does not hold.
     Comparison {
-        /// By how much the best values miss it, where they are numbers.
+        /// Absolute difference of the two sides, if they are numbers.
         distance: Option<f64>,
     },
-    /// What is negated holds.
+    /// The negated atom holds.
     Blocked(Box<Proof>),
     /// A computation has no value for these arguments.
     NoValue,

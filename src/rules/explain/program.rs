@@ -1,4 +1,4 @@
-//! Explanations of the tuples of a stand-alone program.
+//! Explanations of the tuples of a standalone program.
 
 use crate::base::Term;
 use crate::rules::book::fault;
@@ -15,10 +15,10 @@ use crate::rules::standalone::Program;
 use crate::rules::universe::Universe;
 
 impl Program {
-    /// Why the program derives a statement such as `p(1, "a")`, or why not. `_` stands for anything.
+    /// Explains why the program derives a statement such as `p(1, "a")`, or why not. `_` matches any value.
     ///
     /// # Errors
-    /// The statement can't be read, or the budget was spent.
+    /// The statement is invalid, or the budget was exceeded.
     pub fn explain(&self, statement: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
         let (name, pattern) = self.pattern(statement).map_err(RuleFault::Value)?;
         let mut universe = Universe::new(&self.terms, None);
@@ -50,7 +50,7 @@ impl Program {
         Ok(explained(statement, predicate, &pattern, &ground))
     }
 
-    /// The program's facts alone.
+    /// Returns the program's facts without derived tuples.
     fn stated(&self) -> Tables {
         let mut facts = Tables::default();
         for (predicate, rows) in &self.planned.facts {
@@ -62,7 +62,7 @@ impl Program {
 }
 
 fn explained(statement: &str, predicate: PredicateId, pattern: &[Option<Term>], ground: &Ground<'_>) -> Explanation {
-    // A value that nothing has can't be matched.
+    // A term without an id occurs in no tuple, so the pattern can't match.
     let known: Option<Vec<Option<u32>>> = pattern
         .iter()
         .map(|term| term.as_ref().map_or(Some(None), |term| ground.universe.id(term).map(Some)))
@@ -78,7 +78,7 @@ fn explained(statement: &str, predicate: PredicateId, pattern: &[Option<Term>], 
         _ => None,
     };
     let notes = if proofs.is_empty() && miss.is_none() {
-        vec!["no rule derives it and no fact states it".to_owned()]
+        vec!["it is not a fact and no rule derives it".to_owned()]
     } else {
         Vec::new()
     };

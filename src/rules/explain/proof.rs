@@ -1,4 +1,4 @@
-//! Proofs: a tuple, the rule instance that derives it, and so on down to facts.
+//! Builds proofs: a tuple, the rule instance that derives it, and its premises down to facts.
 
 use std::cell::Cell;
 use std::collections::BTreeSet;
@@ -9,12 +9,12 @@ use crate::rules::explain::search::{Binding, Ground, STEP_LIMIT, reading_order};
 use crate::rules::naive::unify;
 use crate::rules::program::{Literal, PredicateId, Rule};
 
-/// Deeper proofs are cut: nobody reads on, and the tree stays small.
+/// Deeper proofs are cut, so that the tree stays small and readable.
 const DEPTH_LIMIT: usize = 40;
-/// Matches of an aggregate that are shown.
+/// Maximum number of matches shown for an aggregate.
 const MATCHES_SHOWN: usize = 3;
 
-/// A walk that proves tuples; each derived one once.
+/// Proves tuples; each derived tuple is expanded only once.
 pub(super) struct Prover<'g, 'a> {
     ground: &'g Ground<'a>,
     shown: BTreeSet<(PredicateId, Vec<TermId>)>,
@@ -26,7 +26,7 @@ impl<'g, 'a> Prover<'g, 'a> {
         Self { ground, shown: BTreeSet::new(), steps: Cell::new(0) }
     }
 
-    /// The proof of a tuple that holds.
+    /// Builds the proof of a tuple that holds.
     pub(super) fn prove(&mut self, predicate: PredicateId, row: &[TermId], depth: usize) -> Proof {
         let statement = self.ground.statement(predicate, row);
         if self.ground.is_fact(predicate, row) {
@@ -53,13 +53,13 @@ impl<'g, 'a> Prover<'g, 'a> {
         Proof { statement, support: Support::Cut }
     }
 
-    /// A binding that satisfies a rule's body, with premises of smaller rounds only.
+    /// Returns a binding that satisfies a rule's body using only premises of earlier rounds.
     fn instance(&self, rule: &Rule, mut binding: Binding, round: Option<u32>) -> Option<Binding> {
         let order = reading_order(rule, &binding);
         self.satisfy(rule, &order, &mut binding, round, &mut |_| true).then_some(binding)
     }
 
-    /// Goes through the ways to satisfy conditions until `found` says that one is enough.
+    /// Enumerates the bindings that satisfy the conditions until `found` returns `true`.
     fn satisfy(
         &self,
         rule: &Rule,
@@ -95,7 +95,7 @@ impl<'g, 'a> Prover<'g, 'a> {
         false
     }
 
-    /// Whether a tuple was there before a round.
+    /// Returns whether a tuple was derived before a round.
     fn earlier(&self, predicate: PredicateId, row: &[TermId], round: Option<u32>) -> bool {
         match (round, self.ground.round(predicate, row)) {
             (Some(limit), Some(round)) => round < limit,
@@ -105,7 +105,7 @@ impl<'g, 'a> Prover<'g, 'a> {
 
     fn premises(&mut self, rule: &Rule, binding: &Binding, round: Option<u32>, depth: usize) -> Vec<Premise> {
         let mut premises = Vec::new();
-        // In the order of the text.
+        // Textual order.
         let mut order: Vec<&Literal> = rule.body.iter().collect();
         order.sort_by_key(|literal| literal.span().start);
         for literal in order {
@@ -127,7 +127,7 @@ impl<'g, 'a> Prover<'g, 'a> {
         premises
     }
 
-    /// The matches of the group that a head row of an aggregating rule stands for.
+    /// Returns the matches of the group from which an aggregating rule derived a head row.
     fn aggregate(&mut self, rule: &Rule, row: &[TermId], depth: usize) -> Option<Support> {
         let aggregation = rule.aggregation.as_ref()?;
         let mut binding = self.ground.head_binding(rule, row)?;

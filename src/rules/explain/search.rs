@@ -1,4 +1,4 @@
-//! Rules looked at backwards, over finished tuples.
+//! Backward search: evaluates rules from their heads over finished tuples.
 
 use crate::base::{Term, TermId};
 use crate::rules::evaluate::{Rounds, Tables};
@@ -7,34 +7,34 @@ use crate::rules::naive::unify;
 use crate::rules::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
 use crate::rules::universe::Universe;
 
-/// What is known of a rule's variables.
+/// Values of a rule's variables; `None` if unbound.
 pub(super) type Binding = Vec<Option<TermId>>;
 
-/// Everything that an explanation stands on.
+/// The rules and tuples that an explanation is built from.
 pub(crate) struct Ground<'a> {
     pub(crate) predicates: &'a Predicates,
-    /// Every rule that took part.
+    /// Every rule that was evaluated.
     pub(crate) rules: Vec<&'a Rule>,
     /// Finished tuples; the nearest layer first.
     pub(crate) layers: Vec<&'a Tables>,
-    /// Tuples that were given, not derived.
+    /// Given tuples, without derived ones.
     pub(crate) facts: Vec<&'a Tables>,
     pub(crate) rounds: &'a Rounds,
     pub(crate) universe: &'a Universe<'a>,
 }
 
-/// Rows looked at for one explanation; more would keep a person waiting.
+/// Maximum number of rows read for one explanation, so that it stays fast enough for interactive use.
 pub(super) const STEP_LIMIT: usize = 20_000_000;
 
 impl<'a> Ground<'a> {
-    /// All tuples of a predicate.
+    /// Returns all tuples of a predicate.
     pub(super) fn rows(&self, predicate: PredicateId) -> impl Iterator<Item = &'a [TermId]> + use<'a> {
         let width = self.predicates.get(predicate).width;
         let table = self.layers.iter().find_map(|tables| tables.get(predicate));
         table.map_or(&[][..], |table| table.index(0)).chunks_exact(width)
     }
 
-    /// Tuples that an atom matches under a binding; by binary search where its first argument is known.
+    /// Returns the tuples that may match an atom under a binding; uses binary search if the first argument is known.
     pub(super) fn candidates(&self, atom: &Atom, binding: &Binding) -> impl Iterator<Item = &'a [TermId]> + use<'a> {
         let width = self.predicates.get(atom.predicate).width;
         let table = self.layers.iter().find_map(|tables| tables.get(atom.predicate));
@@ -55,7 +55,7 @@ impl<'a> Ground<'a> {
         rows[start * width..end * width].chunks_exact(width)
     }
 
-    /// Whether a tuple was given.
+    /// Returns whether a tuple is a given fact.
     pub(super) fn is_fact(&self, predicate: PredicateId, row: &[TermId]) -> bool {
         let width = self.predicates.get(predicate).width;
         self.facts.iter().filter_map(|tables| tables.get(predicate)).any(|table| {
@@ -65,30 +65,31 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// The round of a tuple of a recursive stratum.
+    /// Returns the round of a tuple, or `None` if its stratum is not recursive.
     pub(super) fn round(&self, predicate: PredicateId, row: &[TermId]) -> Option<u32> {
         self.rounds.of(predicate, row)
     }
 
-    /// Rules that derive a predicate.
+    /// Returns the rules that derive a predicate.
     pub(super) fn rules_of(&self, predicate: PredicateId) -> impl Iterator<Item = &'a Rule> + '_ {
         self.rules.iter().copied().filter(move |rule| rule.head.predicate == predicate)
     }
 
-    /// The binding under which a rule's head is a tuple; nothing where it can't be.
+    /// Returns the binding under which a rule's head equals a tuple, or `None` if they don't match.
     pub(super) fn head_binding(&self, rule: &Rule, row: &[TermId]) -> Option<Binding> {
         let mut binding = vec![None; rule.variables.len()];
         unify(&rule.head, row, &mut binding).then_some(binding)
     }
 
-    /// Whether a condition that is no positive atom holds; it may bind a variable. `None`: a value is missing.
+    /// Returns whether a condition other than a positive atom holds; an assignment binds its variable. Returns `None`
+    /// if a value is missing.
     pub(super) fn tested(&self, literal: &Literal, binding: &mut Binding) -> Option<bool> {
         match literal {
             Literal::Positive(_) => None,
             Literal::Negative(atom) => Some(self.blocking(atom, binding).is_none()),
             Literal::Assign { variable, value, .. } => {
                 let value = self.value(value, binding)?;
-                // A value that is nowhere else has no number; then nothing that was derived can have it.
+                // A value without an id occurs in no derived tuple.
                 let id = self.universe.id(&value);
                 match (binding[*variable], id) {
                     (Some(known), Some(id)) => Some(known == id),
@@ -107,13 +108,13 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// A tuple that keeps a negated atom from holding.
+    /// Returns a tuple that matches a negated atom, or `None` if the negation holds.
     pub(super) fn blocking(&self, atom: &Atom, binding: &Binding) -> Option<&'a [TermId]> {
         self.candidates(atom, binding).find(|row| unify(atom, row, &mut binding.clone()))
     }
 }
 
-/// How many of the first `count` places satisfy a condition that holds up to some place and not behind it.
+/// Binary search: returns the first of `count` indices for which `holds` is `false`. `holds` must be monotone.
 fn partition(count: usize, holds: impl Fn(usize) -> bool) -> usize {
     let (mut low, mut high) = (0, count);
     while low < high {
@@ -127,7 +128,7 @@ fn partition(count: usize, holds: impl Fn(usize) -> bool) -> usize {
     low
 }
 
-/// Conditions of a rule in an order to look at them: atoms as written, everything else as soon as it can be.
+/// Returns the evaluation order of a rule's conditions: atoms in textual order, others once their inputs are bound.
 pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
     let mut bound: Vec<bool> = known.iter().map(Option::is_some).collect();
     let mut left: Vec<usize> = (0..rule.body.len()).collect();
@@ -155,8 +156,8 @@ pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
     order
 }
 
-/// An atom that is fully known, which only tests; otherwise the first that shares a variable with what is known, because the
-/// order of the text tells a story; otherwise the first.
+/// Returns a fully bound atom, which is only a test; otherwise the first atom that shares a bound variable, to keep the
+/// textual order, which is easier to follow; otherwise the first atom.
 fn next_atom(rule: &Rule, left: &[usize], bound: &[bool]) -> Option<usize> {
     let mut best: Option<(usize, usize)> = None;
     for idx in left.iter().copied() {

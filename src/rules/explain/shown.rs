@@ -1,4 +1,4 @@
-//! Rules' parts with the values of a binding, as people read them.
+//! Formats atoms and conditions of rules with the values of a binding.
 
 use crate::base::{Term, TermId, names};
 use crate::rules::explain::model::RuleRef;
@@ -8,13 +8,13 @@ use crate::rules::given::property_place;
 use crate::rules::program::{Atom, Literal, Operand, PredicateId, Rule};
 
 impl Ground<'_> {
-    /// A tuple as a statement.
+    /// Formats a tuple as a statement.
     pub(super) fn statement(&self, predicate: PredicateId, row: &[TermId]) -> String {
         let args = row.iter().map(|id| self.term(*id)).collect();
         self.written(predicate, args)
     }
 
-    /// An atom with what is bound of it; `_` for the rest.
+    /// Formats an atom with its bound values, and `_` for unbound arguments.
     pub(super) fn pattern(&self, atom: &Atom, binding: &Binding) -> String {
         let args = atom
             .args
@@ -28,7 +28,7 @@ impl Ground<'_> {
         self.written(atom.predicate, args)
     }
 
-    /// A predicate with its arguments as in the rule text: the property back in its place, the phase as a shorthand.
+    /// Formats a predicate with its arguments as in the rule text: with the property, and the phase as a shorthand.
     fn written(&self, predicate: PredicateId, mut args: Vec<String>) -> String {
         let predicate = self.predicates.get(predicate);
         let name = predicate.name.as_str();
@@ -48,25 +48,25 @@ impl Ground<'_> {
         format!("{name}({})", args.join(", "))
     }
 
-    /// A term, doubles with no more digits than people can use.
+    /// Formats a term; doubles are rounded to six significant digits.
     pub(super) fn term(&self, id: TermId) -> String {
         shown(self.universe.term(id))
     }
 
-    /// A condition with its values.
+    /// Formats a condition with its values.
     pub(super) fn literal(&self, rule: &Rule, literal: &Literal, binding: &Binding) -> String {
         match literal {
             Literal::Positive(atom) => self.pattern(atom, binding),
             Literal::Negative(atom) => format!("not {}", self.negated(rule, atom, binding)),
             Literal::Assign { variable, span, .. } => {
-                let value = binding[*variable].map_or("nothing".into(), |id| self.term(id));
+                let value = binding[*variable].map_or("(no value)".into(), |id| self.term(id));
                 let name = &rule.variables[*variable];
                 let text = self.source_text(rule, span.clone());
                 if name.is_empty() { format!("{text} is {value}") } else { format!("{text}, so ?{name} is {value}") }
             }
             Literal::Compare { op, left, right, span } => {
-                let values =
-                    [left, right].map(|side| self.value(side, binding).map_or("nothing".into(), |term| shown(&term)));
+                let values = [left, right]
+                    .map(|side| self.value(side, binding).map_or("(no value)".into(), |term| shown(&term)));
                 let text = self.source_text(rule, span.clone());
                 format!("{text}, with {} {} {}", values[0], op.symbol(), values[1])
             }
@@ -74,7 +74,7 @@ impl Ground<'_> {
         }
     }
 
-    /// What a negation says is not there. A helper predicate is no predicate of the text, which then speaks for itself.
+    /// Formats a negated atom. For a helper predicate, which is not in the rule text, returns the source text instead.
     pub(super) fn negated(&self, rule: &Rule, atom: &Atom, binding: &Binding) -> String {
         if self.predicates.get(atom.predicate).name.contains('~') {
             return self.source_text(rule, atom.span.clone());
@@ -82,7 +82,7 @@ impl Ground<'_> {
         self.pattern(atom, binding)
     }
 
-    /// The value of an expression, where its variables are bound.
+    /// Computes an expression. Returns `None` if a variable is unbound or the expression has no value.
     pub(super) fn value(&self, expr: &Expr, binding: &Binding) -> Option<Term> {
         let mut used = Vec::new();
         expr.variables(&mut used);
@@ -98,7 +98,7 @@ impl Ground<'_> {
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// A rule, for people to find.
+    /// Returns a reference to a rule.
     pub(super) fn rule_ref(&self, rule: &Rule) -> RuleRef {
         RuleRef {
             name: rule.origin.name.clone(),
@@ -111,7 +111,7 @@ impl Ground<'_> {
 
 fn shown(term: &Term) -> String {
     match term {
-        // Six significant digits: a micrometre in a room.
+        // Six significant digits: within a few metres, 10 micrometres.
         Term::Double(value) if *value != 0.0 && value.is_finite() => {
             let digits = (5.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
             let text = format!("{value:.digits$}");

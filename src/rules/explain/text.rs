@@ -1,11 +1,11 @@
-//! An explanation as text.
+//! Formats an explanation as text.
 
 use std::fmt::Write as _;
 
 use crate::rules::explain::model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};
 
 impl Explanation {
-    /// Indented text, one statement a line.
+    /// Formats the explanation as indented text, one statement per line.
     pub fn to_text(&self) -> String {
         let mut out = String::new();
         let holds = self.findings.as_ref().map(|findings| findings.holds);
@@ -63,7 +63,7 @@ fn write_premises(out: &mut String, depth: usize, premises: &[Premise]) {
     for premise in premises {
         match premise {
             Premise::Proof(proof) => write_proof(out, depth, proof),
-            Premise::Absent(text) => line(out, depth, &format!("nothing like {text}")),
+            Premise::Absent(text) => line(out, depth, &format!("no match for {text}")),
             Premise::Computed(text) => line(out, depth, text),
         }
     }
@@ -93,6 +93,6 @@ fn write_miss(out: &mut String, depth: usize, miss: &Miss) {
             line(out, depth + 2, "blocked by");
             write_proof(out, depth + 3, proof);
         }
-        Failure::NoValue => line(out, depth + 2, "it has no value for these arguments"),
+        Failure::NoValue => line(out, depth + 2, "no value for these arguments"),
     }
 }

@@ -1,4 +1,4 @@
-//! `@export`: tuples to delimited text or N-Triples-like rows.
+//! `@export` and `@output`: write tuples as delimited text.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ use crate::rules::values;
 
 const FORMATS: [&str; 3] = ["csv", "dsv", "tsv"];
 
-/// A predicate and where it goes.
+/// A predicate and its output file.
 #[derive(Debug)]
 pub(super) struct Export {
     pub(super) predicate: String,
@@ -22,7 +22,7 @@ pub(super) struct Export {
     delimiter: u8,
 }
 
-/// What a program exports; where it says nothing of that, nothing.
+/// Returns the exports of a program.
 pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<Export> {
     let syntax = &program.syntax;
     let mut found = Vec::new();
@@ -62,8 +62,8 @@ fn export(program: &Program, syntax: &Syntax, transfer: &Transfer, diagnostics: 
     let relative = Path::new(&path);
     let inside = relative.is_relative() && !relative.components().any(|c| matches!(c, std::path::Component::ParentDir));
     if !inside {
-        let message = format!("`{path}` is outside of the output folder");
-        let help = "name a file below it, and the folder with `-D`";
+        let message = format!("`{path}` is outside the output folder");
+        let help = "use a relative path without `..`, and set the output folder with `-D`";
         diagnostics.push(Diagnostic::error("R073", message).at(&syntax.source, transfer.span.clone()).help(help));
         return None;
     }
@@ -71,17 +71,17 @@ fn export(program: &Program, syntax: &Syntax, transfer: &Transfer, diagnostics: 
     Some(Export { predicate: transfer.predicate.clone(), path: PathBuf::from(path), delimiter })
 }
 
-/// A predicate's name as a file's: with its base, and `_` for what file names can't hold.
+/// Converts a predicate's name, with its base, to a file name. Other characters become `_`.
 fn file_name(syntax: &Syntax, predicate: &str) -> String {
     let base = syntax.base.as_deref().filter(|_| !predicate.contains(':')).unwrap_or("");
     let fits = |c: char| c.is_alphanumeric() || ".-_".contains(c);
     format!("{base}{predicate}").chars().map(|c| if fits(c) { c } else { '_' }).collect()
 }
 
-/// Writes the tuples of a predicate, sorted, and tells how many there are. The file has its name only when it is whole.
+/// Writes the sorted tuples of a predicate and returns their number. The complete file is renamed into place.
 ///
 /// # Errors
-/// Why the file can't be written; `stop` was set.
+/// The reason why the file can't be written, or `stop` was set.
 pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &AtomicBool) -> Result<usize, String> {
     let path = folder.join(&export.path);
     let lower = |error: &dyn std::fmt::Display| error.to_string().to_lowercase();

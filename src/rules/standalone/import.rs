@@ -1,4 +1,4 @@
-//! `@import`: which file, which format, and its rows as facts.
+//! `@import`: reads the rows of a file as facts.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -21,10 +21,10 @@ use crate::rules::values::lexical;
 const FORMATS: [&str; 9] = ["csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];
 const OPTIONS: [&str; 8] =
     ["resource", "format", "delimiter", "quoting", "compression", "ignore_headers", "limit", "base"];
-/// Larger files (unpacked) are refused. Unit: bytes.
+/// Only this much of a file is read, after decompression. Unit: bytes.
 const SIZE_LIMIT: u64 = 4 << 30;
 
-/// A file that is to be read.
+/// A file to import.
 #[derive(Debug)]
 pub(super) struct Import {
     source: Source,
@@ -42,7 +42,7 @@ enum Content {
     Rdf { format: RdfFormat, base: Option<String> },
 }
 
-/// First pass: what is imported, with the number of columns, which a rule, an option or the file itself tells.
+/// First pass: collects the imports. The number of columns comes from an option, a rule, or the file itself.
 pub(super) fn define_imports(checking: &mut Checking<'_>, syntax: &Syntax, folder: &Path) -> Vec<Import> {
     let mut imports = Vec::new();
     for statement in &syntax.statements {
@@ -64,12 +64,12 @@ fn define_import(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transf
     let options = options(checking, syntax, transfer);
     let Some(resource) = text(&options, "resource") else {
         let help = "write `csv{resource = \"file.csv\"}`";
-        checking.error("R071", source, &transfer.span, "the import names no resource", help);
+        checking.error("R071", source, &transfer.span, "the import has no `resource`", help);
         return None;
     };
     if resource.contains("://") {
-        let help = "download it first; this program does not go to the network";
-        checking.error("R072", source, &transfer.span, format!("`{resource}` is no file"), help);
+        let help = "download it first; imports read local files only";
+        checking.error("R072", source, &transfer.span, format!("`{resource}` is not a local file"), help);
         return None;
     }
     let path = folder.join(&resource);
@@ -91,7 +91,7 @@ fn text(options: &Options, name: &str) -> Option<String> {
     }
 }
 
-/// Notes formats and options that this engine does not have; nothing where it can't go on.
+/// Reports unknown formats and options. Returns `None` if the format is unknown.
 fn known_words(checking: &mut Checking<'_>, source: &Source, transfer: &Transfer) -> Option<()> {
     let format = transfer.format.as_str();
     if !FORMATS.contains(&format) {
@@ -111,7 +111,7 @@ fn known_words(checking: &mut Checking<'_>, source: &Source, transfer: &Transfer
     Some(())
 }
 
-/// How a table is read, and how many columns of it are kept.
+/// Returns the options of a table and the number of imported columns. Returns `None` if an error was reported.
 fn table(
     checking: &mut Checking<'_>,
     syntax: &Syntax,
@@ -138,7 +138,8 @@ fn table(
     Some((Content::Table { delimiter, quoting, headers, columns }, arity))
 }
 
-/// Which RDF format a file has, and whether it holds statements or quads.
+/// Returns the RDF format of a file and its number of columns: 3 for triples, 4 for quads. Returns `None` if an error
+/// was reported.
 fn rdf(
     checking: &mut Checking<'_>,
     source: &Source,
@@ -148,7 +149,7 @@ fn rdf(
 ) -> Option<(Content, usize)> {
     let Some(format) = rdf_format(&transfer.format, path) else {
         let help = "name the format: ntriples, nquads, turtle, trig or rdfxml";
-        let message = format!("`{}` does not tell its format", path.display());
+        let message = format!("the RDF format of `{}` is unknown", path.display());
         checking.error("R070", source, &transfer.span, message, help);
         return None;
     };
@@ -156,7 +157,7 @@ fn rdf(
     Some((Content::Rdf { format, base: text(options, "base") }, arity))
 }
 
-/// Arguments of a predicate as the program uses it anywhere.
+/// Returns the number of arguments of a predicate, as used in the program.
 fn arity_in_rules(checking: &Checking<'_>, syntax: &Syntax, predicate: &str) -> Option<usize> {
     if let Some(definition) = checking.defined.get(&(0, predicate.to_owned())) {
         return Some(definition.arity);
@@ -185,7 +186,7 @@ fn columns(options: &Options) -> Result<Option<Vec<ColumnKind>>, String> {
     kinds.collect::<Result<Vec<_>, _>>().map(Some)
 }
 
-/// Columns of the first row; nothing for an empty file.
+/// Returns the number of columns in the first row, or `None` if the file is empty or unreadable.
 fn columns_of_file(path: &Path, delimiter: u8) -> Option<usize> {
     let reader = open(path).ok()?;
     let mut table =
@@ -208,7 +209,7 @@ fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
     }
 }
 
-/// A file, unpacked where its name ends in `.gz`.
+/// Opens a file and decompresses it if its name ends in `.gz`.
 fn open(path: &Path) -> Result<Box<dyn Read>, String> {
     let file = std::fs::File::open(path).map_err(|error| error.to_string().to_lowercase())?;
     let file = std::io::BufReader::new(file);
@@ -220,7 +221,7 @@ fn open(path: &Path) -> Result<Box<dyn Read>, String> {
     })
 }
 
-/// Second pass: the rows of a file become facts of the program.
+/// Second pass: adds the rows of a file to the program's facts.
 pub(super) fn import(
     import: Import,
     predicates: &Predicates,
@@ -235,7 +236,7 @@ pub(super) fn import(
         Diagnostic::error("R072", message).at(&import.source, import.span.clone()).help(help)
     };
     if arity != import.arity {
-        let message = format!("`{}` has {}, the file has {}", import.predicate, counted(arity), import.arity);
+        let message = format!("`{}` has {}, but the file has {}", import.predicate, counted(arity), import.arity);
         diagnostics.push(fault(message, "use every column, or skip some with `format = (any, skip, …)`"));
         return;
     }
@@ -255,7 +256,7 @@ pub(super) fn import(
         Ok(LeftOut { count: 0, .. }) => {}
         Ok(LeftOut { count, first }) => {
             let message = format!("{count} rows of `{}` were left out; the first: {first}", import.path.display());
-            let help = "a row needs as many fields as the predicate has arguments, of the format that its column has";
+            let help = "each row needs one field for each column, in the format of the column";
             let warning = Diagnostic::warning("R074", message).at(&import.source, import.span.clone()).help(help);
             diagnostics.push(warning);
         }
@@ -276,7 +277,7 @@ fn read_rdf(
         parser = parser.with_base_iri(base).map_err(|error| error.to_string())?;
     }
     let quads = format.supports_datasets();
-    // The name under which Nemo, too, puts statements without a graph.
+    // Nemo's name for the default graph.
     let default_graph = Term::iri("tag:nemo:defaultgraph");
     for quad in parser.for_reader(reader).take(limit) {
         let quad = match quad {

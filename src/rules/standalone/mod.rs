@@ -1,6 +1,6 @@
-//! Datalog programs of their own: facts from files, closed by the same engine, written to files.
+//! Standalone Datalog programs: they read facts from files, run on the same engine, and write their results to files.
 //!
-//! Never: knows an action, a snapshot or an ontology; goes to the network; writes outside of the folder it is given.
+//! Never: depends on an action, a snapshot or an ontology; uses the network; writes outside the given folder.
 
 mod export;
 mod import;

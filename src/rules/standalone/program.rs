@@ -1,4 +1,4 @@
-//! A program in memory: checked, planned, and closed by either evaluator.
+//! A program in memory: checked, planned, and evaluated by either engine.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,12 +19,12 @@ use crate::rules::stratify::stratify;
 use crate::rules::syntax::{ExpressionKind, Statement, Syntax};
 use crate::rules::universe::Universe;
 
-/// Which evaluator closes a program.
+/// The evaluator of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Engine {
-    /// Semi-naive on datafrog relations.
+    /// Semi-naive evaluation on datafrog relations.
     Fast,
-    /// Nested loops over sets: slow and obviously right.
+    /// Nested loops over sets: slow and obviously correct.
     Naive,
 }
 
@@ -36,42 +36,42 @@ pub struct Program {
     pub(crate) predicates: Predicates,
     pub(crate) indexes: Indexes,
     pub(crate) planned: Planned,
-    /// What is odd about it but no fault.
+    /// Warnings about the program.
     pub warnings: Diagnostics,
 }
 
-/// Everything that a program derives, its facts included.
+/// Everything that a program derives, including its facts.
 #[derive(Debug, Clone)]
 pub struct Closure {
     terms: Vec<Term>,
-    /// Arguments and rows of each predicate.
+    /// Arity and rows of each predicate.
     tables: BTreeMap<String, (usize, Vec<TermId>)>,
 }
 
 impl Closure {
-    /// Names of the predicates, sorted.
+    /// Returns the names of the predicates, sorted.
     pub fn predicates(&self) -> impl Iterator<Item = &str> {
         self.tables.keys().map(String::as_str)
     }
 
-    /// How many tuples a predicate has.
+    /// Returns the number of tuples of a predicate.
     pub fn count(&self, predicate: &str) -> usize {
         self.tables.get(predicate).map_or(0, |(arity, rows)| rows.len() / (*arity).max(1))
     }
 
-    /// How many arguments a predicate has; nothing for one that the program does not speak of.
+    /// Returns the number of arguments of a predicate, or `None` if the program does not use it.
     pub fn arity(&self, predicate: &str) -> Option<usize> {
         self.tables.get(predicate).map(|(arity, _)| *arity)
     }
 
-    /// The tuples of a predicate, in no particular order.
+    /// Returns the tuples of a predicate, in no particular order.
     pub fn tuples_unsorted(&self, predicate: &str) -> impl Iterator<Item = Vec<&Term>> {
         let (arity, rows) = self.tables.get(predicate).map_or((0, &[][..]), |(arity, rows)| (*arity, rows.as_slice()));
         rows.chunks_exact(arity.max(1))
             .map(move |row| row[..arity].iter().map(|id| &self.terms[*id as usize]).collect())
     }
 
-    /// The tuples of a predicate, sorted.
+    /// Returns the tuples of a predicate, sorted.
     pub fn tuples(&self, predicate: &str) -> Vec<Vec<Term>> {
         let mut tuples: Vec<Vec<Term>> =
             self.tuples_unsorted(predicate).map(|tuple| tuple.into_iter().cloned().collect()).collect();
@@ -81,18 +81,18 @@ impl Closure {
 }
 
 impl Program {
-    /// Checks a program and reads what it imports; relative paths of imports begin at `folder`.
+    /// Checks a program and reads its imports. Relative paths of imports are resolved against `folder`.
     ///
     /// # Errors
-    /// All faults, each with its place: of the text, of the rules, and of files that can't be read.
+    /// All errors with their places: syntax errors, invalid rules, and files that can't be read.
     pub fn load(source: &Source, folder: &Path) -> Result<Self, Diagnostics> {
         Self::load_until(source, folder, &AtomicBool::new(false))
     }
 
-    /// Loads a program as [`Program::load`] does, until `stop` is set: then its imports end with a fault.
+    /// Like [`Program::load`], but imports fail once `stop` is set.
     ///
     /// # Errors
-    /// All faults, each with its place.
+    /// All errors with their places.
     pub fn load_until(source: &Source, folder: &Path, stop: &AtomicBool) -> Result<Self, Diagnostics> {
         let (syntax, mut diagnostics) = parse(source);
         let mut terms = Terms::new();
@@ -122,10 +122,10 @@ impl Program {
         diagnostics.clone().or(Self { syntax, terms, predicates, indexes, planned, warnings: diagnostics })
     }
 
-    /// Adds facts of a predicate that the program speaks of.
+    /// Adds facts of a predicate that the program uses.
     ///
     /// # Errors
-    /// The program has no such predicate, or a row has another number of terms.
+    /// The program does not use the predicate, or a row has the wrong number of terms.
     pub fn add_facts<'t>(&mut self, predicate: &str, rows: impl IntoIterator<Item = &'t [Term]>) -> Result<(), String> {
         let id = self
             .predicates
@@ -142,10 +142,10 @@ impl Program {
         Ok(())
     }
 
-    /// Derives everything that the rules say.
+    /// Derives all tuples.
     ///
     /// # Errors
-    /// The budget was spent; the fault names the rule.
+    /// The budget was exceeded; the fault names the rule.
     pub fn close(&self, engine: Engine, budget: &Budget) -> Result<Closure, RuleFault> {
         let mut universe = Universe::new(&self.terms, None);
         let mut meter = Meter::new(budget);
@@ -170,7 +170,7 @@ impl Program {
         Ok(Closure { terms, tables })
     }
 
-    /// A statement's predicate and arguments; nothing in the place of `_`.
+    /// Parses a statement to its predicate and arguments; `None` stands for `_`.
     pub(crate) fn pattern(&self, statement: &str) -> Result<(String, Vec<Option<Term>>), String> {
         let prefixes: String =
             self.syntax.prefixes.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
@@ -183,11 +183,11 @@ impl Program {
             Statement::Rule(rule) if rule.body.is_empty() => rule.heads.first(),
             _ => None,
         });
-        let head = rule.ok_or("a statement reads `p(1, _)`")?;
+        let head = rule.ok_or("write a statement such as `p(1, _)`")?;
         let args = head.args.iter().map(|arg| match &arg.kind {
             ExpressionKind::Constant(term) => Ok(Some(term.clone())),
             ExpressionKind::Anonymous | ExpressionKind::Variable(_) => Ok(None),
-            _ => Err("a statement has constants and `_` only".to_owned()),
+            _ => Err("a statement may contain only constants and `_`".to_owned()),
         });
         Ok((head.predicate.clone(), args.collect::<Result<_, _>>()?))
     }

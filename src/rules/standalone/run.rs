@@ -1,4 +1,4 @@
-//! From a program's file to its exports.
+//! Runs a program file and writes its exports.
 
 use std::path::{Path, PathBuf};
 
@@ -7,22 +7,22 @@ use crate::rules::findings::{Budget, RuleFault, interrupted};
 use crate::rules::standalone::export::{exports, write};
 use crate::rules::standalone::program::{Engine, Program};
 
-/// What a run of a program did.
+/// Results of running a program.
 #[derive(Debug, Clone, Default)]
 pub struct Summary {
-    /// Tuples of each predicate, by name.
+    /// Name and number of tuples of each predicate.
     pub tuples: Vec<(String, usize)>,
-    /// Files written, with the number of their rows.
+    /// Files written, with their numbers of rows.
     pub written: Vec<(PathBuf, usize)>,
-    /// What is odd about the program but no fault.
+    /// Warnings about the program.
     pub warnings: Diagnostics,
 }
 
-/// Runs a program: reads its imports (relative to its own folder), closes it, writes its exports below `out_dir`.
+/// Runs a program: reads its imports (relative to its folder), evaluates it, and writes its exports below `out_dir`.
 ///
 /// # Errors
-/// All faults of the program and its files; the budget was spent (`R090`); an export can't be written (`R073`); somebody
-/// set the budget's `stop` (`R091`).
+/// All errors of the program and its files; the budget was exceeded (`R090`); an export can't be written (`R073`); the
+/// budget's `stop` was set (`R091`).
 pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diagnostics> {
     let source = Files::Disk
         .read(path)
@@ -37,8 +37,7 @@ pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diag
         if fault == RuleFault::Interrupted {
             return interrupted().in_source(&source);
         }
-        let help =
-            "a rule that makes new values from its own results may never end; give it a limit such as `?x < 100`";
+        let help = "a recursive rule that computes new values may never terminate; add a limit such as `?x < 100`";
         Diagnostic::error("R090", fault.to_string()).in_source(&source).help(help)
     })?;
     let mut summary = Summary { warnings: program.warnings, ..Summary::default() };

@@ -1,22 +1,22 @@
-//! Rows of delimited text to terms.
+//! Reads rows of delimited text as terms.
 
 use std::io::Read;
 
 use crate::base::{Term, TermId, Terms, names};
 use crate::rules::values::{Number, double_term, integer, is_beyond_64_bits, literal};
 
-/// How the fields of a column are read.
+/// How the fields of a column are parsed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ColumnKind {
-    /// Whatever the field looks like.
+    /// The type is inferred from the field.
     Any,
-    /// The text itself.
+    /// The text as it is.
     String,
-    /// Whole numbers only.
+    /// Integers only.
     Int,
     /// Numbers only.
     Double,
-    /// Not at all.
+    /// The column is skipped.
     Skip,
 }
 
@@ -30,7 +30,7 @@ impl ColumnKind {
             .find_map(|(kind, name)| (name == word).then_some(kind))
     }
 
-    /// The term of a field; nothing where the field does not fit the column.
+    /// Parses a field. Returns `None` if the field does not match the column's type.
     fn term(self, field: &str) -> Option<Term> {
         match self {
             Self::Any => Some(any(field)),
@@ -41,11 +41,11 @@ impl ColumnKind {
     }
 }
 
-/// Rows of a file that did not fit.
+/// Rows of a file that were skipped because they are invalid.
 #[derive(Debug, Default)]
 pub(super) struct LeftOut {
     pub(super) count: usize,
-    /// What was wrong with the first.
+    /// The reason for the first one.
     pub(super) first: String,
 }
 
@@ -58,7 +58,7 @@ impl LeftOut {
     }
 }
 
-/// The byte between fields.
+/// Returns the delimiter byte between fields.
 pub(super) fn delimiter_of(format: &str, option: Option<&str>) -> u8 {
     match (format, option) {
         (_, Some(text)) if text.len() == 1 => text.as_bytes()[0],
@@ -67,10 +67,10 @@ pub(super) fn delimiter_of(format: &str, option: Option<&str>) -> u8 {
     }
 }
 
-/// Reads rows to the end of `rows`. A row that does not fit its columns is left out.
+/// Appends the rows of a table to `rows`. A row that does not match the columns is left out.
 ///
 /// # Errors
-/// Why the text can't be read.
+/// The reason why the text can't be read.
 #[expect(clippy::too_many_arguments, reason = "the options of one format; each is used once")]
 pub(super) fn read_table(
     reader: impl Read,
@@ -116,7 +116,7 @@ pub(super) fn read_table(
     Ok(left_out)
 }
 
-/// The term that a field looks like: an IRI, a number, a literal, a name; otherwise it is text.
+/// Infers the term of a field: an IRI, a number, a literal, a name, or otherwise a string.
 fn any(field: &str) -> Term {
     let field = field.trim();
     if let Some(iri) = field.strip_prefix('<').and_then(|rest| rest.strip_suffix('>')) {
@@ -142,6 +142,6 @@ fn any(field: &str) -> Term {
             return literal(text, datatype);
         }
     }
-    // What has no blanks reads as a name or an IRI.
+    // A field without spaces is a name or an IRI.
     if !field.is_empty() && !field.contains([' ', '\n', '>']) { Term::iri(field) } else { Term::string(field) }
 }

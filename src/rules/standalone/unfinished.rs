@@ -1,10 +1,10 @@
-//! A file that gets its name when it is whole.
+//! Atomic file writing: a file is renamed into place when it is complete.
 
 use std::fs::File;
 use std::io;
 use std::path::PathBuf;
 
-/// A file beside the one that it is to become. Dropped before it is kept, it is removed.
+/// A temporary file beside its target. It is removed if dropped before [`Unfinished::keep`].
 #[derive(Debug)]
 pub(super) struct Unfinished {
     path: PathBuf,
@@ -12,21 +12,21 @@ pub(super) struct Unfinished {
 }
 
 impl Unfinished {
-    /// Begins a file that is to replace `target`.
+    /// Creates a temporary file that will replace `target`.
     ///
     /// # Errors
-    /// It can't be made.
+    /// The file can't be created.
     pub(super) fn begin(target: PathBuf) -> io::Result<(Self, File)> {
-        // The number keeps two programs that write the same file apart.
+        // The process id separates two programs that write the same file.
         let path = target.with_added_extension(format!("{}.partial", std::process::id()));
         let file = File::create(&path)?;
         Ok((Self { path, target }, file))
     }
 
-    /// Gives the file its name.
+    /// Renames the file to its target.
     ///
     /// # Errors
-    /// It can't be renamed; then it is removed.
+    /// The file can't be renamed; it is then removed.
     pub(super) fn keep(self) -> io::Result<()> {
         std::fs::rename(&self.path, &self.target)
     }
@@ -34,7 +34,7 @@ impl Unfinished {
 
 impl Drop for Unfinished {
     fn drop(&mut self) {
-        // Where it has its name already, nothing is left to remove.
+        // After a successful rename the file no longer exists, so the error is ignored.
         let _ = std::fs::remove_file(&self.path);
     }
 }
