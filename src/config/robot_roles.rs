@@ -103,11 +103,11 @@ fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, ta
     let (fault, help) = match (found.motion, wanted) {
         (Motion::Fixed, _) => ("does not move", "name a joint of the type prismatic, revolute or continuous"),
         (Motion::Turns, Some(Motion::Slides)) if key == "finger_joints" => (
-            "is revolute, but finger joints must be prismatic",
+            "rotates, but finger joints must be prismatic",
             "only parallel grippers are supported, with two prismatic finger joints",
         ),
         (Motion::Turns, Some(Motion::Slides)) => {
-            ("is revolute, but must be prismatic", "`base_joints` are x, y and heading")
+            ("rotates, but must be prismatic", "`base_joints` are x, y and heading")
         }
         (Motion::Slides, Some(Motion::Turns)) => {
             ("is prismatic, but must be revolute or continuous", "`base_joints` are x, y and heading")

@@ -49,8 +49,10 @@ impl WorldError {
             Self::Urdf { .. } => Diagnostic::error("W020", self.to_string())
                 .help("the profile's `urdf` must name a URDF file with one tree of links"),
             Self::Missing { help, .. } => Diagnostic::error("W021", self.to_string()).help(help.clone()),
-            Self::Unsupported { .. } => Diagnostic::error("W022", self.to_string())
-                .help("use fixed, revolute, continuous or prismatic joints, and boxes, cylinders, spheres, capsules or meshes"),
+            Self::Unsupported { .. } => Diagnostic::error("W022", self.to_string()).help(
+                "use fixed, revolute, continuous or prismatic joints, and boxes, cylinders, spheres, capsules or \
+                 meshes",
+            ),
             Self::Scene { .. } => {
                 Diagnostic::error("W023", self.to_string()).help("see `[physics]` in the configuration")
             }

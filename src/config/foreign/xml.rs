@@ -28,7 +28,7 @@ impl Bound {
     fn in_words(self) -> &'static str {
         match self {
             Self::Finite => "finite",
-            Self::NotNegative => "not negative",
+            Self::NotNegative => "at least 0",
             Self::Positive => "above 0",
         }
     }
