@@ -19,7 +19,7 @@ model_dir = \"../models\"
 ";
 /// The lines of `configs/pick.toml` that name the skill.
 const LAUNCHER: &str = "\
-# Who performs the actions: \"reference\" is the skill that comes with actcheck.
+# The program that performs the actions: \"reference\" is the skill that comes with actcheck.
 test_launcher = \"reference\"
 ";
 
@@ -52,7 +52,7 @@ fn replacements(new: &CampaignTemplate<'_>) -> Vec<(&'static str, String)> {
     ];
     if let Some(skill) = new.skill {
         let launcher = format!(
-            "# Who performs the actions: a program, or \"reference\", the skill that comes with actcheck.\n\
+            "# The program that performs the actions; \"reference\" is the skill that comes with actcheck.\n\
              test_launcher = \"{skill}\"\n"
         );
         pieces.push((LAUNCHER, launcher));
