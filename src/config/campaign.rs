@@ -8,7 +8,7 @@ use crate::base::{Diagnostic, Diagnostics, Files, Shard, Source, Span};
 use crate::config::{Case, ObjectModel, OtherCounts, RobotProfile, Skill, WorldMap, designators};
 use crate::search::Strategy;
 
-/// One campaign: every test in `test_count` scenes, in each `repeat` times.
+/// One campaign: runs every test in `test_count` scenes, `repeat` times in each.
 #[derive(Debug, Clone)]
 pub struct Campaign {
     /// The configuration's text.

@@ -35,7 +35,7 @@ impl Case {
     }
 }
 
-/// How the value of a choice is written.
+/// The notation of a choice's value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Form<'a> {
     /// As one of these names.

@@ -1,4 +1,4 @@
-//! Tables named after designators: the candidate values that scenes are made from.
+//! Tables named after designators: the candidate values for scenes.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -17,10 +17,10 @@ const MOST_RUNS: i64 = 10_000_000;
 /// Largest accepted `repeat`: a thousand runs of one scene give its pass rate to within ±0.03.
 const MOST_REPETITIONS: i64 = 1000;
 
-/// Reads a configuration with the models and the robot that it names. Paths in it are relative to it.
+/// Reads a configuration with its models and robot. Its paths are relative to its folder.
 ///
 /// # Errors
-/// Every fault at once: the file can't be read (C001), is not TOML (C002), has unknown, missing or wrong keys
+/// All faults at once: the file can't be read (C001), is not TOML (C002), has unknown, missing or invalid keys
 /// (C003 to C009), names missing models, robots or files (C010 to C014), or a model or robot has errors (W…).
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics> {
     let source = Files::Disk.read(path).map_err(|reason| {

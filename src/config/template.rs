@@ -81,7 +81,7 @@ fn commented(line: &str) -> String {
     format!("# {line}")
 }
 
-/// Whether a configuration names an ontology, or can be made to.
+/// The result of [`link_ontology`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LinksOntology {
     /// It names one.

@@ -56,7 +56,7 @@ pub struct Course {
 pub struct Record {
     /// Contacts, sorted by start and pair.
     pub contacts: Vec<Contact>,
-    /// One for each object, in scene order.
+    /// One course per object, in scene order.
     pub courses: Vec<Course>,
     /// Smallest and largest true x and y of the base; `None` if it is fixed. Unit: metres.
     pub base: Option<[[f64; 2]; 2]>,

@@ -135,7 +135,7 @@ pub(crate) fn read_model(model: Node, shapes: &mut Shapes, reader: &mut Reader) 
         read_link(link, &mut body, shapes, reader);
     }
     if body.parts.is_empty() && !reader.found.has_errors() {
-        let message = "the model has nothing solid: none of its links has a `<collision>`".to_owned();
+        let message = "the model has no solid shape: none of its links has a `<collision>`".to_owned();
         reader.error("W038", model, message, "give a link a `<collision>`; a `<visual>` does not collide");
     }
     body

@@ -52,7 +52,7 @@ fn read_robot(root: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Rea
         read_link(link, &at, body, shapes, reader);
     }
     if body.parts.is_empty() && !reader.found.has_errors() {
-        let message = "the object has nothing solid: none of its links has a `<collision>`".to_owned();
+        let message = "the object has no solid shape: none of its links has a `<collision>`".to_owned();
         reader.error("W038", root, message, "give a link a `<collision>`; a `<visual>` does not collide");
     }
 }
