@@ -95,7 +95,7 @@ fn a_run_that_takes_too_long_on_the_clock_is_a_timeout_and_can_be_replayed() {
 fn budgets_that_are_none_are_refused() {
     let project = project();
     for (arguments, word) in [
-        (["--time", "ten"], "no duration such as"),
+        (["--time", "ten"], "not a duration such as"),
         (["--until-width", "1"], "between 0 and 1"),
         (["--max-failures", "0"], "--max-failures"),
     ] {

@@ -180,8 +180,8 @@ fn without_noise_clutter_and_obstacles_nearly_everything_passes() {
     let project = project();
     let config = project.path().join("configs/pick_and_place.toml");
     edit(&config, "nav_obstacle_count = 5", "nav_obstacle_count = 0");
-    edit(&config, "\ncount = [1, 4] # beside it", "\ncount = 0");
-    edit(&config, "\ncount = [1, 4] # there", "\ncount = 0");
+    edit(&config, "\ncount = [1, 4] # next to the target", "\ncount = 0");
+    edit(&config, "\ncount = [1, 4] # on this surface", "\ncount = 0");
     let text = std::fs::read_to_string(&config).unwrap();
     // All noise is stated as `…_noise…`, `…_drift` or `dropout`.
     let is_noise =

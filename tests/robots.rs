@@ -70,7 +70,7 @@ fn xacro_is_expanded_by_the_program_of_that_name_or_refused_with_help() {
     assert_eq!(code, Some(0), "{said}");
     let (code, said) = check_xacro(tools.path(), "<robot><xacro:if value=\"${arm}\"/></robot>\n");
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("xacro refuses robot.urdf.xacro: undefined name 'arm'"), "{said}");
+    assert!(said.contains("xacro cannot expand robot.urdf.xacro: undefined name 'arm'"), "{said}");
     // Faults of what came out are told with their lines in it.
     let (code, said) = check_xacro(tools.path(), &urdf.replace("value=\"3\"", "value=\"-3\""));
     assert_eq!(code, Some(2), "{said}");

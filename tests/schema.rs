@@ -363,9 +363,9 @@ fn changed() -> Vec<(String, toml::Table)> {
 fn is_beyond_a_schema(code: &str, message: &str) -> bool {
     let names_and_files = ["C008", "C009", "C010", "C011", "C012", "C020", "C021", "C031", "C034", "C015"];
     names_and_files.contains(&code)
-        || message.contains("is no duration")
+        || message.contains("is not a duration")
         || message.contains("there is no obstacle to choose")
-        || message.contains("there is none to choose")
+        || message.contains("there are no models to choose from")
 }
 
 #[test]

@@ -250,7 +250,7 @@ const WRONG: [(&str, &[&str]); 12] = [
     ("[[walls]]\nfrom_m = [1, 1]\nto_m = [1, 99]", &["C006 m/worlds/wrong.toml:3:12: `walls[1].to_m` is 99"]),
     (
         "[[rooms]]\nname = \"r\"\nlow_m = [1, 1]\nhigh_m = [0, 2]",
-        &["W044 m/worlds/wrong.toml:1:1: the room has no extent"],
+        &["W044 m/worlds/wrong.toml:1:1: the room has no area"],
     ),
     (
         "[[furniture]]\nname = \"t\"\nmodel = \"tabel\"\nat_m = [0, 0]",
@@ -270,7 +270,7 @@ const WRONG: [(&str, &[&str]); 12] = [
     ),
     (
         "[[furniture]]\nname = \"t\"\nmodel = \"table\"\nat_m = [0, 0]\n[[locations]]\nname = \"l\"\nat_m = [0.5, 0]\nsurface = \"t\"",
-        &["W043 m/worlds/wrong.toml:7:1: the location lies inside of `t`"],
+        &["W043 m/worlds/wrong.toml:7:1: the location is inside `t`"],
     ),
     ("name = [", &["C002 m/worlds/wrong.toml:1:9: this is not TOML"]),
 ];
@@ -363,7 +363,7 @@ fn a_gazebo_world_is_furnished_with_its_models() {
     for (inside, expected) in [
         ("<include><uri>model://sofa_bed</uri></include>".to_owned(), "W040"),
         (format!("{}{}", include("a", "0 0 0 0 0 0"), include("a", "3 0 0 0 0 0")), "W041"),
-        (include("a", "0 0 0 1 0 0"), "a model that leans"),
+        (include("a", "0 0 0 1 0 0"), "a tilted model"),
         ("<model name=\"inline\"/>".to_owned(), "W035"),
     ] {
         let said = read(&inside).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! What a configuration file asks for, with nothing left to check.
+//! A validated campaign configuration.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -8,80 +8,80 @@ use crate::base::{Diagnostic, Diagnostics, Files, Shard, Source, Span};
 use crate::config::{Case, ObjectModel, OtherCounts, RobotProfile, Skill, WorldMap, designators};
 use crate::search::Strategy;
 
-/// One campaign: every test in `test_count` scenes, in each `repeat` times.
+/// One campaign: runs every test in `test_count` scenes, `repeat` times in each.
 #[derive(Debug, Clone)]
 pub struct Campaign {
-    /// The text that it was read from.
+    /// The configuration's text.
     pub source: Source,
     /// Lists of action names, performed in order (`tests`).
     pub tests: Vec<Vec<String>>,
     /// Scenes of each test (`test_count`).
     pub test_count: u32,
-    /// Runs of each scene, each with other noise (`repeat`); without it, 1.
+    /// Runs of each scene, each with different noise (`repeat`; default 1).
     pub repeat: u32,
-    /// What performs the actions (`test_launcher`).
+    /// The skills that perform the actions (`test_launcher`).
     pub launcher: Launcher,
-    /// Seed of all randomness (`seed`); without one, 0.
+    /// Seed of all randomness (`seed`; default 0).
     pub seed: u64,
-    /// How scenes are chosen (`[search] strategy`); without one, at random.
+    /// How scenes are chosen (`[search] strategy`; default random).
     pub search: Strategy,
-    /// The ontology's root file (`ontology`) and where it is read from.
+    /// The files that the ontology is read from, and its root file (`ontology`).
     pub ontology: (Files, PathBuf),
-    /// Models by name: all that `model_dir` (or the shipped folder) holds and the campaign can speak of.
+    /// Usable models by name: those of `model_dir` (or the shipped folder), and of shipped worlds.
     pub models: BTreeMap<String, Arc<ObjectModel>>,
-    /// Names of models of which no file says what they are (`[categories]` may).
+    /// Names of models without a category, neither in their own files nor in `[categories]`.
     pub uncategorised: BTreeSet<String>,
-    /// The worlds that scenes lie in (`[world] worlds`), by name; without one there is a floor and nothing else.
+    /// The worlds that contain the scenes (`[world] worlds`), by name; if empty, scenes have only a floor.
     pub worlds: BTreeMap<String, Arc<WorldMap>>,
     /// The robot (`[robot]`).
     pub robot: Arc<RobotProfile>,
-    /// Names of obstacle models in the way of the base (`nav_obstacle_list`).
+    /// Names of the obstacle models (`nav_obstacle_list`).
     pub nav_obstacles: Vec<String>,
-    /// How many obstacles stand in the way (`nav_obstacle_count`).
+    /// Number of obstacles on the floor (`nav_obstacle_count`).
     pub nav_obstacle_count: u32,
     /// Candidate values by designator table: `world` → `worlds`, `pickObject` → `model_list`, and so on.
     ///
-    /// A table named after a designator that has no special meaning gives its candidates under its own name.
+    /// The table of any other designator keeps its own name.
     pub candidates: BTreeMap<String, Vec<String>>,
-    /// How many other objects stand on the surfaces.
+    /// Numbers of other objects on the surfaces.
     pub other_counts: OtherCounts,
-    /// Rules that a scene has to satisfy (`[scene] require`).
+    /// Rules that every scene must satisfy (`[scene] require`).
     pub scene_rule: Option<Source>,
     /// Shares of targets and of other objects that lie on their side (`[pickObject] lying`, `[surfaceObjects] lying`).
     pub lying: (f64, f64),
-    /// Ranges of x, y and heading in which the base starts (`[robot] start_x_m`, `start_y_m`, `start_heading_rad`); without
-    /// them it starts in front of the surface. Units: metres and radians.
+    /// Ranges of the base's initial x, y and heading (`[robot] start_x_m`, `start_y_m`, `start_heading_rad`).
+    /// If `None`, it starts in front of the surface. Units: metres and radians.
     pub start: Option<[Range; 3]>,
-    /// Ranges of what physics draws (`[physics]`).
+    /// Ranges of physical parameters, and time stepping (`[physics]`).
     pub physics: Physics,
-    /// What the sensors get wrong (`[sensing]`, `[camera]`).
+    /// Sensor errors and the camera (`[sensing]`, `[camera]`).
     pub sensing: Sensing,
     /// Budgets of one action (`[budget]`).
     pub budget: Budget,
     /// Budgets of a run and of the whole campaign (`[budget]`).
     pub limits: Limits,
-    /// The part of its runs that is to be made; nothing: all of them.
+    /// The part of the campaign to run; `None` runs all of it.
     pub shard: Option<Shard>,
-    /// The one scene that every run makes (`[case]`); without one, scenes are drawn.
+    /// The fixed scene of every run (`[case]`); if `None`, scenes are sampled.
     pub case: Option<Case>,
-    /// History folder (`[history] dir`), `.actcheck` beside the configuration by default.
+    /// History folder (`[history] dir`), `.actcheck` next to the configuration by default.
     pub history: PathBuf,
-    /// Where things are written, for faults that only a later stage can see: `tests.0.1` is the second action of
+    /// Spans of keys and values, for faults that only a later stage can find: `tests.0.1` is the second action of
     /// the first test, `pickObject` the table's header, `pickObject.2` its third candidate.
     pub places: BTreeMap<String, Span>,
-    /// What is left out of models that are named, and which of the others are wrong.
+    /// Warnings about ignored parts of used models, and about unused models with errors.
     pub warnings: Diagnostics,
 }
 
 impl Campaign {
-    /// Names of the models that can stand in its scenes.
+    /// Returns the names of the models that its scenes can contain.
     pub fn used_models(&self) -> BTreeSet<String> {
         let named = designators::named_models(&self.candidates, &self.nav_obstacles);
         let standing = self.worlds.values().flat_map(|world| &world.furniture).map(|piece| piece.model.as_str());
         named.into_iter().chain(standing).map(str::to_owned).collect()
     }
 
-    /// A fault of the configuration that a later stage found, at the place of `key` (see [`Campaign::places`]).
+    /// Returns an error that a later stage found, at the span of `key` (see [`Campaign::places`]).
     pub fn fault(&self, code: &'static str, key: &str, message: impl Into<String>) -> Diagnostic {
         let fault = Diagnostic::error(code, message);
         match self.places.get(key) {
@@ -91,42 +91,42 @@ impl Campaign {
     }
 }
 
-/// What the command line says instead of the file.
+/// Command-line options that override the file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Overrides {
-    /// Instead of `test_count`; at least 1.
+    /// Overrides `test_count`; at least 1.
     pub runs: Option<u32>,
-    /// Instead of `seed`.
+    /// Overrides `seed`.
     pub seed: Option<u64>,
-    /// Instead of `repeat`; at least 1.
+    /// Overrides `repeat`; at least 1.
     pub repeat: Option<u32>,
-    /// Instead of `[budget] time`. Unit: seconds.
+    /// Overrides `[budget] time`. Unit: seconds.
     pub time_secs: Option<f64>,
-    /// Instead of `[budget] until_width`.
+    /// Overrides `[budget] until_width`.
     pub until_width: Option<f64>,
-    /// Instead of `[budget] max_failures`.
+    /// Overrides `[budget] max_failures`.
     pub max_failures: Option<u64>,
-    /// Only this part of the runs.
+    /// Runs only this part of the campaign.
     pub shard: Option<Shard>,
-    /// Instead of `[search] strategy`.
+    /// Overrides `[search] strategy`.
     pub search: Option<Strategy>,
-    /// Instead of `[history] dir`; relative to where the program runs.
+    /// Overrides `[history] dir`; relative to the current directory.
     pub history: Option<PathBuf>,
 }
 
-/// What performs the actions.
+/// The skills that perform the actions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Launcher {
-    /// Our own skills, in process.
+    /// The built-in reference skills, in process.
     Reference,
-    /// A program of somebody's, for the actions that it knows; our own skills for the others.
+    /// An external program for the actions that it supports; the reference skills for the others.
     Program(Box<Skill>),
 }
 
-/// A range to draw from, both ends included.
+/// A range to sample from, both ends included.
 pub type Range = (f64, f64);
 
-/// What physics draws for each object, and what it is stepped with.
+/// Ranges of each object's physical parameters, and the settings of the solver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Physics {
     /// Factor on the model's mass.
@@ -137,16 +137,16 @@ pub struct Physics {
     pub size_scale: Range,
     /// Coefficient of restitution.
     pub restitution: Range,
-    /// Physics steps in a second.
+    /// Physics steps per second.
     pub steps_per_second: u32,
-    /// Solver iterations in a step.
+    /// Solver iterations per step.
     pub iterations: u32,
 }
 
-/// Standard deviations of what the robot senses and where it starts; 0 is perfect.
+/// Standard deviations of sensing and localisation errors; 0 is perfect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensing {
-    /// Of a perceived object's position, horizontally. Unit: metres.
+    /// Of a perceived object's position, along each horizontal axis. Unit: metres.
     pub position_noise_m: f64,
     /// Of a perceived object's height. Unit: metres.
     pub height_noise_m: f64,
@@ -154,63 +154,63 @@ pub struct Sensing {
     pub yaw_noise_rad: f64,
     /// Of a perceived object's dimensions. Unit: metres.
     pub size_noise_m: f64,
-    /// Of where the base believes that it stands. Unit: metres.
+    /// Of the base's initial position estimate. Unit: metres.
     pub localisation_noise_m: f64,
-    /// Of where the base believes that it heads. Unit: radians.
+    /// Of the base's initial heading estimate. Unit: radians.
     pub heading_noise_rad: f64,
     /// Of a measured finger opening. Unit: metres.
     pub gripper_noise_m: f64,
-    /// How the base finds out where it is while it drives.
+    /// Localisation while the base drives.
     pub odometry: Odometry,
     /// The depth camera (`[camera]`).
     pub camera: Camera,
 }
 
-/// How the base's belief of where it stands changes as it drives; what counts in `[sensing]`. Standard deviations.
+/// Localisation while the base drives: keys of `[sensing]`. Standard deviations unless noted otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Odometry {
-    /// Error of the way over the way, along it and across (`odometry_drift`).
+    /// Position error per distance driven, along and across the path (`odometry_drift`).
     pub drift: f64,
-    /// Error of the heading for each radian turned and for each metre of way (`heading_drift`). Unit: radians.
+    /// Heading error per radian turned and per metre driven (`heading_drift`). Unit: radians.
     pub heading_drift: f64,
-    /// Way between two sights of landmarks, which correct the belief (`landmark_every_m`); 0 where there are none. Unit:
-    /// metres.
+    /// Distance driven between two landmark sightings, which correct the estimate (`landmark_every_m`); 0 means no
+    /// landmarks. Unit: metres.
     pub landmark_every_m: f64,
-    /// Error of the position by landmarks (`landmark_noise_m`). Unit: metres.
+    /// Error of a position measured by landmarks (`landmark_noise_m`). Unit: metres.
     pub landmark_noise_m: f64,
-    /// Error of the heading by landmarks (`landmark_noise_rad`). Unit: radians.
+    /// Error of a heading measured by landmarks (`landmark_noise_rad`). Unit: radians.
     pub landmark_noise_rad: f64,
 }
 
 impl Odometry {
-    /// What the base believes at first it goes on believing.
+    /// Odometry without errors or landmarks: the initial localisation error stays constant.
     pub const IDEAL: Self =
         Self { drift: 0.0, heading_drift: 0.0, landmark_every_m: 0.0, landmark_noise_m: 0.0, landmark_noise_rad: 0.0 };
 }
 
-/// The depth camera on the robot's camera link: what its pictures are like, and what they get wrong.
+/// The depth camera on the robot's camera link: its intrinsics and noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// Pixels in a row.
+    /// Image width. Unit: pixels.
     pub width: u32,
-    /// Rows.
+    /// Image height. Unit: pixels.
     pub height: u32,
-    /// Angle between the outermost columns. Unit: radians. Pixels are square, which gives the other angle.
+    /// Angle between the outermost columns. Unit: radians. The vertical angle follows, as pixels are square.
     pub field_of_view_rad: f64,
-    /// Nothing nearer is seen. Unit: metres from the camera.
+    /// Nearest visible distance from the camera. Unit: metres.
     pub min_range_m: f64,
-    /// Nothing farther is seen. Unit: metres from the camera.
+    /// Farthest visible distance from the camera. Unit: metres.
     pub max_range_m: f64,
     /// Standard deviation of the range at a distance of 1 m; it grows with the square of the distance. Unit: metres.
     pub range_noise_m: f64,
-    /// Share of pixels without a value, anywhere.
+    /// Share of pixels that are dropped at random.
     pub dropout: f64,
-    /// Angle between ray and surface below which pixels are lost: all of them at 0, none at this angle. Unit: radians.
+    /// Angle between ray and surface below which pixels are dropped: all at 0, none at this angle. Unit: radians.
     pub grazing_rad: f64,
 }
 
 impl Camera {
-    /// 320 × 240 pixels, 57 degrees wide, from 0.3 to 5 m like the depth cameras of service robots, and without faults.
+    /// 320 × 240 pixels, 57 degrees wide, from 0.3 to 5 m like the depth cameras of service robots, and without noise.
     pub const IDEAL: Self = Self {
         width: 320,
         height: 240,
@@ -223,28 +223,28 @@ impl Camera {
     };
 }
 
-/// Limits on one action. Beyond them it ends as `timeout`.
+/// Limits on one action. An action that exceeds them ends as `timeout`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
     /// Simulated time of one action. Unit: seconds.
     pub action_secs: f64,
 }
 
-/// Limits on one run and on the whole campaign; nothing means none.
+/// Limits on one run and on the whole campaign; `None` means unlimited.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Limits {
-    /// Time of one run on the clock; beyond it the run ends as `timeout`. Unit: seconds.
+    /// Wall-clock time of one run; a longer run ends as `timeout`. Unit: seconds.
     pub run_secs: Option<f64>,
-    /// Time of the campaign on the clock. Unit: seconds.
+    /// Wall-clock time of the campaign. Unit: seconds.
     pub time_secs: Option<f64>,
-    /// The campaign ends when the 95 % interval of every property is at most so wide. In (0, 1).
+    /// The campaign ends when the 95 % confidence interval of every property is at most this wide. In (0, 1).
     pub until_width: Option<f64>,
-    /// The campaign ends when in so many runs a property failed; at least 1.
+    /// The campaign ends after this many runs with a failed property; at least 1.
     pub max_failures: Option<u64>,
 }
 
 impl Limits {
-    /// The same with what the command line says instead.
+    /// Returns the limits with the overrides of the command line applied.
     pub(super) fn overridden(self, overrides: &Overrides) -> Self {
         Self {
             run_secs: self.run_secs,

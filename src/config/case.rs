@@ -1,4 +1,4 @@
-//! `[case]`: one scene by its choices, as `actcheck export` writes it and `actcheck run` reads it.
+//! `[case]`: one scene as a list of its choices, written by `actcheck export` and read by `actcheck run`.
 
 use std::collections::BTreeMap;
 
@@ -6,8 +6,8 @@ use crate::base::{Diagnostics, Span, did_you_mean};
 use crate::config::designators::Designators;
 use crate::config::{Located, OtherCounts, Table};
 
-/// Choices that pick a name from a designator's candidates: they are written by name, so that a case survives other
-/// candidates being added. `*` stands for a number.
+/// Choices that pick a name from a designator's candidates. They are written by name, so that a case stays valid when
+/// candidates are added. `*` matches a number.
 const NAMED: [(&str, &str); 4] = [
     ("surface.model", "objectSurface"),
     ("target.model", "pickObject"),
@@ -15,41 +15,41 @@ const NAMED: [(&str, &str); 4] = [
     ("place_other.*.model", "surfaceObjects"),
 ];
 
-/// One scene that a configuration fixes: every run of it makes these choices.
+/// A scene fixed by the configuration: every run makes these choices.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Case {
-    /// The run that it was taken from.
+    /// The run that the case was exported from.
     pub from: Option<String>,
-    /// Names of the properties that failed in it.
+    /// Names of the properties that failed in that run.
     pub expect: Vec<String>,
     /// Digest over all states of that run.
     pub trace: Option<String>,
-    /// Values by name of the choice, in order where a name repeats. What is not there is nominal.
+    /// Values by name of the choice, in order if a name repeats. Missing choices take their nominal value.
     pub choices: BTreeMap<String, Vec<f64>>,
 }
 
 impl Case {
-    /// The key of a choice among [`crate::config::Campaign::places`].
+    /// Returns the key of a choice in [`crate::config::Campaign::places`].
     pub fn place_of(choice: &str) -> String {
         format!("case.choices.{choice}")
     }
 }
 
-/// How the value of a choice is written.
+/// The notation of a choice's value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Form<'a> {
-    /// By its name among these.
+    /// As one of these names.
     Name(&'a [String]),
-    /// As so many more than the choice's own value says, which counts from the least.
+    /// As a count: the choice's value plus this least count.
     Count(u32),
-    /// As true for 1 and false for 0.
+    /// As `true` for 1 and `false` for 0.
     YesNo,
-    /// As it is.
+    /// As a number.
     Number,
 }
 
 impl<'a> Form<'a> {
-    /// The form of a choice's values, by its name.
+    /// Returns the form of a choice's values, given its name.
     pub(super) fn of(choice: &str, candidates: &'a BTreeMap<String, Vec<String>>, counts: &OtherCounts) -> Self {
         let fits = |pattern: &str| match pattern.split_once('*') {
             Some((start, end)) => {
@@ -71,7 +71,7 @@ fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Reads `[case]`, whose names are looked up among the candidates of their designators.
+/// Reads `[case]` and looks its names up among the candidates of their designators.
 pub(super) fn read(
     mut table: Table,
     designators: &Designators,
@@ -96,7 +96,7 @@ pub(super) fn read(
     case
 }
 
-/// Choices whose names begin with `prefix`: a table for each part of a name but the last.
+/// Reads the choices whose names begin with `prefix`: each part of a name but the last is a table.
 fn read_choices(
     mut table: Table,
     prefix: &str,
@@ -123,7 +123,7 @@ fn read_choices(
     table.finish(found);
 }
 
-/// Values of one choice: one, or a list of some.
+/// Reads the values of one choice: a single value or a list.
 fn read_values(table: &mut Table, key: &str, form: Form<'_>) -> Vec<f64> {
     match form {
         Form::Name(names) => {
@@ -147,7 +147,7 @@ fn read_values(table: &mut Table, key: &str, form: Form<'_>) -> Vec<f64> {
 fn index_of(table: &mut Table, key: &str, text: &Located<String>, names: &[String]) -> Option<f64> {
     let found = names.iter().position(|name| *name == text.value);
     if found.is_none() {
-        let message = format!("`{}` is no candidate for `{key}`", text.value);
+        let message = format!("`{}` is not a candidate for `{key}`", text.value);
         let help = did_you_mean(&text.value, names.iter().map(String::as_str));
         table.fault("C015", text.span.clone(), message, help);
     }

@@ -1,4 +1,4 @@
-//! A configuration with a single scene, as text for people and for `actcheck run`.
+//! Writes a configuration with a single scene, for users and for `actcheck run`.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -9,16 +9,16 @@ use crate::base::{Choice, ChoiceKind, Diagnostic, Diagnostics, Source};
 use crate::config::Campaign;
 use crate::config::case::Form;
 
-/// Keys that mean nothing for a single scene.
+/// Keys without a meaning for a single scene.
 const OF_CAMPAIGNS: [&str; 5] = ["case", "history", "repeat", "search", "seed"];
 
-/// The same of `[budget]`.
+/// Keys of `[budget]` without a meaning for a single scene.
 const BUDGETS_OF_CAMPAIGNS: [&str; 3] = ["max_failures", "time", "until_width"];
 
-/// What is written as a case, beside the configuration's text.
+/// The data of a case, in addition to the configuration's text.
 #[derive(Debug, Clone)]
 pub struct CaseText<'a> {
-    /// The run that it is taken from.
+    /// The run that the case is exported from.
     pub run: &'a str,
     /// Names of its actions.
     pub test: &'a [String],
@@ -26,21 +26,21 @@ pub struct CaseText<'a> {
     pub failed: &'a [String],
     /// Digest over all states of the run.
     pub trace: &'a str,
-    /// Every decision of the run.
+    /// Every choice of the run.
     pub choices: &'a [Choice],
-    /// Unit of a choice by its name; empty where it has none.
+    /// Returns the unit of a choice by its name, or an empty string if it has none.
     pub unit: fn(&str) -> &'static str,
-    /// The keys `ontology` and `model_dir` and the robot's `profile`, as they are to be written; nothing leaves out.
+    /// Values of the keys `ontology`, `model_dir` and the robot's `profile`; `None` omits a key.
     pub paths: [Option<String>; 3],
-    /// `test_launcher` and `[skill] dir` as they are to be written, where a program performs actions.
+    /// Values to write for `test_launcher` and `[skill] dir`, if an external program performs actions.
     pub skill: Option<(Option<String>, String)>,
 }
 
-/// The paths that a configuration's text names, as they are written: of the ontology, the models, and the robot where it
-/// is named by a file.
+/// Returns the paths in a configuration's text as written: of the ontology, of the models, and of the robot's profile
+/// if it is a file.
 ///
 /// # Errors
-/// C002 where the text is not TOML.
+/// C002 if the text is not TOML.
 pub fn written_paths(source: &Source) -> Result<[Option<String>; 3], Diagnostics> {
     let table = parse(source)?;
     let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
@@ -55,10 +55,10 @@ fn parse(source: &Source) -> Result<toml::Table, Diagnostics> {
     })
 }
 
-/// A campaign's configuration, but with a single scene.
+/// Returns a campaign's configuration reduced to a single scene.
 ///
 /// # Errors
-/// C002 where the campaign's text is not TOML.
+/// C002 if the campaign's text is not TOML.
 pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Diagnostics> {
     let mut table = parse(&campaign.source)?;
     OF_CAMPAIGNS.iter().for_each(|key| drop(table.remove(*key)));
@@ -86,17 +86,17 @@ pub fn case_text(campaign: &Campaign, case: &CaseText<'_>) -> Result<String, Dia
         }
     }
     let mut out = format!(
-        "# One scene, taken from run {}: `actcheck run` with this file makes it again.\n\
-         # Rules, ontology and models are those of the day on which it runs.\n\n{table}\n",
+        "# One scene, exported from run {}: `actcheck run` with this file reproduces it.\n\
+         # The run uses the current rules, ontology and models.\n\n{table}\n",
         case.run
     );
     let _ = writeln!(out, "[case]\nfrom = {}", Value::String(case.run.to_owned()));
-    let _ = writeln!(out, "# What failed when it was taken.\nexpect = {}", names(case.failed));
+    let _ = writeln!(out, "# Properties that failed in that run.\nexpect = {}", names(case.failed));
     let _ = writeln!(out, "# Digest over all states of that run.\ntrace = {}", Value::String(case.trace.to_owned()));
     let _ = writeln!(
         out,
-        "\n# Every decision of the run, to be changed by hand as well. What is left out is nominal; poses are in the world's\n\
-         # frame, with the middle of the surface at its origin and the robot on the side of negative x.\n[case.choices]"
+        "\n# Every choice of the run, to edit as needed. Choices left out take their nominal value. Poses are in the\n\
+         # world frame: its origin is the middle of the surface, with the robot on the negative x side.\n[case.choices]"
     );
     out.push_str(&choice_lines(campaign, case));
     Ok(out)
@@ -106,7 +106,7 @@ fn names(names: &[String]) -> Value {
     Value::Array(names.iter().cloned().map(Value::String).collect())
 }
 
-/// One line for each name, in the order of their first decisions, with a gap between things.
+/// Writes one line per name, in the order of first choices, with a blank line between objects.
 fn choice_lines(campaign: &Campaign, case: &CaseText<'_>) -> String {
     let mut order: Vec<&str> = Vec::new();
     let mut values: BTreeMap<&str, Vec<&Choice>> = BTreeMap::new();
@@ -137,7 +137,7 @@ fn choice_lines(campaign: &Campaign, case: &CaseText<'_>) -> String {
     out
 }
 
-/// A name as dotted keys; in quotation marks where the names of its beginning is a choice too, which TOML does not allow.
+/// Formats a name as dotted keys, or in quotation marks if a prefix of it is a choice too, which TOML forbids.
 fn key(name: &str, all: &[&str]) -> String {
     let quoted = |text: &str| Value::String(text.to_owned()).to_string();
     let within = |other: &&&str| name.strip_prefix(**other).is_some_and(|rest| rest.starts_with('.'));
@@ -151,7 +151,7 @@ fn key(name: &str, all: &[&str]) -> String {
     parts.collect::<Vec<_>>().join(".")
 }
 
-/// A value as the reader of cases takes it, with all its digits.
+/// Formats a value for the reader of cases, with all its digits.
 fn written(value: f64, form: Form<'_>) -> String {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a wrong index finds no name")]
     let whole = value.max(0.0) as usize;
@@ -166,7 +166,7 @@ fn written(value: f64, form: Form<'_>) -> String {
     }
 }
 
-/// Unit and bounds, as a comment.
+/// Returns unit and bounds as a TOML comment.
 fn remark(choice: &Choice, form: Form<'_>, unit: &str) -> Option<String> {
     let bounds = match (form, &choice.kind) {
         (Form::Number, ChoiceKind::Real { low, high, .. }) => format!("{} to {}", short(*low), short(*high)),
@@ -177,7 +177,7 @@ fn remark(choice: &Choice, form: Form<'_>, unit: &str) -> Option<String> {
     Some(format!("  # {unit}{bounds}"))
 }
 
-/// Four decimal places at most: enough for a comment.
+/// Formats a number with at most four decimal places.
 fn short(value: f64) -> String {
     let text = format!("{:.4}", value + 0.0);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

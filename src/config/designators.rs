@@ -1,4 +1,4 @@
-//! Tables named after designators: the candidate values that scenes are made from.
+//! Tables named after designators: the candidate values for scenes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,7 +6,7 @@ use crate::base::{Diagnostics, Span};
 use crate::config::shelf::Shelf;
 use crate::config::{Located, OtherCounts, Table};
 
-/// What a table's candidates are names of.
+/// The kind of thing that a table's candidates name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     World,
@@ -15,7 +15,7 @@ enum Kind {
     Model,
 }
 
-/// The paper's tables with the key that holds their candidates. Worlds come first: they have the places.
+/// The paper's tables with the key of their candidates. Worlds come first because locations and surfaces refer to them.
 const PAPER_TABLES: [(&str, &str, Kind); 6] = [
     ("world", "worlds", Kind::World),
     ("objectLocation", "location_list", Kind::Location),
@@ -25,12 +25,12 @@ const PAPER_TABLES: [(&str, &str, Kind); 6] = [
     ("surfaceObjects", "model_list", Kind::Model),
 ];
 
-/// More things than this on one table are a slip of the finger.
+/// Largest accepted number of objects; a larger one is most likely a typing error.
 const MOST_OBJECTS: i64 = 100;
-/// How many other objects stand around where `[surfaceObjects]` does not say.
+/// Number of other objects if `[surfaceObjects]` has no `count`.
 const DEFAULT_COUNT: (u32, u32) = (1, 4);
 
-/// What the configuration offers scene generation to choose from.
+/// The candidates and counts that scene generation chooses from.
 pub(crate) struct Designators {
     pub(crate) candidates: BTreeMap<String, Vec<String>>,
     pub(crate) other_counts: OtherCounts,
@@ -39,8 +39,8 @@ pub(crate) struct Designators {
     pub(crate) nav_obstacle_count: u32,
 }
 
-/// Reads the tables of designators, those of the paper and any other that has one list of strings. Whether there is
-/// a designator of such a name only the ontology knows, so the place is kept for later.
+/// Reads the tables of designators: those of the paper, and any other with a single list of strings. Only the ontology
+/// can tell whether such a designator exists, so `places` keeps the span for a later check.
 pub(crate) fn read(
     root: &mut Table,
     shelf: &mut Shelf,
@@ -83,7 +83,7 @@ pub(crate) fn read(
     Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count }
 }
 
-/// Names of the models that a configuration may put into scenes.
+/// Returns the names of the models that a configuration may put into scenes.
 pub(crate) fn named_models<'a>(
     candidates: &'a BTreeMap<String, Vec<String>>,
     nav_obstacles: &'a [String],
@@ -107,8 +107,8 @@ fn keep(
     candidates.insert(name.to_owned(), values.into_iter().map(|value| value.value).collect());
 }
 
-/// A table with nothing but one list may be named after a designator of the user's ontology. Any other stays untaken
-/// and so becomes an unknown table.
+/// Reads a table with a single list, which may be named after a designator of the user's ontology. Any other table is
+/// left for [`Table::finish`] to report as unknown.
 fn read_own_table(
     root: &mut Table,
     name: &str,
@@ -123,7 +123,7 @@ fn read_own_table(
     table.finish(found);
 }
 
-/// `count = [least, most]`, or one number for exactly that many.
+/// Reads `count`: `[least, most]` or a single number.
 fn read_count(table: &mut Table) -> Option<(u32, u32)> {
     let bounds = 0..=MOST_OBJECTS;
     let range = if table.is_list("count") {
@@ -135,12 +135,13 @@ fn read_count(table: &mut Table) -> Option<(u32, u32)> {
     range.and_then(both)
 }
 
-/// How many things stand on the surface to place on: of those that stand around the target, where there are such.
+/// Reads the number of objects on the surface to place on, chosen from `[surfaceObjects]`.
 fn read_place_count(table: &mut Table, has_others: bool) -> (u32, u32) {
     let place = table.key_span("count");
     let count = read_count(table).unwrap_or_default();
     if count.1 > 0 && !has_others {
-        let message = format!("{} things shall stand on the surface to place on, but there is none to choose", count.1);
+        let message =
+            format!("`placeSurface.count` allows up to {} objects, but there are no models to choose from", count.1);
         table.fault(
             "C007",
             place.unwrap_or(0..0),

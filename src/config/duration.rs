@@ -1,22 +1,22 @@
-//! Durations as people write them.
+//! Parses durations such as `10m`.
 
 use jiff::SignedDuration;
 
-/// Longer than any campaign: a year. Unit: seconds.
+/// The longest accepted duration: a year. Unit: seconds.
 const LONGEST_SECS: f64 = 366.0 * 86_400.0;
 
-/// Seconds of a duration such as `90s`, `10m`, `2h` or `1h30m`.
+/// Parses a duration such as `90s`, `10m`, `2h` or `1h30m` into seconds.
 ///
 /// # Errors
-/// A sentence: it is no duration, or none above zero and up to a year.
+/// A message if the text is not a duration, or not above zero and at most a year.
 pub fn duration_secs(text: &str) -> Result<f64, String> {
     let duration: SignedDuration =
-        text.trim().parse().map_err(|_| format!("`{text}` is no duration such as 90s, 10m or 2h"))?;
+        text.trim().parse().map_err(|_| format!("`{text}` is not a duration such as 90s, 10m or 2h"))?;
     let secs = duration.as_secs_f64();
     if secs > 0.0 && secs <= LONGEST_SECS {
         Ok(secs)
     } else {
-        Err(format!("`{text}` is not above zero and at most a year"))
+        Err(format!("`{text}` must be above zero and at most a year"))
     }
 }
 

@@ -1,4 +1,4 @@
-//! A configuration file, from its path to a checked campaign.
+//! Loads a configuration file into a validated campaign.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,20 +8,20 @@ use crate::config::designators::{self, Designators};
 use crate::config::{Campaign, Overrides, Table, case, ranges, shelf, skill};
 use crate::search::Strategy;
 
-/// The ontology that the program carries.
+/// The ontology embedded in the program.
 const SHIPPED_ONTOLOGY: &str = "ontology/actions.ttl";
-/// Folder of the history, beside the configuration.
+/// The default history folder, next to the configuration.
 const HISTORY_DIR: &str = ".actcheck";
-/// More runs of one test than anybody waits for; a larger number is a slip of the finger.
+/// Largest accepted `test_count`; a larger one is most likely a typing error.
 const MOST_RUNS: i64 = 10_000_000;
-/// A thousand runs of one scene tell its pass rate to three hundredths.
+/// Largest accepted `repeat`: a thousand runs of one scene give its pass rate to within ±0.03.
 const MOST_REPETITIONS: i64 = 1000;
 
-/// Reads a configuration with the models and the robot that it names. Paths in it are relative to it.
+/// Reads a configuration with its models and robot. Its paths are relative to its folder.
 ///
 /// # Errors
-/// Every fault at once: the file can't be read (C001), is not TOML (C002), has unknown, missing or wrong keys
-/// (C003 to C009), names models, robots or files that are not there (C010 to C014), or a model or robot is wrong (W…).
+/// All faults at once: the file can't be read (C001), is not TOML (C002), has unknown, missing or invalid keys
+/// (C003 to C009), names missing models, robots or files (C010 to C014), or a model or robot has errors (W…).
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics> {
     let source = Files::Disk.read(path).map_err(|reason| {
         Diagnostic::error("C001", format!("cannot read the configuration {}: {reason}", path.display()))
@@ -30,10 +30,10 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics>
     load_text(source, path.parent().unwrap_or(Path::new("")), overrides)
 }
 
-/// The same for a text that has been read already: paths in it are relative to `folder`.
+/// Like [`load`], for a text that has already been read. Paths in it are relative to `folder`.
 ///
 /// # Errors
-/// As [`load`], but for C001.
+/// As [`load`], except C001.
 pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics> {
     let mut table = Table::parse(&source)?;
     let mut found = Diagnostics::new();
@@ -53,7 +53,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let (budget, limits) = ranges::read_budget(&mut table, &mut found);
     let search = read_search(&mut table, &mut found);
     let history = read_history(&mut table, folder, &mut found);
-    // Before the tables of designators, which may have any name.
+    // Taken before the tables of designators, which may have any name.
     let case = table.table("case");
     let designators = designators::read(&mut table, &mut shelf, &mut places, &mut found);
     let case = case.map(|table| case::read(table, &designators, &mut places, &mut found));
@@ -100,7 +100,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     })
 }
 
-/// Faults of one text in the order of their places; texts in the order in which they were read.
+/// Sorts the faults of each text by position; texts keep the order in which they were read.
 pub(crate) fn in_order_of_place(found: Diagnostics) -> Diagnostics {
     let mut names: Vec<String> = Vec::new();
     let mut faults: Vec<(usize, usize, Diagnostic)> = Vec::new();
@@ -139,7 +139,7 @@ fn read_ontology_path(table: &mut Table, folder: &Path) -> (Files, PathBuf) {
             "C012",
             written.span,
             message,
-            "the path is relative to the configuration; without it the shipped one serves",
+            "the path is relative to the configuration; without it, the shipped ontology is used",
         );
     }
     (Files::Disk, path)
@@ -157,7 +157,7 @@ fn read_search(table: &mut Table, found: &mut Diagnostics) -> Option<Strategy> {
     strategy
 }
 
-/// `[scene] require`: a file of rules.
+/// Reads `[scene] require`: a rule file.
 fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Option<Source> {
     let mut scene = table.table("scene")?;
     scene.require(&["require"]);
@@ -187,7 +187,7 @@ fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Pa
     dir
 }
 
-/// A path of a configuration, seen from where the program runs: without `..` where that changes nothing.
+/// Resolves a path of a configuration relative to `folder`, without `..` where removing it does not change the target.
 pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
     let (mut base, mut rest) = (folder.to_path_buf(), Path::new(written));
     while let Ok(shorter) = rest.strip_prefix("..") {
@@ -197,7 +197,7 @@ pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
         rest = shorter;
     }
     let path = base.join(rest);
-    // The folder that the program runs in has no name of its own.
+    // An empty path is the current directory.
     if path.as_os_str().is_empty() { PathBuf::from(".") } else { path }
 }
 

@@ -1,4 +1,4 @@
-//! Surfaces made of triangles, as plain data.
+//! Triangle meshes.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::base::Digest;
 
-/// A surface made of triangles. Unit: metres. Frame: the shape's own.
+/// A triangle mesh. Unit: metres. Frame: the shape's own.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     /// Shape: x, y, z.
@@ -16,21 +16,21 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Triangles whose normal leans by less than this count as level. Unit: cosine (about 2.5 degrees).
+/// Triangles whose normal is tilted by less than this count as level. Unit: cosine (about 2.5 degrees).
 const LEVEL_COSINE: f64 = 0.999;
 
 impl Mesh {
-    /// A surface whose triangles all speak of vertices that are there, and whose numbers are finite.
+    /// Creates a mesh with finite coordinates and valid vertex indices.
     ///
     /// # Errors
-    /// A lower-case sentence that says what is wrong.
+    /// A lower-case message if a coordinate is not finite, an index is out of bounds, or there are no triangles.
     pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, String> {
         if let Some(vertex) = vertices.iter().position(|vertex| !vertex.iter().all(|x| x.is_finite())) {
             return Err(format!("its vertex {} is not finite", vertex + 1));
         }
         let beyond = |idx: &u32| *idx as usize >= vertices.len();
         if let Some(triangle) = triangles.iter().position(|corners| corners.iter().any(beyond)) {
-            return Err(format!("its triangle {} speaks of a vertex that is not there", triangle + 1));
+            return Err(format!("its triangle {} refers to a missing vertex", triangle + 1));
         }
         if triangles.is_empty() {
             return Err("it has no triangles".to_owned());
@@ -38,14 +38,14 @@ impl Mesh {
         Ok(Self { vertices, triangles })
     }
 
-    /// The same surface with corners of the same place made one, as neighbours share them, and nothing else.
+    /// Merges equal vertices, so that neighbouring triangles share them, and drops degenerate triangles.
     #[must_use]
     pub fn welded(&self) -> Self {
         let mut known: BTreeMap<[u64; 3], u32> = BTreeMap::new();
         let mut vertices: Vec<[f64; 3]> = Vec::new();
         let mut place = |idx: u32| {
             let vertex = self.vertices[idx as usize];
-            // Adding 0 makes one of both zeros.
+            // Adding 0 turns -0 into +0.
             *known.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
                 vertices.push(vertex);
                 u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
@@ -57,7 +57,7 @@ impl Mesh {
         Self { vertices, triangles }
     }
 
-    /// The same surface with each axis multiplied. A mirrored one is turned inside out again.
+    /// Scales each axis. Reverses the triangles of a mirrored mesh, so that they still face outwards.
     #[must_use]
     pub fn scaled(&self, [x, y, z]: [f64; 3]) -> Self {
         let vertices = self.vertices.iter().map(|vertex| [vertex[0] * x, vertex[1] * y, vertex[2] * z]).collect();
@@ -66,14 +66,14 @@ impl Mesh {
         Self { vertices, triangles: triangles.collect() }
     }
 
-    /// Volume inside, by the divergence theorem; about right where the surface is nearly closed. Unit: cubic metres.
+    /// Enclosed volume, by the divergence theorem; approximate if the mesh has small holes. Unit: cubic metres.
     pub fn volume(&self) -> f64 {
         let sixfold: f64 = self.corners().map(|[a, b, c]| a.dot(&b.cross(&c))).sum();
         (sixfold / 6.0).abs()
     }
 
-    /// Area of the triangles that are level, face up, and lie no deeper than `depth_m` below `top_m`, after a turn by
-    /// `turned`, and the rectangle about them: lowest and highest x and y. Units: metres, square metres.
+    /// Finds the triangles that, transformed by `placed`, are level, face up, and are at most `depth_m` below `top_m`.
+    /// Returns their area and bounding rectangle. Units: metres, square metres.
     pub(crate) fn top(&self, top_m: f64, depth_m: f64, placed: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Top {
         let mut found = Top::default();
         for corners in self.corners() {
@@ -91,7 +91,7 @@ impl Mesh {
         found
     }
 
-    /// Digest of its numbers.
+    /// Digest of vertices and triangles.
     pub fn digest(&self) -> String {
         let mut digest = Digest::new();
         for vertex in &self.vertices {
@@ -108,7 +108,7 @@ impl Mesh {
     }
 }
 
-/// The level, upward part of a surface near its top.
+/// The level part of a mesh near its top, facing up: area and bounding rectangle (lowest and highest x and y).
 pub(crate) struct Top {
     pub(crate) area: f64,
     pub(crate) low: [f64; 2],

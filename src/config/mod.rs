@@ -1,6 +1,6 @@
-//! TOML text to a `Campaign` in which nothing is left to check; models and robots are read here too.
+//! Parses and validates a TOML configuration into a [`Campaign`], including its models, worlds and robot.
 //!
-//! Never: draws a choice, knows what an action means, or reads the ontology.
+//! Never: samples a choice, interprets actions, or reads the ontology.
 
 mod campaign;
 mod case;

@@ -1,4 +1,4 @@
-//! Models of objects: what stands on tables, and the tables.
+//! Models of objects and furniture.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -7,12 +7,12 @@ use crate::base::{Diagnostic, Diagnostics, Pose, Source, digest_of, names};
 use crate::config::shape::bounds;
 use crate::config::{Part, Shape, Table};
 
-/// A rigid object that a scene can hold, made of primitive shapes.
+/// A rigid object or piece of furniture, made of shapes.
 ///
-/// Frame: the model's own; its origin is on the ground below its middle, z up, as it stands by itself.
+/// Frame: the model's own, z up, in its upright pose; the origin is on the ground below its middle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectModel {
-    /// Name by which configurations know it; the file's name without its ending.
+    /// Name in configurations; the file's name without its extension.
     pub name: String,
     /// Its class in the ontology: an IRI.
     pub category: String,
@@ -22,32 +22,32 @@ pub struct ObjectModel {
     pub friction: f64,
     /// Coefficient of restitution in [0, 1].
     pub restitution: f64,
-    /// Where the origin of its file is: another place than the model's own in files of other people. Unit: metres.
+    /// Position of the file's origin in the model's frame; nonzero only for SDF and URDF models. Unit: metres.
     pub origin_m: [f64; 3],
-    /// Outer dimensions as it stands. Unit: metres. Shape: x, y, z.
+    /// Outer dimensions in the upright pose. Unit: metres. Shape: x, y, z.
     pub size_m: [f64; 3],
-    /// What it is made of. Their volumes share the mass.
+    /// Shapes of the model. The mass is distributed by their volumes.
     pub parts: Vec<Part>,
-    /// Whether it stands where it is put whatever pushes it.
+    /// Whether it is static.
     pub fixed: bool,
-    /// How its mass is spread, where its file says so; otherwise evenly over the parts.
+    /// Centre of mass and moments of inertia from its file; if `None`, the parts have a uniform density.
     pub inertia: Option<Inertia>,
-    /// For platforms: the flat rectangle on top where things can stand.
+    /// For furniture: the flat rectangle on top that can hold objects.
     pub surface: Option<Surface>,
-    /// Digest of the files it was read from.
+    /// Digest of the model's files.
     pub digest: String,
 }
 
-/// How a model's mass is spread. Frame: the model's.
+/// Mass distribution of a model. Frame: the model's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Inertia {
     /// Centre of mass. Unit: metres.
     pub com_m: [f64; 3],
-    /// Moments about the centre of mass for the model's own mass, row by row. Unit: kg·m².
+    /// Inertia tensor about the centre of mass for the model's mass, row by row. Unit: kg·m².
     pub about_com: [[f64; 3]; 3],
 }
 
-/// A horizontal rectangle where objects can stand. Frame: the model's, centred on its origin.
+/// A horizontal rectangle that can hold objects. Frame: the model's, centred on its origin.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Surface {
     /// Height above the ground. Unit: metres.
@@ -57,8 +57,7 @@ pub struct Surface {
 }
 
 impl ObjectModel {
-    /// The convex solids that the model is made of: every part, with tubes taken apart into their boxes.
-    /// Frame: the model's.
+    /// Returns the convex solids of the model: its parts, with each tube split into boxes. Frame: the model's.
     pub fn solids(&self) -> Vec<Part> {
         let mut solids = Vec::new();
         for part in &self.parts {
@@ -75,7 +74,7 @@ impl ObjectModel {
         solids
     }
 
-    /// The same thing, larger or smaller in all directions, of the same mass.
+    /// Scales the model uniformly; the mass stays the same.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {
         let placed = |pose: &Pose| Pose { position: pose.position.map(|x| x * by), rotation: pose.rotation };
@@ -107,14 +106,14 @@ impl ObjectModel {
     }
 }
 
-/// How far the parts may miss the stated size. Staves of a round wall lie a few millimetres inside of it.
+/// Tolerance between the parts' bounding box and `size_m`: the staves of a tube lie a few millimetres inside it.
 const SIZE_TOLERANCE_M: f64 = 0.006;
 
-/// Reads one model. Its name is the file's name without ending.
+/// Reads one model. Its name is the file's name without its extension.
 ///
 /// # Errors
-/// Every fault of the text: the table reader's own (`C…`), an unknown shape (W001), parts that do not fill
-/// the stated size (W002), and a category that is no IRI (W003).
+/// All faults of the text: those of the table reader (`C…`), an unknown shape (W001), parts that do not match
+/// `size_m` (W002), and a category that is not an IRI (W003).
 pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
     let mut table = Table::parse(source)?;
     let mut found = Diagnostics::new();
@@ -122,7 +121,7 @@ pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
     let category = table.string("category").and_then(|written| {
         let iri = full_iri(&written.value);
         if iri.is_none() {
-            let message = format!("the category `{}` is no IRI", written.value);
+            let message = format!("the category `{}` is not an IRI", written.value);
             table.fault("W003", written.span, message, "write it like `category = \"act:Glass\"`");
         }
         iri
@@ -161,7 +160,7 @@ pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
 const POSITIVE: (std::ops::Bound<f64>, std::ops::Bound<f64>) =
     (std::ops::Bound::Excluded(0.0), std::ops::Bound::Unbounded);
 
-/// `act:Glass` and other known prefixes in full; an IRI as it is.
+/// Expands a known prefix, as in `act:Glass`; returns a full IRI unchanged, and `None` if the prefix is unknown.
 pub(crate) fn full_iri(text: &str) -> Option<String> {
     if text.contains("://") {
         return Some(text.to_owned());
@@ -239,7 +238,7 @@ fn read_surface(mut table: Table, found: &mut Diagnostics) -> Option<Surface> {
     Some(Surface { height_m: height_m?, size_m: size_m? })
 }
 
-/// The box around all parts must be the stated size, standing on the ground and centred over the origin.
+/// Checks that the bounding box of all parts has the size `size_m`, rests on the ground and is centred on the origin.
 fn check_size(model: &ObjectModel, source: &Source) -> Diagnostics {
     let (low, high) = bounds(&model.parts);
     let [x, y, z] = model.size_m;
@@ -248,14 +247,11 @@ fn check_size(model: &ObjectModel, source: &Source) -> Diagnostics {
     if miss <= SIZE_TOLERANCE_M {
         return Diagnostics::new();
     }
-    let message = format!(
-        "the parts reach from {} to {}, which is not the stated size about the origin",
-        triple(&low),
-        triple(&high)
-    );
+    let message =
+        format!("the bounding box of the parts, from {} to {}, does not match `size_m`", triple(&low), triple(&high));
     Diagnostic::error("W002", message)
         .in_source(source)
-        .help("`size_m` is the outer size; the origin is on the ground below the middle")
+        .help("`size_m` is the outer size; the origin must be on the ground below the middle")
         .into()
 }
 
@@ -289,7 +285,7 @@ mod tests {
             let corner = solid.pose.to_isometry() * nalgebra::Point3::new(size[0] / 2.0, size[1] / 2.0, 0.0);
             assert!(corner.x.hypot(corner.y) <= 0.04 + 1e-9, "{corner}");
         }
-        // The material of a thin ring: its circumference times its wall times its height, less the chords.
+        // Volume of a thin ring: circumference times wall times height, minus the chords.
         assert!((model.volume() / (std::f64::consts::TAU * 0.038 * 0.004 * 0.1) - 1.0).abs() < 0.06);
     }
 

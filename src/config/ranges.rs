@@ -1,4 +1,4 @@
-//! The tables of numbers: physics, sensing, camera, budget.
+//! Reads the tables of numbers: physics, sensing, camera and budget.
 
 use std::ops::Bound;
 
@@ -7,11 +7,11 @@ use crate::config::{Budget, Camera, Limits, Odometry, Physics, Sensing, Table, d
 
 const ABOVE_ZERO: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(100.0));
 
-/// Control commands and contact records in a second of simulated time. Every physics rate is a multiple of it, so that
+/// Control commands and contact records per second of simulated time. Every physics rate is a multiple of it, so that
 /// a control period is a whole number of physics steps.
 pub const CONTROL_HZ: u32 = 60;
 
-/// `[physics]`: what each object's mass, friction and restitution are drawn from, and how time is stepped.
+/// Reads `[physics]`: the ranges of each object's mass, friction, size and restitution, and the time step.
 pub(crate) fn read_physics(root: &mut Table, found: &mut Diagnostics) -> Physics {
     let mut physics = Physics {
         mass_scale: (0.9, 1.1),
@@ -25,7 +25,7 @@ pub(crate) fn read_physics(root: &mut Table, found: &mut Diagnostics) -> Physics
     let Some(mut table) = root.table("physics") else { return physics };
     set(&mut physics.mass_scale, table.range("mass_scale", ABOVE_ZERO));
     set(&mut physics.friction_scale, table.range("friction_scale", 0.0..=100.0));
-    // Beyond that it would be another thing.
+    // Beyond these factors it would be a different object.
     set(&mut physics.size_scale, table.range("size_scale", 0.5..=2.0));
     set(&mut physics.restitution, table.range("restitution", 0.0..=1.0));
     set(&mut physics.steps_per_second, read_steps(&mut table));
@@ -38,9 +38,9 @@ fn read_steps(table: &mut Table) -> Option<u32> {
     let span = table.key_span("steps_per_second");
     let steps = u32::try_from(table.integer("steps_per_second", 60..=10_000)?).ok()?;
     if steps % CONTROL_HZ != 0 {
-        let message = format!("`physics.steps_per_second` is {steps}, which is no multiple of {CONTROL_HZ}");
+        let message = format!("`physics.steps_per_second` is {steps}, which is not a multiple of {CONTROL_HZ}");
         let help = format!(
-            "the robot is controlled {CONTROL_HZ} times a second, so that many must divide it: {} or {} would do",
+            "it must be a multiple of the control rate, {CONTROL_HZ} Hz: use {} or {}",
             steps / CONTROL_HZ * CONTROL_HZ,
             (steps / CONTROL_HZ + 1) * CONTROL_HZ
         );
@@ -49,7 +49,7 @@ fn read_steps(table: &mut Table) -> Option<u32> {
     Some(steps)
 }
 
-/// `[sensing]`: standard deviations of what the robot senses; 0, the default, is perfect.
+/// Reads `[sensing]`: standard deviations of the robot's sensing; 0, the default, is perfect.
 pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing {
     let mut sensing = Sensing {
         position_noise_m: 0.0,
@@ -76,7 +76,7 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
         set(value, table.number(key, 0.0..=most));
     }
     let odometry = &mut sensing.odometry;
-    // A base that is wrong about half of its way, or that sees a landmark a hundred metres away, knows nothing.
+    // With half of the distance as drift, or 100 m between landmarks, localisation is already worthless.
     for (key, value, most) in [
         ("odometry_drift", &mut odometry.drift, 0.5),
         ("heading_drift", &mut odometry.heading_drift, 0.5),
@@ -90,15 +90,15 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
     sensing
 }
 
-/// `[camera]`: the depth camera. Without a key of noise it has none.
+/// Reads `[camera]`: the depth camera, without noise by default.
 fn read_camera(root: &mut Table, found: &mut Diagnostics) -> Camera {
     let mut camera = Camera::IDEAL;
     let Some(mut table) = root.table("camera") else { return camera };
-    // More pixels than a million are nobody's depth camera, and take seconds a picture.
+    // No depth camera has more than a million pixels, and such an image takes seconds to render.
     for (key, value) in [("width", &mut camera.width), ("height", &mut camera.height)] {
         set(value, table.integer(key, 16..=1024).and_then(|count| u32::try_from(count).ok()));
     }
-    // Flat pictures end before half a turn.
+    // The field of view of a perspective camera is less than pi.
     set(&mut camera.field_of_view_rad, table.number("field_of_view_rad", 0.1..=2.6));
     let place = table.key_span("min_range_m").or_else(|| table.key_span("max_range_m"));
     set(&mut camera.min_range_m, table.number("min_range_m", 0.0..=100.0));
@@ -106,7 +106,8 @@ fn read_camera(root: &mut Table, found: &mut Diagnostics) -> Camera {
     if camera.min_range_m >= camera.max_range_m
         && let Some(place) = place
     {
-        let message = format!("the camera sees from {} m to {} m: nothing", camera.min_range_m, camera.max_range_m);
+        let message =
+            format!("the camera has an empty range, from {} m to {} m", camera.min_range_m, camera.max_range_m);
         table.fault("C009", place, message, "`min_range_m` must be less than `max_range_m`");
     }
     set(&mut camera.range_noise_m, table.number("range_noise_m", 0.0..=0.5));
@@ -116,9 +117,9 @@ fn read_camera(root: &mut Table, found: &mut Diagnostics) -> Camera {
     camera
 }
 
-/// `[budget]`: limits on one action, on one run, and on the campaign.
+/// Reads `[budget]`: limits on an action, on a run, and on the campaign.
 pub(crate) fn read_budget(root: &mut Table, found: &mut Diagnostics) -> (Budget, Limits) {
-    // A pick takes some ten seconds; one that is not done in a minute is lost.
+    // A pick takes about ten seconds; after a minute it has failed.
     let (mut budget, mut limits) = (Budget { action_secs: 60.0 }, Limits::default());
     let Some(mut table) = root.table("budget") else { return (budget, limits) };
     set(&mut budget.action_secs, table.number("action_secs", (Bound::Excluded(0.0), Bound::Included(3600.0))));

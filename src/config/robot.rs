@@ -1,4 +1,4 @@
-//! Which joints of a URDF do what.
+//! Robot profiles: the roles of a URDF's joints and links.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,13 +9,13 @@ use crate::config::load::beside;
 use crate::config::robot_roles::Roles;
 use crate::config::{Located, Shape, Table, xacro};
 
-/// `package://` is looked for in so many folders above the URDF: `PACKAGE/robots/FILE.urdf` lies two below the packages.
+/// Number of folders above the URDF that are searched for `package://`. `PACKAGE/robots/FILE.urdf` needs two.
 const PACKAGE_LEVELS: usize = 4;
 
-/// Joints of the base that `base = "planar"` puts below the URDF's root: x, y, heading.
+/// Base joints that `base = "planar"` adds below the URDF's root: x, y, heading.
 const PLANAR_JOINTS: [&str; 3] = ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 
-/// Keys of a profile that have no default.
+/// Required keys of a profile.
 const REQUIRED: [&str; 11] = [
     "name",
     "urdf",
@@ -30,52 +30,51 @@ const REQUIRED: [&str; 11] = [
     "home",
 ];
 
-/// A robot: its URDF and the parts that the skills need to know. Read from a profile beside the URDF.
+/// A robot: its URDF and the roles of its joints and links. Read from a profile next to the URDF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotProfile {
-    /// Name for people.
+    /// Display name.
     pub name: String,
     /// The URDF's text.
     pub urdf: Source,
-    /// Joints of an omnidirectional base in the order x, y, heading; `None` where the base is fixed.
+    /// Joints of an omnidirectional base in the order x, y, heading; `None` if the base is fixed.
     pub base_joints: Option<[String; 3]>,
-    /// Whether those joints are not in the URDF, but are put below its root: `base = "planar"`.
+    /// Whether those joints are added below the URDF's root instead of being part of it: `base = "planar"`.
     pub planar_base: bool,
-    /// Height of the root above the floor, for a base that is mounted on something; what it is mounted on is not simulated.
-    /// Unit: metres.
+    /// Height of the root above the floor, for a base on a mount; the mount itself is not simulated. Unit: metres.
     pub mount_height_m: f64,
     /// Joints that position the hand (lift and arm), from the base outwards.
     pub arm_joints: Vec<String>,
     /// Finger joints, left then right; they move the same distance.
     pub finger_joints: [String; 2],
-    /// Head joints, pan then tilt, where there is a head that moves.
+    /// Head joints, pan then tilt; empty if the head does not move.
     pub head_joints: Vec<String>,
-    /// Link between the fingertips; its x axis points where the fingers point, its y axis across them.
+    /// Link between the fingertips; its x axis points along the fingers, its y axis across them.
     pub grasp_link: String,
-    /// How the frame of a grasp is turned on that link, where the link's own axes are others: about its fixed x, y, z in this
-    /// order. Unit: radians.
+    /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,
+    /// in this order. Unit: radians.
     pub grasp_turned_rad: [f64; 3],
-    /// Links that are the fingers, left then right.
+    /// Links of the fingers, left then right.
     pub finger_links: [String; 2],
-    /// Link of the depth camera: its x axis looks forwards, its z axis is up in pictures.
+    /// Link of the depth camera: its x axis points forwards, its z axis up in the image.
     pub camera_link: String,
     /// Widest gap between the fingers. Unit: metres.
     pub max_opening_m: f64,
     /// Arm posture for driving, in the order of `arm_joints`. Units: metres or radians.
     pub home: Vec<f64>,
-    /// Arm postures near which inverse kinematics looks first, in the order of `arm_joints`.
+    /// Seeds of inverse kinematics: arm postures in the order of `arm_joints`.
     pub postures: Vec<Vec<f64>>,
     /// Friction coefficient of the fingertips.
     pub finger_friction: f64,
-    /// Force with which one finger closes. Unit: newtons.
+    /// Closing force of one finger. Unit: newtons.
     pub grip_force_n: f64,
-    /// Collision meshes by the name that the URDF gives their file, in the file's own scale.
+    /// Collision meshes by the file name in the URDF, in the file's own scale.
     pub meshes: BTreeMap<String, Vec<Shape>>,
     /// Digest of profile, URDF and meshes.
     pub digest: String,
 }
 
-/// Reads a profile with the meshes that lie around its URDF: [`read_with`] without further folders.
+/// Reads a profile with the meshes around its URDF: [`read_with`] without further folders.
 ///
 /// # Errors
 /// As [`read_with`].
@@ -83,13 +82,13 @@ pub fn read(files: &Files, path: &Path) -> Result<RobotProfile, Diagnostics> {
     read_with(files, path, &[])
 }
 
-/// Reads a profile, the URDF that it names (relative to the profile) and the meshes that this names: `package://NAME/…` is
-/// looked for in the folders of the profile's `package_dirs`, in `packages`, and around the URDF. xacro is expanded.
+/// Reads a profile, its URDF (relative to the profile) and the URDF's meshes. `package://NAME/…` is looked up in the
+/// profile's `package_dirs`, in `packages`, and around the URDF. xacro is expanded.
 ///
 /// # Errors
-/// Every fault of both texts: the table reader's own (`C…`), a file that can't be read (W010), a list of the wrong length
-/// (W011), xacro that can't be expanded (W012), what is wrong with the URDF and its meshes (W031 to W037, W051), and roles that
-/// the URDF can't fill (W050 to W054).
+/// All faults of both texts: those of the table reader (`C…`), an unreadable file (W010), a list of the wrong length
+/// (W011), a failed xacro expansion (W012), faults of the URDF and its meshes (W031 to W037, W051), and roles that the
+/// URDF's joints and links can't fill (W050 to W054).
 pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<RobotProfile, Diagnostics> {
     let source = files.read(path).map_err(|reason| {
         Diagnostic::error("W010", format!("cannot read the robot profile {}: {reason}", path.display()))
@@ -118,7 +117,7 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
     }
     table.finish(&mut found);
     found.or(())?;
-    // Every missing or wrong key was noted above, so something is missing only beside a fault.
+    // Every missing or wrong key was reported above, so this error only occurs together with another.
     let incomplete = || Diagnostic::error("W010", "the robot profile is incomplete").in_source(&source).into();
     profile.zip(read).map(|(profile, read)| with_meshes(profile, read)).ok_or_else(incomplete)
 }
@@ -131,7 +130,7 @@ fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> Ro
     profile
 }
 
-/// The URDF's text, expanded where it is xacro, and its path.
+/// Reads the URDF, after expansion if it is xacro. Returns its text and path.
 fn read_urdf(files: &Files, folder: &Path, table: &mut Table) -> Option<(Source, PathBuf)> {
     let written = table.string("urdf")?;
     let path = beside(folder, &written.value);
@@ -149,7 +148,7 @@ fn read_urdf(files: &Files, folder: &Path, table: &mut Table) -> Option<(Source,
     None
 }
 
-/// The base: joints of the URDF, joints that are put below it, or none.
+/// Reads the base: joints of the URDF, joints added below its root (`true`), or none.
 fn read_base(table: &mut Table, roles: &mut Roles) -> Option<(Option<[String; 3]>, bool)> {
     let kind = table.string("base");
     let joints = if table.has("base_joints") { Some(names(table, "base_joints", roles)?) } else { None };
@@ -159,12 +158,12 @@ fn read_base(table: &mut Table, roles: &mut Roles) -> Option<(Option<[String; 3]
         ("fixed", None) => Some((None, false)),
         ("planar" | "fixed", Some(_)) => {
             let message = format!("`base = \"{}\"` and `base_joints` exclude each other", kind.value);
-            table.fault("W052", kind.span, message, "`base_joints` are for a URDF that has joints for its base");
+            table.fault("W052", kind.span, message, "use `base_joints` only if the URDF has joints for the base");
             None
         }
         (other, _) => {
             let help = did_you_mean(other, ["planar", "fixed"]);
-            table.fault("W011", kind.span, format!("there is no base `{other}`"), help);
+            table.fault("W011", kind.span, format!("unknown base `{other}`"), help);
             None
         }
     }
@@ -233,7 +232,7 @@ fn values(list: Vec<Located<String>>) -> Vec<String> {
     list.into_iter().map(|name| name.value).collect()
 }
 
-/// A list of exactly `N` names: joints or links, as the key says.
+/// Reads a list of exactly `N` names: of links if the key ends in `_links`, else of joints.
 fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles) -> Option<[String; N]> {
     let span = table.key_span(key)?;
     let list = table.strings(key)?;
@@ -245,9 +244,9 @@ fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles
     }
     let names = <[String; N]>::try_from(values(list)).ok();
     if names.is_none() {
-        let message = format!("`{key}` must name {N} things, but this list has {length}");
+        let message = format!("`{key}` must list {N} names, but this list has {length}");
         let help = if key.starts_with("finger") {
-            "only parallel grippers of two fingers are known; a robot without one has to be given one in its URDF"
+            "only parallel grippers with two fingers are supported; add one to the URDF if the robot has none"
         } else {
             "see models/robots/mobile_manipulator.toml for an example"
         };
@@ -256,7 +255,7 @@ fn names<const N: usize>(table: &mut Table, key: &'static str, roles: &mut Roles
     names
 }
 
-/// Positions of all arm joints.
+/// Reads one position for each arm joint.
 fn posture(table: &mut Table, key: &str, n_arm_joints: usize, roles: &mut Roles) -> Option<Vec<f64>> {
     let span = table.key_span(key)?;
     let positions = table.number_list(key, ..)?;

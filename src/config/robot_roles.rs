@@ -1,4 +1,4 @@
-//! What a robot profile gives a part of the URDF to do, and whether that part can do it.
+//! Checks that the URDF's joints and links can fill the roles that a robot profile assigns to them.
 
 use std::collections::BTreeMap;
 
@@ -6,25 +6,25 @@ use crate::base::{Span, did_you_mean};
 use crate::config::foreign::robot_tree::{Motion, Tree};
 use crate::config::{Located, Table};
 
-/// Slack of positions at a limit, which are often rounded. Unit: metres or radians.
+/// Tolerance at joint limits, whose values are often rounded. Unit: metres or radians.
 const SLACK: f64 = 1e-3;
 
-/// The names of a profile with the places where they are written.
+/// The names in a profile, with their spans.
 #[derive(Debug, Default)]
 pub(super) struct Roles {
-    /// Keys of the profile with the joints that they name.
+    /// Joints named by each key of the profile.
     pub(super) joints: Vec<(&'static str, Vec<Located<String>>)>,
-    /// The links that it names.
+    /// Links named by the profile.
     pub(super) links: Vec<Vec<Located<String>>>,
-    /// Postures of the arm: where each is written, and its positions.
+    /// Postures of the arm, each with its span and positions.
     pub(super) postures: Vec<(Span, Vec<f64>)>,
-    /// The widest gap between the fingers, and where it is written.
+    /// The widest gap between the fingers, with its span.
     pub(super) opening: Option<(Span, f64)>,
 }
 
 impl Roles {
-    /// Notes every role that its joint or link can't have: W050 there is none of that name, W052 a joint has two roles, W053
-    /// it moves otherwise, W054 a position is beyond its limits.
+    /// Reports every role that its joint or link can't fill: an unknown name (W050), a joint with two roles (W052), a
+    /// joint of the wrong type (W053), a position beyond the joint limits (W054).
     pub(super) fn check(&self, tree: &Tree, table: &mut Table) {
         for link in self.links.iter().flatten() {
             if !tree.links.contains(&link.value) {
@@ -60,14 +60,14 @@ impl Roles {
                 let Some(limits) = tree.joints.get(&joint.value) else { continue };
                 if *position < limits.lower - SLACK || *position > limits.upper + SLACK {
                     let message = format!("{position} is beyond the limits of `{}`", joint.value);
-                    let help = format!("it goes from {} to {}", limits.lower, limits.upper);
+                    let help = format!("its limits are {} and {}", limits.lower, limits.upper);
                     table.fault("W054", span.clone(), message, help);
                 }
             }
         }
     }
 
-    /// Whether the fingers go so far apart.
+    /// Checks that the fingers can open to `max_opening_m`.
     fn check_opening(&self, tree: &Tree, table: &mut Table) {
         let Some((span, opening)) = &self.opening else { return };
         let fingers: Vec<f64> = self
@@ -86,7 +86,7 @@ impl Roles {
     }
 }
 
-/// Whether a joint is there and moves as its role wants it.
+/// Checks that a joint exists and has the type that its role requires.
 fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, table: &mut Table) {
     let name = &joint.value;
     let Some(found) = tree.joints.get(name) else {
@@ -103,11 +103,15 @@ fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, ta
     let (fault, help) = match (found.motion, wanted) {
         (Motion::Fixed, _) => ("does not move", "name a joint of the type prismatic, revolute or continuous"),
         (Motion::Turns, Some(Motion::Slides)) if key == "finger_joints" => (
-            "turns, and fingers have to slide",
-            "only parallel grippers are known, whose two fingers are prismatic joints",
+            "rotates, but finger joints must be prismatic",
+            "only parallel grippers are supported, with two prismatic finger joints",
         ),
-        (Motion::Turns, Some(Motion::Slides)) => ("turns, and has to slide", "`base_joints` are x, y and heading"),
-        (Motion::Slides, Some(Motion::Turns)) => ("slides, and has to turn", "`base_joints` are x, y and heading"),
+        (Motion::Turns, Some(Motion::Slides)) => {
+            ("rotates, but must be prismatic", "`base_joints` are x, y and heading")
+        }
+        (Motion::Slides, Some(Motion::Turns)) => {
+            ("is prismatic, but must be revolute or continuous", "`base_joints` are x, y and heading")
+        }
         _ => return,
     };
     table.fault("W053", joint.span.clone(), format!("the joint `{name}` {fault}"), help);

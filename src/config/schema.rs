@@ -1,7 +1,7 @@
-//! The schema of configurations, for editors.
+//! The JSON schema of configurations, for editors.
 
 /// JSON Schema (draft 2020-12) of a campaign's configuration: keys, types, bounds, defaults and meanings.
 ///
-/// `tests/schema.rs` holds it to what [`crate::config::load`] accepts. Relations between keys, files and names of models are not in
-/// it: `actcheck check` finds those.
+/// `tests/schema.rs` checks that it accepts the same configurations as [`crate::config::load`]. It does not cover
+/// relations between keys, files and names of models; `actcheck check` does.
 pub const SCHEMA: &str = include_str!("../../configs/campaign.schema.json");

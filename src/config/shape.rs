@@ -11,11 +11,11 @@ use crate::config::mesh::Mesh;
 pub struct Part {
     /// Pose of the shape's centre. Frame: the model's.
     pub pose: Pose,
-    /// Its form.
+    /// Geometry of the shape.
     pub shape: Shape,
 }
 
-/// What a part can look like. Unit: metres.
+/// The geometry of a part. Unit: metres.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Shape {
     /// A box by its full extents.
@@ -35,7 +35,7 @@ pub enum Shape {
         /// Radius.
         radius: f64,
     },
-    /// A hollow wall about z, open above and below: what makes a glass a glass. Built from `staves` boxes.
+    /// A hollow wall about z, open above and below, as of a glass. Built from `staves` boxes.
     Tube {
         /// Outer radius at the lower rim.
         radius_low: f64,
@@ -45,22 +45,22 @@ pub enum Shape {
         wall: f64,
         /// Full height.
         height: f64,
-        /// How many boxes approximate the round.
+        /// Number of boxes that approximate the wall.
         staves: u32,
     },
-    /// A cylinder about z with a half ball on each end.
+    /// A cylinder about z with a hemisphere on each end.
     Capsule {
-        /// Radius of cylinder and balls.
+        /// Radius of cylinder and hemispheres.
         radius: f64,
-        /// Height of the cylinder alone.
+        /// Height of the cylinder, without the hemispheres.
         height: f64,
     },
-    /// A closed surface, not yet taken apart into convex solids. Where it is used as a solid, it counts as its hull.
+    /// A closed mesh, not yet decomposed into convex solids. Code that needs a solid uses its convex hull.
     Mesh {
-        /// The surface.
+        /// The mesh.
         mesh: Mesh,
     },
-    /// The convex hull of some points: a piece of a mesh.
+    /// A convex hull of points: one piece of a decomposed mesh.
     Hull {
         /// Corners.
         points: Vec<[f64; 3]>,
@@ -84,9 +84,9 @@ impl Shape {
         }
     }
 
-    /// The boxes that a tube is built from, in its own frame; nothing for other shapes.
+    /// Returns the boxes of a tube in its own frame, or an empty list for other shapes.
     ///
-    /// The outer edges of the boxes lie on the tube's outer radius, so the whole never exceeds it.
+    /// The outer edges of the boxes lie on the tube's outer radius, so the boxes never exceed it.
     pub(super) fn staves(&self) -> Vec<Part> {
         let Self::Tube { radius_low, radius_high, wall, height, staves } = *self else { return Vec::new() };
         let half_angle = std::f64::consts::PI / f64::from(staves);
@@ -108,7 +108,7 @@ impl Shape {
 }
 
 impl Shape {
-    /// The same form, larger or smaller in all directions.
+    /// Scales the shape uniformly.
     #[must_use]
     pub fn sized(&self, by: f64) -> Self {
         match self {
@@ -127,7 +127,7 @@ impl Shape {
         }
     }
 
-    /// A mesh or a piece of one with each axis multiplied; any other shape as it is.
+    /// Scales each axis of a mesh or hull; returns other shapes unchanged.
     #[must_use]
     pub fn scaled(&self, scale: [f64; 3]) -> Self {
         match self {
@@ -143,11 +143,11 @@ impl Shape {
 }
 
 impl Part {
-    /// The smallest box around the part along the axes of its frame: lowest and highest corner.
+    /// Returns the axis-aligned bounding box in the model's frame: lowest and highest corner.
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         let at = self.pose.to_isometry();
         let centre = at.translation.vector;
-        // How much of a line along the shape's own z axis, and of a disc across it, points along each axis outside.
+        // Extents along the frame's axes of a unit segment along the shape's z axis, and of a unit disc across it.
         let along = (at.rotation * Vector3::z()).abs();
         let across = along.map(|cosine| (1.0 - cosine * cosine).max(0.0).sqrt());
         let reach = match &self.shape {
@@ -174,7 +174,7 @@ fn around(at: &Isometry3<f64>, points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     (low.into(), high.into())
 }
 
-/// The box around several parts; turned inside out where there are none.
+/// Returns the bounding box of several parts; inverted (infinite lows, negative infinite highs) if there are none.
 pub(crate) fn bounds(parts: &[Part]) -> (Vector3<f64>, Vector3<f64>) {
     let nothing = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     parts.iter().fold(nothing, |(low, high), part| {

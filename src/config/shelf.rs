@@ -1,4 +1,4 @@
-//! What `model_dir` holds: objects and robots by name.
+//! The contents of `model_dir`: objects, worlds and robots by name.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,9 +9,9 @@ use crate::config::foreign::{self, Lookup};
 use crate::config::load::beside;
 use crate::config::{Furniture, Located, ObjectModel, Range, RobotProfile, Table, WorldMap, model, robot, world_map};
 
-/// Where models lie inside the program.
+/// Folder of the models embedded in the program.
 const SHIPPED_MODELS: &str = "models";
-/// The robot that serves where none is named.
+/// The robot if the configuration names none.
 const DEFAULT_ROBOT: &str = "mobile_manipulator";
 
 /// The models that a configuration can name.
@@ -20,25 +20,25 @@ pub(crate) struct Shelf {
     folder: PathBuf,
     /// Objects by name.
     pub(crate) models: BTreeMap<String, Arc<ObjectModel>>,
-    /// Names of object files, readable or not, so that a wrong model is not reported as a missing one too.
+    /// Names of object files, including invalid ones, so that an invalid model is not also reported as missing.
     names: Vec<String>,
-    /// What other people's models are found to be: it matters only where the configuration names them.
+    /// Faults of SDF and URDF models, reported in full only if the configuration names the model.
     said: BTreeMap<String, Diagnostics>,
-    /// Models of which nobody says what they are.
+    /// Models without a category.
     pub(crate) uncategorised: BTreeSet<String>,
     /// The worlds that the configuration names.
     pub(crate) worlds: BTreeMap<String, Arc<WorldMap>>,
-    /// Ranges in which the robot's base starts.
+    /// Ranges of the base's initial x, y and heading.
     pub(crate) start: Option<[Range; 3]>,
-    /// What is left out of the worlds.
+    /// Warnings about ignored parts of the worlds.
     warnings: Diagnostics,
 }
 
-/// The world with nothing but a floor: it needs no file.
+/// The world with only a floor, which needs no file.
 const FLOOR_ALONE: &str = "empty";
 
-/// Reads all models of `model_dir`, or of the shipped folder. A wrong one of ours is reported with its own place at once;
-/// see [`Shelf::report`] for those of other people.
+/// Reads all models of `model_dir`, or of the shipped folder. Faults of TOML models are reported at once; those of SDF
+/// and URDF models by [`Shelf::report`].
 pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Shelf {
     let written = table.string("model_dir");
     let (files, dir) = match &written {
@@ -71,9 +71,9 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
     }
     shelf.read_foreign();
     if let (Some(written), true) = (written, shelf.names.is_empty()) {
-        let message = format!("the model folder {} holds no models", shelf.folder.display());
+        let message = format!("the model folder {} contains no models", shelf.folder.display());
         let help = "it needs a folder `objects` with one TOML file for each model, or a folder with `model.config` and \
-            `model.sdf` for each; without `model_dir` the shipped models serve";
+            `model.sdf` for each; without `model_dir`, the shipped models are used";
         table.fault("C010", written.span, message, help);
     }
     shelf.read_categories(table, found);
@@ -81,13 +81,13 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
 }
 
 impl Shelf {
-    /// Reads the models of other people: those in Gazebo's layout and those in URDF.
+    /// Reads the SDF and URDF models.
     fn read_foreign(&mut self) {
         let folders = [self.folder.clone(), self.folder.join("objects")];
         let lookup = Lookup { files: &self.files, folders: folders.to_vec() };
         for model in folders.iter().flat_map(|folder| foreign::find(&self.files, folder)) {
             if self.names.contains(&model.name) {
-                let message = format!("there are two models `{0}`: {1} is left out", model.name, model.path.display());
+                let message = format!("there are two models `{0}`: {1} is ignored", model.name, model.path.display());
                 let fault = Diagnostic::warning("W036", message).help("give one of them another name");
                 self.said.entry(model.name).or_default().push(fault);
                 continue;
@@ -104,7 +104,7 @@ impl Shelf {
         }
     }
 
-    /// `[categories]`: what models are, by name, whatever their files say.
+    /// Reads `[categories]`: categories by model name, which override those in the models' files.
     fn read_categories(&mut self, root: &mut Table, found: &mut Diagnostics) {
         let Some(mut table) = root.table("categories") else { return };
         for key in table.keys() {
@@ -119,7 +119,7 @@ impl Shelf {
                     }
                 }
                 None => {
-                    let message = format!("the category `{}` is no IRI", written.value);
+                    let message = format!("the category `{}` is not an IRI", written.value);
                     table.fault("W003", written.span, message, format!("write it like `{key} = \"act:Glass\"`"));
                 }
             }
@@ -127,8 +127,8 @@ impl Shelf {
         table.finish(found);
     }
 
-    /// What was found in other people's models: all of it where the configuration names the model, and of others no
-    /// more than that they are wrong.
+    /// Returns the faults of SDF and URDF models: all of them for a model that the configuration names, and only the
+    /// errors, as warnings, for the others.
     pub(crate) fn report(&self, named: &BTreeSet<&str>) -> Diagnostics {
         let mut report = self.warnings.clone();
         for (name, said) in &self.said {
@@ -144,16 +144,16 @@ impl Shelf {
         report
     }
 
-    /// Reports a name that no model has (C008).
+    /// Reports an unknown model name (C008).
     pub(crate) fn check_name(&self, table: &mut Table, name: &Located<String>) {
-        // With an empty shelf, its absence has been reported already.
+        // An empty model folder has already been reported.
         if !self.names.is_empty() && !self.names.contains(&name.value) {
             let message = format!("there is no model `{}` in {}", name.value, self.objects_folder().display());
             table.fault("C008", name.span.clone(), message, choose(&name.value, &self.names));
         }
     }
 
-    /// Reads a world that the configuration names: from the model folder, or else from the shipped one.
+    /// Reads a world by name from the model folder, or else from the shipped one.
     pub(crate) fn read_world(&mut self, table: &mut Table, name: &Located<String>, found: &mut Diagnostics) {
         if name.value == FLOOR_ALONE {
             self.worlds.insert(name.value.clone(), Arc::new(WorldMap::nothing(FLOOR_ALONE)));
@@ -176,7 +176,7 @@ impl Shelf {
                     "C020",
                     name.span.clone(),
                     message,
-                    "worlds lie in the folder `worlds` of the model folder",
+                    "worlds are in the folder `worlds` of the model folder",
                 );
                 return;
             }
@@ -208,7 +208,7 @@ impl Shelf {
         own.chain(shipped.into_iter().map(|path| (Files::Shipped, path))).filter(|(_, path)| is_world(path)).collect()
     }
 
-    /// What shipped worlds are furnished with.
+    /// Adds the shipped models, which shipped worlds use as furniture.
     fn add_shipped_models(&mut self) {
         for path in Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("objects")) {
             let model = Files::Shipped.read(&path).ok().and_then(|source| model::read(&source).ok());
@@ -218,7 +218,7 @@ impl Shelf {
         }
     }
 
-    /// Reports a location that no named world has (C021). Where none has locations, they are what the robot makes of them.
+    /// Reports a location that no named world has (C021). If no world has locations, any name is accepted.
     pub(crate) fn check_location(&self, table: &mut Table, name: &Located<String>) {
         let known: Vec<String> =
             self.worlds.values().flat_map(|world| &world.locations).map(|location| location.name.clone()).collect();
@@ -229,7 +229,8 @@ impl Shelf {
         }
     }
 
-    /// Reports a surface that is neither furniture of a named world (C021) nor, where a world has none, a model (C008).
+    /// Reports a surface that is not furniture of a named world (C021). If a world has no surfaces, models are accepted
+    /// too (else C008).
     pub(crate) fn check_surface(&self, table: &mut Table, name: &Located<String>) {
         let surfaces = |world: &WorldMap| -> Vec<String> {
             let carries =
@@ -249,13 +250,13 @@ impl Shelf {
         }
     }
 
-    /// Where objects lie, for messages: the folder of our own models, where there is one.
+    /// Returns the folder of objects for messages: `objects` if it has files, else the model folder.
     fn objects_folder(&self) -> PathBuf {
         let objects = self.folder.join("objects");
         if self.files.list(&objects).is_empty() { self.folder.clone() } else { objects }
     }
 
-    /// The robot that `[robot] profile` names: a path to a TOML file, or a name from the model folder or the shipped one.
+    /// Reads the robot of `[robot] profile`: a path to a TOML file, or a name in the model folder or the shipped one.
     pub(crate) fn read_robot(
         &mut self,
         root: &mut Table,
@@ -292,7 +293,10 @@ impl Shelf {
         robot::read_with(&files, &path, &packages).map(Arc::new).map_err(|faults| found.extend(faults)).ok()
     }
 
-    /// A robot's profile by name, or what is wrong and what to do.
+    /// Finds a robot's profile by name.
+    ///
+    /// # Errors
+    /// A message and a help text if there is no such robot.
     fn find_robot(&self, name: &str) -> Result<(Files, PathBuf), (String, String)> {
         self.robots().into_iter().find(|(_, path)| stem(path) == name).ok_or_else(|| {
             let mut known: Vec<String> = self.robots().iter().map(|(_, path)| stem(path)).collect();
@@ -314,7 +318,7 @@ impl Shelf {
     }
 }
 
-/// `start_x_m`, `start_y_m` and `start_heading_rad`: all of them or none.
+/// Reads `start_x_m`, `start_y_m` and `start_heading_rad`, which must be given together.
 fn read_start(table: &mut Table) -> Option<[Range; 3]> {
     let keys = ["start_x_m", "start_y_m", "start_heading_rad"];
     if !keys.iter().any(|key| table.has(key)) {
@@ -334,7 +338,7 @@ fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
 }
 
-/// "did you mean", or the whole list.
+/// Returns "did you mean", or the whole list.
 fn choose(name: &str, known: &[String]) -> String {
     did_you_mean(name, known.iter().map(String::as_str))
 }

@@ -1,4 +1,4 @@
-//! What performs the actions: our own skills, or a program that is looked for here (`test_launcher`, `[skill]`).
+//! The skills that perform the actions: the reference skills or an external program (`test_launcher`, `[skill]`).
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -10,40 +10,41 @@ use crate::base::{Diagnostic, Diagnostics, Digest, Span};
 use crate::config::load::beside;
 use crate::config::{Launcher, Located, Table};
 
-/// A program that performs actions, found and ready to be started.
+/// A program that performs actions, located and ready to start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Skill {
-    /// The command as the user wrote it, with the arguments of `[skill] args` behind it.
+    /// The command as the user wrote it, followed by the arguments of `[skill] args`.
     pub text: String,
-    /// The file that is started.
+    /// The executable.
     pub program: PathBuf,
     /// Its arguments.
     pub args: Vec<String>,
-    /// The file that `test_launcher` begins with, seen from where this program runs, and the words behind it; nothing where it
-    /// begins with an installed program.
+    /// The file that `test_launcher` begins with, relative to the current directory, and the words after it; `None` if
+    /// it begins with an installed program.
     pub launched: Option<(PathBuf, Vec<String>)>,
-    /// Digest of the launched file, and of every argument that is a file.
+    /// Digest of the command and of the files among its words.
     pub digest: String,
-    /// Further variables of its environment (`env`).
+    /// Additional environment variables (`env`).
     pub env: BTreeMap<String, String>,
-    /// Its working folder (`dir`); without one, the configuration's.
+    /// Working directory (`dir`); the configuration's folder by default.
     pub dir: PathBuf,
-    /// Whether it is told the truth about the scene (`privileged`).
+    /// Whether the program receives the scene's ground truth (`privileged`).
     pub privileged: bool,
-    /// Time on the clock until it has introduced itself (`startup_s`). Unit: seconds.
+    /// Wall-clock time limit for its first message (`startup_s`). Unit: seconds.
     pub startup_secs: f64,
-    /// Time on the clock for each of its answers (`timeout_s`). Unit: seconds.
+    /// Wall-clock time limit for each reply (`timeout_s`). Unit: seconds.
     pub timeout_secs: f64,
-    /// Most memory of each of its processes (`memory_mb`). Unit: megabytes of 2²⁰ bytes.
+    /// Memory limit of each of its processes (`memory_mb`). Unit: MiB (2²⁰ bytes).
     pub memory_mb: Option<u64>,
-    /// Most computing time of each of its processes (`cpu_s`). Unit: seconds.
+    /// CPU time limit of each of its processes (`cpu_s`). Unit: seconds.
     pub cpu_secs: Option<u64>,
-    /// So many runs in a row that the program broke stop the campaign (`max_broken`).
+    /// The campaign stops after this many consecutive runs that the program broke (`max_broken`).
     pub max_broken: u64,
 }
 
 impl Skill {
-    /// What `test_launcher` is in a configuration that lies elsewhere; nothing where it is the same everywhere.
+    /// Returns the value of `test_launcher` for a configuration in another folder; `seen` converts the file's path.
+    /// Returns `None` if the value does not depend on the folder.
     pub fn launcher(&self, seen: impl Fn(&Path) -> String) -> Option<String> {
         let (file, behind) = self.launched.as_ref()?;
         let file = seen(file);
@@ -52,18 +53,18 @@ impl Skill {
     }
 }
 
-/// An hour is more than any answer takes.
+/// Largest accepted time limit: an hour. Unit: seconds.
 const LONGEST_SECS: f64 = 3600.0;
-/// Above zero, and no more than that.
+/// Bounds of a time limit.
 const A_WHILE: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(LONGEST_SECS));
 
-/// What starts a launch file of ROS, by the file's ending.
+/// Commands that start ROS launch files, by the file's extension.
 const ROS: [(&str, &[&str]); 2] = [(".launch.py", &["ros2", "launch"]), (".launch", &["roslaunch"])];
 
 /// Reads `test_launcher` and `[skill]`. Paths are relative to `folder`, the configuration's.
 ///
-/// Notes a command that is none (C030), a program that is not there (C031) or can't be started (C032), a launch file without ROS
-/// (C033), a working folder that is none (C034), and a `[skill]` for which there is no program (C035, a warning).
+/// Reports an invalid command (C030), a program that is missing (C031) or can't be started (C032), a launch file
+/// without ROS (C033), a missing working directory (C034), and a `[skill]` without a program (C035, a warning).
 pub(super) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Launcher {
     let written = table.string("test_launcher").filter(|written| written.value != "reference");
     let span = table.key_span("skill");
@@ -109,7 +110,7 @@ fn blank(folder: &Path) -> Skill {
         env: BTreeMap::new(),
         dir,
         privileged: false,
-        // A Python that imports the libraries of learning takes some ten seconds on a busy machine.
+        // A Python program that imports machine-learning libraries takes about ten seconds on a busy machine.
         startup_secs: 30.0,
         timeout_secs: 10.0,
         memory_mb: None,
@@ -118,7 +119,7 @@ fn blank(folder: &Path) -> Skill {
     }
 }
 
-/// `[skill]` beside our own skills: its mistakes are told all the same.
+/// Reports a `[skill]` table without a program, including the faults in it.
 fn unused(mut options: Table, folder: &Path, span: Span, found: &mut Diagnostics) {
     let source = options.source().clone();
     fill(&mut blank(folder), &mut options, folder);
@@ -127,7 +128,7 @@ fn unused(mut options: Table, folder: &Path, span: Span, found: &mut Diagnostics
     found.push(
         Diagnostic::warning("C035", message)
             .at(&source, span)
-            .help("name a program in `test_launcher`, or leave it out"),
+            .help("name a program in `test_launcher`, or remove `[skill]`"),
     );
 }
 
@@ -147,27 +148,22 @@ fn fill(skill: &mut Skill, options: &mut Table, folder: &Path) {
         skill.dir = beside(folder, &written.value);
         if !skill.dir.is_dir() {
             let message = format!("there is no folder {}", skill.dir.display());
-            options.fault(
-                "C034",
-                written.span,
-                message,
-                "the program's working folder is relative to the configuration",
-            );
+            options.fault("C034", written.span, message, "`dir` is relative to the configuration");
         }
     }
     set(&mut skill.privileged, options.boolean("privileged"));
     set(&mut skill.startup_secs, options.number("startup_s", A_WHILE));
     set(&mut skill.timeout_secs, options.number("timeout_s", A_WHILE));
-    // Under 16 MB no interpreter starts.
+    // Interpreters need at least 16 MB to start.
     skill.memory_mb = options.integer("memory_mb", 16..=1 << 30).map(i64::unsigned_abs);
     skill.cpu_secs = options.integer("cpu_s", 1..=i64::from(u32::MAX)).map(i64::unsigned_abs);
     set(&mut skill.max_broken, options.integer("max_broken", 1..=i64::from(u32::MAX)).map(i64::unsigned_abs));
 }
 
-/// A text that the system takes as an argument: it ends at a zero.
+/// Returns the text, or reports an error if it contains a NUL character, which would end the argument.
 fn whole(table: &mut Table, key: &str, text: Located<String>) -> Option<String> {
     if text.value.contains('\0') {
-        table.fault("C006", text.span, format!("a zero character stands in `{key}`"), "leave it out");
+        table.fault("C006", text.span, format!("`{key}` contains a NUL character"), "remove it");
         return None;
     }
     Some(text.value)
@@ -186,22 +182,22 @@ struct Missing {
     help: String,
 }
 
-/// What a command starts.
+/// A resolved command.
 struct Command {
     program: PathBuf,
     args: Vec<String>,
-    /// The file that the command begins with, if it does, and the words behind it.
+    /// The file that the command begins with, if any, and the words after it.
     launched: Option<(PathBuf, Vec<String>)>,
 }
 
-/// The file that a command starts, and its arguments.
+/// Resolves a command to an executable and its arguments.
 fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
     let text = written.value.as_str();
-    // A path may have spaces in it.
+    // A path may contain spaces.
     let words = if beside(folder, text).is_file() { Some(vec![text.to_owned()]) } else { shlex::split(text) };
     let split = words.filter(|words| !text.contains('\0') && !words.is_empty()).ok_or_else(|| Missing {
         code: "C030",
-        message: format!("`{text}` is no command: a quotation mark is left open, or nothing is in it"),
+        message: format!("`{text}` is not a command: it is empty or a quotation mark is not closed"),
         help: "write it as in a shell, such as `python3 my_pick.py --speed 0.5`".to_owned(),
     })?;
     let mut words = split.into_iter();
@@ -212,14 +208,13 @@ fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
     }
     let program = on_path(&name).ok_or_else(|| Missing {
         code: "C031",
-        message: format!("there is no program `{name}`, neither beside the configuration nor on the search path"),
-        help: "name a file relative to the configuration, or an installed program; `reference` means our own skills"
-            .to_owned(),
+        message: format!("there is no program `{name}`, neither next to the configuration nor in `PATH`"),
+        help: "name a file relative to the configuration, an installed program, or `reference`".to_owned(),
     })?;
     Ok(Command { program, args, launched: None })
 }
 
-/// The same where a command begins with a file: `name` is how it is written, `path` where it is.
+/// Resolves a command that begins with a file: `name` as written, `path` relative to the current directory.
 fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Missing> {
     if !path.is_file() {
         return Err(Missing {
@@ -237,14 +232,14 @@ fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Mi
             return Err(Missing {
                 code: "C032",
                 message: format!("{} is not executable", path.display()),
-                help: format!("run `chmod +x {name}`, or name what runs it: `test_launcher = \"sh {name}\"`"),
+                help: format!("run `chmod +x {name}`, or name a program that runs it: `test_launcher = \"sh {name}\"`"),
             });
         }
     };
     Ok(Command { program, args, launched })
 }
 
-/// A file that something else runs.
+/// Resolves a file that `starter` runs.
 fn through(
     starter: &[&str],
     path: &Path,
@@ -254,21 +249,21 @@ fn through(
     let (program, before) = starter.split_first().unwrap_or((&"sh", &[]));
     let found = on_path(program).ok_or_else(|| Missing {
         code,
-        message: format!("{} needs `{program}`, which is not on the search path", path.display()),
+        message: format!("{} needs `{program}`, which is not in `PATH`", path.display()),
         help: match code {
             "C033" => "install ROS and source its `setup.bash` first, or name the program that the file launches",
-            _ => "install it, or name what shall run the file: `test_launcher = \"/path/to/python my_pick.py\"`",
+            _ => "install it, or name a program that runs the file: `test_launcher = \"/path/to/python my_pick.py\"`",
         }
         .to_owned(),
     })?;
     let mut all: Vec<String> = before.iter().map(|word| (*word).to_owned()).collect();
-    // The program's working folder may be another one.
+    // The program may have another working directory.
     all.push(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()).display().to_string());
     all.extend(args);
     Ok((found, all))
 }
 
-/// A program of the search path, which like the disk is part of the machine that the configuration speaks of.
+/// Finds a program in `PATH`. Like the disk, `PATH` is part of the machine that the configuration refers to.
 fn on_path(name: &str) -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
     std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| is_executable(path))
@@ -278,8 +273,8 @@ fn is_executable(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
 }
 
-/// Digest of a command: its words without their folders, and the bytes of those that are files. Of an installed program, such as
-/// an interpreter, the name counts alone, so that machines agree.
+/// Digest of a command: its words without their folders, and the contents of those that are files. Only the name of an
+/// installed program, such as an interpreter, is included, so that the digest is the same on all machines.
 fn digest(program: &Path, args: &[String], dir: &Path) -> String {
     let mut digest = Digest::new();
     let installed = program.file_name().and_then(OsStr::to_str).and_then(on_path).is_some_and(|found| found == program);
@@ -296,7 +291,7 @@ fn last(path: &Path) -> std::borrow::Cow<'_, str> {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy()
 }
 
-/// Of a file, if it is one.
+/// Returns the contents of a file, or nothing if it can't be read.
 fn bytes(path: &Path) -> Vec<u8> {
     let file = path.is_file().then(|| std::fs::read(path).ok());
     file.flatten().unwrap_or_default()

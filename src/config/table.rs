@@ -1,4 +1,4 @@
-//! TOML tables with places: every value that is taken is checked, every key that is not taken is reported.
+//! TOML tables with spans: validates every value that is read and reports every unknown key.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -10,26 +10,26 @@ use crate::config::words::{example, in_words};
 
 /// A table that is being read.
 ///
-/// Getters take a key and return nothing where it is missing or wrong; a wrong one has then been noted.
-/// [`Table::finish`] notes what nobody asked for.
+/// Getters remove a key and return its value. They return `None` if the key is missing, and also record a fault if its
+/// value is invalid. [`Table::finish`] reports the keys that remain.
 #[derive(Debug)]
 pub struct Table {
     source: Source,
     /// Dotted path from the root, empty for the root.
     path: String,
-    /// Where its header or its braces are.
+    /// Span of its header or braces.
     span: Span,
     entries: BTreeMap<String, Entry>,
-    /// Keys that were asked for, whether they were there or not.
+    /// Keys that were requested, whether present or not.
     known: BTreeSet<String>,
     found: Diagnostics,
 }
 
 impl Table {
-    /// The root table of a text.
+    /// Parses the root table of a text.
     ///
     /// # Errors
-    /// C002 for each place where the text is not TOML.
+    /// C002 for each syntax error.
     pub fn parse(source: &Source) -> Result<Self, Diagnostics> {
         Ok(Self::new(source, String::new(), 0..0, value::parse(source)?))
     }
@@ -43,22 +43,22 @@ impl Table {
         &self.source
     }
 
-    /// Where the table is written.
+    /// Span of the table's header or braces.
     pub fn span(&self) -> Span {
         self.span.clone()
     }
 
-    /// Where a key is written, if it is there and was not taken yet.
+    /// Returns the span of a key, or `None` if it is missing or was already taken.
     pub fn key_span(&self, key: &str) -> Option<Span> {
         self.entries.get(key).map(|entry| entry.key_span.clone())
     }
 
-    /// Keys that were not taken yet, sorted.
+    /// Returns the keys that were not taken yet, sorted.
     pub fn keys(&self) -> Vec<String> {
         self.entries.keys().cloned().collect()
     }
 
-    /// Whether a key is there and was not taken yet.
+    /// Whether a key is present and was not taken yet.
     pub fn has(&self, key: &str) -> bool {
         self.entries.contains_key(key)
     }
@@ -68,12 +68,12 @@ impl Table {
         self.entries.get(key).is_some_and(|entry| matches!(entry.value.value, Value::Array(_)))
     }
 
-    /// Keys that were not taken yet, sorted.
+    /// Returns the keys that were not taken yet, sorted.
     pub fn untaken_keys(&self) -> Vec<String> {
         self.entries.keys().cloned().collect()
     }
 
-    /// The only key of an untaken sub-table, where there is just one and it holds a list of strings.
+    /// Returns the only key of an untaken sub-table; `None` unless it has one key, with a list of strings.
     pub fn only_list_of(&self, table: &str) -> Option<String> {
         let Value::Table(entries) = &self.entries.get(table)?.value.value else { return None };
         let mut entries = entries.iter();
@@ -85,13 +85,13 @@ impl Table {
         }
     }
 
-    /// Keys that were not taken yet and hold tables, sorted.
+    /// Returns the keys of tables that were not taken yet, sorted.
     pub fn untaken_tables(&self) -> Vec<String> {
         let is_table = |entry: &Entry| matches!(entry.value.value, Value::Table(_));
         self.entries.iter().filter(|(_, entry)| is_table(entry)).map(|(key, _)| key.clone()).collect()
     }
 
-    /// Notes every key of the list that is missing (C005).
+    /// Reports every missing key of the list (C005).
     pub fn require(&mut self, keys: &[&str]) {
         for key in keys {
             self.known.insert((*key).to_owned());
@@ -107,17 +107,17 @@ impl Table {
         }
     }
 
-    /// Notes a fault of this table's text.
+    /// Records a fault of this table's text.
     pub fn fault(&mut self, code: &'static str, span: Span, message: impl Into<String>, help: impl Into<String>) {
         self.found.push(Diagnostic::error(code, message).at(&self.source, span).help(help));
     }
 
-    /// Notes the faults of a table within this one.
+    /// Records the faults of a table within this one.
     pub fn note(&mut self, faults: Diagnostics) {
         self.found.extend(faults);
     }
 
-    /// Moves the faults to `diagnostics`, with one (C003) for each key that nobody asked for.
+    /// Moves the faults to `diagnostics`, with a C003 for each unknown key.
     pub fn finish(mut self, diagnostics: &mut Diagnostics) {
         for (key, entry) in std::mem::take(&mut self.entries) {
             let kind = if matches!(entry.value.value, Value::Table(_)) { "table" } else { "key" };
@@ -128,19 +128,19 @@ impl Table {
         diagnostics.extend(self.found);
     }
 
-    /// A string that is not empty.
+    /// Takes a string that is not empty.
     pub fn string(&mut self, key: &str) -> Option<Located<String>> {
         let value = self.take(key)?;
         self.text_of(key, "a string", value)
     }
 
-    /// A list of strings, none of them empty. The list may be empty: see [`Table::some_strings`].
+    /// Takes a list of non-empty strings. The list may be empty: see [`Table::some_strings`].
     pub fn strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let list = self.list(key, "a list of strings")?;
         Some(list.into_iter().filter_map(|value| self.text_of(key, "a list of strings", value)).collect())
     }
 
-    /// A list of at least one string, with the place of the whole list.
+    /// Takes a list of at least one string.
     pub fn some_strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let span = self.entries.get(key).map(|entry| entry.value.span.clone());
         let before = self.found.len();
@@ -151,7 +151,7 @@ impl Table {
         (!list.is_empty()).then_some(list)
     }
 
-    /// A list of at least one list of at least one string; each inner list has its place.
+    /// Takes a list of at least one list of at least one string; each inner list has its span.
     pub fn some_lists_of_strings(&mut self, key: &str) -> Option<Vec<Located<Vec<Located<String>>>>> {
         let expected = "a list of lists of strings";
         let place = self.entries.get(key).map(|entry| entry.value.span.clone());
@@ -163,12 +163,7 @@ impl Table {
         for Located { value, span } in outer {
             match value {
                 Value::Array(inner) if inner.is_empty() => {
-                    self.fault(
-                        "C007",
-                        span,
-                        format!("an empty list stands in {}", self.name(key)),
-                        "name at least one",
-                    );
+                    self.fault("C007", span, format!("an empty list in {}", self.name(key)), "name at least one");
                 }
                 Value::Array(inner) => {
                     let value = inner.into_iter().filter_map(|value| self.text_of(key, expected, value)).collect();
@@ -180,13 +175,13 @@ impl Table {
         Some(lists)
     }
 
-    /// A whole number within bounds.
+    /// Takes an integer within bounds.
     pub fn integer(&mut self, key: &str, bounds: RangeInclusive<i64>) -> Option<i64> {
         let value = self.take(key)?;
         self.integer_of(key, &value, &bounds)
     }
 
-    /// Two whole numbers `[least, most]` within bounds, the first not above the second.
+    /// Takes two integers `[least, most]` within bounds, the first not above the second.
     pub fn integer_range(&mut self, key: &str, bounds: RangeInclusive<i64>) -> Option<(i64, i64)> {
         let expected = "a range of whole numbers `[least, most]`";
         let span = self.entries.get(key).map(|entry| entry.value.span.clone());
@@ -199,13 +194,13 @@ impl Table {
         self.in_order(key, span?, least?, most?)
     }
 
-    /// A finite number within bounds.
+    /// Takes a finite number within bounds.
     pub fn number(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<f64> {
         let value = self.take(key)?;
         self.number_of(key, &value, &bounds)
     }
 
-    /// Exactly `N` finite numbers, each within bounds.
+    /// Takes exactly `N` finite numbers, each within bounds.
     pub fn numbers<const N: usize>(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<[f64; N]> {
         let span = self.entries.get(key).map(|entry| entry.value.span.clone());
         let list = self.number_list(key, bounds)?;
@@ -219,14 +214,14 @@ impl Table {
         }
     }
 
-    /// Any number of finite numbers, each within bounds.
+    /// Takes a list of finite numbers, each within bounds.
     pub fn number_list(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<Vec<f64>> {
         let list = self.list(key, "a list of numbers")?;
         let numbers: Vec<Option<f64>> = list.iter().map(|value| self.number_of(key, value, &bounds)).collect();
         numbers.into_iter().collect()
     }
 
-    /// Two finite numbers `[low, high]` within bounds, the first not above the second.
+    /// Takes two finite numbers `[low, high]` within bounds, the first not above the second.
     pub fn range(&mut self, key: &str, bounds: impl RangeBounds<f64>) -> Option<(f64, f64)> {
         let expected = "a range of numbers `[low, high]`";
         let span = self.entries.get(key).map(|entry| entry.value.span.clone());
@@ -239,7 +234,7 @@ impl Table {
         self.in_order(key, span?, low?, high?)
     }
 
-    /// `true` or `false`.
+    /// Takes `true` or `false`.
     pub fn boolean(&mut self, key: &str) -> Option<bool> {
         let value = self.take(key)?;
         if let Value::Boolean(boolean) = value.value {
@@ -249,7 +244,7 @@ impl Table {
         None
     }
 
-    /// A table, which has to be finished by itself.
+    /// Takes a table, on which the caller must call [`Table::finish`].
     pub fn table(&mut self, key: &str) -> Option<Table> {
         let key_span = self.key_span(key);
         let value = self.take(key)?;
@@ -262,7 +257,8 @@ impl Table {
         }
     }
 
-    /// A list of tables (`[[key]]`), each of which has to be finished by itself; none where the key is missing.
+    /// Takes a list of tables (`[[key]]`), on each of which the caller must call [`Table::finish`]; empty if the key is
+    /// missing.
     pub fn tables(&mut self, key: &str) -> Vec<Table> {
         let expected = "a list of tables";
         let mut tables = Vec::new();
@@ -294,11 +290,11 @@ impl Table {
         }
     }
 
-    /// The text of a value, which is the whole of what `expected` says or an element of it.
+    /// Returns the text of a value. `expected` describes the value or the list that contains it.
     fn text_of(&mut self, key: &str, expected: &str, value: Located<Value>) -> Option<Located<String>> {
         match value.value {
             Value::String(text) if text.trim().is_empty() => {
-                self.fault("C006", value.span, format!("an empty string stands in {}", self.name(key)), "write a name");
+                self.fault("C006", value.span, format!("an empty string in {}", self.name(key)), "write a name");
                 None
             }
             Value::String(text) => Some(Located { value: text, span: value.span }),
@@ -366,7 +362,7 @@ impl Table {
         self.fault("C004", span, message, example(key, expected));
     }
 
-    /// A key as messages speak of it.
+    /// Returns a key's full path for messages.
     fn name(&self, key: &str) -> String {
         format!("`{}`", self.path_of(key))
     }

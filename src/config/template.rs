@@ -1,14 +1,14 @@
-//! A new configuration, ready to edit: `configs/pick.toml` without the paths of a checkout.
+//! The template of new configurations: `configs/pick.toml` without the paths of a checkout.
 
 use crate::base::Source;
 use crate::config::Table;
 
-/// The configuration that new ones are made from.
+/// The configuration that new ones are derived from.
 const PICK: &str = include_str!("../../configs/pick.toml");
 
-/// The line of `ontology` in a new configuration, active.
+/// The uncommented `ontology` line of a new configuration.
 const ONTOLOGY_LINE: &str = "ontology = \"ontology/actions.ttl\"";
-/// The line of `model_dir` in a new configuration, active.
+/// The uncommented `model_dir` line of a new configuration.
 const MODELS_LINE: &str = "model_dir = \"models\"";
 
 /// The lines of `configs/pick.toml` that name files of a checkout.
@@ -19,7 +19,7 @@ model_dir = \"../models\"
 ";
 /// The lines of `configs/pick.toml` that name the skill.
 const LAUNCHER: &str = "\
-# Who performs the actions: \"reference\" is the skill that comes with actcheck.
+# The program that performs the actions: \"reference\" is the skill that comes with actcheck.
 test_launcher = \"reference\"
 ";
 
@@ -28,20 +28,20 @@ test_launcher = \"reference\"
 pub struct CampaignTemplate<'a> {
     /// The configuration's name, without `.toml`.
     pub name: &'a str,
-    /// Uses `ontology/actions.ttl` beside the configuration instead of the shipped ontology.
+    /// Uses `ontology/actions.ttl` next to the configuration instead of the shipped ontology.
     pub ontology: bool,
-    /// Uses the folder `models` beside the configuration instead of the shipped models.
+    /// Uses the folder `models` next to the configuration instead of the shipped models.
     pub models: bool,
     /// The program that performs the actions, as a path from the configuration; the reference skill if `None`.
     pub skill: Option<&'a str>,
 }
 
-/// The text of a new configuration. It runs as it is if the files that it names exist.
+/// Returns the text of a new configuration. It runs unchanged if the files that it names exist.
 pub fn campaign_template(new: &CampaignTemplate<'_>) -> String {
     replacements(new).into_iter().fold(PICK.to_owned(), |text, (from, to)| text.replacen(from, &to, 1))
 }
 
-/// Pieces of `configs/pick.toml` and what replaces each.
+/// Returns the pieces of `configs/pick.toml` to replace, each with its replacement.
 fn replacements(new: &CampaignTemplate<'_>) -> Vec<(&'static str, String)> {
     let name = new.name;
     let mut pieces = vec![
@@ -52,7 +52,7 @@ fn replacements(new: &CampaignTemplate<'_>) -> Vec<(&'static str, String)> {
     ];
     if let Some(skill) = new.skill {
         let launcher = format!(
-            "# Who performs the actions: a program, or \"reference\", the skill that comes with actcheck.\n\
+            "# The program that performs the actions; \"reference\" is the skill that comes with actcheck.\n\
              test_launcher = \"{skill}\"\n"
         );
         pieces.push((LAUNCHER, launcher));
@@ -60,7 +60,7 @@ fn replacements(new: &CampaignTemplate<'_>) -> Vec<(&'static str, String)> {
     pieces
 }
 
-/// The lines of `ontology` and `model_dir`; each is commented out unless its files are used.
+/// Returns the lines of `ontology` and `model_dir`, commented out unless their files are used.
 fn paths(new: &CampaignTemplate<'_>) -> String {
     let [ontology, models] =
         [(new.ontology, ONTOLOGY_LINE), (new.models, MODELS_LINE)].map(|(is_used, line)| match is_used {
@@ -68,10 +68,10 @@ fn paths(new: &CampaignTemplate<'_>) -> String {
             false => commented(line),
         });
     format!(
-        "# Actions, properties and the rule files that decide them. Without this line: those that actcheck carries.\n\
+        "# Actions, properties and the rule files that decide them. Without this line: those that come with actcheck.\n\
          # `actcheck new property NAME --for ACTION` copies them into this folder and activates the line.\n\
          {ontology}\n\n\
-         # Models of objects and robots, to edit or to add to. Without this line: those that actcheck carries.\n\
+         # Models of objects and robots, to edit or extend. Without this line: those that come with actcheck.\n\
          # `actcheck new campaign NAME --with model` writes a copy and a configuration that uses it.\n\
          {models}\n"
     )
@@ -81,25 +81,25 @@ fn commented(line: &str) -> String {
     format!("# {line}")
 }
 
-/// Whether a configuration names an ontology, or can be made to.
+/// The result of [`link_ontology`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LinksOntology {
     /// It names one.
     Already,
-    /// Its text with the template's line activated.
+    /// Its text with the template's line uncommented.
     Now(String),
     /// It names none and does not have the template's line.
     No,
 }
 
-/// Activates the line with which [`campaign_template`] names `ontology/actions.ttl`.
+/// Uncomments the `ontology` line of [`campaign_template`].
 pub fn link_ontology(config: &str) -> LinksOntology {
     let names_one = |text: &str| Table::parse(&Source::new("", text)).is_ok_and(|table| table.has("ontology"));
     if names_one(config) {
         return LinksOntology::Already;
     }
     let text = config.replacen(&commented(ONTOLOGY_LINE), ONTOLOGY_LINE, 1);
-    // Below the header of a table the line would be a key of that table, and within a comment it would still be none.
+    // Below a table header the line would be a key of that table; within a comment it would remain a comment.
     if names_one(&text) { LinksOntology::Now(text) } else { LinksOntology::No }
 }
 

@@ -1,4 +1,4 @@
-//! TOML values with their places: the fence around the parser.
+//! TOML values with their spans, independent of the parser's types.
 
 use std::collections::BTreeMap;
 
@@ -7,32 +7,32 @@ use toml::de::{DeTable, DeValue};
 
 use crate::base::{Diagnostic, Diagnostics, Source, Span};
 
-/// Beyond this many, syntax errors are echoes of the first ones.
+/// Largest number of reported syntax errors; further ones usually follow from the first.
 const MOST_SYNTAX_ERRORS: usize = 3;
 
-/// A value with the place where it is written.
+/// A value with its span in the source.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Located<T> {
     /// The value.
     pub value: T,
-    /// Where it is written.
+    /// Its span.
     pub span: Span,
 }
 
-/// What stands behind a key.
+/// A key's span and its value.
 #[derive(Debug)]
 pub(super) struct Entry {
     pub(super) key_span: Span,
     pub(super) value: Located<Value>,
 }
 
-/// A value as it is written.
+/// A TOML value.
 #[derive(Debug)]
 pub(super) enum Value {
     String(String),
-    /// Nothing where it does not fit 64 bits.
+    /// `None` if it does not fit into 64 bits.
     Integer(Option<i64>),
-    /// Nothing where it is too large for a double.
+    /// `None` if it can't be parsed as an `f64`.
     Float(Option<f64>),
     Boolean(bool),
     Datetime,
@@ -40,10 +40,10 @@ pub(super) enum Value {
     Table(BTreeMap<String, Entry>),
 }
 
-/// The entries of a text's root table.
+/// Parses the entries of a text's root table.
 ///
 /// # Errors
-/// C002 for each place where the text is not TOML.
+/// C002 for each syntax error.
 pub(super) fn parse(source: &Source) -> Result<BTreeMap<String, Entry>, Diagnostics> {
     let (root, errors) = DeTable::parse_recoverable(&source.text);
     let mut found = Diagnostics::new();
@@ -59,7 +59,7 @@ pub(super) fn parse(source: &Source) -> Result<BTreeMap<String, Entry>, Diagnost
 }
 
 impl Value {
-    /// What it is, in words.
+    /// Returns the kind of the value for messages.
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::String(_) => "a string",

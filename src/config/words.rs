@@ -1,9 +1,9 @@
-//! What was expected, in words and as an example.
+//! Descriptions and examples of expected values, for messages.
 
 use std::fmt::Display;
 use std::ops::{Bound, RangeBounds};
 
-/// "a number of at least 0 and at most 1": bounds at or beyond `unlimited` are left out.
+/// Describes bounds, as in "a number of at least 0 and at most 1". Bounds at or beyond `unlimited` are omitted.
 pub(super) fn in_words<T: PartialOrd + Display>(what: &str, bounds: &impl RangeBounds<T>, unlimited: &T) -> String {
     let low = match bounds.start_bound() {
         Bound::Included(low) => Some(format!("of at least {low}")),
@@ -23,7 +23,7 @@ pub(super) fn in_words<T: PartialOrd + Display>(what: &str, bounds: &impl RangeB
     }
 }
 
-/// How a value of what was expected is written.
+/// Returns an example of the expected value.
 pub(super) fn example(key: &str, expected: &str) -> String {
     let value = match expected {
         text if text.contains("list of lists") => "[[\"…\"], [\"…\", \"…\"]]",

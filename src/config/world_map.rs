@@ -1,4 +1,4 @@
-//! Worlds: what stands in them whatever a scene adds, and the names of their places.
+//! Worlds: the walls and furniture that all their scenes share, and their named locations and rooms.
 
 use std::collections::BTreeSet;
 
@@ -7,51 +7,51 @@ use serde::{Deserialize, Serialize};
 use crate::base::{Diagnostics, Pose, Source, Span, did_you_mean, digest_of, names};
 use crate::config::{Located, ObjectModel, Part, Shape, Table};
 
-/// A world that scenes can lie in. Frame of everything: world; the floor at 0.
+/// A world for scenes. Frame: world; the floor is at z = 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorldMap {
-    /// Name by which configurations know it; the file's name without its ending.
+    /// Name in configurations; the file's name without its extension.
     pub name: String,
-    /// Walls, which nobody names.
+    /// Walls, which have no names.
     pub walls: Vec<Wall>,
-    /// What stands in it and never moves.
+    /// Static furniture.
     pub furniture: Vec<Furniture>,
-    /// Places where a robot can be sent.
+    /// Named goals for the robot.
     pub locations: Vec<Location>,
-    /// Rectangles of the floor that have a name.
+    /// Named rectangles of the floor.
     pub rooms: Vec<Room>,
-    /// Digest of the file it was read from.
+    /// Digest of the world's file.
     pub digest: String,
 }
 
-/// A wall as the thing that it is.
+/// A wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wall {
-    /// Form and class.
+    /// Its shape and category.
     pub model: ObjectModel,
-    /// Where its middle stands.
+    /// Pose of the middle of its base.
     pub pose: Pose,
 }
 
-/// A piece of furniture. Robots come to its negative x side.
+/// A piece of furniture. Robots approach it from its negative x side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Furniture {
-    /// Unique in the world; where its model has a surface, also the surface's name.
+    /// Unique in the world; also names its surface, if its model has one.
     pub name: String,
     /// Name of its model.
     pub model: String,
-    /// Where its model's origin is.
+    /// Pose of its model's origin.
     pub pose: Pose,
 }
 
-/// A place with a name.
+/// A named pose on the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Location {
     /// Unique among the world's locations.
     pub name: String,
     /// Units: metres, metres, radians. Shape: x, y, heading.
     pub at: [f64; 3],
-    /// Name of the surface that it is in front of.
+    /// Name of the surface that it is in front of, if any.
     pub surface: Option<String>,
 }
 
@@ -66,15 +66,15 @@ pub struct Room {
     pub high_m: [f64; 2],
 }
 
-/// A wall's height where it says none: that of a low room. Unit: metres.
+/// Default height of a wall: that of a low room. Unit: metres.
 const WALL_HEIGHT_M: f64 = 2.4;
-/// A wall's thickness where it says none. Unit: metres.
+/// Default thickness of a wall. Unit: metres.
 const WALL_THICKNESS_M: f64 = 0.1;
-/// Worlds end there: what is farther away has left the simulation. Unit: metres.
+/// Largest coordinate in a world: an object farther away has left the simulation. Unit: metres.
 const FARTHEST_M: f64 = 12.0;
 
 impl WorldMap {
-    /// A floor and nothing else.
+    /// Returns a world with only a floor.
     pub(crate) fn nothing(name: &str) -> Self {
         Self {
             name: name.to_owned(),
@@ -87,12 +87,12 @@ impl WorldMap {
     }
 }
 
-/// Reads a world of ours. Models are looked up by `model`: nothing where there is none of that name, which names there are.
+/// Reads a TOML world. `model` looks models up by name; `known` lists the names for suggestions.
 ///
 /// # Errors
-/// Every fault of the text: the table reader's own (`C…`), furniture of no known model (W040), two things of one name
-/// (W041), a location in front of what is no surface (W042), a location inside of furniture (W043), a wall or room
-/// without extent (W044).
+/// All faults of the text: those of the table reader (`C…`), an unknown model (W040), a duplicate name (W041), a
+/// location in front of an unknown surface (W042), a location inside furniture (W043), a wall or room without extent
+/// (W044).
 pub(crate) fn read<'a>(
     name: &str,
     source: &Source,
@@ -117,7 +117,7 @@ pub(crate) fn read<'a>(
     found.or(WorldMap { name: name.to_owned(), walls, furniture, locations, rooms, digest: digest_of(&source.text) })
 }
 
-/// A name that nothing else of its kind has (W041).
+/// Reads a name and reports duplicates (W041).
 fn new_name(table: &mut Table, taken: &mut BTreeSet<String>) -> Option<String> {
     let Located { value, span } = table.string("name")?;
     if taken.insert(value.clone()) {
@@ -138,7 +138,7 @@ fn read_room(mut table: Table, found: &mut Diagnostics) -> Option<Room> {
         table.fault(
             "W044",
             span,
-            "the room has no extent",
+            "the room has no area",
             "`low_m` has the smaller x and the smaller y, `high_m` the larger ones",
         );
     }
@@ -166,7 +166,7 @@ fn read_wall(mut table: Table, found: &mut Diagnostics) -> Option<Wall> {
     let (from, to) = (from?, to?);
     let heading = libm::atan2(to[1] - from[1], to[0] - from[0]);
     let middle = [(from[0] + to[0]) / 2.0, (from[1] + to[1]) / 2.0, 0.0];
-    // Walls that meet overlap at the corner.
+    // Extend the wall so that adjacent walls overlap at the corner.
     let model = wall_model([length(from, to) + thickness, thickness, height]);
     Some(Wall { model, pose: Pose::upright(middle, heading) })
 }
@@ -177,7 +177,7 @@ fn wall_model(size_m: [f64; 3]) -> ObjectModel {
     ObjectModel {
         name: "wall".to_owned(),
         category: names::act("Wall"),
-        // Of aerated concrete.
+        // Density of aerated concrete.
         mass_kg: 600.0 * part.shape.volume(),
         friction: 0.6,
         restitution: 0.0,
@@ -239,8 +239,8 @@ fn read_location<'a>(
         let inside =
             furniture.iter().find(|piece| model(&piece.model).is_some_and(|model| is_inside(at, piece, model)));
         if let Some(piece) = inside {
-            let message = format!("the location lies inside of `{}`", piece.name);
-            table.fault("W043", span, message, "a robot stands on a location: leave room for it");
+            let message = format!("the location is inside `{}`", piece.name);
+            table.fault("W043", span, message, "move it away: the robot drives to this location");
         }
     }
     table.finish(found);

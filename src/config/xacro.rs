@@ -1,53 +1,53 @@
-//! xacro, which other programs expand to URDF.
+//! Expands xacro to URDF with the external program `xacro`.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::base::Source;
 
-/// The program, as ROS installs it and `pip install xacro` does.
+/// The program, as installed by ROS or by `pip install xacro`.
 const PROGRAM: &str = "xacro";
 
-/// Why a xacro file is of no use.
+/// A failed expansion.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Unexpanded {
-    /// A lower-case sentence.
+    /// The error, in lower case.
     pub(super) message: String,
-    /// What to do.
+    /// How to fix it.
     pub(super) help: String,
 }
 
-/// Whether a file is xacro, by its name.
+/// Whether a file is xacro, by its extension.
 pub(super) fn is_xacro(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending == "xacro")
 }
 
-/// The URDF that a xacro file stands for, by the program `xacro`.
+/// Expands a xacro file to URDF with the program `xacro`.
 ///
 /// # Errors
-/// The program is not there, or refuses the file in its own words.
+/// The program can't be started, reports an error in the file, or prints something other than UTF-8.
 pub(super) fn expand(path: &Path) -> Result<Source, Unexpanded> {
     let shown = path.display();
     let output = Command::new(PROGRAM).arg(path).stdin(Stdio::null()).output().map_err(|error| Unexpanded {
-        message: format!("{shown} is xacro, which the program `xacro` expands, and that can't be started: {error}"),
+        message: format!("cannot start the program `xacro` to expand {shown}: {error}"),
         help: format!("install it (`pip install xacro`), or expand the file elsewhere: `xacro {shown} > robot.urdf`"),
     })?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr);
         let said: Vec<&str> = said.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
         return Err(Unexpanded {
-            message: format!("xacro refuses {shown}: {}", plain(&said.join("; "))),
-            help: format!("see what `xacro {shown}` says; packages that it looks for have to be installed"),
+            message: format!("xacro cannot expand {shown}: {}", plain(&said.join("; "))),
+            help: format!("run `xacro {shown}` to see the error; the packages that it refers to must be installed"),
         });
     }
     let text = String::from_utf8(output.stdout).map_err(|_| Unexpanded {
-        message: format!("xacro makes of {shown} what is not UTF-8 text"),
-        help: "see what stands in the file".to_owned(),
+        message: format!("the expansion of {shown} is not UTF-8 text"),
+        help: "check the file's encoding".to_owned(),
     })?;
     Ok(Source::new(format!("{shown} (expanded)"), text))
 }
 
-/// Without colours and other codes for terminals.
+/// Removes colours and other terminal codes.
 fn plain(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     let mut rest = text.chars();

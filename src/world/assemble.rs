@@ -1,4 +1,4 @@
-//! The robot's links and joints put into the engine.
+//! Inserts the robot's links and joints into the physics engine.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
@@ -14,24 +14,25 @@ use crate::world::engine::{Owner, collider, off_floor};
 use crate::world::layout::{Layout, Named};
 use crate::world::robot::Motor;
 
-/// Error at which a motor gives all it has. Unit: metres. Stiffness is the effort limit over this.
+/// Position error at which a motor reaches its effort limit. Unit: metres. Stiffness is the effort limit divided by
+/// this.
 const SATURATION_M: f64 = 1e-3;
-/// The same for joints that turn. Unit: radians.
+/// As [`SATURATION_M`], for revolute joints. Unit: radians.
 const SATURATION_RAD: f64 = 0.02;
-/// Damping over stiffness of a motor. Unit: seconds.
+/// Ratio of a motor's damping to its stiffness. Unit: seconds.
 const DAMPING_SECS: f64 = 0.02;
-/// The same for fingers, which are light.
+/// As [`DAMPING_SECS`], for fingers, which are light.
 const FINGER_DAMPING_SECS: f64 = 0.01;
 /// Friction of the robot's links other than the fingers: painted metal and plastic.
 const LINK_FRICTION: f64 = 0.4;
-/// Natural frequency of the stops at joint limits. Unit: hertz. The engine's own stops throw a loaded joint back.
+/// Natural frequency of the joint limits. Unit: hertz. The engine's default limits make a loaded joint bounce back.
 const STOP_FREQUENCY_HZ: f32 = 60.0;
-/// Damping ratio of the stops.
+/// Damping ratio of the joint limits.
 const STOP_DAMPING: f32 = 5.0;
-/// Ranges wider than this are no stops in practice; leaving them out saves the solver work. Unit: metres or radians.
+/// Joint ranges wider than this get no limits in the engine, which saves solver time. Unit: metres or radians.
 const WIDEST_RANGE: f64 = 20.0;
 
-/// Home posture with the base where it starts and the fingers half open.
+/// Returns the home posture, with the base at its start pose and the fingers half open.
 pub(super) fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, base: [f64; 3]) -> Vec<f64> {
     let mut positions: Vec<f64> = model.joints.iter().map(|joint| 0.0_f64.clamp(joint.lower, joint.upper)).collect();
     for (idx, position) in named.layout.arm.iter().zip(&profile.home) {
@@ -84,8 +85,8 @@ pub(super) fn insert_links(
     bodies
 }
 
-/// Links that a planar base stands on the floor with, such as wheels. Its joints carry it, and are all that moves it: wheels that
-/// are pressed on the floor as well would throw it about.
+/// Marks the links below a planar base, such as wheels, which do not collide with the floor. The planar joints support
+/// and move the base; wheels in contact with the floor would disturb it.
 fn links_on_floor(model: &RobotModel, named: &Named, profile: &RobotProfile) -> Vec<bool> {
     let Layout { arm, head, fingers, .. } = &named.layout;
     let mut on_floor = vec![profile.planar_base];
@@ -140,7 +141,7 @@ pub(super) fn insert_joints(
     Ok(motors)
 }
 
-/// A joint for the engine, which moves along or about the x axis of a frame of its own.
+/// Converts a joint for the engine, whose joints move along or about the x axis of a local frame.
 fn engine_joint(joint: &Joint) -> (GenericJoint, JointAxis) {
     let (locked, axis) = match joint.kind {
         JointKind::Prismatic => (JointAxesMask::LOCKED_PRISMATIC_AXES, JointAxis::LinX),
@@ -159,7 +160,7 @@ fn engine_joint(joint: &Joint) -> (GenericJoint, JointAxis) {
     (data, axis)
 }
 
-/// A rotation that brings the x axis onto another one.
+/// Returns a rotation that maps the x axis to `axis`.
 fn x_onto(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
     Rotation3::rotation_between(&Vector3::x(), axis).map_or_else(
         || UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI),

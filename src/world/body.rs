@@ -1,4 +1,4 @@
-//! The space that the robot itself takes up, so that it can tell itself from what it sees.
+//! The space that the robot occupies, used to remove the robot itself from its camera images.
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
@@ -9,24 +9,24 @@ use crate::world::Kinematics;
 /// The robot's collision shapes in one posture.
 #[derive(Debug, Clone)]
 pub struct OwnBody {
-    /// From the world to each shape, and the shape.
+    /// Each shape with its transform from the world frame.
     solids: Vec<(Isometry3<f64>, Shape)>,
 }
 
 impl OwnBody {
-    /// The shapes for given joint positions.
+    /// Returns the shapes at the given joint positions.
     pub fn new(kinematics: &Kinematics, positions: &[f64]) -> Self {
         let solids = kinematics.solids(positions).into_iter().map(|(pose, shape)| bounded(pose, shape));
         Self { solids: solids.collect() }
     }
 
-    /// Whether a point is in one of the shapes or at most so far from it (at edges a little farther). Unit: metres.
+    /// Whether a point is inside a shape or within `margin` of it (slightly farther at edges). Unit: metres.
     pub fn is_near(&self, point: &Point3<f64>, margin: f64) -> bool {
         self.solids.iter().any(|(from_world, shape)| is_within(&(from_world * point), shape, margin))
     }
 }
 
-/// From the world to a shape, and the shape; the box around it where its own form is not simple.
+/// Returns the transform from the world to a shape, and the shape. Replaces complex shapes by their bounding box.
 fn bounded(pose: Isometry3<f64>, shape: Shape) -> (Isometry3<f64>, Shape) {
     match shape {
         Shape::Box { .. } | Shape::Cylinder { .. } | Shape::Sphere { .. } => (pose.inverse(), shape),
@@ -39,7 +39,7 @@ fn bounded(pose: Isometry3<f64>, shape: Shape) -> (Isometry3<f64>, Shape) {
     }
 }
 
-/// Frame: the shape's.
+/// Whether a point is within `margin` of the shape. Frame: the shape's.
 fn is_within(point: &Point3<f64>, shape: &Shape, margin: f64) -> bool {
     match *shape {
         Shape::Box { size } => point.iter().zip(size).all(|(along, extent)| along.abs() <= extent / 2.0 + margin),
@@ -48,7 +48,7 @@ fn is_within(point: &Point3<f64>, shape: &Shape, margin: f64) -> bool {
             point.z.abs() <= height / 2.0 + margin && point.x * point.x + point.y * point.y <= reach * reach
         }
         Shape::Sphere { radius } => point.coords.norm() <= radius + margin,
-        // The others have become boxes.
+        // `bounded` has replaced all other shapes by boxes.
         _ => false,
     }
 }

@@ -1,8 +1,9 @@
-//! A depth camera on the robot's camera link: one ray a pixel against everything there is, the robot's own links included.
+//! A depth camera on the robot's camera link: casts one ray per pixel against all colliders, including the robot's own
+//! links.
 //!
-//! What a picture gets wrong is one recorded choice, `sense.camera.frame`: the number of the picture's noise, from which
-//! the noise of each pixel follows by its place. Its nominal value, 0, is a picture without noise. So a replay has the same
-//! picture, and a shrunk record says whether a failure needs the camera's noise at all.
+//! An image's noise is one recorded choice, `sense.camera.frame`: a seed from which the noise of each pixel is derived.
+//! Its nominal value, 0, is an image without noise. So a replay sees the same image, and a shrunk run shows whether the
+//! failure needs camera noise.
 
 use nalgebra::{Isometry3, Point3};
 use parry3d::shape::Shape;
@@ -15,32 +16,33 @@ use crate::world::convert::{from_pose, to_real};
 use crate::world::engine::Owner;
 use crate::world::rays::{Lens, Solids};
 
-/// How many different noises there are, that without any included.
+/// Number of noise seeds, including 0 (no noise).
 const FRAMES: usize = 1 << 32;
 
-/// A picture of distances. Frame of its points: the camera's, x forwards, y left, z up.
+/// A depth image. Frame of its points: the camera's, x forwards, y left, z up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthImage {
-    /// Pixels in a row.
+    /// Width. Unit: pixels.
     pub width: usize,
-    /// Rows.
+    /// Height. Unit: pixels.
     pub height: usize,
-    /// Distance of the picture's plane from the eye, in pixels.
+    /// Focal length. Unit: pixels.
     pub focal_px: f64,
-    /// Distance along the forward axis for each pixel, row by row from the upper left; 0 where nothing was measured.
-    /// Unit: metres.
+    /// Depth along the forward axis of each pixel, row by row from the upper left; 0 if nothing was measured. Unit:
+    /// metres.
     pub depths: Vec<f32>,
 }
 
 impl DepthImage {
-    /// What a pixel sees, if it sees anything. Frame: camera.
+    /// Returns the point measured by a pixel, or `None` if it has no depth. Frame: camera.
     pub fn point(&self, column: usize, row: usize) -> Option<Point3<f64>> {
         let depth = f64::from(*self.depths.get(row * self.width + column)?);
         let [left, up] = self.lens().slopes(column, row);
         (depth > 0.0).then(|| Point3::new(depth, depth * left, depth * up))
     }
 
-    /// Where a point would be in the picture: columns from the left, rows from above; nothing for what is behind.
+    /// Projects a point to the image: column from the left, row from the top. Returns `None` if it is behind the
+    /// camera.
     pub fn pixel(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
         self.lens().pixel(point)
     }
@@ -51,7 +53,7 @@ impl DepthImage {
 }
 
 impl World {
-    /// Takes a picture with the camera as it is now, at its true place.
+    /// Takes an image from the camera's current true pose.
     pub fn look(&self, choices: &mut Choices) -> DepthImage {
         let began_secs = self.watch_secs();
         let camera = &self.sensing.camera;
@@ -64,7 +66,7 @@ impl World {
         image
     }
 
-    /// All shapes, where sensors see them.
+    /// All shapes at the poses where sensors see them.
     fn solids(&self) -> impl Iterator<Item = (Isometry3<f64>, &dyn Shape)> {
         self.engine.colliders.iter().map(|(_, collider)| (self.shown_at(collider), collider.shape()))
     }
@@ -109,14 +111,15 @@ fn picture(camera: &Camera, solids: &Solids<'_>, noise: Option<&Noise<'_>>) -> D
     DepthImage { width, height, focal_px, depths }
 }
 
-/// What one picture gets wrong.
+/// The noise of one image.
 struct Noise<'a> {
     camera: &'a Camera,
     stream: Stream,
 }
 
 impl Noise<'_> {
-    /// The range that a pixel measures, if it measures any. `sine` is that of the angle between ray and surface.
+    /// Returns the measured range of a pixel, or `None` if it is dropped. `sine` computes the sine of the angle between
+    /// ray and surface.
     fn measure(&self, pixel: u64, range: f64, sine: impl FnOnce() -> f64) -> Option<f64> {
         let grazing = self.camera.grazing_rad;
         let lost = if grazing > 0.0 { lost_at(sine(), grazing) } else { 0.0 };
@@ -126,9 +129,9 @@ impl Noise<'_> {
     }
 }
 
-/// Share of pixels that are lost where a surface is seen at an angle of this sine: all of them at 0, none from `grazing` on.
+/// Share of pixels dropped on a surface seen at an angle with this sine: 1 at 0, and 0 from `grazing` on.
 fn lost_at(sine: f64, grazing: f64) -> f64 {
-    // An angle is never smaller than its sine: the arc sine, which takes long, is for grazing rays only.
+    // An angle is at least its sine, so the slow arc sine is only needed for grazing rays.
     if sine >= grazing { 0.0 } else { (1.0 - libm::asin(sine) / grazing).max(0.0) }
 }
 
@@ -153,7 +156,7 @@ mod tests {
     fn a_wall_is_everywhere_as_deep_as_it_is_far() {
         let image = look(&[(2.5, &Cuboid::new([0.5, 5.0, 5.0].into()))]);
         assert!(image.depths.iter().all(|depth| (depth - 2.0).abs() < 1e-5));
-        // The outermost columns look half a pixel less than half the field of view aside.
+        // The outermost pixel centres are half a pixel inside the field of view.
         let corner = image.point(0, 0).expect("the wall fills the picture");
         let outermost = 2.0 * libm::tan(0.5) * (63.0 / 64.0);
         assert!((corner.y - outermost).abs() < 1e-4 && (corner.z - outermost * 47.0 / 63.0).abs() < 1e-4, "{corner}");
@@ -167,7 +170,7 @@ mod tests {
         assert!((middle(&look(&[(3.0, &wall), (1.0, &ball)])) - 0.8).abs() < 2e-3);
         assert!((middle(&look(&[(3.0, &wall)])) - 2.9).abs() < 1e-4);
         assert_eq!(middle(&look(&[(6.0, &wall)])), 0.0);
-        // What is too near is not seen, and it still hides what is behind.
+        // An object that is too near is not measured, but it still occludes the objects behind it.
         assert_eq!(middle(&look(&[(3.0, &wall), (0.4, &ball)])), 0.0);
     }
 

@@ -1,4 +1,4 @@
-//! Which things touch, and with what force.
+//! Contacts between objects, links and the floor, with their forces.
 
 use std::collections::BTreeMap;
 
@@ -8,22 +8,21 @@ use rapier3d::prelude::PhysicsWorld;
 use crate::world::convert::from_vector;
 use crate::world::engine::Owner;
 
-/// Contact forces under this are solver noise: the lightest object of the shipped models weighs ten times as much.
-/// Unit: newtons.
+/// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model. Unit: newtons.
 pub const CONTACT_FLOOR_NEWTONS: f64 = 0.05;
 
-/// The contact of two things at one moment.
+/// The contact of two bodies at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
-    /// Sum of the normal forces' sizes. Unit: newtons.
+    /// Sum of the magnitudes of the normal forces. Unit: newtons.
     pub normal_n: f64,
-    /// How deep the second goes into the first. Unit: metres; 0 where they only meet.
+    /// Penetration depth; 0 if they only touch. Unit: metres.
     pub depth_m: f64,
     /// Sum of normal and friction forces on the second of the pair. Unit: newtons. Frame: world.
     pub force_n: Vector3<f64>,
 }
 
-/// All contacts above the floor, by the pair of things in order.
+/// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`], by ordered pair of owners.
 pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
     let mut found: BTreeMap<(Owner, Owner), Touch> = BTreeMap::new();
     let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
@@ -38,7 +37,7 @@ pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
                 if impulse <= 0.0 {
                     continue;
                 }
-                // Friction is kept for the last substep only, and as it acts on the first of the pair.
+                // The engine keeps friction only for the last substep, and as it acts on the first of the pair.
                 let last = f64::from(point.data.warmstart_impulse);
                 let share = if last > 0.0 { impulse / last } else { 0.0 };
                 let friction = from_vector(point.data.warmstart_tangent_world) * -share;

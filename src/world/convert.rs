@@ -1,28 +1,28 @@
-//! The fence: our poses and vectors to the engine's and back.
+//! Conversions between nalgebra's types and the engine's.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use rapier3d::math::{Pose as EnginePose, Rotation as EngineRotation, Vector as EngineVector};
 
-/// A vector of ours for the engine, which calculates in 32 bits.
-#[expect(clippy::cast_possible_truncation, reason = "the engine calculates in 32 bits")]
+/// Converts a vector for the engine, which computes in 32 bits.
+#[expect(clippy::cast_possible_truncation, reason = "the engine computes in 32 bits")]
 pub fn to_vector(v: &Vector3<f64>) -> EngineVector {
     EngineVector::new(v.x as f32, v.y as f32, v.z as f32)
 }
 
-/// A vector of the engine.
+/// Converts a vector from the engine.
 pub fn from_vector(v: EngineVector) -> Vector3<f64> {
     Vector3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z))
 }
 
-/// A pose of ours for the engine.
-#[expect(clippy::cast_possible_truncation, reason = "the engine calculates in 32 bits")]
+/// Converts a pose for the engine.
+#[expect(clippy::cast_possible_truncation, reason = "the engine computes in 32 bits")]
 pub fn to_pose(pose: &Isometry3<f64>) -> EnginePose {
     let q = pose.rotation.quaternion();
     let rotation = EngineRotation::from_xyzw(q.i as f32, q.j as f32, q.k as f32, q.w as f32).normalize();
     EnginePose::from_parts(to_vector(&pose.translation.vector), rotation)
 }
 
-/// A pose of the engine.
+/// Converts a pose from the engine.
 pub fn from_pose(pose: &EnginePose) -> Isometry3<f64> {
     let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
     Isometry3::from_parts(
@@ -31,8 +31,8 @@ pub fn from_pose(pose: &EnginePose) -> Isometry3<f64> {
     )
 }
 
-/// A number for the engine.
-#[expect(clippy::cast_possible_truncation, reason = "the engine calculates in 32 bits")]
+/// Converts a number for the engine.
+#[expect(clippy::cast_possible_truncation, reason = "the engine computes in 32 bits")]
 pub fn to_real(value: f64) -> f32 {
     value as f32
 }

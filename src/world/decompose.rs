@@ -1,4 +1,4 @@
-//! Meshes taken apart into convex solids, which is all that contacts can be found between.
+//! Decomposes meshes into convex solids, between which the engine can find contacts.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -10,18 +10,18 @@ use crate::base::Digest;
 use crate::scenario::{Mesh, Shape};
 use crate::world::convert::to_real;
 
-/// Counts up whenever the same mesh and parameters would give other solids.
+/// Version of the algorithm: increment it if the same mesh and parameters give different solids.
 const ALGORITHM: u32 = 1;
-/// Cells along the longest side of the box around a mesh. At 64 a cell of a mug is 1.5 mm.
+/// Voxels along the longest side of a mesh's bounding box. At 64, a voxel of a mug is 1.5 mm.
 const RESOLUTION: u32 = 64;
-/// How much of its hull's volume a piece may lack, as a share of the whole mesh's hull. 0.01 keeps a mug open.
+/// Largest volume between a piece and its hull, as a share of the whole mesh's hull. 0.01 keeps a mug open.
 const CONCAVITY: f32 = 0.01;
-/// At most this many pieces: each costs time in every step of every run.
+/// Largest number of pieces: each costs time in every step of every run.
 const MOST_HULLS: u32 = 32;
-/// A mesh that fills its hull so far is convex but for rounding.
+/// A mesh that fills this share of its hull counts as convex, up to rounding.
 const CONVEX: f64 = 0.97;
 
-/// What the solids of a mesh are a function of: the mesh and how it is taken apart.
+/// Returns a key of a mesh's decomposition: a digest of the mesh, the parameters and the algorithm's version.
 pub fn decomposition_key(mesh: &Mesh) -> String {
     let mut digest = Digest::new();
     digest.update(mesh.digest().as_bytes());
@@ -31,10 +31,10 @@ pub fn decomposition_key(mesh: &Mesh) -> String {
     digest.finish()
 }
 
-/// Convex solids that fill a mesh: hulls, in the mesh's own frame. The same mesh gives the same bits.
+/// Decomposes a mesh into convex hulls in the mesh's frame. The result is deterministic, bit by bit.
 ///
 /// # Errors
-/// A lower-case sentence where nothing solid can be made of it: its points lie in a plane, or it defeats the library.
+/// A lower-case message if its points lie in a plane or the library fails on it.
 pub fn decompose(mesh: &Mesh) -> Result<Vec<Shape>, String> {
     let frame = Frame::around(mesh);
     let points: Vec<Vector> = mesh.vertices.iter().map(|vertex| frame.inside(vertex)).collect();
@@ -43,13 +43,13 @@ pub fn decompose(mesh: &Mesh) -> Result<Vec<Shape>, String> {
         return Ok(vec![whole]);
     }
     let pieces = catch_unwind(AssertUnwindSafe(|| pieces(&points, &mesh.triangles)))
-        .map_err(|_| "it can't be taken apart into convex solids")?;
-    // Slivers without a hull have no volume that could be missed.
+        .map_err(|_| "it can't be decomposed into convex solids")?;
+    // Slivers without a hull have no relevant volume.
     let hulls: Vec<Shape> = pieces.iter().filter_map(|piece| frame.hull(piece)).collect();
     Ok(if hulls.is_empty() { vec![whole] } else { hulls })
 }
 
-/// Points of the surface inside of each piece.
+/// Returns the points of the surface within each piece.
 fn pieces(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<Vec<Vector>> {
     let parameters = VHACDParameters {
         resolution: RESOLUTION,
@@ -60,7 +60,7 @@ fn pieces(points: &[Vector], triangles: &[[u32; 3]]) -> Vec<Vec<Vector>> {
     VHACD::decompose(&parameters, points, triangles, true).compute_primitive_intersections(points, triangles)
 }
 
-/// A box of side 1 about the origin, in which the library's tolerances mean the same for things of all sizes.
+/// Normalises meshes to a box of side 1 about the origin, so that the library's tolerances are relative to the size.
 struct Frame {
     middle: [f64; 3],
     side: f64,
@@ -86,13 +86,13 @@ impl Frame {
         [0, 1, 2].map(|axis| point[axis] * self.side + self.middle[axis])
     }
 
-    /// The hull of some points; nothing where they lie in a plane.
+    /// Computes the convex hull of points. Returns `None` if they lie in a plane.
     fn hull(&self, points: &[Vector]) -> Option<Shape> {
         let (corners, triangles) = catch_unwind(AssertUnwindSafe(|| try_convex_hull(points).ok())).ok().flatten()?;
         let corners: Vec<[f64; 3]> = corners.iter().map(|corner| self.outside(corner)).collect();
         let volume = Mesh::new(corners, triangles).ok().map(|mesh| (mesh.volume(), mesh.welded().vertices));
         let (volume, points) = volume?;
-        // A millionth of the box: thinner than any sheet that could be felt.
+        // A millionth of the box: thinner than any relevant sheet.
         (volume > 1e-6 * self.side.powi(3)).then_some(Shape::Hull { points, volume })
     }
 }
@@ -101,7 +101,7 @@ impl Frame {
 mod tests {
     use super::*;
 
-    /// An L: two boxes of 1 × 1 × 1 and 1 × 1 × 2, side by side, as one surface.
+    /// An L shape: two boxes of 1 × 1 × 1 and 1 × 1 × 2, side by side, as one mesh.
     fn angle() -> Mesh {
         let profile = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
         let at = |y: f64| profile.map(|[x, z]| [x, y, z]);

@@ -1,4 +1,4 @@
-//! A URDF as the tree that is simulated: links that move against each other, with fixed ones folded in.
+//! Converts a URDF to the simulated tree: movable links, with fixed links merged into them.
 
 use std::collections::BTreeMap;
 
@@ -8,12 +8,12 @@ use crate::base::{Pose, did_you_mean};
 use crate::scenario::{Part, RobotProfile, Shape};
 use crate::world::WorldError;
 
-/// How a joint moves.
+/// The type of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
-    /// Along its axis; metres and newtons.
+    /// Slides along its axis. Units: metres and newtons.
     Prismatic,
-    /// About its axis; radians and newton metres.
+    /// Rotates about its axis. Units: radians and newton metres.
     Revolute,
 }
 
@@ -22,13 +22,13 @@ pub enum JointKind {
 pub struct Joint {
     /// Name in the URDF.
     pub name: String,
-    /// How it moves.
+    /// Type.
     pub kind: JointKind,
-    /// Index of the link that it sits on.
+    /// Index of the parent link.
     pub parent: usize,
-    /// Pose of the joint on its parent, at position 0.
+    /// Pose of the joint at position 0, in the frame of its parent link.
     pub origin: Isometry3<f64>,
-    /// Direction in the joint's frame.
+    /// Axis direction in the joint's frame.
     pub axis: Unit<Vector3<f64>>,
     /// Lower limit of the position.
     pub lower: f64,
@@ -40,49 +40,49 @@ pub struct Joint {
     pub velocity: f64,
     /// Viscous friction.
     pub damping: f64,
-    /// Joint that this one follows, with factor and offset.
+    /// Index of the joint that this one mimics, with factor and offset.
     pub mimic: Option<(usize, f64, f64)>,
 }
 
-/// A link with everything that is fixed to it.
+/// A movable link, merged with all links fixed to it.
 #[derive(Debug, Clone)]
 pub struct Link {
-    /// Name of the link that the joint moves; those fixed to it are folded in.
+    /// Name of the URDF link that the joint moves.
     pub name: String,
     /// Unit: kilograms.
     pub mass: f64,
     /// Centre of mass in the link's frame.
     pub com: Vector3<f64>,
-    /// About the centre of mass, along the link's axes. Unit: kg·m².
+    /// Inertia tensor about the centre of mass, along the link's axes. Unit: kg·m².
     pub inertia: Matrix3<f64>,
     /// Collision shapes in the link's frame.
     pub solids: Vec<Part>,
 }
 
-/// The whole robot. Parents come before their children.
+/// The robot's links and joints. Parents come before their children.
 #[derive(Debug, Clone)]
 pub struct RobotModel {
     /// `links[0]` is the root.
     pub links: Vec<Link>,
-    /// One fewer than links.
+    /// One less than `links`.
     pub joints: Vec<Joint>,
-    /// Every link of the URDF: the link that it was folded into, and where.
+    /// For every URDF link: the index of the link that it was merged into, and its pose in that link's frame.
     frames: BTreeMap<String, (usize, Isometry3<f64>)>,
     /// The URDF's name, for messages.
     name: String,
 }
 
-/// Mass of links that have none in the URDF, such as the stages of a base. Unit: kilograms. Small beside any real
+/// Mass of links without a mass in the URDF, such as the stages of a base. Unit: kilograms. Small compared to any real
 /// link, large enough for 32-bit arithmetic.
 const LEAST_MASS: f64 = 0.01;
-/// Their inertia: a ball of that mass and 1 cm. Unit: kg·m².
+/// Moment of inertia of those links: that of a ball of this mass with a radius of 1 cm. Unit: kg·m².
 const LEAST_INERTIA: f64 = 4e-7;
 
 impl RobotModel {
-    /// The robot of a profile's URDF.
+    /// Reads the robot of a profile's URDF.
     ///
     /// # Errors
-    /// [`WorldError`] if the text is no URDF, not one tree, or uses what can't be simulated.
+    /// [`WorldError`] if the text is not a URDF, is not a single tree, or contains unsupported elements.
     pub fn read(profile: &RobotProfile) -> Result<Self, WorldError> {
         let name = profile.urdf.name.to_string();
         let robot = urdf_rs::read_from_string(&profile.urdf.text)
@@ -93,7 +93,7 @@ impl RobotModel {
         Folding::new(&robot, name, &profile.meshes)?.fold(profile)
     }
 
-    /// Index of a joint by its name.
+    /// Returns the index of a joint by its name.
     ///
     /// # Errors
     /// [`WorldError::Missing`] with the nearest name.
@@ -106,7 +106,7 @@ impl RobotModel {
         })
     }
 
-    /// Where a link of the URDF went: index of the folded link and pose on it.
+    /// Returns the index of the link that a URDF link was merged into, and its pose in that link's frame.
     ///
     /// # Errors
     /// [`WorldError::Missing`] with the nearest name.
@@ -120,12 +120,12 @@ impl RobotModel {
     }
 }
 
-/// The state of folding a URDF's links together.
+/// The state while merging a URDF's links.
 struct Folding<'a> {
     robot: &'a urdf_rs::Robot,
     links: BTreeMap<&'a str, &'a urdf_rs::Link>,
     children: BTreeMap<&'a str, Vec<&'a urdf_rs::Joint>>,
-    /// Solids of mesh files.
+    /// Solids by mesh file.
     meshes: &'a BTreeMap<String, Vec<Shape>>,
     out: RobotModel,
 }
@@ -162,7 +162,7 @@ impl<'a> Folding<'a> {
             self.add_planar_base(names);
         }
         self.out.links.push(empty_link(root));
-        // Links whose children are still to be visited, with the folded link that they belong to.
+        // Links whose children are still to be visited, with the merged link that they belong to.
         let mut open = vec![(*root, self.out.links.len() - 1, Isometry3::identity())];
         while let Some((name, into, at)) = open.pop() {
             self.merge(name, into, &at)?;
@@ -187,7 +187,7 @@ impl<'a> Folding<'a> {
         Ok(self.out)
     }
 
-    /// Puts a base that drives every way below the URDF's root, with the speeds and efforts of the mobile manipulator's.
+    /// Adds an omnidirectional base below the URDF's root, with the speeds and efforts of the mobile manipulator.
     fn add_planar_base(&mut self, names: &[String; 3]) {
         let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
         for (parent, (name, axis)) in names.iter().zip(axes).enumerate() {
@@ -209,11 +209,11 @@ impl<'a> Folding<'a> {
         }
     }
 
-    /// Adds one link of the URDF to a folded one: mass, inertia (by the parallel axis theorem) and shapes.
+    /// Merges a URDF link into a movable link: mass, inertia (by the parallel axis theorem) and shapes.
     fn merge(&mut self, name: &str, into: usize, at: &Isometry3<f64>) -> Result<(), WorldError> {
         self.out.frames.insert(name.to_owned(), (into, *at));
         let Some(source) = self.links.get(name) else {
-            let reason = format!("a joint speaks of the link `{name}`, which is not there");
+            let reason = format!("a joint refers to a missing link `{name}`");
             return Err(WorldError::Urdf { name: self.out.name.clone(), reason });
         };
         let inertial = at * isometry(&source.inertial.origin);
@@ -238,7 +238,7 @@ impl<'a> Folding<'a> {
         Ok(())
     }
 
-    /// The solids of a collision geometry: one, or the pieces of a mesh.
+    /// Returns the solids of a collision geometry: a primitive, or the pieces of a mesh.
     fn shapes(&self, geometry: &urdf_rs::Geometry, link: &str) -> Result<Vec<Shape>, WorldError> {
         Ok(match geometry {
             urdf_rs::Geometry::Box { size } => vec![Shape::Box { size: size.0 }],
@@ -251,7 +251,7 @@ impl<'a> Folding<'a> {
                 let scale = scale.map_or([1.0; 3], |scale| scale.0);
                 let solids = self.meshes.get(filename).ok_or_else(|| WorldError::Unsupported {
                     name: self.out.name.clone(),
-                    what: format!("the mesh {filename} of `{link}`, which was not read,"),
+                    what: format!("the mesh {filename} of `{link}`, which was not loaded,"),
                 })?;
                 solids.iter().map(|solid| solid.scaled(scale)).collect()
             }
@@ -296,7 +296,7 @@ impl<'a> Folding<'a> {
     }
 }
 
-/// Mass, its centre, and its inertia about that.
+/// Mass, centre of mass, and inertia tensor about it.
 struct Mass {
     mass: f64,
     com: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! The engine, set up once: gravity, solver, shapes, who owns which collider.
+//! Configures the physics engine: gravity, solver, shapes, and the owners of colliders.
 
 use nalgebra::Vector3;
 use rapier3d::prelude::{
@@ -11,10 +11,10 @@ use crate::world::convert::{to_pose, to_real, to_vector};
 use crate::world::kinematics::GRAVITY;
 use crate::world::{WorldError, fault, fresh};
 
-/// Whom a collider belongs to.
+/// The owner of a collider.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Owner {
-    /// The ground.
+    /// The floor.
     Floor,
     /// Object by its index in the scene.
     Object(usize),
@@ -23,7 +23,7 @@ pub enum Owner {
 }
 
 impl Owner {
-    /// The number that the engine keeps with each collider.
+    /// Returns the owner as a collider's user data.
     pub fn to_tag(self) -> u128 {
         match self {
             Self::Floor => 0,
@@ -32,7 +32,7 @@ impl Owner {
         }
     }
 
-    /// Back from the number.
+    /// Returns the owner from a collider's user data.
     pub fn from_tag(tag: u128) -> Self {
         let idx = usize::try_from(tag.saturating_sub(1) / 2).unwrap_or(usize::MAX);
         match tag {
@@ -43,21 +43,21 @@ impl Owner {
     }
 }
 
-/// Natural frequency of contacts between what moves. Unit: hertz. Cuts the depth of a grasp's contacts from 1.8 mm
-/// (30 Hz, the engine's default) to a few tenths.
+/// Natural frequency of contacts between moving bodies. Unit: hertz. Reduces the penetration in a grasp from 1.8 mm (at
+/// 30 Hz, the engine's default) to a few tenths of a millimetre.
 const CONTACT_FREQUENCY_HZ: f32 = 90.0;
-/// Natural frequency of contacts with what is fixed. Unit: hertz. Stiffer ones lift a rim that rolls a little in every
-/// step, which keeps things rocking; at 20 Hz a salt mill sinks in and stands askew.
+/// Natural frequency of contacts with static bodies. Unit: hertz. Stiffer contacts lift a rolling rim a little in every
+/// step, which keeps objects rocking; at 20 Hz a salt mill sinks in and tilts.
 const SUPPORT_FREQUENCY_HZ: f32 = 30.0;
-/// Damping ratio of contacts: the engine's default, which keeps piles still.
+/// Damping ratio of contacts: the engine's default, which keeps stacks at rest.
 const CONTACT_DAMPING: f32 = 10.0;
-/// Friction of the floor: that of a wooden one.
+/// Friction coefficient of the floor: that of wood.
 const FLOOR_FRICTION: f32 = 0.5;
 
-/// An engine without bodies.
+/// Creates an engine without bodies.
 ///
 /// # Errors
-/// [`WorldError::Scene`] for rates that can't be stepped with.
+/// [`WorldError::Scene`] if `physics` has fewer than 30 steps per second or no iterations.
 pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
     if physics.steps_per_second < 30 || physics.iterations == 0 {
         let what = format!(
@@ -70,11 +70,11 @@ pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
     let parameters = IntegrationParameters {
         dt: 1.0 / to_real(f64::from(physics.steps_per_second)),
         num_solver_iterations: physics.iterations as usize,
-        // Without it every grasp creeps: friction would only act in the second of the solver's two passes.
+        // Without it, friction acts only in the second of the solver's two passes, and every grasp slips slowly.
         friction_in_bias_pass: true,
         contact_softness: softness(CONTACT_FREQUENCY_HZ),
         static_contact_softness: softness(SUPPORT_FREQUENCY_HZ),
-        // Kept contacts may be centimetres old; ours decide verdicts.
+        // Recycled contacts may be off by centimetres, but contacts decide verdicts.
         contact_recycling: false,
         ..IntegrationParameters::default()
     };
@@ -83,15 +83,15 @@ pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
     Ok(PhysicsWorld { gravity, integration_parameters: parameters, narrow_phase, ..PhysicsWorld::default() })
 }
 
-/// The group of the floor alone.
+/// The collision group of the floor.
 const FLOOR_GROUP: Group = Group::GROUP_32;
 
-/// Groups of what meets everything but the floor.
+/// Returns the collision groups of a body that does not collide with the floor.
 pub fn off_floor() -> InteractionGroups {
     InteractionGroups::new(Group::ALL, Group::ALL.difference(FLOOR_GROUP), InteractionTestMode::And)
 }
 
-/// Adds the floor: a slab with its top at 0.
+/// Adds the floor: a slab with its top at z = 0.
 pub fn add_floor(engine: &mut PhysicsWorld) {
     let half = to_real(fault::WORLD_RADIUS_M + 1.0);
     let floor = ColliderBuilder::cuboid(half, half, 0.5)
@@ -103,16 +103,17 @@ pub fn add_floor(engine: &mut PhysicsWorld) {
     engine.insert_collider(floor, None);
 }
 
-/// A convex solid as a collider in its body's frame; nothing for tubes, which have to be taken apart before, and for
-/// points that enclose nothing.
+/// Returns a collider for a convex solid in its body's frame. Returns `None` for tubes, which the caller must decompose
+/// first, and for points without a volume.
 ///
-/// Two surfaces share the geometric mean of their frictions: what the scene says holds against the same material.
+/// The friction of two surfaces is the geometric mean of their coefficients: a scene's value is that against the same
+/// material.
 pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> Option<ColliderBuilder> {
     let mut pose = solid.pose.to_isometry();
     let builder = match &solid.shape {
         Shape::Box { size: [x, y, z] } => ColliderBuilder::cuboid(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0)),
         Shape::Cylinder { radius, height } => {
-            // The engine's cylinders stand along y.
+            // The axis of the engine's cylinders is y.
             pose.rotation *= nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
             ColliderBuilder::cylinder(to_real(height / 2.0), to_real(*radius))
         }
@@ -132,7 +133,7 @@ pub fn collider(solid: &Part, owner: Owner, friction: f64, restitution: f64) -> 
     )
 }
 
-/// The convex hull of some points; nothing where they lie in a plane.
+/// Returns the convex hull of points, or `None` if they lie in a plane.
 fn hull(points: &[[f64; 3]]) -> Option<ColliderBuilder> {
     let points: Vec<_> = points.iter().map(|point| to_vector(&Vector3::from(*point))).collect();
     ColliderBuilder::convex_hull(&points)

@@ -1,4 +1,4 @@
-//! Why a scene can't be simulated.
+//! Errors of building a simulation.
 
 use crate::base::Diagnostic;
 
@@ -6,51 +6,53 @@ use crate::base::Diagnostic;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorldError {
-    /// The URDF's text is not a robot.
-    #[error("{name} is no usable URDF: {reason}")]
+    /// The URDF can't be used.
+    #[error("{name} is not a usable URDF: {reason}")]
     Urdf {
         /// The URDF's path.
         name: String,
-        /// What the parser says.
+        /// The reason.
         reason: String,
     },
-    /// The profile or the URDF names a joint or a link that is not there.
+    /// The profile or the URDF refers to a missing joint or link.
     #[error("{name} has no {kind} `{missing}`")]
     Missing {
         /// The URDF's path.
         name: String,
         /// `joint` or `link`.
         kind: &'static str,
-        /// What was named.
+        /// The missing name.
         missing: String,
         /// Nearest names.
         help: String,
     },
-    /// A part of a URDF that simulation has no counterpart for.
+    /// The URDF has an element that the simulation does not support.
     #[error("{name}: {what} is not supported")]
     Unsupported {
         /// The URDF's path.
         name: String,
-        /// Which part.
+        /// The element.
         what: String,
     },
-    /// A number of the scene that physics can't be stepped with.
+    /// The scene has an invalid physics setting.
     #[error("{what}")]
     Scene {
-        /// What is wrong with it.
+        /// The message.
         what: String,
     },
 }
 
 impl WorldError {
-    /// The same as a fault that a user can mend.
+    /// Converts the error to a diagnostic for the user.
     pub fn diagnostic(&self) -> Diagnostic {
         match self {
             Self::Urdf { .. } => Diagnostic::error("W020", self.to_string())
                 .help("the profile's `urdf` must name a URDF file with one tree of links"),
             Self::Missing { help, .. } => Diagnostic::error("W021", self.to_string()).help(help.clone()),
-            Self::Unsupported { .. } => Diagnostic::error("W022", self.to_string())
-                .help("use fixed, revolute, continuous and prismatic joints, and boxes, cylinders, spheres, capsules or meshes"),
+            Self::Unsupported { .. } => Diagnostic::error("W022", self.to_string()).help(
+                "use fixed, revolute, continuous or prismatic joints, and boxes, cylinders, spheres, capsules or \
+                 meshes",
+            ),
             Self::Scene { .. } => {
                 Diagnostic::error("W023", self.to_string()).help("see `[physics]` in the configuration")
             }

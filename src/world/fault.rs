@@ -1,25 +1,26 @@
-//! What can go wrong with simulation itself.
+//! Faults of the simulation, and disturbances for tests.
 
 use std::fmt;
 
 use crate::base::Pose;
 
-/// Horizontal distance from the world's origin beyond which a body has left it. Unit: metres. The floor ends a metre
-/// further out; scenes are a few metres wide.
+/// Radius of the world: a body farther from the origin, horizontally, has left it. Unit: metres. The floor ends a metre
+/// farther out; scenes are a few metres wide.
 pub const WORLD_RADIUS_M: f64 = 14.0;
-/// Depth below the floor at which a body has left the world. Unit: metres. Contacts never sink more than millimetres.
+/// Depth below the floor at which a body has left the world. Unit: metres. Contacts penetrate by a few millimetres at
+/// most.
 pub const WORLD_DEPTH_M: f64 = 0.3;
 
-/// A state that physics must never reach. Whatever the robot did, it is not to blame.
+/// An invalid state of the simulation, never caused by the robot's behaviour.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Fault {
-    /// A pose or a velocity of the body is not a number, or infinite.
+    /// A pose or velocity of the body is NaN or infinite.
     NotFinite(String),
-    /// The body is outside of the world.
+    /// The body has left the world.
     LeftWorld {
-        /// Which body.
+        /// The body.
         id: String,
-        /// Where it is. Unit: metres.
+        /// Its position. Unit: metres.
         position: [f64; 3],
     },
 }
@@ -35,26 +36,26 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Something that happens to an object by no doing of the robot's, for tests of what notices it. It can happen in reality.
+/// A realistic external disturbance of an object, for tests of its detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mishap {
-    /// The object is somewhere else from one moment to the next, at rest.
+    /// The object jumps to this pose, at rest.
     Pose(Pose),
-    /// Its friction coefficient is another one.
+    /// Its friction coefficient changes.
     Friction(f64),
-    /// It lies on its side where it stood, at rest.
+    /// It falls onto its side in place, at rest.
     Fall,
 }
 
-/// A disturbance that breaks simulation, for tests of physics.
+/// A disturbance that breaks the simulation, for tests of physics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Poison {
     /// The body's velocity becomes NaN.
     NotFinite,
-    /// The body is put somewhere. Unit: metres.
+    /// The body moves to this position. Unit: metres.
     Teleport([f64; 3]),
-    /// The body gets a velocity, without turning. Unit: m/s.
+    /// The body gets this linear velocity. Unit: m/s.
     Velocity([f64; 3]),
-    /// Sensors see the body here from now on, wherever it is.
+    /// From now on, sensors see the body at this pose.
     Decoy(Pose),
 }

@@ -1,4 +1,4 @@
-//! What bodies look like, for pictures: as little as an outline needs.
+//! Simplified shapes of bodies, for drawing their outlines.
 
 use nalgebra::Vector3;
 
@@ -6,8 +6,8 @@ use crate::scenario::{Part, Shape};
 use crate::world::World;
 
 impl World {
-    /// Forms of all objects and links by their names in traces: parts in the frame of the object or link. Pieces of meshes
-    /// are reduced to their outermost points.
+    /// Returns the shapes of all objects and links by their names in traces, in the frame of the object or link. Pieces
+    /// of meshes are reduced to their outermost points.
     pub fn forms(&self) -> Vec<(String, Vec<Part>)> {
         let objects = self.objects.iter().map(|object| (object.id.clone(), reduced(&object.model.parts)));
         let links = self.robot.model.links.iter().filter(|link| !link.solids.is_empty());
@@ -19,7 +19,7 @@ fn reduced(parts: &[Part]) -> Vec<Part> {
     parts.iter().map(|part| Part { pose: part.pose, shape: outermost(&part.shape) }).collect()
 }
 
-/// A hull of the points that reach farthest in each of 26 directions; any other shape as it is.
+/// Reduces a hull or mesh to its extreme points in 26 directions; returns other shapes unchanged.
 fn outermost(shape: &Shape) -> Shape {
     let points: Vec<[f64; 3]> = match shape {
         Shape::Hull { points, .. } => points.clone(),
@@ -37,7 +37,7 @@ fn outermost(shape: &Shape) -> Shape {
     Shape::Hull { points: farthest, volume: shape.volume() }
 }
 
-/// To the sides, edges and corners of a cube.
+/// Directions to the faces, edges and corners of a cube.
 fn directions() -> impl Iterator<Item = Vector3<f64>> {
     (0..27).filter(|idx| *idx != 13).map(|idx| {
         let part = |divisor: i32| f64::from(idx / divisor % 3 - 1);

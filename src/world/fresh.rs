@@ -1,9 +1,9 @@
-//! Contacts found anew in every step.
+//! Recomputes contacts in every step.
 //!
-//! The engine's geometry keeps contact points until they have moved by about a millimetre or the normal has turned by a
-//! degree. On a rim that rolls, the kept point trails the true one; the push then acts behind where the thing rests and
-//! drives it on: a bottle that was tipped a little on a table rocked for ever wider until it fell. Points found anew
-//! take that energy out of nowhere away.
+//! By default the engine keeps contact points until they have moved by about a millimetre or the normal has turned by a
+//! degree. On a rolling rim, the kept point lags behind the true one; the contact force then acts behind the point of
+//! support and adds energy: a slightly tipped bottle rocked wider and wider until it fell. Recomputing the points
+//! avoids this energy gain.
 
 use parry3d::math::{Pose, Real, Vector};
 use parry3d::query::details::NormalConstraints;
@@ -15,12 +15,12 @@ use parry3d::query::{
 use parry3d::shape::Shape;
 use rapier3d::prelude::{ContactData, ContactManifoldData, NarrowPhase};
 
-/// A narrow phase that keeps no contact point of the step before.
+/// Creates a narrow phase that does not reuse contact points from the previous step.
 pub fn narrow_phase() -> NarrowPhase {
     NarrowPhase::with_query_dispatcher(Forget.chain(DefaultQueryDispatcher))
 }
 
-/// Makes each contact be found anew, and leaves every answer to the next in the chain. What warms the solver up is kept:
+/// Invalidates cached contacts and leaves all queries to the next dispatcher in the chain. Warm starting still works:
 /// impulses are matched by feature.
 struct Forget;
 

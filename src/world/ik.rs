@@ -1,19 +1,19 @@
-//! Inverse kinematics: joint positions that bring the grasp link to a pose, within the joints' limits.
+//! Inverse kinematics of the grasp link, within the joint limits.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector6};
 
 use crate::world::Kinematics;
 
-/// What is asked of the solver.
+/// A request to the solver.
 #[derive(Debug, Clone)]
 pub struct Reach {
-    /// Where the grasp link shall be. Frame: that of the kinematics' root.
+    /// Target pose of the grasp link. Frame: that of the kinematics' root.
     pub target: Isometry3<f64>,
-    /// How readily each joint moves, from 0 (held where it is) to 1. Shape: one per joint.
+    /// Weight of each joint, from 0 (held fixed) to 1. Shape: one per joint.
     pub mobility: Vec<f64>,
 }
 
-/// Position error that counts as reached. Unit: metres. A tenth of what sensing gets wrong.
+/// Position error that counts as reached. Unit: metres. A tenth of the sensing errors.
 const REACHED_M: f64 = 5e-4;
 /// Angle error that counts as reached. Unit: radians.
 const REACHED_RAD: f64 = 2e-3;
@@ -23,9 +23,9 @@ const MOST_ITERATIONS: usize = 80;
 /// Largest change of a joint in one iteration. Units: metres or radians.
 const LARGEST_STEP: f64 = 0.3;
 
-/// Joint positions near `seed` that reach the target, or nothing if the solver finds none.
+/// Returns joint positions near `seed` that reach the target, or `None` if the solver does not converge.
 ///
-/// Damped least squares; a joint that meets its limit is held there and the rest is solved again.
+/// Uses damped least squares; a joint that reaches its limit is held there and the others are solved again.
 pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
     let mut positions = seed.to_vec();
     for (position, joint) in positions.iter_mut().zip(kinematics.joints()) {
@@ -43,7 +43,7 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
     None
 }
 
-/// One iteration. Joints that would pass a limit stop at it, and the others make up for them.
+/// Performs one iteration. Joints that would pass a limit stop at it, and the others compensate.
 fn step(
     kinematics: &Kinematics,
     positions: &mut [f64],
@@ -72,12 +72,12 @@ fn step(
     }
 }
 
-/// Whether the joint is already at the limit that it wants to pass (to a millionth of a radian or metre).
+/// Whether the joint is already at the limit that it would pass (to a millionth of a radian or metre).
 fn at_limit(position: f64, wanted: f64, lower: f64, upper: f64) -> bool {
     (wanted < lower && position <= lower + 1e-6) || (wanted > upper && position >= upper - 1e-6)
 }
 
-/// W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, no component larger than the largest step.
+/// Computes W·Jᵀ·(J·W·Jᵀ + λ²·I)⁻¹·e, scaled down so that no component exceeds the largest step.
 fn least_squares(jacobian: &DMatrix<f64>, error: &Vector6<f64>, mobility: &[f64]) -> DVector<f64> {
     let weights = DMatrix::from_diagonal(&DVector::from_column_slice(mobility));
     let weighted = &weights * jacobian.transpose();
@@ -92,7 +92,7 @@ fn least_squares(jacobian: &DMatrix<f64>, error: &Vector6<f64>, mobility: &[f64]
     change
 }
 
-/// What is missing from one pose to another: metres above radians.
+/// Returns the difference between two poses: linear part (metres) above angular part (radians).
 fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     let linear = to.translation.vector - from.translation.vector;
     let angular = (to.rotation * from.rotation.inverse()).scaled_axis();

@@ -1,4 +1,4 @@
-//! Where the robot's links are for given joint positions, and which forces hold it against gravity.
+//! Forward kinematics, the grasp Jacobian and gravity compensation.
 
 use std::sync::Arc;
 
@@ -8,10 +8,10 @@ use crate::base::Pose;
 use crate::scenario::{Part, Shape};
 use crate::world::description::{Joint, JointKind, RobotModel};
 
-/// Earth's pull. Unit: m/s².
+/// Gravitational acceleration. Unit: m/s².
 pub const GRAVITY: f64 = 9.81;
 
-/// A robot's geometry as skills see it: no physics, no truth about the world.
+/// A robot's geometry for skills, without physics or ground truth.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
     model: Arc<RobotModel>,
@@ -22,8 +22,8 @@ pub struct Kinematics {
 }
 
 impl Kinematics {
-    /// The geometry of a robot whose root stands at `root`; `grasp` and `camera` are the links of these names and where
-    /// they were folded to.
+    /// Creates the geometry of a robot with its root at `root`. `grasp` and `camera` are the merged link and the pose
+    /// in its frame.
     pub(crate) fn new(
         model: Arc<RobotModel>,
         root: Isometry3<f64>,
@@ -38,8 +38,8 @@ impl Kinematics {
         &self.model.joints
     }
 
-    /// Points spread over the robot's collision shapes, at most about `spacing` apart: index of the link and the point in
-    /// its frame. Units: metres.
+    /// Samples points on the robot's collision shapes, at most about `spacing` apart. Returns each with the index of
+    /// its link, in the link's frame. Unit: metres.
     pub fn surface_points(&self, spacing: f64) -> Vec<(usize, Point3<f64>)> {
         let mut points = Vec::new();
         for (idx, link) in self.model.links.iter().enumerate() {
@@ -51,7 +51,7 @@ impl Kinematics {
         points
     }
 
-    /// Poses of all links. Shape: one more than positions.
+    /// Returns the poses of all links. Shape: one more than `positions`.
     pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
         let mut poses = Vec::with_capacity(self.model.links.len());
         poses.push(self.root);
@@ -61,22 +61,22 @@ impl Kinematics {
         poses
     }
 
-    /// Pose of the grasp link.
+    /// Returns the pose of the grasp link.
     pub fn grasp(&self, positions: &[f64]) -> Isometry3<f64> {
         self.links(positions)[self.grasp.0] * self.grasp.1
     }
 
-    /// Pose of the camera: x looks forwards, z is up in its pictures.
+    /// Returns the pose of the camera: x forwards, z up in the image.
     pub fn camera(&self, positions: &[f64]) -> Isometry3<f64> {
         self.links(positions)[self.camera.0] * self.camera.1
     }
 
-    /// Collision shapes of each link, in its frame.
+    /// Returns the collision shapes of each link, in its frame.
     pub(crate) fn solids_of_links(&self) -> impl Iterator<Item = &[Part]> {
         self.model.links.iter().map(|link| link.solids.as_slice())
     }
 
-    /// Poses of all collision shapes, with the shapes.
+    /// Returns all collision shapes with their poses.
     pub(crate) fn solids(&self, positions: &[f64]) -> Vec<(Isometry3<f64>, Shape)> {
         let links = self.model.links.iter().zip(self.links(positions));
         links
@@ -86,7 +86,7 @@ impl Kinematics {
             .collect()
     }
 
-    /// Pose of the grasp link, and how it moves with each joint. Shape: 6 × joints, linear above angular.
+    /// Returns the pose and the Jacobian of the grasp link. Shape: 6 × joints, linear above angular.
     pub fn grasp_jacobian(&self, positions: &[f64]) -> (Isometry3<f64>, Matrix6xX<f64>) {
         let poses = self.links(positions);
         let grasp = poses[self.grasp.0] * self.grasp.1;
@@ -106,10 +106,10 @@ impl Kinematics {
         (grasp, jacobian)
     }
 
-    /// Forces and torques that hold the robot's own weight. Units: newtons or newton metres. Shape: one per joint.
+    /// Returns the forces and torques that compensate gravity. Units: newtons or newton metres. Shape: one per joint.
     pub fn holding_efforts(&self, positions: &[f64]) -> Vec<f64> {
         let poses = self.links(positions);
-        // Weight of each subtree and its moment, gathered from the leaves inwards: children come after their parents.
+        // Mass and first moment of each subtree, accumulated from the leaves: children come after their parents.
         let mut weights: Vec<(f64, Vector3<f64>)> = self
             .model
             .links
@@ -144,13 +144,13 @@ fn motion(joint: &Joint, position: f64) -> Isometry3<f64> {
     }
 }
 
-/// Direction of a joint's axis and a point on it. Frame: world.
+/// Returns the direction of a joint's axis and a point on it. Frame: world.
 fn axis_in_world(joint: &Joint, poses: &[Isometry3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
     let frame = poses[joint.parent] * joint.origin;
     (frame.rotation * joint.axis.into_inner(), frame.translation.vector)
 }
 
-/// Points on a shape in its own frame. Tubes have none: robots are not made of them.
+/// Samples points on a shape in its own frame. Tubes have none: robots do not contain them.
 fn spread(shape: &Shape, spacing: f64) -> Vec<Point3<f64>> {
     match *shape {
         Shape::Box { size } => {
@@ -172,11 +172,11 @@ fn spread(shape: &Shape, spacing: f64) -> Vec<Point3<f64>> {
                 .collect()
         }
         Shape::Capsule { radius, height } => {
-            // The cylinder around it.
+            // Its bounding cylinder.
             spread(&Shape::Cylinder { radius, height: height + 2.0 * radius }, spacing)
         }
         Shape::Hull { .. } | Shape::Mesh { .. } => {
-            // The box around it.
+            // Its bounding box.
             let (low, high) = Part { pose: Pose::IDENTITY, shape: shape.clone() }.bounds();
             let (low, high) = (Vector3::from(low), Vector3::from(high));
             let middle = (low + high) / 2.0;
@@ -187,7 +187,7 @@ fn spread(shape: &Shape, spacing: f64) -> Vec<Point3<f64>> {
     }
 }
 
-/// Numbers from −extent/2 to extent/2, both included, at most `spacing` apart.
+/// Returns numbers from −extent/2 to extent/2, both included, at most `spacing` apart.
 fn steps(extent: f64, spacing: f64) -> Vec<f64> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen steps")]
     let n_steps = (extent / spacing).ceil().clamp(1.0, 200.0) as usize;

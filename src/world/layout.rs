@@ -1,4 +1,4 @@
-//! Which joints and links of a URDF do what.
+//! Resolves the joints and links of a profile in the URDF.
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
@@ -6,20 +6,20 @@ use crate::scenario::RobotProfile;
 use crate::world::WorldError;
 use crate::world::description::RobotModel;
 
-/// Which joints of the robot are what, by their index.
+/// Indices of the robot's joints by their role.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
-    /// The base's: x, y, heading; none where it is fixed.
+    /// Base: x, y, heading; `None` if it is fixed.
     pub base: Option<[usize; 3]>,
-    /// The arm's, in the profile's order.
+    /// Arm, in the profile's order.
     pub arm: Vec<usize>,
-    /// The head's: pan, tilt.
+    /// Head: pan, tilt.
     pub head: Vec<usize>,
-    /// The fingers': left, right.
+    /// Fingers: left, right.
     pub fingers: [usize; 2],
 }
 
-/// Where the profile's names are in the URDF.
+/// The profile's joints and links, resolved in the URDF.
 pub(super) struct Named {
     pub(super) layout: Layout,
     pub(super) finger_links: [usize; 2],
@@ -53,10 +53,10 @@ impl Named {
     }
 }
 
-/// Whether a profile and its URDF fit together, without simulating.
+/// Checks that a profile matches its URDF, without simulating.
 ///
 /// # Errors
-/// [`WorldError`]: the first thing that is missing or can't be simulated.
+/// [`WorldError`] for the first missing or unsupported element.
 pub fn check_robot(profile: &RobotProfile) -> Result<(), WorldError> {
     let model = RobotModel::read(profile)?;
     Named::find(profile, &model).map(|_| ())

@@ -1,4 +1,4 @@
-//! What can happen to an object, or to the robot, by no doing of the robot's.
+//! External disturbances of objects and of the robot.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -6,11 +6,11 @@ use crate::base::Pose;
 use crate::world::convert::{to_pose, to_real, to_vector};
 use crate::world::{Mishap, World};
 
-/// Gap that is left below an object that is laid down, so that it falls into contact and is not pushed out. Unit: metres.
+/// Gap below an object that is laid down, so that it drops into contact instead of being pushed out. Unit: metres.
 const DROP_M: f64 = 2e-3;
 
 impl World {
-    /// Lets something happen to an object. False if there is no such object.
+    /// Applies a disturbance to an object. Returns `false` if there is no such object.
     pub fn befall(&mut self, id: &str, mishap: Mishap) -> bool {
         let Some(object) = self.objects.iter().find(|object| object.id == id) else { return false };
         let pose = match mishap {
@@ -35,7 +35,8 @@ impl World {
 }
 
 impl World {
-    /// Somebody carries the robot off to where it does not believe to be: x, y and heading. False if its base does not move.
+    /// Moves the robot to another pose (x, y, heading) without changing its pose estimate. Returns `false` if its base
+    /// is fixed.
     pub fn carry_off(&mut self, to: [f64; 3]) -> bool {
         if self.robot.layout.base.is_none() {
             return false;
@@ -43,7 +44,7 @@ impl World {
         let from = self.base_true();
         let [x, y, heading] = self.believed(from);
         self.robot.shift_base(&mut self.engine, [0, 1, 2].map(|axis| to[axis] - from[axis]));
-        // Its wheels did not turn.
+        // The odometry does not register the move.
         let (believed, truth) = (Pose::upright([x, y, 0.0], heading), Pose::upright([to[0], to[1], 0.0], to[2]));
         self.believed_from_true = believed.to_isometry() * truth.to_isometry().inverse();
         self.forget_way();
@@ -51,9 +52,9 @@ impl World {
     }
 }
 
-/// A standing object of a size, laid on its side about where it stood: its middle stays above the same place.
+/// Returns the pose of a standing object after it is laid on its side; its middle stays above the same point.
 fn lying(standing: &Isometry3<f64>, [width, _, height]: [f64; 3]) -> Isometry3<f64> {
-    // About its own y axis: what was its top points along its own x axis, its width is what stands up now.
+    // Rotated about its y axis: its top now points along its former x axis, and its width is vertical.
     let turned = standing.rotation * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::FRAC_PI_2);
     let top = turned * Vector3::z();
     let foot = standing.translation.vector - top * (height / 2.0) + Vector3::z() * (width / 2.0 + DROP_M);

@@ -1,6 +1,6 @@
-//! A `Scene` to a stepping simulation: the only place that knows the physics engine.
+//! Simulates a `Scene`: the only module that uses the physics engine.
 //!
-//! Never: decides what the robot does, calls anything a success, or attaches a thing to the hand by a constraint.
+//! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint.
 
 mod assemble;
 mod body;

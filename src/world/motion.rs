@@ -1,40 +1,41 @@
-//! What the robot measured of itself and what its controllers were told, over time: what policies are learned from.
+//! The robot's measurements and commands over time, as data for policy learning.
 
 use serde::{Deserialize, Serialize};
 
 use crate::world::recorder::grain;
 use crate::world::{Command, World};
 
-/// Positions, velocities and targets are whole multiples of this, which compresses. Units: metres or radians, and of them a second.
+/// Positions, velocities and targets are rounded to multiples of this, for compression. Units: metres or radians (per
+/// second).
 const GRAIN: f64 = 1e-4;
-/// The same for efforts. Units: newtons or newton metres.
+/// As [`GRAIN`], for efforts. Units: newtons or newton metres.
 const EFFORT_GRAIN: f64 = 0.01;
 
-/// The course of the robot during one action, sampled as often as its bodies' poses are; the first row is how it began.
+/// The robot's motion during one action, sampled as often as the bodies' poses; the first row is the initial state.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// Names of the joints, in the robot's order.
     pub joints: Vec<String>,
-    /// One for each moment; see [`MotionRow`]. Shape: moments × (12 + 4 · joints).
+    /// One row per moment; see [`MotionRow`]. Shape: moments × (12 + 4 · joints).
     pub rows: Vec<Vec<f32>>,
 }
 
 /// One moment of a [`Motion`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionRow<'a> {
-    /// Since the action began. Unit: seconds.
+    /// Time since the action began. Unit: seconds.
     pub time_secs: f32,
     /// Measured gap between the fingers. Unit: metres.
     pub opening_m: f32,
-    /// What each finger's motor gives, left and right. Unit: newtons, positive closes.
+    /// Force of each finger's motor, left and right; positive closes. Unit: newtons.
     pub finger_efforts_n: [f32; 2],
-    /// The gap that the fingers were told to go to. Unit: metres.
+    /// Commanded gap between the fingers. Unit: metres.
     pub told_opening_m: f32,
-    /// The largest force that a finger was told to give. Unit: newtons.
+    /// Commanded largest force of a finger. Unit: newtons.
     pub told_force_n: f32,
-    /// Where the base truly is: x, y (metres), heading (radians). Frame: world.
+    /// True base pose: x, y (metres), heading (radians). Frame: world.
     pub base_true: [f32; 3],
-    /// Where the base believes that it is.
+    /// Believed base pose, in the same order.
     pub base_believed: [f32; 3],
     joints: &'a [f32],
 }
@@ -42,18 +43,18 @@ pub struct MotionRow<'a> {
 /// One joint at one moment. Units: metres or radians, and their efforts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointMoment {
-    /// Measured position, the base's by its own belief.
+    /// Measured position; for the base, by its own belief.
     pub position: f32,
     /// Measured velocity.
     pub velocity: f32,
-    /// What its motor gives beyond what holds the robot's own weight.
+    /// Effort of its motor, without gravity compensation.
     pub effort: f32,
-    /// Where its controller was told to go in the control tick that ended then.
+    /// Commanded position in the control tick that ended at this moment.
     pub target: f32,
 }
 
 impl Motion {
-    /// Its moments, in order. Rows of another length than they should have are none.
+    /// Returns its moments in order. Rows of the wrong length are skipped.
     pub fn moments(&self) -> impl Iterator<Item = MotionRow<'_>> {
         self.rows.iter().filter_map(|row| {
             let (head, joints) = row.split_first_chunk::<12>()?;
@@ -74,7 +75,7 @@ impl Motion {
 }
 
 impl<'a> MotionRow<'a> {
-    /// Its joints, in the order of their names.
+    /// Returns its joints, in the order of [`Motion::joints`].
     pub fn joints(&self) -> impl Iterator<Item = JointMoment> + 'a {
         self.joints.chunks_exact(4).map(|values| JointMoment {
             position: values[0],
@@ -85,7 +86,7 @@ impl<'a> MotionRow<'a> {
     }
 }
 
-/// Gathers a [`Motion`].
+/// Records a [`Motion`].
 #[derive(Default)]
 pub(super) struct MotionMeter {
     told: Option<Command>,
@@ -93,7 +94,7 @@ pub(super) struct MotionMeter {
 }
 
 impl MotionMeter {
-    /// Notes what the controllers are told.
+    /// Stores the command.
     pub(super) fn tell(&mut self, command: &Command) {
         match &mut self.told {
             Some(told) => told.clone_from(command),
@@ -103,14 +104,14 @@ impl MotionMeter {
 }
 
 impl World {
-    /// Begins anew: what is told now is to stay.
+    /// Starts a new recording, with a command to hold the current state.
     pub(super) fn begin_motion(&mut self) {
         self.recorder.motion.rows.clear();
         self.recorder.motion.told = Some(self.hold());
         self.record_motion();
     }
 
-    /// Keeps this moment.
+    /// Records this moment.
     pub(super) fn record_motion(&mut self) {
         let Some(told) = &self.recorder.motion.told else { return };
         let observed = self.observe();
@@ -129,7 +130,7 @@ impl World {
         self.recorder.motion.rows.push(row);
     }
 
-    /// What was kept since it began.
+    /// Returns the motion recorded since the start.
     pub(super) fn end_motion(&mut self) -> Motion {
         let joints = self.robot.model.joints.iter().map(|joint| joint.name.clone()).collect();
         Motion { joints, rows: std::mem::take(&mut self.recorder.motion.rows) }

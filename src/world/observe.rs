@@ -1,4 +1,4 @@
-//! The truth at one moment, with names.
+//! Creates snapshots of the true state.
 
 use std::collections::BTreeSet;
 
@@ -9,11 +9,11 @@ use crate::world::engine::Owner;
 use crate::world::simulation::Object;
 use crate::world::{BodyState, RobotState, Snapshot, World};
 
-/// Share of a body's weight that a contact has to carry for the body to rest on it. Two supports share at least so much.
+/// Share of a body's weight that a contact must carry for the body to rest on it. Low enough for several supports.
 const CARRIED_SHARE: f64 = 0.1;
 
 impl World {
-    /// All that is true now.
+    /// Returns the true state of the world.
     pub fn snapshot(&self) -> Snapshot {
         let pairs = self.pairs();
         let bodies = self.objects.iter().enumerate().map(|(idx, object)| self.body(idx, object, &pairs)).collect();
@@ -70,7 +70,7 @@ impl World {
         }
     }
 
-    /// The box around an object's shapes. Unit: metres. Frame: world.
+    /// Returns the bounding box of an object's shapes. Unit: metres. Frame: world.
     pub(super) fn aabb(&self, object: &Object) -> ([f64; 3], [f64; 3]) {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
@@ -111,7 +111,7 @@ impl World {
         }
     }
 
-    /// Name of a thing in snapshots: the robot is one thing.
+    /// Returns the name of an owner in snapshots; all links are `robot`.
     fn thing(&self, owner: Owner) -> String {
         match owner {
             Owner::Link(_) => "robot".to_owned(),
@@ -120,10 +120,10 @@ impl World {
     }
 }
 
-/// Two things that touch. Owners are in order: floor, objects, links.
+/// Two owners in contact, ordered: floor, objects, links.
 struct Pair {
     first: Owner,
     second: Owner,
-    /// Upward force that the first gives the second. Unit: newtons.
+    /// Upward force of the first on the second. Unit: newtons.
     lift_on_second_n: f64,
 }

@@ -1,8 +1,8 @@
-//! How the base's belief of where it stands changes as it drives: wheels are off, landmarks put it right.
+//! Localisation of the base while it drives: wheel odometry drifts, landmarks correct it.
 //!
-//! Wheels are off by the same share for a stretch of the way, then by another: each stretch has choices of its own, named
-//! `sense.odometry.*`. A landmark gives the true place with noise; how much of it is believed follows from how far astray
-//! the belief may be by now (a Kalman filter with one variance for the place and one for the heading).
+//! The relative wheel errors are constant within a stretch of the path. Each stretch has its own choices, named
+//! `sense.odometry.*`. A landmark measures the true pose with noise; its weight depends on the current uncertainty of
+//! the estimate (a Kalman filter with one variance for the position and one for the heading).
 
 use nalgebra::Vector2;
 
@@ -10,30 +10,31 @@ use crate::base::{Choices, Pose};
 use crate::scenario::Odometry;
 use crate::world::World;
 
-/// Way, or turn, after which wheels are off by another share. Units: metres, or radians.
+/// Length of a stretch with constant wheel errors: distance plus rotation. Units: metres and radians.
 const STRETCH: f64 = 0.5;
-/// A correction is believed no faster than this, so that a base that follows its belief does not jerk. Units: m/s and
-/// rad/s.
+/// Largest rate at which corrections are applied, so that a base that follows its estimate does not jerk. Units: m/s
+/// and rad/s.
 const CORRECTION_SPEED: f64 = 0.05;
 
-/// What the base remembers of its way.
+/// The state of the base's odometry.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tracker {
-    /// Where it truly was a tick ago.
+    /// True base pose at the previous tick.
     last: Option<[f64; 3]>,
-    /// Errors in this stretch: along the way, across it, for each radian turned, and of the heading for each metre.
+    /// Errors in this stretch: along and across the path (shares), of the heading per radian turned and per metre
+    /// driven.
     off: [f64; 4],
-    /// What is left of this stretch.
+    /// Remaining length of this stretch.
     left: f64,
-    /// Way since a landmark was seen. Unit: metres.
+    /// Distance since the last landmark. Unit: metres.
     since_landmark_m: f64,
-    /// Variances of place and heading. Units: m² and rad².
+    /// Variances of position and heading. Units: m² and rad².
     variances: [f64; 2],
-    /// Corrections that are not believed yet: x, y, heading.
+    /// Corrections not applied yet: x, y, heading.
     pending: [f64; 3],
 }
 
-/// A step of the base, truly.
+/// The true motion of the base in one tick.
 struct Step {
     along: Vector2<f64>,
     way_m: f64,
@@ -41,18 +42,18 @@ struct Step {
 }
 
 impl World {
-    /// Begins with what the base may be wrong about at first.
+    /// Starts with the uncertainty of the initial localisation.
     pub(super) fn begin_tracking(&mut self) {
         let (place, heading) = (self.sensing.localisation_noise_m, self.sensing.heading_noise_rad);
         self.tracker = Tracker { variances: [place * place, heading * heading], ..Tracker::default() };
     }
 
-    /// The base is elsewhere, and no wheel has turned: the next step begins here.
+    /// Starts the next step at the current pose, after the base was moved without turning its wheels.
     pub(super) fn forget_way(&mut self) {
         self.tracker.last = None;
     }
 
-    /// Takes into the belief how the base has moved since the last time. To be called after every tick.
+    /// Updates the pose estimate with the base's motion since the last call. Call it after every tick.
     pub fn track_base(&mut self, choices: &mut Choices) {
         if self.sensing.odometry == Odometry::IDEAL || self.robot.layout.base.is_none() {
             return;
@@ -77,7 +78,7 @@ impl World {
         self.believed_from_true = Pose::upright([x, y, 0.0], heading).to_isometry() * truth.inverse();
     }
 
-    /// The believed pose after a step, by what the wheels say of it.
+    /// Returns the believed pose after a step, by wheel odometry.
     fn by_wheels(&mut self, last: [f64; 3], step: &Step, choices: &mut Choices) -> [f64; 3] {
         let [x, y, heading] = self.believed(last);
         let astray = heading - last[2];
@@ -105,7 +106,7 @@ impl World {
         ]
     }
 
-    /// Notes how the belief is to be corrected by a landmark.
+    /// Computes the correction by a landmark, to be applied gradually.
     fn see_landmark(&mut self, truth: [f64; 3], believed: [f64; 3], choices: &mut Choices) {
         let odometry = &self.sensing.odometry;
         let noise = [odometry.landmark_noise_m, odometry.landmark_noise_m, odometry.landmark_noise_rad];
@@ -123,8 +124,8 @@ impl World {
 }
 
 impl Tracker {
-    /// How far astray the belief may be grows with the way. Stretches are independent of each other; a wrong heading takes
-    /// the place aside in proportion to the way.
+    /// Increases the variances with the distance. Stretches are independent; a heading error displaces the position in
+    /// proportion to the distance.
     fn grow(&mut self, odometry: &Odometry, step: &Step) {
         let moved = step.way_m + step.turn_rad.abs();
         self.since_landmark_m += step.way_m;
@@ -134,7 +135,7 @@ impl Tracker {
     }
 }
 
-/// The share of a measurement that is believed, which leaves a smaller variance.
+/// Returns the Kalman gain of a measurement, and reduces the variance.
 fn share(variance: &mut f64, noise: f64) -> f64 {
     let total = *variance + noise * noise;
     if total <= 0.0 {
@@ -166,7 +167,7 @@ mod tests {
         for _ in 0..200 {
             tracker.grow(&odometry, &Step { along: Vector2::zeros(), way_m: 0.01, turn_rad: 0.0 });
         }
-        // Two metres: four stretches of half a metre, each off by a tenth.
+        // Two metres: four stretches of half a metre, each with an error of a tenth.
         assert!((tracker.variances[1].sqrt() - 0.02).abs() < 1e-9, "{}", tracker.variances[1].sqrt());
         let straight = 0.1 * 0.5 * 2.0;
         assert!(tracker.variances[0].sqrt() > straight && tracker.variances[0].sqrt() < 1.2 * straight);

@@ -1,6 +1,6 @@
-//! How good the simulation itself was: how deep things went into each other, and energy that came from nowhere.
+//! Measures the quality of the simulation: penetration depth, and energy gained without a cause.
 //!
-//! Reads the state of the engine after a tick and changes nothing of it.
+//! Reads the engine's state after a tick without changing it.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,21 +8,21 @@ use crate::world::World;
 use crate::world::engine::Owner;
 use crate::world::kinematics::GRAVITY;
 
-/// What physics got wrong in a run, at worst.
+/// The worst errors of physics in a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// How deep two things went into each other that pushed each other. Unit: metres.
+    /// Deepest penetration of two bodies in contact. Unit: metres.
     pub deepest_penetration_m: f64,
-    /// Largest rise of the energy, kinetic and of height, of the objects that the robot could not have given any: it
-    /// neither touched them nor what they were next to. Unit: joules. Real objects only lose.
+    /// Largest rise of the kinetic and potential energy of the objects that the robot could not have pushed: it touched
+    /// neither them nor their neighbours. Unit: joules. Real objects only lose energy.
     pub energy_gain_j: f64,
 }
 
-/// Follows penetration and energy tick by tick.
+/// Measures penetration and energy tick by tick.
 #[derive(Debug, Default)]
 pub(super) struct QualityMeter {
     deepest_m: f64,
-    /// Energy of each object after the tick before; nothing for those that are fixed or in the robot's reach.
+    /// Energy of each object after the previous tick; `None` for static objects and those the robot could push.
     before: Vec<Option<f64>>,
     /// Sum of all changes since the beginning.
     level_j: f64,
@@ -31,12 +31,12 @@ pub(super) struct QualityMeter {
 }
 
 impl QualityMeter {
-    /// What was worst up to now.
+    /// Returns the worst values so far.
     pub(super) fn quality(&self) -> Quality {
         Quality { deepest_penetration_m: self.deepest_m, energy_gain_j: self.gain_j }
     }
 
-    /// One tick: the deepest contact, and the energy of each object that is free of the robot.
+    /// Records a tick: the deepest contact, and the energy of each object that the robot could not push.
     pub(super) fn tick(&mut self, deepest_m: f64, energies: Vec<Option<f64>>) {
         self.deepest_m = self.deepest_m.max(deepest_m);
         let changes = self.before.iter().zip(&energies).filter_map(|(before, now)| Some((*now)? - (*before)?));
@@ -48,13 +48,13 @@ impl QualityMeter {
 }
 
 impl World {
-    /// What physics got wrong since the first record began, at worst.
+    /// Returns the worst errors of physics since the first record began.
     pub fn quality(&self) -> Quality {
         self.recorder.quality.quality()
     }
 
-    /// Energy of each object, in scene order; nothing for those that are fixed, and for those that the robot is next to or
-    /// that are next to such. Unit: joules.
+    /// Returns the energy of each object, in scene order; `None` for static objects and those the robot could push.
+    /// Unit: joules.
     pub(super) fn free_energies(&self) -> Vec<Option<f64>> {
         let reached = self.reached_by_robot();
         let objects = self.objects.iter().zip(reached);
@@ -67,8 +67,8 @@ impl World {
             .collect()
     }
 
-    /// Which objects the robot could have pushed, directly or through others. The boxes around them decide, so that no
-    /// contact is overlooked that began and ended within a tick.
+    /// Marks the objects that the robot could have pushed, directly or through others. Compares bounding boxes, so that
+    /// it includes contacts that began and ended within a tick.
     fn reached_by_robot(&self) -> Vec<bool> {
         let mut reached = vec![false; self.objects.len()];
         let mut pairs: Vec<(usize, usize)> = Vec::new();
@@ -82,7 +82,7 @@ impl World {
                 _ => {}
             }
         }
-        // What is fixed passes nothing on.
+        // Static objects do not transmit a push.
         let fixed: Vec<bool> = self
             .objects
             .iter()

@@ -1,9 +1,9 @@
-//! Rays from one eye: which shape each meets first.
+//! Ray casting from one eye point.
 //!
-//! A picture has as many rays as pixels, and all start at one point. So every shape is prepared once for that point, and
-//! each ray is only tried against the shapes whose outline meets the tile of its pixel and whose ball it passes through,
-//! nearest first. Boxes, cylinders and balls, which most shapes are, are met in closed form; the library's cylinders are
-//! searched for and take a hundred times as long.
+//! All rays of an image start at the same point. So each shape is prepared once for that point, and each ray is tested
+//! only against the shapes whose silhouette overlaps the tile of its pixel and whose bounding sphere it hits, nearest
+//! first. Boxes, cylinders and balls, the most frequent shapes, are intersected in closed form; the library's iterative
+//! cylinder intersection takes a hundred times as long.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::query::Ray;
@@ -12,30 +12,30 @@ use parry3d::shape::{Shape, TypedShape};
 use crate::world::convert::{from_vector, to_real, to_vector};
 use crate::world::silhouette::Silhouette;
 
-/// Pixels along one side of a tile: fine enough for few shapes in each, coarse enough for few tiles.
+/// Side of a tile in pixels: small enough for few shapes per tile, large enough for few tiles.
 const TILE: usize = 8;
-/// By this much balls around shapes are larger, so that rounding makes no ray miss what it meets. Unit: metres.
+/// Margin of bounding spheres, so that rounding does not make a ray miss a shape. Unit: metres.
 const BALL_RIM_M: f64 = 1e-4;
 
-/// A lens: how pixels and directions belong together. Frame: camera, x forwards, y left, z up.
+/// A pinhole projection between pixels and directions. Frame: camera, x forwards, y left, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lens {
-    /// Pixels in a row.
+    /// Image width. Unit: pixels.
     pub(super) width: usize,
-    /// Rows.
+    /// Image height. Unit: pixels.
     pub(super) height: usize,
-    /// Distance of the picture's plane from the eye, in pixels.
+    /// Focal length. Unit: pixels.
     pub(super) focal_px: f64,
 }
 
 impl Lens {
-    /// How far a pixel's ray goes left and up on a unit of its way forwards.
+    /// Returns how far a pixel's ray goes left and up per unit forwards.
     pub(super) fn slopes(&self, column: usize, row: usize) -> [f64; 2] {
         let off = |idx: usize, count: usize| (count as f64 / 2.0 - idx as f64 - 0.5) / self.focal_px;
         [off(column, self.width), off(row, self.height)]
     }
 
-    /// Where a point would be in the picture: columns from the left, rows from above; nothing for what is behind.
+    /// Projects a point to the image: column from the left, row from the top. Returns `None` if it is behind the eye.
     pub(super) fn pixel(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
         let scale = self.focal_px / point.x;
         let (width, height) = (self.width as f64, self.height as f64);
@@ -47,17 +47,17 @@ impl Lens {
     }
 }
 
-/// Shapes as they are met from one eye.
+/// Shapes prepared for rays from one eye point.
 pub(super) struct Solids<'a> {
     lens: Lens,
-    /// How far the rays of each column go left, and of each row up, on a unit of their way forwards.
+    /// How far the rays of each column go left, and of each row up, per unit forwards.
     slopes: [Vec<f64>; 2],
     solids: Vec<Solid<'a>>,
-    /// For each tile, row by row: the shapes that may be in it, the nearest first.
+    /// For each tile, row by row: the shapes that may be visible in it, nearest first.
     tiles: Vec<Vec<usize>>,
 }
 
-/// Where a ray meets a shape: how far along, in lengths of its direction, whose forward part is 1.
+/// A hit of a ray: the shape, and the distance along the ray in lengths of its direction, whose forward part is 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hit {
     pub(super) along: f64,
@@ -94,12 +94,12 @@ impl<'a> Solids<'a> {
         Self { lens, slopes, solids, tiles }
     }
 
-    /// As [`Lens::slopes`], looked up.
+    /// Returns the precomputed [`Lens::slopes`].
     pub(super) fn slopes(&self, column: usize, row: usize) -> [f64; 2] {
         [self.slopes[0][column], self.slopes[1][row]]
     }
 
-    /// The first shape that a pixel's ray meets within `most` of its lengths.
+    /// Returns the first hit of a pixel's ray within `most` of its lengths.
     pub(super) fn first(&self, column: usize, row: usize, most: f64) -> Option<Hit> {
         let slopes = self.slopes(column, row);
         let square = 1.0 + slopes[0] * slopes[0] + slopes[1] * slopes[1];
@@ -121,7 +121,7 @@ impl<'a> Solids<'a> {
         best
     }
 
-    /// Sine of the angle between a pixel's ray and the surface that it met.
+    /// Returns the sine of the angle between a pixel's ray and the surface at the hit.
     pub(super) fn sine(&self, column: usize, row: usize, hit: Hit) -> f64 {
         let solid = &self.solids[hit.solid];
         let ray = solid.direction(self.slopes(column, row));
@@ -138,29 +138,29 @@ struct Solid<'a> {
     forwards: Vector3<f64>,
     left: Vector3<f64>,
     up: Vector3<f64>,
-    /// Corners of the box around it. Frame: camera. A corner's number has a bit for each axis.
+    /// Corners of its bounding box. Frame: camera. Each bit of a corner's index selects the side along one axis.
     corners: [Point3<f64>; 8],
     ball: Around,
-    /// Forward distance that none of its points is nearer than. Unit: metres.
+    /// Lower bound of the forward distance of its points. Unit: metres.
     nearest: f64,
 }
 
-/// A ball around a shape, as rays from the eye pass it. Frame: camera.
+/// A bounding sphere, prepared for rays from the eye. Frame: camera.
 struct Around {
     middle: Vector3<f64>,
-    /// Squared distance of the eye from its surface, along a tangent; negative where the eye is inside.
+    /// Squared length of a tangent from the eye to the sphere; negative if the eye is inside.
     off: f64,
 }
 
 impl Around {
-    /// Whether a ray passes through, or may. `square` is that of its length.
+    /// Whether a ray may hit the shape. `square` is the squared length of its direction.
     fn is_passed_by(&self, [left, up]: [f64; 2], square: f64) -> bool {
         let dot = self.middle.x + self.middle.y * left + self.middle.z * up;
         self.off <= 0.0 || (dot > 0.0 && dot * dot >= self.off * square)
     }
 }
 
-/// Forms that rays meet in closed form. Unit: metres.
+/// Shapes with a closed-form ray intersection. Unit: metres.
 enum Form {
     Box {
         half: Vector3<f64>,
@@ -228,18 +228,18 @@ impl<'a> Solid<'a> {
                 return met.map(f64::from).filter(|along| *along < most);
             }
         };
-        // An eye inside of a shape sees nothing but its inside.
+        // If the eye is inside the shape, the hit is at the eye.
         span.filter(|(enter, leave)| enter <= leave && *leave >= 0.0)
             .map(|(enter, _)| enter.max(0.0))
             .filter(|along| *along < most)
     }
 
-    /// Any vector along the surface's normal where a ray meets it.
+    /// Returns a vector along the surface normal at the hit, of any length.
     fn normal(&self, ray: &Vector3<f64>, along: f64) -> Vector3<f64> {
         let point = self.eye + ray * along;
         match self.form {
             Form::Box { half } => {
-                // The side that the point is nearest to, or farthest beyond.
+                // The axis of the side that the point is nearest to.
                 let depth = point.coords.abs() - half;
                 let axis = depth.imax();
                 Vector3::ith(axis, 1.0)
@@ -251,7 +251,7 @@ impl<'a> Solid<'a> {
             Form::Ball { .. } => point.coords,
             Form::Other => {
                 let ray = Ray::new(to_vector(&self.eye.coords), to_vector(ray));
-                // A little farther, so that rounding does not lose the hit.
+                // Cast slightly farther, so that rounding does not lose the hit.
                 let met = self.shape.cast_local_ray_and_get_normal(&ray, to_real(along * 1.001 + 1e-4), true);
                 met.map_or(from_vector(ray.dir), |met| from_vector(met.normal))
             }
@@ -259,19 +259,19 @@ impl<'a> Solid<'a> {
     }
 }
 
-/// Where a ray enters and leaves a box about the origin.
+/// Returns the distances at which a ray enters and leaves a box about the origin.
 fn box_span(eye: &Point3<f64>, ray: &Vector3<f64>, half: &Vector3<f64>) -> Option<(f64, f64)> {
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
     for axis in 0..3 {
         let (first, second) = ((-half[axis] - eye[axis]) / ray[axis], (half[axis] - eye[axis]) / ray[axis]);
-        // Along a side, both are infinite, or no number where the ray lies in it: then it passes.
+        // Parallel to a side, both are infinite, or NaN if the ray lies in it; `min` and `max` then ignore the axis.
         enter = enter.max(first.min(second));
         leave = leave.min(first.max(second));
     }
     Some((enter, leave))
 }
 
-/// Where a ray enters and leaves a cylinder about y.
+/// Returns the distances at which a ray enters and leaves a cylinder about y.
 fn cylinder_span(eye: &Point3<f64>, ray: &Vector3<f64>, radius: f64, half_height: f64) -> Option<(f64, f64)> {
     let level = Vector3::new(eye.x, 0.0, eye.z);
     let (enter, leave) = round_span(eye.x * ray.x + eye.z * ray.z, ray.x * ray.x + ray.z * ray.z, &level, radius)?;
@@ -279,7 +279,8 @@ fn cylinder_span(eye: &Point3<f64>, ray: &Vector3<f64>, radius: f64, half_height
     Some((enter.max(first.min(second)), leave.min(first.max(second))))
 }
 
-/// Where a ray is within a radius: `dot` is eye · ray, `square` ray · ray, of the parts that count.
+/// Returns the span of a ray within a radius. `dot` is eye · ray and `square` is ray · ray, over the relevant
+/// components.
 fn round_span(dot: f64, square: f64, eye: &Vector3<f64>, radius: f64) -> Option<(f64, f64)> {
     let off = eye.norm_squared() - radius * radius;
     if square < 1e-12 {
@@ -307,7 +308,7 @@ mod tests {
         Isometry3::new(Vector3::new(x, y, z) * reach, Vector3::new(roll, pitch, yaw) * 3.0)
     }
 
-    /// Every ray of many random scenes meets what a plain loop of the library's ray casts meets.
+    /// Every ray of many random scenes has the same hit as in a plain loop over the library's ray casts.
     #[test]
     fn every_pixel_agrees_with_a_plain_loop() {
         let shapes: [Box<dyn Shape>; 4] = [
@@ -333,7 +334,7 @@ mod tests {
                 if plain.is_finite() {
                     n_hits += 1;
                 }
-                // At the very edge of a shape the library's 32 bits and our 64 may differ.
+                // At the very edge of a shape, the library's 32-bit result and our 64-bit result may differ.
                 if f64::from(plain) != ours && (f64::from(plain) - ours).abs() > 2e-3 {
                     n_edges += 1;
                 }

@@ -1,4 +1,4 @@
-//! What happened, tick by tick: digest, frames, contact episodes, extremes.
+//! Records a run tick by tick: state digest, frames, contact episodes, extremes.
 
 use std::collections::BTreeMap;
 
@@ -14,13 +14,13 @@ use crate::world::motion::MotionMeter;
 use crate::world::quality::QualityMeter;
 use crate::world::robot_course::{RobotCourse, RobotMeter};
 
-/// Time between two frames. Unit: seconds. Pictures and replays need no more, and a trace stays small.
+/// Time between two frames. Unit: seconds. Enough for images and replays, and it keeps traces small.
 const FRAME_SECS: f64 = 0.1;
-/// Gaps of a contact shorter than this are one contact. Unit: seconds.
+/// Shorter gaps between contacts of a pair are ignored. Unit: seconds.
 const SAME_CONTACT_SECS: f64 = 0.05;
-/// Positions in frames are whole multiples of this, which compresses. Unit: metres.
+/// Positions in frames are rounded to multiples of this, for compression. Unit: metres.
 const FRAME_GRAIN_M: f64 = 1e-4;
-/// The same for the components of quaternions.
+/// As [`FRAME_GRAIN_M`], for the components of quaternions.
 const FRAME_GRAIN_TURN: f64 = 2e-4;
 
 /// One uninterrupted contact. Times since the record began. Unit: seconds.
@@ -28,15 +28,15 @@ const FRAME_GRAIN_TURN: f64 = 2e-4;
 pub struct Contact {
     /// The pair, sorted.
     pub pair: [String; 2],
-    /// When it began.
+    /// Start of the contact.
     pub start_secs: f64,
-    /// When it ended, or the record.
+    /// End of the contact or of the record.
     pub end_secs: f64,
     /// Largest normal force. Unit: newtons.
     pub max_force_n: f64,
 }
 
-/// What one object went through. See the fields of the same names in a trace.
+/// Extremes of one object's motion. See the fields of the same names in a trace.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     /// Id of the object.
@@ -47,20 +47,20 @@ pub struct Course {
     pub max_speed: f64,
     /// Largest height gained. Unit: metres.
     pub max_rise_m: f64,
-    /// Largest distance from where it began. Unit: metres.
+    /// Largest distance from its initial position. Unit: metres.
     pub max_displacement_m: f64,
 }
 
-/// What was recorded since [`World::begin_record`].
+/// The data recorded since [`World::begin_record`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
-    /// Contacts, by start and pair.
+    /// Contacts, sorted by start and pair.
     pub contacts: Vec<Contact>,
-    /// One for each object, in scene order.
+    /// One course per object, in scene order.
     pub courses: Vec<Course>,
-    /// Smallest and largest true x and y of the base; nothing where it stands for good. Unit: metres.
+    /// Smallest and largest true x and y of the base; `None` if it is fixed. Unit: metres.
     pub base: Option<[[f64; 2]; 2]>,
-    /// What the robot went through.
+    /// The robot's course.
     pub robot: RobotCourse,
 }
 
@@ -69,13 +69,13 @@ pub struct Record {
 pub struct Tracks {
     /// Unit: seconds.
     pub period_secs: f64,
-    /// What has a track.
+    /// Names of the tracked bodies.
     pub names: Vec<String>,
     /// Shape: frames × (7 · names).
     pub rows: Vec<Vec<f32>>,
 }
 
-/// An open contact: tick of its start and of its latest sight, and its largest force.
+/// A contact episode: its first and latest tick, and its largest force.
 #[derive(Debug, Clone, Copy)]
 struct Episode {
     start: u64,
@@ -83,7 +83,7 @@ struct Episode {
     max_force_n: f64,
 }
 
-/// The memory of a world.
+/// The recorder of a world.
 pub struct Recorder {
     digest: Digest,
     tick_secs: f64,
@@ -103,7 +103,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// An empty memory for `n_objects` objects and the named bodies.
+    /// Creates an empty recorder for `n_objects` objects and the tracked bodies.
     pub fn new(n_objects: usize, tracked: Vec<(String, RigidBodyHandle)>, tick_secs: f64) -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a handful of ticks")]
         let ticks_per_frame = (FRAME_SECS / tick_secs).round().max(1.0) as u64;
@@ -126,19 +126,19 @@ impl Recorder {
         }
     }
 
-    /// Control ticks since the world was built.
+    /// Returns the number of control ticks since the world was built.
     pub(super) fn n_ticks(&self) -> u64 {
         self.n_ticks
     }
 
-    /// Time of a tick since the record began. Unit: seconds.
+    /// Returns the time of a tick since the record began. Unit: seconds.
     pub(super) fn secs_since_begin(&self, tick: u64) -> f64 {
         tick.saturating_sub(self.began) as f64 * self.tick_secs
     }
 }
 
 impl World {
-    /// Begins a record: contacts and extremes count from here, frames go on.
+    /// Begins a record: resets contacts and extremes; frames continue.
     pub fn begin_record(&mut self) {
         let poses = self.objects.iter().map(|object| self.pose_of(object)).collect();
         let recorder = &mut self.recorder;
@@ -155,7 +155,7 @@ impl World {
         self.begin_motion();
     }
 
-    /// Ends a record and hands it out.
+    /// Ends the record and returns it.
     pub fn end_record(&mut self) -> Record {
         let mut closed = std::mem::take(&mut self.recorder.closed);
         closed.extend(std::mem::take(&mut self.recorder.open));
@@ -165,7 +165,7 @@ impl World {
             .map(|((first, second), episode)| {
                 let mut pair = [self.name_of(*first), self.name_of(*second)];
                 pair.sort();
-                // A contact is seen at the end of its tick.
+                // A contact is detected at the end of its tick.
                 let start_secs = secs(episode.start.saturating_sub(1));
                 Contact { pair, start_secs, end_secs: secs(episode.latest), max_force_n: episode.max_force_n }
             })
@@ -189,7 +189,7 @@ impl World {
         }
     }
 
-    /// The course of everything that moves since the first record began.
+    /// Returns the poses of all moving bodies since the first record began.
     pub fn tracks(&self) -> Tracks {
         Tracks {
             period_secs: self.recorder.ticks_per_frame as f64 * self.recorder.tick_secs,
@@ -198,12 +198,12 @@ impl World {
         }
     }
 
-    /// Digest over the bits of all states up to now.
+    /// Returns a digest over the bits of all states so far.
     pub fn state_digest(&self) -> String {
         self.recorder.digest.clone().finish()
     }
 
-    /// Name of a thing in contacts.
+    /// Returns the name of an owner in contacts.
     pub(super) fn name_of(&self, owner: Owner) -> String {
         match owner {
             Owner::Floor => "floor".to_owned(),
@@ -215,7 +215,7 @@ impl World {
         }
     }
 
-    /// Looks at the state after a tick.
+    /// Records the state after a tick.
     pub(super) fn record(&mut self) {
         self.recorder.n_ticks += 1;
         self.digest_state();

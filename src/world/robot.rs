@@ -21,27 +21,28 @@ pub(super) struct Motor {
     pub(super) stiffness: f64,
     pub(super) damping: f64,
     pub(super) max_effort: f64,
-    /// Where the controller wants to be in the end.
+    /// Final target position.
     pub(super) target: f64,
-    /// Where it wants to be now: follows the target no faster than the joint may move.
+    /// Current target position: approaches `target` within the joint's velocity limit.
     pub(super) setpoint: f64,
     pub(super) setpoint_velocity: f64,
-    /// What it gives instead of going anywhere.
+    /// Commanded effort, instead of a position.
     pub(super) push: Option<f64>,
 }
 
-/// Share of its largest speed within which a motor that gives an effort takes it back, so that it gets no faster.
+/// Share of the largest speed over which an effort-controlled motor reduces its effort, to limit its speed.
 const SLACK: f64 = 0.02;
 
 impl Motor {
-    /// What it gives beyond the robot's own weight, by its control law.
+    /// Returns its effort by its control law, without gravity compensation.
     fn load(&self, position: f64, velocity: f64) -> f64 {
         let law = || self.stiffness * (self.setpoint - position) + self.damping * (self.setpoint_velocity - velocity);
         self.push.unwrap_or_else(law)
     }
 
-    /// Gives an effort for a step: what wants to move at `top` speed and may give no more gives that much until it is there. Where
-    /// it goes to positions again, it begins from where it is.
+    /// Applies an effort for a step: a velocity motor with the target speed `top` and `effort` as its limit gives this
+    /// effort until it reaches that speed. Also resets the setpoint, so that position control later resumes at the
+    /// current position.
     fn give(&mut self, engine: &mut PhysicsWorld, effort: f64, top: f64) {
         let Some((multibody, link)) = engine.multibody_joints.get_mut(self.joint) else { return };
         let Some(is) = multibody.link(link) else { return };
@@ -58,7 +59,7 @@ impl Motor {
 
 /// The robot, its bodies in the engine, and its joint controllers.
 pub struct Robot {
-    /// The profile that it was built from.
+    /// Its profile.
     pub profile: Arc<RobotProfile>,
     /// Its links and joints.
     pub model: Arc<RobotModel>,
@@ -66,17 +67,17 @@ pub struct Robot {
     pub kinematics: Kinematics,
     /// Body of each link.
     pub bodies: Vec<RigidBodyHandle>,
-    /// Which joint is what.
+    /// Its joints by role.
     pub layout: Layout,
     /// Links of the fingers, left and right.
     pub finger_links: [usize; 2],
     motors: Vec<Motor>,
 }
 
-/// A robot's geometry, layout and home posture without a simulation.
+/// Returns a robot's geometry, layout and home posture, without a simulation.
 ///
 /// # Errors
-/// [`WorldError`] where profile and URDF don't fit.
+/// [`WorldError`] if profile and URDF don't match.
 pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), WorldError> {
     let model = Arc::new(RobotModel::read(&start.profile)?);
     let named = Named::find(&start.profile, &model)?;
@@ -89,17 +90,17 @@ pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), Wo
 fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
     let [x, y, heading] = start.base;
     match layout.base {
-        // A robot with a base of its own has its root at the origin of the world: its odometry's frame.
+        // The root of a mobile robot is at the world's origin, which is the frame of its odometry.
         Some(_) => Isometry3::identity(),
         None => Pose::upright([x, y, start.profile.mount_height_m], heading).to_isometry(),
     }
 }
 
 impl Robot {
-    /// Puts the robot into the engine, in its home posture.
+    /// Inserts the robot into the engine, in its home posture.
     ///
     /// # Errors
-    /// [`WorldError`] where profile and URDF don't fit.
+    /// [`WorldError`] if profile and URDF don't match.
     pub fn insert(engine: &mut PhysicsWorld, start: &RobotStart) -> Result<Self, WorldError> {
         let profile = start.profile.clone();
         let model = Arc::new(RobotModel::read(&profile)?);
@@ -116,7 +117,7 @@ impl Robot {
         Ok(robot)
     }
 
-    /// Joint positions and velocities, measured.
+    /// Returns the measured joint positions and velocities.
     pub fn state(&self, engine: &PhysicsWorld) -> (Vec<f64>, Vec<f64>) {
         let mut positions = Vec::with_capacity(self.motors.len());
         let mut velocities = Vec::with_capacity(self.motors.len());
@@ -129,7 +130,7 @@ impl Robot {
         (positions, velocities)
     }
 
-    /// All joints with their limits.
+    /// Returns the state of all joints, with their limits.
     pub fn joint_states(&self, engine: &PhysicsWorld) -> Vec<JointState> {
         let (positions, velocities) = self.state(engine);
         let states = self.model.joints.iter().zip(positions.into_iter().zip(velocities));
@@ -146,7 +147,7 @@ impl Robot {
             .collect()
     }
 
-    /// Force that each finger's motor gives, from its control law. Unit: newtons, positive closes.
+    /// Returns the force of each finger's motor by its control law; positive closes. Unit: newtons.
     pub fn finger_efforts(&self, engine: &PhysicsWorld) -> [f64; 2] {
         let (positions, velocities) = self.state(engine);
         self.layout.fingers.map(|idx| {
@@ -157,15 +158,15 @@ impl Robot {
         })
     }
 
-    /// Effort of each joint's motor beyond what holds the robot's own weight, from its control law: what is held, pushed and
-    /// braked. Units: newtons or newton metres.
+    /// Returns the effort of each joint's motor by its control law, without gravity compensation: for holding, pushing
+    /// and braking. Units: newtons or newton metres.
     pub fn loads(&self, positions: &[f64], velocities: &[f64]) -> Vec<f64> {
         let joints = self.motors.iter().zip(positions.iter().zip(velocities));
         joints.map(|(motor, (position, velocity))| motor.load(*position, *velocity)).collect()
     }
 
-    /// What each motor would give by its control law, as a share of what its joint may: more than 1 is cut off. The robot's own
-    /// weight, which is compensated, comes on top of it.
+    /// Returns the effort of each motor by its control law, as a share of the joint's limit, before clamping. Gravity
+    /// compensation is not included.
     pub fn effort_shares(&self, positions: &[f64], velocities: &[f64]) -> Vec<f64> {
         let states = positions.iter().zip(velocities);
         let motors = self.motors.iter().zip(&self.model.joints).zip(states);
@@ -178,7 +179,7 @@ impl Robot {
         shares.collect()
     }
 
-    /// Tells one joint's controller where to go. Positions beyond the limits are brought back to them.
+    /// Sets a joint's target position, clamped to its limits.
     pub fn aim(&mut self, joint: usize, target: f64) {
         let Joint { lower, upper, .. } = self.model.joints[joint];
         if target.is_finite() {
@@ -186,12 +187,13 @@ impl Robot {
         }
     }
 
-    /// Where one joint's controller is told to go.
+    /// Returns a joint's target position.
     pub fn target(&self, joint: usize) -> f64 {
         self.motors[joint].target
     }
 
-    /// Joints, by index, whose motors give an effort instead of going to a position; all others do that. Fingers always do.
+    /// Sets effort control for the given joints (by index), and position control for all others. Fingers are always
+    /// position-controlled.
     pub fn push(&mut self, efforts: &[(usize, f64)]) {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let told = efforts.iter().find(|(joint, effort)| *joint == idx && effort.is_finite());
@@ -208,8 +210,8 @@ impl Robot {
         }
     }
 
-    /// One step of the joint controllers: setpoints go evenly to the targets in the `steps_left` of the tick, within the
-    /// velocity limits; motors follow setpoints, with the robot's own weight (not that of what it holds) compensated.
+    /// Steps the joint controllers: setpoints approach the targets evenly over the `steps_left` of the tick, within the
+    /// velocity limits. Motors follow the setpoints, with gravity compensation for the robot but not for held objects.
     pub fn control(&mut self, engine: &mut PhysicsWorld, holding: &[f64], dt: f64, steps_left: u32) {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let held = holding.get(idx).copied().unwrap_or(0.0);
@@ -236,7 +238,7 @@ impl Robot {
         }
     }
 
-    /// Puts all joints somewhere at once, with motors holding them there.
+    /// Moves all joints to the positions at once, and holds them there.
     fn move_to(&mut self, engine: &mut PhysicsWorld, positions: &[f64]) {
         let Some(first) = self.motors.first().map(|motor| motor.joint) else { return };
         for (motor, position) in self.motors.iter_mut().zip(positions) {
@@ -245,7 +247,7 @@ impl Robot {
         }
         let order: Vec<(MultibodyJointHandle, f64)> =
             self.motors.iter().map(|motor| motor.joint).zip(positions.iter().copied()).collect();
-        // Only this settles whether the root is fixed, and with it where each joint's coordinate is.
+        // This determines whether the root is fixed, and with it the index of each joint's coordinate.
         let Some((multibody, _)) = engine.multibody_joints.get_mut(first) else { return };
         multibody.forward_kinematics(&engine.bodies, true);
         let mut displacements = vec![0.0_f32; multibody.ndofs()];
@@ -262,7 +264,7 @@ impl Robot {
         engine.bodies.propagate_modified_body_positions_to_colliders(&mut engine.colliders);
     }
 
-    /// Moves the base from one moment to the next, with all that it carries; the other joints stay as they are. Units: metres,
+    /// Moves the base at once, with everything attached to it; the other joints keep their positions. Units: metres,
     /// metres, radians.
     pub fn shift_base(&mut self, engine: &mut PhysicsWorld, by: [f64; 3]) {
         let Some(base) = self.layout.base else { return };
@@ -285,7 +287,7 @@ impl Robot {
         engine.bodies.propagate_modified_body_positions_to_colliders(&mut engine.colliders);
     }
 
-    /// Joints that follow others are held to them as the mechanism does it.
+    /// Couples mimic joints to their leaders, as a mechanism does.
     fn couple_mimics(&self, engine: &mut PhysicsWorld) {
         for (follower, joint) in self.model.joints.iter().enumerate() {
             let Some((leader, factor, offset)) = joint.mimic else { continue };
@@ -354,7 +356,7 @@ pub(super) mod tests {
         build(&scene).expect("the scene is right")
     }
 
-    /// A posture within the limits, by choice.
+    /// A random posture within the limits.
     fn posture(world: &World, choices: &mut Choices) -> Vec<f64> {
         let joints = world.kinematics().joints().iter();
         joints.map(|joint| choices.real("q", joint.lower.max(-2.0), joint.upper.min(2.0), 0.0)).collect()
@@ -406,7 +408,7 @@ pub(super) mod tests {
         assert!(n_solved >= 60, "solved {n_solved} of 100 from random postures");
     }
 
-    /// A constant force on what is free to move: acceleration is force over mass, up to the joint's largest speed.
+    /// A constant force on a free joint: acceleration is force over mass, up to the joint's largest speed.
     #[test]
     fn efforts_push_as_told_and_no_faster_than_joints_may() {
         let mut world = lonely();
@@ -440,6 +442,6 @@ pub(super) mod tests {
         let refused = check_robot(&profile).expect_err("there is no such joint").diagnostic();
         assert_eq!((refused.code, refused.help.as_deref()), ("W021", Some("did you mean `arm_flex_joint`?")));
         profile.urdf.text = "<robot".into();
-        assert_eq!(check_robot(&profile).expect_err("it is no URDF").diagnostic().code, "W020");
+        assert_eq!(check_robot(&profile).expect_err("it is not a URDF").diagnostic().code, "W020");
     }
 }

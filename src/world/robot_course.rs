@@ -1,7 +1,7 @@
-//! What the robot itself goes through: joints at their limits, links in each other, things in its hand.
+//! Measures the robot's course: joints at their limits, self-collisions, held objects.
 //!
-//! The simulation lets links of the robot pass through each other (a posture in which they do is no fault of physics), so
-//! whether they would have collided is measured beside it, from their shapes and poses.
+//! In the simulation the robot's links pass through each other (a self-colliding posture is not a fault of physics), so
+//! self-collisions are detected separately, from the links' shapes and poses.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,24 +16,24 @@ use crate::world::convert::{from_pose, from_vector};
 use crate::world::engine::Owner;
 use crate::world::{Motion, World};
 
-/// Control ticks between two looks for links in each other. At 60 ticks a second that is twenty looks: what moves at 1 m/s
-/// goes 5 cm from one to the next.
+/// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per second: a link at 1
+/// m/s moves 5 cm between them.
 const TICKS_PER_LOOK: u64 = 3;
-/// A motor that gives more than this share of its limit is overloaded.
+/// A motor above this share of its effort limit is overloaded.
 const OVERLOAD_SHARE: f64 = 0.99;
-/// Links that go no deeper into each other than this only touch. Unit: metres.
+/// Links that penetrate each other by no more than this only touch. Unit: metres.
 const TOUCH_M: f64 = 1e-4;
 
-/// What the robot went through during one action.
+/// The robot's course during one action.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RobotCourse {
     /// One for each joint, in the robot's order.
     pub joints: Vec<JointCourse>,
-    /// Pairs of links that were in each other, sorted.
+    /// Pairs of links that penetrated each other, sorted.
     pub self_contacts: Vec<SelfCollision>,
-    /// Things that both fingers touched at some time, in scene order.
+    /// Objects that both fingers touched at the same time, in scene order.
     pub held: Vec<HeldCourse>,
-    /// What it measured and was told. It is kept with the course of the bodies, which not every reader needs.
+    /// Its measurements and commands. Stored with the bodies' tracks, which not every reader needs.
     #[serde(skip)]
     pub motion: Motion,
 }
@@ -43,43 +43,43 @@ pub struct RobotCourse {
 pub struct JointCourse {
     /// Name in the URDF.
     pub name: String,
-    /// How far its position was beyond its limits at most; negative where it kept inside.
+    /// Largest excess of its position beyond its limits; negative if it stayed within them.
     pub max_excess: f64,
     /// Largest speed as a share of the joint's limit.
     pub max_speed_share: f64,
-    /// Longest time without a break that its motor gave all it may; 0 for fingers, which hold by force. Unit: seconds.
+    /// Longest uninterrupted time at the motor's effort limit; 0 for fingers, which hold by force. Unit: seconds.
     pub overload_secs: f64,
 }
 
-/// Two links of the robot that were in each other, and had not been when the run began.
+/// Two links of the robot that penetrated each other, and did not when the run began.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SelfCollision {
     /// `robot/LINK`, sorted.
     pub pair: [String; 2],
-    /// When it was first seen, since the action began. Unit: seconds.
+    /// Time of its first detection since the action began. Unit: seconds.
     pub start_secs: f64,
-    /// How deep they were in each other at most. Unit: metres.
+    /// Largest penetration depth. Unit: metres.
     pub max_depth_m: f64,
 }
 
-/// Something between both fingers.
+/// An object held between both fingers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeldCourse {
     /// Id of the object.
     pub id: String,
-    /// For how long, all together. Unit: seconds.
+    /// Total time held. Unit: seconds.
     pub held_secs: f64,
-    /// Largest angle from the vertical meanwhile. Unit: radians.
+    /// Largest angle from the vertical while held. Unit: radians.
     pub max_tilt_rad: f64,
 }
 
-/// Gathers a [`RobotCourse`].
+/// Measures a [`RobotCourse`].
 #[derive(Default)]
 pub(super) struct RobotMeter {
     joints: Vec<JointMeter>,
-    /// Tick of the first sight and largest depth.
+    /// Tick of the first detection, and largest depth.
     self_contacts: BTreeMap<(usize, usize), (u64, f64)>,
-    /// Ticks and largest tilt.
+    /// Number of ticks, and largest tilt.
     held: BTreeMap<usize, (u64, f64)>,
     /// Pairs of links that could collide, found when the first record begins.
     pairs: Option<Vec<(usize, usize)>>,
@@ -104,7 +104,7 @@ impl RobotMeter {
 }
 
 impl World {
-    /// Begins to measure anew; what of the robot may collide with itself is settled when this is first done.
+    /// Resets the measurement. The first call determines the pairs of links that could collide.
     pub(super) fn begin_robot_course(&mut self) {
         if self.recorder.robot.pairs.is_none() {
             self.recorder.robot.pairs = Some(self.pairs_apart());
@@ -112,7 +112,7 @@ impl World {
         self.recorder.robot.begin(self.robot.model.joints.len());
     }
 
-    /// Looks at the robot after a tick.
+    /// Records the robot's state after a tick.
     pub(super) fn record_robot(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
         self.record_joints();
         self.record_held(touches);
@@ -121,7 +121,7 @@ impl World {
         }
     }
 
-    /// What was measured since it began.
+    /// Returns the course since the start.
     pub(super) fn end_robot_course(&self) -> RobotCourse {
         let (meter, tick_secs) = (&self.recorder.robot, self.tick_secs());
         let joints = self.robot.model.joints.iter().zip(&meter.joints).map(|(joint, course)| JointCourse {
@@ -189,13 +189,13 @@ impl World {
         self.recorder.robot.pairs = Some(pairs);
     }
 
-    /// Pairs of links that are apart now, and are not next to each other on the robot.
+    /// Returns the pairs of links that are apart now and are not neighbours in the tree.
     fn pairs_apart(&self) -> Vec<(usize, usize)> {
         let links = &self.robot.model.links;
         let solid: Vec<usize> = (0..links.len()).filter(|idx| !links[*idx].solids.is_empty()).collect();
         let mut neighbours = BTreeSet::new();
         for idx in &solid {
-            // Stages without a form, such as those of the base, lie between neighbours.
+            // Skip links without shapes, such as the stages of the base.
             let mut at = *idx;
             while at > 0 {
                 at = self.robot.model.joints[at - 1].parent;
@@ -210,7 +210,7 @@ impl World {
         pairs.filter(|pair| !neighbours.contains(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M).collect()
     }
 
-    /// How deep two links are in each other. Unit: metres; 0 where they are apart.
+    /// Returns the penetration depth of two links; 0 if they are apart. Unit: metres.
     fn depth_of(&self, first: usize, second: usize) -> f64 {
         let balls = |idx: usize| self.solids_of(self.robot.bodies[idx]).map(|solid| (ball(solid), solid));
         let mut deepest = 0.0f64;
@@ -232,7 +232,7 @@ impl World {
     }
 }
 
-/// Middle and radius of a ball around a solid. Frame: world. Unit: metres.
+/// Returns centre and radius of a solid's bounding sphere. Frame: world. Unit: metres.
 fn ball(solid: &Collider) -> (Point3<f64>, f64) {
     let around = solid.shape().compute_local_bounding_sphere();
     let pose: Isometry3<f64> = from_pose(solid.position());
@@ -243,7 +243,7 @@ fn ball(solid: &Collider) -> (Point3<f64>, f64) {
 mod tests {
     use crate::world::robot::tests::lonely;
 
-    /// A posture puts the hand into the robot's own body: it is seen; the home posture is free of it.
+    /// A posture with the hand inside the robot's body is detected; the home posture has no self-collision.
     #[test]
     fn links_in_each_other_are_seen_and_joints_beyond_their_limits_too() {
         let mut world = lonely();

@@ -1,4 +1,4 @@
-//! Which postures would let the robot's links go into each other: physics leaves that out, so a plan has to keep clear of it.
+//! Detects postures with self-collisions. Physics ignores them, so motion plans must avoid them.
 
 use nalgebra::{Isometry3, Point3};
 use parry3d::query::intersection_test;
@@ -9,7 +9,7 @@ use crate::world::Kinematics;
 use crate::world::convert::to_pose;
 use crate::world::engine::{Owner, collider};
 
-/// The forms of a robot's links, and the pairs of them that could meet.
+/// The shapes of a robot's links, and the pairs of links that could collide.
 #[derive(Clone)]
 pub struct SelfContact {
     links: Vec<Form>,
@@ -20,14 +20,14 @@ pub struct SelfContact {
 #[derive(Clone)]
 struct Form {
     solids: Vec<(EnginePose, SharedShape)>,
-    /// A ball around them.
+    /// Centre of their bounding sphere.
     middle: Point3<f64>,
     radius: f64,
 }
 
 impl SelfContact {
-    /// The pairs of links that could meet: not neighbours, whose forms go into each other in their joint, and not those that
-    /// meet in one of the postures that are known to be right, such as that for driving.
+    /// Finds the pairs of links that could collide. Leaves out neighbours, whose shapes overlap at their joint, and
+    /// pairs that overlap in one of the `right` postures, which are known to be valid, such as the one for driving.
     pub fn new(kinematics: &Kinematics, right: &[Vec<f64>]) -> Self {
         let links: Vec<Form> = kinematics.solids_of_links().map(Form::new).collect();
         let neighbour = |link: usize| bearer(kinematics, &links, link);
@@ -48,7 +48,7 @@ impl SelfContact {
         found
     }
 
-    /// Whether two links go into each other at these poses of the links (see [`Kinematics::links`]).
+    /// Whether any two links collide at these link poses (see [`Kinematics::links`]).
     pub fn touches(&self, poses: &[Isometry3<f64>]) -> bool {
         self.pairs.iter().any(|pair| self.meet(*pair, poses))
     }
@@ -62,7 +62,7 @@ impl SelfContact {
         let (at_a, at_b) = (to_pose(&poses[first]), to_pose(&poses[second]));
         a.solids.iter().any(|(on_a, solid_a)| {
             let solids_b = b.solids.iter();
-            // Convex solids are always supported; were one not, it would count as met.
+            // Convex solids are always supported; an unsupported pair would count as a collision.
             solids_b.into_iter().any(|(on_b, solid_b)| {
                 intersection_test(&(at_a * *on_a), solid_a.as_ref(), &(at_b * *on_b), solid_b.as_ref())
                     .map_or(true, |found| found.intersecting)
@@ -92,7 +92,7 @@ impl Form {
     }
 }
 
-/// The nearest link inwards that has a form.
+/// Returns the nearest ancestor link with shapes.
 fn bearer(kinematics: &Kinematics, links: &[Form], mut link: usize) -> Option<usize> {
     while link > 0 {
         link = kinematics.joints()[link - 1].parent;

@@ -1,6 +1,6 @@
-//! What the robot sees: truth with noise, through its own idea of where it stands.
+//! Perception of objects: ground truth with noise, relative to the robot's pose estimate.
 //!
-//! Every draw is a recorded choice named `sense.*`.
+//! Every random sample is a recorded choice named `sense.*`.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
@@ -8,26 +8,26 @@ use crate::base::{Choices, Pose};
 use crate::world::World;
 use crate::world::simulation::Object;
 
-/// Tilt beyond which an object counts as lying: it is then seen as the upright box around it. Unit: radians.
+/// Tilt beyond which an object counts as lying: it is then seen as its upright bounding box. Unit: radians.
 const LYING_RAD: f64 = 0.3;
-/// No object is seen smaller than this, whatever the noise. Unit: metres.
+/// Smallest perceived dimension, whatever the noise. Unit: metres.
 const SMALLEST_M: f64 = 0.005;
 
-/// One object as it is seen. Frame: world, by the base's belief.
+/// One perceived object. Frame: world, by the base's believed pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
     /// Id of the object.
     pub id: String,
-    /// Pose of its foot.
+    /// Upright pose, with the origin at its foot.
     pub pose: Pose,
     /// Dimensions along its own axes. Unit: metres.
     pub size_m: [f64; 3],
-    /// Whether it is furniture, which the robot knows from its map to stand still.
+    /// Whether it is furniture, which is static and on the robot's map.
     pub furniture: bool,
 }
 
 impl World {
-    /// Draws where the base believes that it stands. The error stays as it is while the base moves, unless its odometry
+    /// Samples the base's initial pose estimate. Its error stays constant while the base moves, unless the odometry
     /// drifts.
     pub fn localise(&mut self, choices: &mut Choices) {
         let x = choices.normal("sense.localisation.x", self.sensing.localisation_noise_m);
@@ -40,7 +40,7 @@ impl World {
         self.begin_tracking();
     }
 
-    /// Where everything truly is: poses of the objects' own frames, which stand on their feet.
+    /// Returns all objects with the true poses of their own frames, whose origins are at their feet.
     pub fn truth(&self) -> Vec<Sighting> {
         let objects = self.objects.iter().map(|object| Sighting {
             id: object.id.clone(),
@@ -51,13 +51,13 @@ impl World {
         objects.collect()
     }
 
-    /// Ids of everything that can be seen, in scene order.
+    /// Returns the ids of all objects, in scene order.
     pub fn visible(&self) -> Vec<String> {
         self.objects.iter().map(|object| object.id.clone()).collect()
     }
 
-    /// Everything that the floor plan has: without noise, and off by as much as the robot is wrong about where it stands itself.
-    /// What stands for good and is on no map is for the robot's eyes.
+    /// Returns the furniture of the floor plan, without noise; it is off only by the error of the robot's pose
+    /// estimate. Static objects that are not on the map must be perceived.
     pub fn known_furniture(&self) -> Vec<Sighting> {
         let on_map = self.objects.iter().filter(|object| object.on_map);
         let as_built = on_map.map(|object| {
@@ -67,12 +67,12 @@ impl World {
         as_built.collect()
     }
 
-    /// The same, where the scene lies in a world that has a map. Nothing without one.
+    /// Returns [`World::known_furniture`], or `None` if the scene's world has no map.
     pub fn map_of_furniture(&self) -> Option<Vec<Sighting>> {
         self.has_map.then(|| self.known_furniture())
     }
 
-    /// Looks at one object; nothing if there is none of that id.
+    /// Perceives one object. Returns `None` if there is no such id.
     pub fn perceive(&self, id: &str, choices: &mut Choices) -> Option<Sighting> {
         let idx = self.objects.iter().position(|object| object.id == id)?;
         let object = &self.objects[idx];
@@ -98,12 +98,12 @@ impl World {
         Some(Sighting { id: id.to_owned(), pose, size_m, furniture: object.on_map })
     }
 
-    /// Gap between the fingers as a noisy sensor gives it. Unit: metres.
+    /// Returns the gap between the fingers, measured with noise. Unit: metres.
     pub fn feel_opening(&self, choices: &mut Choices) -> f64 {
         self.observe().gripper_opening_m + choices.normal("sense.gripper", self.sensing.gripper_noise_m)
     }
 
-    /// Upright pose of an object's foot and its size along the axes of that pose.
+    /// Returns the upright pose of an object's foot, and its size along the axes of that pose.
     fn foot(&self, object: &Object, pose: &Isometry3<f64>) -> (Isometry3<f64>, [f64; 3]) {
         let plain = Pose::from_isometry(pose);
         if plain.tilt() <= LYING_RAD {

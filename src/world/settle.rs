@@ -1,32 +1,32 @@
-//! Letting a new scene come to rest.
+//! Lets a new scene come to rest.
 
 use crate::world::World;
 use crate::world::convert::from_vector;
 
-/// Longest time that a scene gets. Unit: seconds. Objects fall a few millimetres; a rolling one needs no longer to show.
+/// Time limit. Unit: seconds. Objects fall a few millimetres; a rolling object is detected within this time.
 const MOST_SECS: f64 = 3.0;
-/// Speed below which a body is at rest. Units: m/s, and rad/s tenfold.
+/// Speed below which a body is at rest. Unit: m/s. The angular limit in rad/s is ten times this.
 const REST_SPEED: f64 = 0.01;
-/// Time for which all have to be at rest. Unit: seconds.
+/// Time for which all objects must be at rest. Unit: seconds.
 const REST_SECS: f64 = 0.25;
-/// Distance from where the scene put it beyond which an object has left its place. Unit: metres.
+/// Distance from its initial position beyond which an object has left its place. Unit: metres.
 const LEFT_M: f64 = 0.05;
 
-/// How a scene came to rest.
+/// The result of settling a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settling {
     /// Whether everything came to rest in its place.
     pub settled: bool,
-    /// Simulated time that it took. Unit: seconds.
+    /// Simulated time taken. Unit: seconds.
     pub secs: f64,
-    /// Ids of objects that still moved when time was up.
+    /// Ids of objects that were still moving at the time limit.
     pub unsettled: Vec<String>,
-    /// Ids of objects that came to rest elsewhere than where the scene put them.
+    /// Ids of objects that left the place where the scene put them.
     pub left: Vec<String>,
 }
 
 impl World {
-    /// Steps, with the robot holding its posture, until every object rests or time is up.
+    /// Steps the simulation, with the robot holding its posture, until every object is at rest or time is up.
     pub fn settle(&mut self) -> Settling {
         let start = self.time_secs();
         let mut rests_since = start;

@@ -1,25 +1,25 @@
-//! Where in a picture a box can be seen: the outline of its corners, cut off at the eye.
+//! Silhouettes of boxes in an image: the outline of their projected corners, clipped at the eye.
 
 use nalgebra::Point3;
 
 use crate::world::rays::Lens;
 
-/// What is nearer to the eye than this, forwards, counts as behind it. Unit: metres. No form of a robot is so near to its camera.
+/// Distance of the near clipping plane. Unit: metres. No shape of a robot is this close to its camera.
 const NEAR_M: f64 = 1e-3;
-/// By this much outlines are wider, so that rounding loses no pixel. Unit: pixels.
+/// Margin of outlines, so that rounding does not lose a pixel. Unit: pixels.
 const RIM_PX: f64 = 1.0;
 
 /// A convex outline. Unit: pixels; columns to the right, rows down.
 pub(super) struct Silhouette {
     low: [f64; 2],
     high: [f64; 2],
-    /// Lines that the outline lies on one side of: unit normal outwards, and how far along it the outline reaches.
+    /// Bounding half-planes: the unit normal outwards, and the outline's extent along it.
     sides: Vec<([f64; 2], f64)>,
 }
 
 impl Silhouette {
-    /// The outline of a box by its corners, whose numbers have a bit for each axis; nothing where all of it is behind the eye
-    /// or beside the picture. Frame: camera.
+    /// Returns the outline of a box given by its corners; each bit of a corner's index selects the side along one axis.
+    /// Returns `None` if the box is behind the eye or outside the image. Frame: camera.
     pub(super) fn of(corners: &[Point3<f64>; 8], lens: &Lens) -> Option<Self> {
         let points: Vec<[f64; 2]> =
             in_front(corners).iter().filter_map(|point| lens.pixel(point)).filter(|at| at[0].is_finite()).collect();
@@ -33,7 +33,7 @@ impl Silhouette {
         inside.then(|| Self { low, high, sides: sides(&points) })
     }
 
-    /// First and last column, first and last row of the part of a picture that it may be in.
+    /// Returns the first and last column, and the first and last row, of its bounding box in the image.
     pub(super) fn within(&self, width: usize, height: usize) -> [usize; 4] {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the picture")]
         let within = |at: f64, count: usize| at.floor().clamp(0.0, (count - 1) as f64) as usize;
@@ -41,7 +41,7 @@ impl Silhouette {
         [within(low[0], width), within(high[0], width), within(low[1], height), within(high[1], height)]
     }
 
-    /// Whether it meets a square, or may: none of its sides has the whole square beyond it.
+    /// Whether it may overlap a square: the square is not completely beyond any of its sides.
     pub(super) fn meets(&self, [column, row]: [usize; 2], size: usize) -> bool {
         let (left, top, size) = (column as f64, row as f64, size as f64);
         self.sides.iter().all(|([x, y], reach)| {
@@ -52,7 +52,7 @@ impl Silhouette {
     }
 }
 
-/// Corners of the part of a box that is in front of the eye.
+/// Returns the corners of the part of a box in front of the eye.
 fn in_front(corners: &[Point3<f64>; 8]) -> Vec<Point3<f64>> {
     let mut points: Vec<Point3<f64>> = corners.iter().filter(|corner| corner.x >= NEAR_M).copied().collect();
     for from in 0..8usize {
@@ -68,7 +68,7 @@ fn in_front(corners: &[Point3<f64>; 8]) -> Vec<Point3<f64>> {
     points
 }
 
-/// The lines through two of some points that have all others on one side.
+/// Returns the lines through two of the points that have all others on one side.
 fn sides(points: &[[f64; 2]]) -> Vec<([f64; 2], f64)> {
     let mut sides = Vec::new();
     for (idx, from) in points.iter().enumerate() {
@@ -97,7 +97,7 @@ mod tests {
 
     const LENS: Lens = Lens { width: 80, height: 60, focal_px: 60.0 };
 
-    /// Points of boxes anywhere, also around the eye, are only ever seen in tiles that the outline meets.
+    /// Points of random boxes, including boxes around the eye, are only visible in tiles that overlap the outline.
     #[test]
     fn no_point_of_a_box_is_outside_of_its_outline() {
         let stream = Stream::new(3);

@@ -1,4 +1,4 @@
-//! A scene that steps: the robot acts by commands, physics does the rest.
+//! The simulation of a scene, stepped by commands to the robot.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -20,38 +20,38 @@ use crate::world::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 
 /// A body slower than this may fall asleep. Unit: m/s of its farthest point.
 const SLEEP_SPEED: f32 = 0.02;
-/// Time below that speed until it does. Unit: seconds.
+/// Time below that speed until it falls asleep. Unit: seconds.
 const SLEEP_AFTER_SECS: f32 = 0.3;
 
-/// What the robot's controllers are told. Positions beyond limits are brought back to them; speeds are limited anyway.
+/// A command to the robot's controllers. Positions are clamped to the joint limits; the controllers limit speeds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Command {
-    /// Where each joint shall go, in the order of [`Kinematics::joints`]; the base's by its own belief of where it is.
-    /// Units: metres or radians. Finger joints go by `gripper_opening_m` instead.
+    /// Target position of each joint, in the order of [`Kinematics::joints`]; for the base, by its own belief. Finger
+    /// joints follow `gripper_opening_m` instead. Units: metres or radians.
     pub positions: Vec<f64>,
     /// Gap between the fingers. Unit: metres.
     pub gripper_opening_m: f64,
     /// Largest force of one finger. Unit: newtons.
     pub grip_force_n: f64,
-    /// Joints, by index, whose motors give an effort instead of going to a position, beyond what holds the robot's own weight. At
-    /// its largest speed a joint gets no faster. Not for fingers. Units: newtons or newton metres.
+    /// Effort-controlled joints, by index, each with its effort in addition to gravity compensation. Joints stay within
+    /// their largest speed. Not for fingers. Units: newtons or newton metres.
     pub efforts: Vec<(usize, f64)>,
 }
 
-/// What the robot measures of itself.
+/// The robot's own measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
     /// Simulated time since the scene was built. Unit: seconds.
     pub time_secs: f64,
-    /// Joint positions, the base's by its own belief. Units: metres or radians.
+    /// Joint positions; for the base, by its own belief. Units: metres or radians.
     pub positions: Vec<f64>,
     /// Joint velocities.
     pub velocities: Vec<f64>,
-    /// Gap between the fingers by their encoders. Unit: metres.
+    /// Gap between the fingers, measured by their encoders. Unit: metres.
     pub gripper_opening_m: f64,
-    /// Force that each finger's motor gives, left and right. Unit: newtons, positive closes.
+    /// Force of each finger's motor, left and right; positive closes. Unit: newtons.
     pub finger_efforts_n: [f64; 2],
-    /// Effort of each joint's motor beyond what holds the robot's own weight. Units: newtons or newton metres.
+    /// Effort of each joint's motor, without gravity compensation. Units: newtons or newton metres.
     pub loads: Vec<f64>,
 }
 
@@ -59,33 +59,33 @@ pub struct Observation {
 pub(super) struct Object {
     pub(super) id: String,
     pub(super) model: Arc<ObjectModel>,
-    /// Whether nothing moves it.
+    /// Whether it is static.
     pub(super) fixed: bool,
-    /// Whether it belongs to the world that the robot has a plan of, as nothing else of a scene does.
+    /// Whether it is on the robot's floor plan, like furniture and unlike other objects.
     pub(super) on_map: bool,
     pub(super) body: RigidBodyHandle,
     pub(super) mass_kg: f64,
     pub(super) friction: f64,
     pub(super) restitution: f64,
-    /// Where the scene put it.
+    /// Its initial pose in the scene.
     pub(super) placed: Isometry3<f64>,
 }
 
-/// A simulation of one scene. Each worker has one of its own.
+/// A simulation of one scene. Each worker has its own.
 pub struct World {
     pub(super) engine: PhysicsWorld,
     pub(super) objects: Vec<Object>,
     pub(super) robot: Robot,
     pub(super) sensing: Sensing,
-    /// Where the base believes that it is, from where it is. Frame: world.
+    /// Transform from the base's true pose to its believed pose. Frame: world.
     pub(super) believed_from_true: Isometry3<f64>,
     pub(super) tracker: Tracker,
     pub(super) recorder: Recorder,
     pub(super) fault: Option<Fault>,
-    /// Where sensors see an object, by its index, if not where it is.
+    /// Poses at which sensors see objects, by their index, if they differ from the true poses.
     pub(super) decoys: BTreeMap<usize, Isometry3<f64>>,
     knows: Arc<[KnownKind]>,
-    /// Whether the robot has a map of what stands in the world for good.
+    /// Whether the robot has a map of the world's furniture.
     pub(super) has_map: bool,
     plan: FloorPlan,
     n_steps: u64,
@@ -94,18 +94,18 @@ pub struct World {
     watch: Option<Watch>,
 }
 
-/// Measures what the engine takes, by a clock of somebody else's.
+/// Measures the engine's time with a clock supplied by the caller.
 struct Watch {
     clock_secs: fn() -> f64,
     spent_secs: f64,
-    /// Looking changes nothing of the world.
+    /// In a cell, because taking an image does not change the world.
     looked_secs: Cell<f64>,
 }
 
-/// Builds the simulation of a scene. Nothing has moved yet: see [`World::settle`].
+/// Builds the simulation of a scene, before any step: see [`World::settle`].
 ///
 /// # Errors
-/// [`WorldError`] where the robot's files or the rates of physics are unusable.
+/// [`WorldError`] if the robot's files or the physics settings are unusable.
 pub fn build(scene: &Scene) -> Result<World, WorldError> {
     let mut engine = engine(&scene.physics)?;
     add_floor(&mut engine);
@@ -152,7 +152,7 @@ fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object
         activation.normalized_linear_threshold = SLEEP_SPEED;
         activation.time_until_sleep = SLEEP_AFTER_SECS;
     }
-    // Where the model says how its mass is spread, the shapes have none of their own.
+    // If the model states its inertia, the shapes have no mass of their own.
     let density = if spread.is_some() { 0.0 } else { object.mass_kg / object.model.volume().max(1e-9) };
     for solid in object.model.solids() {
         if let Some(collider) = collider(&solid, Owner::Object(idx), object.friction, object.restitution) {
@@ -173,16 +173,16 @@ fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object
     }
 }
 
-/// The spread of mass that a model states, for the mass that the scene gives it.
+/// Returns the mass properties that a model states, scaled to the mass in the scene.
 fn mass_properties(inertia: &Inertia, object: &SceneObject) -> MassProperties {
     let scale = object.mass_kg / object.model.mass_kg;
-    // Columns, as the engine has them, are rows of what is symmetric.
+    // The engine takes columns, which equal the rows of a symmetric matrix.
     let [x, y, z] = inertia.about_com.map(|row| to_vector(&(Vector3::from(row) * scale)));
     let about_com = rapier3d::math::Matrix::from_cols(x, y, z);
     MassProperties::with_inertia_matrix(to_vector(&Vector3::from(inertia.com_m)), to_real(object.mass_kg), about_com)
 }
 
-/// What moves, with its name in traces: objects, then links that can be seen.
+/// Returns the moving bodies with their names in traces: objects, then links with shapes.
 fn tracks(objects: &[Object], robot: &Robot) -> Vec<(String, RigidBodyHandle)> {
     let objects = objects.iter().filter(|object| !object.fixed).map(|o| (o.id.clone(), o.body));
     let links = robot.model.links.iter().zip(&robot.bodies).skip(1).filter(|(link, _)| !link.solids.is_empty());
@@ -190,62 +190,63 @@ fn tracks(objects: &[Object], robot: &Robot) -> Vec<(String, RigidBodyHandle)> {
 }
 
 impl World {
-    /// Simulated time since the scene was built. Unit: seconds.
+    /// Returns the simulated time since the scene was built. Unit: seconds.
     pub fn time_secs(&self) -> f64 {
         self.n_steps as f64 / f64::from(self.steps_per_second)
     }
 
-    /// Length of a control tick. Unit: seconds.
+    /// Returns the length of a control tick. Unit: seconds.
     pub fn tick_secs(&self) -> f64 {
         f64::from(self.steps_per_tick) / f64::from(self.steps_per_second)
     }
 
-    /// What is wrong with simulation, if anything is. It stays wrong.
+    /// Returns the fault of the simulation, if any. A fault is permanent.
     pub fn fault(&self) -> Option<&Fault> {
         self.fault.as_ref()
     }
 
-    /// The robot's geometry. Its root is the robot's own idea of the world's origin.
+    /// Returns the robot's geometry. Its root is the world's origin by the robot's own belief.
     pub fn kinematics(&self) -> &Kinematics {
         &self.robot.kinematics
     }
 
-    /// Which of its joints are what.
+    /// Returns the robot's joints by role.
     pub fn layout(&self) -> &Layout {
         &self.robot.layout
     }
 
-    /// The profile that the robot was built from.
+    /// Returns the robot's profile.
     pub fn profile(&self) -> &RobotProfile {
         &self.robot.profile
     }
 
-    /// The kinds of things that the robot can tell apart.
+    /// Returns the kinds of objects that the robot can recognise.
     pub fn known_kinds(&self) -> &Arc<[KnownKind]> {
         &self.knows
     }
 
-    /// The robot's map of its world: walls, furniture and places with names.
+    /// Returns the robot's map of its world: walls, furniture and named locations.
     pub fn floor_plan(&self) -> &FloorPlan {
         &self.plan
     }
 
-    /// The kind of thing that an id of the scene stands for: what a robot is told with its task, and nothing of where it is.
+    /// Returns the kind of the object with this id, which is part of the robot's task; it does not reveal the object's
+    /// pose. Returns `None` if there is no such id.
     pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
         let model = &self.objects.iter().find(|object| object.id == id)?.model;
         Some(KnownKind { name: model.name.clone(), category: model.category.clone(), size_m: model.size_m })
     }
 
-    /// One control tick: the controllers take the command, physics takes its steps, the recorder looks.
+    /// Performs one control tick: passes the command to the controllers, steps physics, and records the state.
     ///
-    /// After a fault nothing moves any more.
+    /// Does not step the simulation after a fault.
     pub fn step(&mut self, command: &Command) {
         self.take(command);
         self.recorder.motion.tell(command);
         self.tick();
     }
 
-    /// One control tick with the commands as they were.
+    /// Performs one control tick with the previous command.
     pub(super) fn tick(&mut self) {
         if self.fault.is_some() {
             return;
@@ -272,34 +273,34 @@ impl World {
         }
     }
 
-    /// From now on the wall time that the engine's steps take is measured, by a clock that counts seconds.
+    /// Starts measuring the wall time of the engine's steps, with a clock in seconds.
     pub fn watch(&mut self, clock_secs: fn() -> f64) {
         self.watch = Some(Watch { clock_secs, spent_secs: 0.0, looked_secs: Cell::new(0.0) });
     }
 
-    /// Wall time that the engine's steps took since [`World::watch`]; 0 without it. Unit: seconds.
+    /// Returns the wall time of the engine's steps since [`World::watch`]; 0 without it. Unit: seconds.
     pub fn watched_secs(&self) -> f64 {
         self.watch.as_ref().map_or(0.0, |watch| watch.spent_secs)
     }
 
-    /// Time that the camera's pictures took since [`World::watch`]; 0 without it. Unit: seconds.
+    /// Returns the wall time of camera images since [`World::watch`]; 0 without it. Unit: seconds.
     pub fn looked_secs(&self) -> f64 {
         self.watch.as_ref().map_or(0.0, |watch| watch.looked_secs.get())
     }
 
-    /// What the clock shows, where there is one. Unit: seconds.
+    /// Returns the clock's time, or `None` without a clock. Unit: seconds.
     pub(super) fn watch_secs(&self) -> Option<f64> {
         self.watch.as_ref().map(|watch| (watch.clock_secs)())
     }
 
-    /// A picture was taken that began at this time on the clock. Unit: seconds.
+    /// Adds the time of an image that was started at this time. Unit: seconds.
     pub(super) fn looked(&self, began_secs: Option<f64>) {
         if let (Some(watch), Some(began)) = (&self.watch, began_secs) {
             watch.looked_secs.set(watch.looked_secs.get() + (watch.clock_secs)() - began);
         }
     }
 
-    /// What the robot measures of itself now.
+    /// Returns the robot's current measurements.
     pub fn observe(&self) -> Observation {
         let (mut positions, velocities) = self.robot.state(&self.engine);
         let gripper_opening_m = self.robot.layout.fingers.iter().map(|idx| positions[*idx]).sum();
@@ -320,7 +321,7 @@ impl World {
         }
     }
 
-    /// The command that keeps everything where its controllers want it now.
+    /// Returns the command that holds the current joint positions.
     pub fn hold(&self) -> Command {
         let observed = self.observe();
         Command {
@@ -331,19 +332,19 @@ impl World {
         }
     }
 
-    /// Where the base's controllers are told to go, as the robot believes it now: the same place looks another one when it
-    /// finds out that it stands elsewhere.
+    /// Returns the base's target pose in terms of the robot's current belief, which changes with each correction of its
+    /// pose estimate. Returns `None` if the base is fixed.
     pub fn aimed_base(&self) -> Option<[f64; 3]> {
         let base = self.robot.layout.base?;
         Some(self.believed(base.map(|idx| self.robot.target(idx))))
     }
 
-    /// The depth camera.
+    /// Returns the depth camera's settings.
     pub fn camera(&self) -> &Camera {
         &self.sensing.camera
     }
 
-    /// Disturbs the state of an object, for tests. False if there is no such object.
+    /// Disturbs the state of an object, for tests. Returns `false` if there is no such object.
     pub fn poison(&mut self, id: &str, poison: Poison) -> bool {
         let Some(idx) = self.objects.iter().position(|object| object.id == id) else { return false };
         let object = &self.objects[idx];
@@ -380,17 +381,17 @@ impl World {
         self.robot.push(&command.efforts);
     }
 
-    /// A base pose as the robot believes it, from the true one. Headings keep counting beyond a full turn.
+    /// Converts a true base pose to the believed one. Headings continue beyond a full turn.
     pub(super) fn believed(&self, base: [f64; 3]) -> [f64; 3] {
         moved(&self.believed_from_true, base)
     }
 
-    /// A true base pose, from the believed one.
+    /// Converts a believed base pose to the true one.
     fn truly(&self, base: [f64; 3]) -> [f64; 3] {
         moved(&self.believed_from_true.inverse(), base)
     }
 
-    /// True base pose: x, y, heading.
+    /// Returns the true base pose: x, y, heading.
     pub(super) fn base_true(&self) -> [f64; 3] {
         match self.robot.layout.base {
             Some(base) => {
@@ -424,12 +425,12 @@ impl World {
         None
     }
 
-    /// Where sensors see an object: where it is, unless a decoy says otherwise.
+    /// Returns the pose at which sensors see an object: the true one, unless it has a decoy.
     pub(super) fn shown(&self, idx: usize) -> Isometry3<f64> {
         self.decoys.get(&idx).copied().unwrap_or_else(|| self.pose_of(&self.objects[idx]))
     }
 
-    /// True pose of an object.
+    /// Returns the true pose of an object.
     pub(super) fn pose_of(&self, object: &Object) -> Isometry3<f64> {
         self.engine.bodies.get(object.body).map_or(object.placed, |body| from_pose(body.position()))
     }

@@ -1,10 +1,10 @@
-//! The state of the world at one moment, as plain data with names instead of handles.
+//! Snapshots of the world: plain data with names instead of handles.
 
 use serde::{Deserialize, Serialize};
 
 use crate::base::Pose;
 
-/// All that is true at one moment. Frame: world. Units: SI.
+/// The true state of the world at one moment. Frame: world. Units: SI.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
     /// Simulated time since the scene was built. Unit: seconds.
@@ -22,9 +22,9 @@ pub struct BodyState {
     pub id: String,
     /// Name of its model.
     pub model: String,
-    /// Its class: an IRI.
+    /// IRI of its class.
     pub category: String,
-    /// Whether it is a platform, fixed to the world.
+    /// Whether it is static.
     pub fixed: bool,
     /// Pose of the model's origin.
     pub pose: Pose,
@@ -32,9 +32,9 @@ pub struct BodyState {
     pub linear_velocity: [f64; 3],
     /// Unit: rad/s.
     pub angular_velocity: [f64; 3],
-    /// Lower corner of the box around it. Unit: metres.
+    /// Lower corner of its axis-aligned bounding box. Unit: metres.
     pub aabb_min: [f64; 3],
-    /// Upper corner of the box around it. Unit: metres.
+    /// Upper corner of its axis-aligned bounding box. Unit: metres.
     pub aabb_max: [f64; 3],
     /// Unit: kilograms.
     pub mass_kg: f64,
@@ -42,9 +42,9 @@ pub struct BodyState {
     pub friction: f64,
     /// Coefficient of restitution.
     pub restitution: f64,
-    /// What touches it with more than the contact floor, sorted: ids of objects, or `robot`, or `floor`.
+    /// Bodies in contact with it, above the minimum contact force, sorted: ids of objects, `robot` or `floor`.
     pub touches: Vec<String>,
-    /// What carries it against gravity, sorted: ids of objects, or `robot`, or `floor`.
+    /// Bodies that support it against gravity, sorted: ids of objects, `robot` or `floor`.
     pub rests_on: Vec<String>,
     /// Whether physics has put it to sleep.
     pub asleep: bool,

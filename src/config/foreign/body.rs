@@ -1,4 +1,4 @@
-//! A rigid thing as a foreign file describes it, and the model that it makes.
+//! A rigid body read from SDF or URDF, and its conversion to a model.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
@@ -6,24 +6,24 @@ use crate::base::{Pose, names};
 use crate::config::shape::bounds;
 use crate::config::{Inertia, ObjectModel, Part, Shape, Surface};
 
-/// Density of what has no mass. Unit: kg/m³. That of water, which is SDF's own default.
+/// Density of a body without a mass: that of water, SDF's default. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
-/// Friction where a file says nothing: SDF's default.
+/// Default friction coefficient, as in SDF.
 const FRICTION: f64 = 1.0;
-/// A top may lie this much below the highest point. Unit: metres.
+/// Largest distance of a supporting surface below the model's highest point. Unit: metres.
 const TOP_DEPTH_M: f64 = 0.003;
-/// Nothing smaller carries other things. Unit: metres.
+/// Smallest side of a supporting surface. Unit: metres.
 const SMALLEST_SURFACE_M: f64 = 0.15;
-/// Share of its rectangle that a top must fill.
+/// Share of its bounding rectangle that a mesh's top must fill to count as a surface.
 const FULL: f64 = 0.95;
 
-/// A rigid thing. Frame: the file's own.
+/// A rigid body. Frame: the file's own.
 #[derive(Default)]
 pub(crate) struct Body {
     pub(crate) parts: Vec<Part>,
-    /// One for each link that says what it weighs.
+    /// Masses of the links that state one.
     pub(crate) masses: Vec<Mass>,
-    /// Whether some link with shapes says nothing of its mass.
+    /// Whether a link with shapes has no mass.
     pub(crate) weighs_unknown: bool,
     pub(crate) friction: Option<f64>,
     pub(crate) restitution: Option<f64>,
@@ -34,13 +34,13 @@ pub(crate) struct Body {
 pub(crate) struct Mass {
     pub(crate) kg: f64,
     pub(crate) com: Vector3<f64>,
-    /// Moments about its centre; nothing where they are to follow from the shapes.
+    /// Inertia tensor about the centre of mass; `None` if it must be computed from the shapes.
     pub(crate) about_com: Option<Matrix3<f64>>,
 }
 
 impl Body {
-    /// The model: as the thing stands with its origin at `pose`, moved so that its middle is above the origin and its
-    /// lowest point at 0. Its category is left to others.
+    /// Converts the body to a model: places its origin at `pose`, then moves it so that its middle is above the origin
+    /// and its lowest point at z = 0. The caller sets the category.
     pub(crate) fn into_model(self, name: &str, digest: String, pose: &Isometry3<f64>) -> ObjectModel {
         let turned = self.placed(pose);
         let (low, high) = bounds(&turned);
@@ -76,7 +76,7 @@ impl Body {
         self.parts.iter().map(moved).collect()
     }
 
-    /// All links' moments about their common centre, by the parallel axis theorem.
+    /// Combines the links' inertia tensors about the common centre of mass, by the parallel axis theorem.
     fn inertia(&self, model_from_file: &Isometry3<f64>) -> Option<Inertia> {
         let total: f64 = self.masses.iter().map(|mass| mass.kg).sum();
         let com = self.masses.iter().map(|mass| mass.com * mass.kg).sum::<Vector3<f64>>() / total;
@@ -95,15 +95,16 @@ impl Body {
     }
 }
 
-/// Whether moments can be those of any spread of mass: none negative, none larger than the two others together.
+/// Whether an inertia tensor is physically possible: principal moments are positive, and none exceeds the sum of the
+/// other two.
 pub(crate) fn is_possible(moments: &Matrix3<f64>) -> bool {
     let principal = moments.symmetric_eigenvalues();
     let (sum, most) = (principal.sum(), principal.max());
-    // A flat thing's largest moment is the sum of the others; figures are rounded to a few digits.
+    // The largest moment of a flat body equals the sum of the others; the tolerance allows for rounded numbers.
     principal.min() > 0.0 && most <= 1.02 * (sum - most)
 }
 
-/// The largest level rectangle on top, centred on the origin, where there is one that other things could stand on.
+/// Returns the largest level rectangle on top, centred on the origin; `None` if all are too small to hold objects.
 fn surface(parts: &[Part], top_m: f64) -> Option<Surface> {
     let rectangles = parts.iter().filter_map(|part| top_rectangle(part, top_m));
     let centred = rectangles.map(|(low, high)| [0, 1].map(|axis| 2.0 * high[axis].min(-low[axis])));
@@ -112,7 +113,7 @@ fn surface(parts: &[Part], top_m: f64) -> Option<Surface> {
     Some(Surface { height_m: top_m, size_m: largest })
 }
 
-/// The level top of one part along the axes: lowest and highest x and y.
+/// Returns the axis-aligned rectangle of a part's level top: lowest and highest x and y.
 fn top_rectangle(part: &Part, top_m: f64) -> Option<([f64; 2], [f64; 2])> {
     let at = part.pose.to_isometry();
     let (low, high) = part.bounds();
@@ -123,12 +124,12 @@ fn top_rectangle(part: &Part, top_m: f64) -> Option<([f64; 2], [f64; 2])> {
     let is_upright = |axis: Vector3<f64>| (at.rotation * axis).z.abs() > 0.999;
     match &part.shape {
         Shape::Box { .. } => {
-            // Turned by a right angle or not at all: each of its axes is one of the model's.
+            // Each of its axes is parallel to one of the model's.
             let is_straight = |axis: Vector3<f64>| (at.rotation * axis).abs().max() > 0.999;
             [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().all(is_straight).then_some(whole)
         }
         Shape::Cylinder { radius, .. } if is_upright(Vector3::z()) => {
-            // The largest square in the disc.
+            // The largest square inside the disc.
             let half = radius * std::f64::consts::FRAC_1_SQRT_2;
             let [x, y, _] = part.pose.position;
             Some(([x - half, y - half], [x + half, y + half]))

@@ -1,6 +1,6 @@
-//! Surfaces of COLLADA (.dae) files: what the scene instances, with its transforms and its unit.
+//! Reads COLLADA (.dae) meshes: the geometry that the scene instances, with transforms and unit.
 //!
-//! The axis that a file calls up is left alone, as Gazebo does: the numbers are taken as they stand.
+//! Ignores `up_axis`, as Gazebo does: coordinates are used unchanged.
 
 use nalgebra::{Matrix4, Point3, Rotation3, Unit, Vector3};
 
@@ -9,17 +9,17 @@ use crate::config::foreign::mesh_file::{MOST_TRIANGLES, checked};
 use crate::config::foreign::xml::{self, Node};
 use crate::config::mesh::Mesh;
 
-/// Nodes nested deeper than this, or more of them than that, are no drawing of a thing: they instance each other.
+/// Limits on the depth and the number of nodes; only nodes that instance each other in a cycle exceed them.
 const DEEPEST: usize = 64;
 const MOST_NODES: usize = 100_000;
 
-/// Elements that hold a surface and are not read. Lines and points have no surface, so their absence changes nothing.
+/// Unsupported elements with a surface. Lines and points have none, so they are ignored.
 const UNREAD: [&str; 3] = ["trifans", "tristrips", "polygons"];
 
-/// Reads the geometry that a file's scene shows, as one surface.
+/// Reads the geometry of a file's scene as one mesh.
 ///
 /// # Errors
-/// W031 it is not XML, W037 it has no usable geometry.
+/// W031 if it is not XML, W037 if it has no usable geometry.
 pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, Diagnostics> {
     let document = xml::parse(source)?;
     let root = document.root_element();
@@ -30,7 +30,7 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
             .into()
     };
     if root.tag_name().name() != "COLLADA" {
-        return Err(fault(root, format!("its root is `<{}>` and not `<COLLADA>`", root.tag_name().name())));
+        return Err(fault(root, format!("its root is `<{}>` instead of `<COLLADA>`", root.tag_name().name())));
     }
     let mut gathering = Gathering { root, vertices: Vec::new(), triangles: Vec::new(), depth: 0, n_nodes: 0 };
     gathering.scene().map_err(|(node, reason)| fault(node, reason))?;
@@ -38,11 +38,11 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
         && xml::text(up) != "Z_UP"
     {
         let message =
-            format!("the mesh calls {} up, and its numbers are taken as they stand, as Gazebo does", xml::text(up));
+            format!("the mesh's up axis, {}, is ignored, as in Gazebo: coordinates are used unchanged", xml::text(up));
         warnings.push(
             Diagnostic::warning("W036", message)
                 .at(source, xml::span(up))
-                .help("export it with z up, or turn the geometry by a `<pose>`"),
+                .help("export it with z up, or rotate the geometry with a `<pose>`"),
         );
     }
     let unit = unit(root);
@@ -50,14 +50,14 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
     checked(vertices, gathering.triangles).map_err(|reason| fault(root, reason))
 }
 
-/// Metres in one unit of the file.
+/// Returns the length of one unit of the file in metres.
 fn unit(root: Node) -> f64 {
     let written = xml::child(root, "asset").and_then(|asset| xml::child(asset, "unit"));
     let metres = written.and_then(|unit| unit.attribute("meter")?.trim().parse().ok());
     metres.filter(|metres: &f64| metres.is_finite() && *metres > 0.0).unwrap_or(1.0)
 }
 
-/// What is wrong, and where.
+/// A faulty element and the reason.
 type Fault<'a> = (Node<'a>, String);
 
 /// The scene's triangles so far, in the file's unit.
@@ -70,7 +70,7 @@ struct Gathering<'a> {
 }
 
 impl<'a> Gathering<'a> {
-    /// The scene that the file instances; without one, its first, and without any, every geometry as it stands.
+    /// Gathers the scene that the file instances, or else its first scene, or else every geometry without transforms.
     fn scene(&mut self) -> Result<(), Fault<'a>> {
         let named = xml::child(self.root, "scene").and_then(|scene| xml::child(scene, "instance_visual_scene"));
         let scene = match named {
@@ -90,7 +90,7 @@ impl<'a> Gathering<'a> {
     fn node(&mut self, node: Node<'a>, parent: &Matrix4<f64>) -> Result<(), Fault<'a>> {
         self.n_nodes += 1;
         if self.depth >= DEEPEST || self.n_nodes > MOST_NODES {
-            return Err((node, "its nodes instance each other without end".to_owned()));
+            return Err((node, "its nodes are nested too deeply or instance each other".to_owned()));
         }
         self.depth += 1;
         let at = parent * transform(node)?;
@@ -105,7 +105,9 @@ impl<'a> Gathering<'a> {
                     let geometry = self.target(inner, "geometry")?;
                     self.geometry(geometry, &at)?;
                 }
-                "instance_controller" => return Err((inner, "a skeleton moves its surface".to_owned())),
+                "instance_controller" => {
+                    return Err((inner, "a surface moved by a skeleton is not supported".to_owned()));
+                }
                 _ => {}
             }
         }
@@ -113,7 +115,7 @@ impl<'a> Gathering<'a> {
         Ok(())
     }
 
-    /// The element that a `url` or `source` names.
+    /// Finds the element that a `url` or `source` refers to.
     fn target(&self, instance: Node<'a>, kind: &str) -> Result<Node<'a>, Fault<'a>> {
         let url = instance.attribute("url").or_else(|| instance.attribute("source")).unwrap_or_default();
         let id = url.trim_start_matches('#');
@@ -129,7 +131,7 @@ impl<'a> Gathering<'a> {
             match primitive.tag_name().name() {
                 "triangles" | "polylist" => self.primitive(primitive, at)?,
                 unread if UNREAD.contains(&unread) => {
-                    return Err((primitive, format!("`<{unread}>` is not read")));
+                    return Err((primitive, format!("`<{unread}>` is not supported")));
                 }
                 _ => {}
             }
@@ -137,7 +139,7 @@ impl<'a> Gathering<'a> {
         Ok(())
     }
 
-    /// Triangles, or polygons cut into fans of triangles.
+    /// Adds triangles, or polygons split into triangle fans.
     fn primitive(&mut self, primitive: Node<'a>, at: &Matrix4<f64>) -> Result<(), Fault<'a>> {
         let inputs: Vec<Node> = xml::children(primitive, "input").collect();
         let offset = |input: &Node| input.attribute("offset").and_then(|at| at.parse::<usize>().ok()).unwrap_or(0);
@@ -149,7 +151,7 @@ impl<'a> Gathering<'a> {
         let corners: Vec<usize> =
             indices.chunks_exact(stride).filter_map(|all| all.get(offset(vertex)).copied()).collect();
         if corners.iter().any(|corner| *corner >= positions.len()) {
-            return Err((primitive, "it speaks of a vertex that is not there".to_owned()));
+            return Err((primitive, "it refers to a missing vertex".to_owned()));
         }
         let before = self.vertices.len();
         self.vertices.extend(positions.iter().map(|position| <[f64; 3]>::from(at.transform_point(position).coords)));
@@ -160,7 +162,7 @@ impl<'a> Gathering<'a> {
         let mut rest = corners.as_slice();
         for count in counts {
             let Some((polygon, behind)) = rest.split_at_checked(count) else {
-                return Err((primitive, "it counts more corners than it lists".to_owned()));
+                return Err((primitive, "`<vcount>` counts more corners than `<p>` lists".to_owned()));
             };
             rest = behind;
             for pair in polygon.get(1..).unwrap_or_default().windows(2) {
@@ -180,7 +182,7 @@ impl<'a> Gathering<'a> {
         Ok(())
     }
 
-    /// The places of a VERTEX input: its POSITION source.
+    /// Returns the positions of a VERTEX input, from its POSITION source.
     fn positions(&self, input: Node<'a>) -> Result<Vec<Point3<f64>>, Fault<'a>> {
         let vertices = self.target(input, "vertices")?;
         let position = xml::children(vertices, "input").find(|input| input.attribute("semantic") == Some("POSITION"));
@@ -196,7 +198,7 @@ impl<'a> Gathering<'a> {
     }
 }
 
-/// What a node's own transforms do, in the order in which they stand.
+/// Returns the product of a node's own transforms, in document order.
 fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
     let mut product = Matrix4::identity();
     for element in node.children().filter(|child| child.is_element()) {
@@ -205,7 +207,7 @@ fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
             "matrix" => 16,
             "translate" | "scale" => 3,
             "rotate" => 4,
-            "lookat" | "skew" => return Err((element, format!("`<{kind}>` is not read"))),
+            "lookat" | "skew" => return Err((element, format!("`<{kind}>` is not supported"))),
             _ => continue,
         };
         let numbers: Vec<f64> = list(element, kind)?;
@@ -225,10 +227,10 @@ fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
     Ok(product)
 }
 
-/// All numbers that an element lists.
+/// Parses the list of numbers in an element.
 fn list<'a, T: std::str::FromStr>(node: Node<'a>, what: &str) -> Result<Vec<T>, Fault<'a>> {
     let words = xml::text(node).split_whitespace();
     words
-        .map(|word| word.parse().map_err(|_| (node, format!("`<{what}>` holds `{word}`, which is no number"))))
+        .map(|word| word.parse().map_err(|_| (node, format!("`<{what}>` contains `{word}`, which is not a number"))))
         .collect()
 }

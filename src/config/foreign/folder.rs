@@ -1,4 +1,4 @@
-//! Which models a folder holds in Gazebo's layout, and reading one.
+//! Finds and reads SDF and URDF models in a folder with Gazebo's layout.
 
 use std::path::{Path, PathBuf};
 
@@ -8,16 +8,16 @@ use crate::config::foreign::lookup::Lookup;
 use crate::config::foreign::xml::{self, Reader};
 use crate::config::foreign::{sdf, urdf};
 
-/// A model that a folder holds.
+/// A model found in a folder.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
-    /// Name by which configurations know it: the folder's, or the URDF's without its ending.
+    /// Name in configurations: the folder's, or the URDF's without its extension.
     pub(crate) name: String,
-    /// Its `model.config`, its `model.sdf` or its URDF.
+    /// Path of its `model.config`, `model.sdf` or URDF.
     pub(crate) path: PathBuf,
 }
 
-/// The models of a folder: `NAME/model.config`, `NAME/model.sdf`, `NAME/model.urdf` and `NAME.urdf`, by name.
+/// Finds the models of a folder, sorted by name: `NAME/model.config`, `NAME/model.sdf`, `NAME/model.urdf`, `NAME.urdf`.
 pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
     let mut found: Vec<Found> = Vec::new();
     for model in files.folders(folder) {
@@ -39,12 +39,12 @@ pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
     found
 }
 
-/// Reads a model, with warnings of what was left out.
+/// Reads a model. Also returns warnings about ignored elements.
 ///
 /// # Errors
-/// Every fault of its files: they can't be read (W030), are not XML (W031) or no model (W032), lack something (W033), say
-/// something impossible (W034) or something that can't be simulated (W035), name no usable mesh (W037), or describe
-/// nothing solid (W038).
+/// All faults of its files: an unreadable file (W030), text that is not XML (W031) or not a model (W032), a missing
+/// element (W033), an invalid value (W034), an element that can't be simulated (W035), an unusable mesh (W037), or no
+/// solid shape (W038).
 pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<(ObjectModel, Diagnostics), Diagnostics> {
     let path = match found.path.file_name().and_then(|name| name.to_str()) {
         Some("model.config") => sdf_path(&found.path, lookup.files)?,
@@ -64,7 +64,7 @@ fn unreadable(path: &Path, reason: &str) -> Diagnostic {
         .help("a model is a folder with `model.config` and the SDF file that it names, or a URDF file")
 }
 
-/// The SDF file that a `model.config` names: of several, that of the newest version.
+/// Returns the SDF file named by a `model.config`; if there are several, that of the newest version.
 fn sdf_path(config: &Path, files: &Files) -> Result<PathBuf, Diagnostics> {
     let source = files.read(config).map_err(|reason| unreadable(config, &reason))?;
     let document = xml::parse(&source)?;

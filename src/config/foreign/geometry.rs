@@ -1,4 +1,4 @@
-//! Shapes as SDF and URDF write them.
+//! Shapes in SDF and URDF.
 
 use std::path::Path;
 
@@ -8,20 +8,20 @@ use crate::config::foreign::mesh_file;
 use crate::config::foreign::xml::{self, Bound, Node, Reader};
 use crate::config::{Mesh, Shape};
 
-/// What the shapes of one file are read with.
+/// Reads the shapes of one file.
 pub(crate) struct Shapes<'a> {
     pub(crate) lookup: &'a Lookup<'a>,
-    /// The file that holds them.
+    /// The file that contains the shapes.
     pub(crate) path: &'a Path,
-    /// Digest of the files that were read for them.
+    /// Digest of the mesh files.
     pub(crate) digest: Digest,
 }
 
-/// Kinds of geometry that simulation has.
+/// Help text with the supported kinds of geometry.
 const KINDS: &str = "use a box, cylinder, sphere, capsule or mesh";
 
 impl Shapes<'_> {
-    /// The shape of an SDF `<geometry>`; nothing where it is empty or wrong, which has then been noted.
+    /// Reads the shape of an SDF `<geometry>`. Reports a fault and returns `None` if it is empty or invalid.
     pub(crate) fn sdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
         let kind = kind_of(geometry, reader)?;
         if kind.tag_name().name() == "mesh" {
@@ -36,8 +36,8 @@ impl Shapes<'_> {
     fn sdf_mesh(&mut self, mesh: Node, reader: &mut Reader) -> Option<Shape> {
         reader.leaves_out(mesh, &["uri", "scale", "submesh", "convex_decomposition"]);
         if let Some(submesh) = xml::child(mesh, "submesh") {
-            let message = "a part of a mesh file can't be taken alone".to_owned();
-            reader.error("W035", submesh, message, "export that part to a file of its own");
+            let message = "`<submesh>` is not supported".to_owned();
+            reader.error("W035", submesh, message, "export that part of the mesh to its own file");
         }
         let uri = reader.required(mesh, "uri")?;
         let scale = match xml::child(mesh, "scale") {
@@ -47,7 +47,7 @@ impl Shapes<'_> {
         self.mesh(uri, xml::text(uri), scale, reader)
     }
 
-    /// The shape of a URDF `<geometry>`.
+    /// Reads the shape of a URDF `<geometry>`.
     pub(crate) fn urdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
         let kind = kind_of(geometry, reader)?;
         if kind.tag_name().name() != "mesh" {
@@ -63,12 +63,7 @@ impl Shapes<'_> {
 
     pub(crate) fn mesh(&mut self, node: Node, uri: &str, scale: [f64; 3], reader: &mut Reader) -> Option<Shape> {
         if scale.contains(&0.0) {
-            reader.error(
-                "W034",
-                node,
-                "a scale of 0 leaves nothing of the mesh".to_owned(),
-                "write 1 for the file's own size",
-            );
+            reader.error("W034", node, "the mesh's scale must not be 0".to_owned(), "write 1 for the file's own size");
             return None;
         }
         match self.mesh_file(uri) {
@@ -78,7 +73,7 @@ impl Shapes<'_> {
                 Some(Shape::Mesh { mesh: file.mesh.scaled(scale) })
             }
             Err(faults) => {
-                // A mesh file without lines is told of where it is named.
+                // A fault without a source, as of a binary mesh file, is reported where the file is named.
                 let placed = |fault: Diagnostic| match fault.source {
                     None => fault.at(reader.source, xml::span(node)),
                     Some(_) => fault,
@@ -98,7 +93,7 @@ impl Shapes<'_> {
     }
 }
 
-/// The element that says of what kind a geometry is.
+/// Returns the element that determines the kind of a geometry.
 fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Node<'n>> {
     let kind = geometry.children().find(Node::is_element);
     if kind.is_none() {
@@ -107,7 +102,7 @@ fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Node<'n>> {
     kind
 }
 
-/// A shape by its numbers, whose texts `written` finds by name: as elements in SDF, as attributes in URDF.
+/// Reads a primitive shape. `written` finds its parameters by name: elements in SDF, attributes in URDF.
 fn primitive<'n>(
     kind: Node<'n>,
     reader: &mut Reader,
@@ -138,7 +133,7 @@ fn primitive<'n>(
     }
 }
 
-/// Whether a mesh encloses anything worth the name. Unit of the bound: cubic metres (a cube of a tenth of a millimetre).
+/// Whether a mesh has a volume above 1e-12 m³ (a cube of 0.1 mm).
 pub(crate) fn has_volume(mesh: &Mesh) -> bool {
     mesh.volume() > 1e-12
 }

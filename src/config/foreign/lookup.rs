@@ -1,20 +1,20 @@
-//! Where the files lie that models name by URI.
+//! Resolves the URIs in models to files.
 
 use std::path::{Path, PathBuf};
 
 use crate::base::Files;
 
-/// Folders in which `model://NAME/…` and `package://NAME/…` are looked for, in order.
+/// Folders in which `model://NAME/…` and `package://NAME/…` are looked up, in order.
 pub(crate) struct Lookup<'a> {
     pub(crate) files: &'a Files,
     pub(crate) folders: Vec<PathBuf>,
 }
 
 impl Lookup<'_> {
-    /// The path of a URI in a file; what has no scheme is beside that file.
+    /// Returns the path of a URI in a file. A URI without a scheme is relative to that file.
     ///
     /// # Errors
-    /// A lower-case sentence that says why there is none.
+    /// A lower-case message if the file does not exist or the scheme is not supported.
     pub(crate) fn resolve(&self, uri: &str, file: &Path) -> Result<PathBuf, String> {
         let beside = file.parent().unwrap_or(Path::new(""));
         match uri.split_once("://") {
@@ -24,7 +24,7 @@ impl Lookup<'_> {
                 let folders: Vec<String> = self.folders.iter().map(|folder| folder.display().to_string()).collect();
                 format!("there is no `{path}` in {}", folders.join(" or "))
             }),
-            Some((scheme, _)) => Err(format!("`{scheme}://` is not looked up")),
+            Some((scheme, _)) => Err(format!("`{scheme}://` is not supported")),
         }
     }
 

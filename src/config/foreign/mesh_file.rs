@@ -1,4 +1,4 @@
-//! Mesh files: stl and obj by a library, dae by [`collada`](super::collada).
+//! Reads mesh files: stl and obj with the `mesh_loader` crate, dae with [`collada`](super::collada).
 
 use std::path::Path;
 
@@ -6,26 +6,26 @@ use crate::base::{Diagnostic, Diagnostics, Files, Source};
 use crate::config::foreign::collada;
 use crate::config::mesh::Mesh;
 
-/// More triangles than any collision shape needs; a larger file would fill the memory.
+/// Largest number of triangles: more than any collision shape needs, and a larger file could exhaust memory.
 pub(crate) const MOST_TRIANGLES: usize = 2_000_000;
 
-/// How models name mesh files.
+/// Help text on how models name mesh files.
 pub(crate) const HOW_TO_NAME: &str =
-    "the URI is `model://NAME/meshes/FILE`, `package://NAME/meshes/FILE` or a path beside the model's file";
+    "the URI is `model://NAME/meshes/FILE`, `package://NAME/meshes/FILE` or a path relative to the model's file";
 
-/// A mesh file as it was read.
+/// The contents of a mesh file.
 pub(crate) struct MeshFile {
     pub(crate) mesh: Mesh,
     /// Its bytes, for digests.
     pub(crate) bytes: Vec<u8>,
-    /// What was left out of it.
+    /// Warnings about ignored elements.
     pub(crate) warnings: Diagnostics,
 }
 
-/// Reads a mesh file; its ending says of what kind it is.
+/// Reads a mesh file; its extension determines the format.
 ///
 /// # Errors
-/// A fault of the file (W037): it can't be read, is of another kind, is not what its ending says, or has no triangles.
+/// W037 if the file can't be read, has an unsupported or a wrong extension, or contains no triangles.
 pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> {
     let shown = path.display();
     let bytes = files.read_bytes(path).map_err(|reason| -> Diagnostics {
@@ -40,7 +40,7 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
     };
     let mesh = match ending.as_str() {
         "stl" => of_scene(mesh_loader::stl::from_slice(&bytes)),
-        // Materials have no bearing on what a thing bumps into, so their files are not read.
+        // Materials do not affect collisions, so their files are not read.
         "obj" => of_scene(mesh_loader::obj::from_slice(&bytes, Some(path), |_| Ok(Vec::new()))),
         "dae" => {
             let text = std::str::from_utf8(&bytes).map_err(|_| unusable("it is not UTF-8 text".to_owned()))?;
@@ -50,13 +50,13 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
                 warnings,
             });
         }
-        _ => Err(format!("`.{ending}` files are not read")),
+        _ => Err(format!("`.{ending}` files are not supported")),
     };
     let mesh = mesh.map_err(unusable)?;
     Ok(MeshFile { mesh, bytes, warnings })
 }
 
-/// All meshes of a file as one.
+/// Merges all meshes of a file.
 fn of_scene(scene: std::io::Result<mesh_loader::Scene>) -> Result<Mesh, String> {
     let scene = scene.map_err(|error| error.to_string().to_lowercase())?;
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
@@ -69,7 +69,10 @@ fn of_scene(scene: std::io::Result<mesh_loader::Scene>) -> Result<Mesh, String> 
     checked(vertices, triangles)
 }
 
-/// A welded mesh of a bearable size.
+/// Welds a mesh.
+///
+/// # Errors
+/// A lower-case message if the mesh is invalid or has more than [`MOST_TRIANGLES`] triangles.
 pub(crate) fn checked(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Mesh, String> {
     if triangles.len() > MOST_TRIANGLES {
         return Err(format!("it has {} triangles, more than {MOST_TRIANGLES}", triangles.len()));

@@ -1,7 +1,7 @@
-//! Other people's models: folders in Gazebo's layout, SDF, URDF, and the mesh files that they name.
+//! Third-party models: folders in Gazebo's layout, SDF, URDF, and their mesh files.
 //!
-//! What a file says and simulation has no counterpart for is an error where it changes what the thing is, and a warning
-//! where the thing works without it. Never: leaves out anything in silence, takes a mesh apart, or guesses a category.
+//! An element that the simulation does not support is an error if it changes the model, and a warning if the model
+//! works without it. Never: ignores an element silently, decomposes a mesh, or guesses a category.
 
 mod body;
 mod collada;

@@ -1,4 +1,4 @@
-//! A robot's URDF, as far as its text shows what is wrong with it, and the collision meshes that it names.
+//! Validates the text of a robot's URDF and reads its collision meshes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,17 +10,17 @@ use crate::config::foreign::lookup::Lookup;
 use crate::config::foreign::robot_tree::{self, Tree};
 use crate::config::foreign::xml::{self, Node, Reader};
 
-/// What a URDF holds for a profile.
+/// The parts of a URDF that a profile needs.
 pub(crate) struct RobotText {
-    /// Meshes by the name that the URDF gives their file.
+    /// Meshes by their file name in the URDF.
     pub(crate) meshes: BTreeMap<String, Vec<Shape>>,
     /// Digest of the mesh files.
     pub(crate) digest: String,
-    /// Its links and joints; nothing where the text is no URDF at all or has none.
+    /// Its links and joints; `None` if the text is not a URDF or has no links.
     pub(crate) tree: Option<Tree>,
 }
 
-/// Reads the links, the joints and every mesh that a link collides with; notes every fault with its place.
+/// Reads the links, joints and collision meshes, and reports every fault with its span.
 pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotText {
     let mut shapes = Shapes { lookup, path, digest: Digest::new() };
     let mut meshes = BTreeMap::new();
@@ -36,7 +36,7 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Di
     let tree = if root.tag_name().name() == "robot" {
         Some(robot_tree::read(root, &mut reader)).filter(|tree| !tree.links.is_empty())
     } else {
-        let message = format!("the root is `<{}>` and not `<robot>`", root.tag_name().name());
+        let message = format!("the root is `<{}>` instead of `<robot>`", root.tag_name().name());
         reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");
         None
     };
@@ -57,7 +57,7 @@ fn read_collision(
 ) {
     let Some(geometry) = reader.required(collision, "geometry") else { return };
     let Some(mesh) = xml::child(geometry, "mesh") else {
-        // A primitive is made anew with the robot; here its numbers are read.
+        // Primitives are created with the robot; this only validates their numbers.
         shapes.urdf(geometry, reader);
         return;
     };

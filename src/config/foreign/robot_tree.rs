@@ -1,41 +1,41 @@
-//! The links and joints of a robot's URDF: whether they make one tree, and what each joint can do.
+//! The links and joints of a robot's URDF: checks that they form one tree, and reads each joint's type and limits.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::base::did_you_mean;
 use crate::config::foreign::xml::{self, Bound, Node, Reader};
 
-/// Kinds of joints that simulation has.
+/// Supported joint types.
 const KINDS: [&str; 4] = ["fixed", "prismatic", "revolute", "continuous"];
 
-/// How a joint of a URDF moves.
+/// The kind of motion of a URDF joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Motion {
     Fixed,
     Slides,
     Turns,
-    /// Something is wrong with it, which has been said.
+    /// The joint has a fault, which has been reported.
     Unknown,
 }
 
-/// What a profile has to know of a joint.
+/// The properties of a joint that profiles are checked against.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TreeJoint {
     pub(crate) motion: Motion,
-    /// Unit: metres or radians; infinite where it goes on turning.
+    /// Unit: metres or radians; infinite if the joint is continuous.
     pub(crate) lower: f64,
     pub(crate) upper: f64,
 }
 
-/// The names of a URDF.
+/// The links and joints of a URDF by name.
 #[derive(Debug, Default)]
 pub(crate) struct Tree {
     pub(crate) joints: BTreeMap<String, TreeJoint>,
     pub(crate) links: BTreeSet<String>,
 }
 
-/// Reads the tree below `<robot>` and notes what is wrong with it: names that are missing or double (W033, W051), joints that
-/// can't be simulated (W035), numbers (W034), and links that make no tree (W051).
+/// Reads the tree below `<robot>` and reports its faults: missing or duplicate names (W033, W051), joints that can't be
+/// simulated (W035), invalid numbers (W034), and links that do not form a tree (W051).
 pub(crate) fn read(root: Node, reader: &mut Reader) -> Tree {
     let mut tree = Tree::default();
     for link in xml::children(root, "link") {
@@ -50,7 +50,7 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> Tree {
         reader.error("W051", root, "the robot has no links".to_owned(), "add `<link name=\"base_link\"/>`");
         return tree;
     }
-    // Child link: joint and parent link.
+    // Joint and parent link by child link.
     let mut above: BTreeMap<&str, (Node, &str)> = BTreeMap::new();
     for joint in xml::children(root, "joint") {
         let Some(name) = reader.attribute(joint, "name") else { continue };
@@ -62,8 +62,13 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> Tree {
         let (parent, child) = (end(joint, "parent", &tree, reader), end(joint, "child", &tree, reader));
         let (Some(parent), Some(child)) = (parent, child) else { continue };
         if above.insert(child, (joint, parent)).is_some() {
-            let message = format!("the link `{child}` hangs on two joints");
-            reader.error("W051", joint, message, "links form one tree: each but the first hangs on one joint");
+            let message = format!("the link `{child}` is the child of two joints");
+            reader.error(
+                "W051",
+                joint,
+                message,
+                "links form one tree: each link but the root is the child of one joint",
+            );
         }
         weigh(root, joint, child, reader);
     }
@@ -72,7 +77,7 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> Tree {
     tree
 }
 
-/// A mass below nothing.
+/// Reports a negative mass.
 fn read_mass(link: Node, reader: &mut Reader) {
     let Some(inertial) = xml::child(link, "inertial") else { return };
     if let Some(mass) = reader.required(inertial, "mass")
@@ -82,7 +87,7 @@ fn read_mass(link: Node, reader: &mut Reader) {
     }
 }
 
-/// A link that moves, touches things and states that it weighs nothing: nothing could push it, or be pushed by it.
+/// Reports a movable, colliding link with a mass of 0: it could neither push an object nor be pushed.
 fn weigh(root: Node, joint: Node, child: &str, reader: &mut Reader) {
     let link = xml::children(root, "link").find(|link| link.attribute("name") == Some(child));
     let moves = joint.attribute("type") != Some("fixed");
@@ -90,8 +95,8 @@ fn weigh(root: Node, joint: Node, child: &str, reader: &mut Reader) {
     let mass = xml::child(link, "inertial").and_then(|inertial| xml::child(inertial, "mass"));
     let weight: Option<f64> = mass.and_then(|mass| mass.attribute("value")?.trim().parse().ok());
     if let (Some(mass), Some(0.0)) = (mass, weight) {
-        let message = format!("the link `{child}` moves, and weighs nothing");
-        reader.error("W034", mass, message, "give it its mass in kilograms, or no `<collision>`");
+        let message = format!("the link `{child}` moves but has a mass of 0");
+        reader.error("W034", mass, message, "set its mass in kilograms, or remove its `<collision>`");
     }
 }
 
@@ -114,7 +119,7 @@ fn read_joint(joint: Node, name: &str, reader: &mut Reader) -> Option<TreeJoint>
         && let Some(written) = reader.attribute(axis, "xyz")
         && reader.numbers(axis, written, Bound::Finite) == Some([0.0; 3])
     {
-        let message = format!("the axis of the joint `{name}` has no direction");
+        let message = format!("the axis of the joint `{name}` must not be zero");
         reader.error("W034", axis, message, "write `<axis xyz=\"0 0 1\"/>`, or another direction");
     }
     if kind == "continuous" {
@@ -122,7 +127,7 @@ fn read_joint(joint: Node, name: &str, reader: &mut Reader) -> Option<TreeJoint>
     }
     let limit = reader.required(joint, "limit")?;
     let mut number = |key: &str, bound: Bound| {
-        // Both ends are 0 where they are left out; efforts and velocities must be said.
+        // `lower` and `upper` default to 0; `effort` and `velocity` are required.
         let written = match (limit.attribute(key), key) {
             (None, "lower" | "upper") => "0",
             _ => reader.attribute(limit, key)?,
@@ -134,14 +139,14 @@ fn read_joint(joint: Node, name: &str, reader: &mut Reader) -> Option<TreeJoint>
     number("velocity", Bound::NotNegative);
     let (lower, upper) = (lower?, upper?);
     if lower > upper {
-        let message = format!("the joint `{name}` goes from {lower} down to {upper}");
-        reader.error("W034", limit, message, "`lower` is the smaller number");
+        let message = format!("the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}");
+        reader.error("W034", limit, message, "`lower` must not exceed `upper`");
         return None;
     }
     Some(TreeJoint { motion, lower, upper })
 }
 
-/// The link at one end of a joint.
+/// Returns the link at one end of a joint.
 fn end<'n>(joint: Node<'n>, which: &str, tree: &Tree, reader: &mut Reader) -> Option<&'n str> {
     let end = reader.required(joint, which)?;
     let link = reader.attribute(end, "link")?;
@@ -161,12 +166,12 @@ fn check_mimics(root: Node, tree: &Tree, reader: &mut Reader) {
         if !moves {
             let known = tree.joints.iter().filter(|(_, joint)| joint.motion != Motion::Fixed);
             let help = did_you_mean(leader, known.map(|(name, _)| name.as_str()));
-            reader.error("W051", mimic, format!("there is no joint `{leader}` to follow"), help);
+            reader.error("W051", mimic, format!("there is no movable joint `{leader}` to mimic"), help);
         }
     }
 }
 
-/// One root, and no circles.
+/// Checks that there are one root and no cycles.
 fn check_tree(root: Node, tree: &Tree, above: &BTreeMap<&str, (Node, &str)>, reader: &mut Reader) {
     let mut circles: BTreeSet<&str> = BTreeSet::new();
     for start in tree.links.iter().map(String::as_str) {
@@ -175,8 +180,8 @@ fn check_tree(root: Node, tree: &Tree, above: &BTreeMap<&str, (Node, &str)>, rea
         while let Some((joint, parent)) = above.get(link) {
             if !seen.insert(link) {
                 if circles.is_disjoint(&seen) {
-                    let message = format!("the link `{link}` hangs on itself by way of `{parent}`");
-                    reader.error("W051", *joint, message, "links form one tree: take one of the joints away");
+                    let message = format!("the link `{link}` is its own ancestor through `{parent}`");
+                    reader.error("W051", *joint, message, "links form one tree: remove one of the joints");
                 }
                 circles.extend(&seen);
                 break;
@@ -185,9 +190,9 @@ fn check_tree(root: Node, tree: &Tree, above: &BTreeMap<&str, (Node, &str)>, rea
         }
     }
     let roots: Vec<&str> = tree.links.iter().map(String::as_str).filter(|link| !above.contains_key(link)).collect();
-    // Where joints are wrong, links seem to be loose that are not.
+    // Faulty joints make connected links look disconnected.
     if roots.len() > 1 && !reader.found.has_errors() {
-        let message = format!("the links make {} trees, which begin at `{}`", roots.len(), roots.join("`, `"));
+        let message = format!("the links form {} trees, with the roots `{}`", roots.len(), roots.join("`, `"));
         reader.error("W051", root, message, "links form one tree: join them with joints of the type `fixed`");
     }
 }

@@ -1,4 +1,4 @@
-//! Models in Gazebo's format.
+//! Reads SDF models, Gazebo's format.
 
 use std::path::Path;
 
@@ -11,19 +11,19 @@ use crate::config::foreign::lookup::Lookup;
 use crate::config::foreign::xml::{self, Bound, Node, Reader};
 use crate::config::{Part, Shape};
 
-/// Minor versions of SDF 1 that are read.
+/// Supported minor versions of SDF 1.
 const VERSIONS: std::ops::RangeInclusive<u32> = 4..=11;
 
-/// A model as its file describes it.
+/// A model read from SDF or URDF.
 pub(crate) struct SdfModel {
     pub(crate) body: Body,
-    /// Where the file puts its origin when it stands by itself.
+    /// Pose of the model's origin in the file.
     pub(crate) pose: Isometry3<f64>,
-    /// Digest of the file and of the meshes that it names.
+    /// Digest of the file and its meshes.
     pub(crate) digest: String,
 }
 
-/// The one model of an SDF file, with what was found in it; nothing where something is wrong.
+/// Reads the model of an SDF file and its faults. The model is `None` if there are errors.
 pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
     let document = match xml::parse(source) {
         Ok(document) => document,
@@ -42,29 +42,29 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<Sdf
     (complete.map(|(body, pose)| SdfModel { body, pose, digest: shapes.digest.finish() }), found)
 }
 
-/// The model of a document that holds one.
+/// Returns the only model of a document.
 fn root_model<'a>(root: Node<'a>, reader: &mut Reader) -> Option<Node<'a>> {
     check_version(root, reader)?;
     let models: Vec<Node> = xml::children(root, "model").collect();
     match models.as_slice() {
         [model] => Some(*model),
         [] => {
-            let message = "the file holds no `<model>`".to_owned();
-            reader.error("W032", root, message, "a file with a `<world>` belongs into the folder `worlds`");
+            let message = "the file contains no `<model>`".to_owned();
+            reader.error("W032", root, message, "a file with a `<world>` belongs in the folder `worlds`");
             None
         }
         [_, second, ..] => {
-            let message = format!("the file holds {} models", models.len());
+            let message = format!("the file contains {} models", models.len());
             reader.error("W032", *second, message, "give each model a folder of its own");
             None
         }
     }
 }
 
-/// Whether a root is SDF of a version that is read (W032).
+/// Returns `Some` if the root is SDF of a supported version; otherwise reports W032.
 pub(crate) fn check_version(root: Node, reader: &mut Reader) -> Option<()> {
     if root.tag_name().name() != "sdf" {
-        let message = format!("the root is `<{}>` and not `<sdf>`", root.tag_name().name());
+        let message = format!("the root is `<{}>` instead of `<sdf>`", root.tag_name().name());
         reader.error("W032", root, message, "an SDF file begins with `<sdf version=\"1.6\">`");
         return None;
     }
@@ -73,20 +73,20 @@ pub(crate) fn check_version(root: Node, reader: &mut Reader) -> Option<()> {
     if minor.is_some_and(|minor| VERSIONS.contains(&minor)) {
         return Some(());
     }
-    let message = format!("SDF {version} is not read");
-    reader.error("W032", root, message, format!("versions 1.{} to 1.{} are", VERSIONS.start(), VERSIONS.end()));
+    let message = format!("SDF {version} is not supported");
+    reader.error("W032", root, message, format!("use a version from 1.{} to 1.{}", VERSIONS.start(), VERSIONS.end()));
     None
 }
 
-/// The pose that an element says it has; the identity where it says none.
+/// Reads the pose of an element; the identity if it has none.
 ///
-/// Only poses in the frame of the element around them are read (W035).
+/// Only poses in the frame of the parent element are supported (W035).
 pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     let Some(written) = xml::child(node, "pose") else { return Some(Isometry3::identity()) };
     let relative_to = written.attribute("relative_to").or_else(|| written.attribute("frame")).unwrap_or("");
     if !["", "__model__", "world"].contains(&relative_to) {
-        let message = format!("a pose relative to `{relative_to}` is not read");
-        reader.error("W035", written, message, "write the pose in the frame of the element around it");
+        let message = format!("a pose relative to `{relative_to}` is not supported");
+        reader.error("W035", written, message, "write the pose in the frame of the parent element");
         return None;
     }
     let text = xml::text(written);
@@ -102,7 +102,7 @@ pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     Some(xml::placed([x, y, z], [roll * unit, pitch * unit, yaw * unit]))
 }
 
-/// A model's links as one rigid body.
+/// Reads a model's links as one rigid body.
 pub(crate) fn read_model(model: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
     const KNOWN: [&str; 13] = [
         "link",
@@ -123,8 +123,8 @@ pub(crate) fn read_model(model: Node, shapes: &mut Shapes, reader: &mut Reader) 
     let fixed = xml::child(model, "static").is_some_and(|node| reader.boolean(node).unwrap_or(false));
     let mut body = Body { fixed, ..Body::default() };
     for nested in model.children().filter(|child| ["model", "include", "gripper"].contains(&child.tag_name().name())) {
-        let message = format!("`<{}>` inside of a model is not read", nested.tag_name().name());
-        reader.error("W035", nested, message, "write its links into this model, or use it as a model of its own");
+        let message = format!("`<{}>` inside a model is not supported", nested.tag_name().name());
+        reader.error("W035", nested, message, "copy its links into this model, or make it a separate model");
     }
     for plugin in xml::children(model, "plugin") {
         reader.warning("W036", plugin, "the plugin is not run".to_owned(), "the model works without it");
@@ -135,24 +135,24 @@ pub(crate) fn read_model(model: Node, shapes: &mut Shapes, reader: &mut Reader) 
         read_link(link, &mut body, shapes, reader);
     }
     if body.parts.is_empty() && !reader.found.has_errors() {
-        let message = "the model has nothing solid: none of its links has a `<collision>`".to_owned();
-        reader.error("W038", model, message, "give a link a `<collision>`; a `<visual>` is only looked at");
+        let message = "the model has no solid shape: none of its links has a `<collision>`".to_owned();
+        reader.error("W038", model, message, "give a link a `<collision>`; a `<visual>` does not collide");
     }
     body
 }
 
-/// One body can't bend: links of what moves are joined by fixed joints (W035).
+/// Checks that the links form one rigid body: those of a model that is not static need fixed joints (W035).
 fn check_joints(model: Node, links: &[Node], fixed: bool, reader: &mut Reader) {
     let joints: Vec<Node> = xml::children(model, "joint").collect();
     for joint in joints.iter().filter(|joint| joint.attribute("type") != Some("fixed")) {
         let kind = joint.attribute("type").unwrap_or("unknown");
         let name = joint.attribute("name").unwrap_or("");
-        let message = format!("the joint `{name}` is of the type {kind}, and objects can't bend");
+        let message = format!("the joint `{name}` is of the type {kind}, but objects must be rigid");
         reader.error("W035", *joint, message, "make the joint `fixed`; robots are read from URDF");
     }
     if let (Some(loose), false) = (links.get(joints.len() + 1), fixed) {
         let name = loose.attribute("name").unwrap_or("");
-        let message = format!("nothing joins the link `{name}` to the others");
+        let message = format!("no joint connects the link `{name}` to the others");
         reader.error("W035", *loose, message, "add a `<joint type=\"fixed\">`, or write `<static>true</static>`");
     }
 }
@@ -173,18 +173,18 @@ fn read_link(link: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Read
     reader.leaves_out(link, &KNOWN);
     let Some(at) = pose(link, reader) else { return };
     for (name, usual, message) in [
-        ("gravity", true, "a link that nothing pulls down can't be simulated"),
-        ("kinematic", false, "a link that others move can't be simulated"),
+        ("gravity", true, "a link without gravity can't be simulated"),
+        ("kinematic", false, "a kinematic link can't be simulated"),
     ] {
         if let Some(node) = xml::child(link, name)
             && reader.boolean(node).is_some_and(|value| value != usual)
             && !body.fixed
         {
-            reader.error("W035", node, message.to_owned(), "write `<static>true</static>` for what never moves");
+            reader.error("W035", node, message.to_owned(), "write `<static>true</static>` if the model never moves");
         }
     }
     if let Some(decay) = xml::child(link, "velocity_decay") {
-        let message = "`<velocity_decay>` is not read: air does not slow anything down".to_owned();
+        let message = "`<velocity_decay>` is ignored: the simulation has no air drag".to_owned();
         reader.warning("W036", decay, message, "the model works without it");
     }
     let before = body.parts.len();
@@ -214,8 +214,13 @@ fn read_collision(collision: Node, link: &Isometry3<f64>, body: &mut Body, shape
     if let Shape::Mesh { mesh } = &shape
         && !has_volume(mesh)
     {
-        let message = "the mesh encloses nothing".to_owned();
-        reader.error("W037", collision, message, "a collision mesh is a closed surface; use a thin box for a sheet");
+        let message = "the mesh has no volume".to_owned();
+        reader.error(
+            "W037",
+            collision,
+            message,
+            "a collision mesh must be a closed surface; use a thin box for a sheet",
+        );
     }
     body.parts.push(Part { pose: Pose::from_isometry(&(link * at)), shape });
 }
@@ -232,7 +237,7 @@ fn read_surface(surface: Node, body: &mut Body, reader: &mut Reader) {
         if let (Some(along), Some(across)) = (along, across)
             && along != across
         {
-            let message = format!("friction can't depend on the direction: {along} serves, and {across} does not");
+            let message = format!("friction can't depend on the direction: {along} is used and {across} is ignored");
             reader.warning("W036", ode, message, "give `<mu>` and `<mu2>` the same value");
         }
         set("friction", &mut body.friction, along, ode, reader);
@@ -245,19 +250,24 @@ fn read_surface(surface: Node, body: &mut Body, reader: &mut Reader) {
     }
 }
 
-/// A body is of one material: the first value counts, and another one is told.
+/// Sets a material parameter of the body. The first value is used; others are ignored with a warning.
 fn set(what: &str, place: &mut Option<f64>, value: Option<f64>, node: Node, reader: &mut Reader) {
     match (*place, value) {
         (None, Some(_)) => *place = value,
         (Some(known), Some(other)) if known != other => {
-            let message = format!("one body has one {what}: {known} serves, and {other} does not");
-            reader.warning("W036", node, message, "make two models of it, or give all its collisions the same value");
+            let message = format!("a body has only one {what}: {known} is used and {other} is ignored");
+            reader.warning(
+                "W036",
+                node,
+                message,
+                "give all its collisions the same value, or split it into two models",
+            );
         }
         _ => {}
     }
 }
 
-/// What a link weighs; nothing where it does not say how much.
+/// Reads the mass of a link; `None` if it has none.
 fn read_inertial(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<Mass> {
     reader.leaves_out(inertial, &["mass", "pose", "inertia"]);
     let at = link * pose(inertial, reader)?;
@@ -279,12 +289,18 @@ fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
     possible(moments, inertia, reader)
 }
 
-/// Moments that some spread of mass could have; others are told and follow from the shapes (W036).
+/// Returns the moments of inertia if they are possible. Otherwise warns (W036) and returns `None`: they are then
+/// computed from the shapes.
 pub(crate) fn possible(moments: Matrix3<f64>, inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
     if is_possible(&moments) {
         return Some(moments);
     }
-    let message = "no body has these moments of inertia: they are taken from its shapes instead".to_owned();
-    reader.warning("W036", inertia, message, "each must be above 0 and no larger than the two others together");
+    let message = "these moments of inertia are impossible: they are computed from the shapes instead".to_owned();
+    reader.warning(
+        "W036",
+        inertia,
+        message,
+        "each principal moment must be above 0 and at most the sum of the other two",
+    );
     None
 }

@@ -1,4 +1,4 @@
-//! Objects that are written as URDF: rigid, whatever their links.
+//! Reads objects in URDF as one rigid body.
 
 use std::path::Path;
 
@@ -12,10 +12,10 @@ use crate::config::foreign::sdf::{SdfModel, possible};
 use crate::config::foreign::xml::{self, Bound, Node, Reader};
 use crate::config::{Part, Shape};
 
-/// Links that are joined in a longer chain than this stand in a circle.
+/// Longest chain of links; a longer one is a cycle.
 const LONGEST_CHAIN: usize = 256;
 
-/// The object of a URDF file, with what was found in it; nothing where something is wrong.
+/// Reads the object of a URDF file and its faults. The object is `None` if there are errors.
 pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
     let document = match xml::parse(source) {
         Ok(document) => document,
@@ -29,7 +29,7 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<Sdf
     if root.tag_name().name() == "robot" {
         read_robot(root, &mut body, &mut shapes, &mut reader);
     } else {
-        let message = format!("the root is `<{}>` and not `<robot>`", root.tag_name().name());
+        let message = format!("the root is `<{}>` instead of `<robot>`", root.tag_name().name());
         reader.error("W032", root, message, "a URDF file begins with `<robot name=\"…\">`");
     }
     let found = reader.found;
@@ -44,7 +44,7 @@ fn read_robot(root: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Rea
     let joints: Vec<Node> = xml::children(root, "joint").collect();
     for joint in joints.iter().filter(|joint| joint.attribute("type") != Some("fixed")) {
         let (name, kind) = (joint.attribute("name").unwrap_or(""), joint.attribute("type").unwrap_or("unknown"));
-        let message = format!("the joint `{name}` is of the type {kind}, and objects can't bend");
+        let message = format!("the joint `{name}` is of the type {kind}, but objects must be rigid");
         reader.error("W035", *joint, message, "make the joint `fixed`; robots are read through `[robot] profile`");
     }
     for link in xml::children(root, "link") {
@@ -52,12 +52,12 @@ fn read_robot(root: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Rea
         read_link(link, &at, body, shapes, reader);
     }
     if body.parts.is_empty() && !reader.found.has_errors() {
-        let message = "the object has nothing solid: none of its links has a `<collision>`".to_owned();
-        reader.error("W038", root, message, "give a link a `<collision>`; a `<visual>` is only looked at");
+        let message = "the object has no solid shape: none of its links has a `<collision>`".to_owned();
+        reader.error("W038", root, message, "give a link a `<collision>`; a `<visual>` does not collide");
     }
 }
 
-/// Where a link is: through the fixed joints up to the root.
+/// Returns the pose of a link relative to the root, through its chain of fixed joints.
 fn place(link: Node, joints: &[Node], reader: &mut Reader) -> Option<Isometry3<f64>> {
     let named =
         |joint: &Node, end: &str| xml::child(*joint, end).and_then(|node| node.attribute("link")).map(str::to_owned);
@@ -70,11 +70,11 @@ fn place(link: Node, joints: &[Node], reader: &mut Reader) -> Option<Isometry3<f
         at = origin(*joint, reader)? * at;
         name = named(joint, "parent").unwrap_or_default();
     }
-    reader.error("W035", link, "the link's joints lead in a circle".to_owned(), "links form one tree");
+    reader.error("W035", link, "the link's joints form a cycle".to_owned(), "links form one tree");
     None
 }
 
-/// The `<origin>` of an element; the identity where it has none.
+/// Reads the `<origin>` of an element; the identity if it has none.
 fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     let Some(written) = xml::child(node, "origin") else { return Some(Isometry3::identity()) };
     let mut three = |name: &str| match written.attribute(name) {
@@ -94,12 +94,12 @@ fn read_link(link: Node, at: &Isometry3<f64>, body: &mut Body, shapes: &mut Shap
         if let Shape::Mesh { mesh } = &shape
             && !has_volume(mesh)
         {
-            let message = "the mesh encloses nothing".to_owned();
+            let message = "the mesh has no volume".to_owned();
             reader.error(
                 "W037",
                 collision,
                 message,
-                "a collision mesh is a closed surface; use a thin box for a sheet",
+                "a collision mesh must be a closed surface; use a thin box for a sheet",
             );
         }
         body.parts.push(Part { pose: Pose::from_isometry(&(at * placed)), shape });

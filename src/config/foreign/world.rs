@@ -1,4 +1,4 @@
-//! Worlds in Gazebo's format: the models that they include, standing still, with a location in front of each surface.
+//! Reads Gazebo worlds: their included models as static furniture, with a location in front of each surface.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -7,7 +7,7 @@ use crate::config::foreign::sdf::{check_version, pose};
 use crate::config::foreign::xml::{self, Node, Reader};
 use crate::config::{Furniture, Location, ObjectModel, WorldMap};
 
-/// Elements of a world that have no bearing on what stands where, or are there anyway: light, how Gazebo looks and steps.
+/// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
 const WITHOUT_BEARING: [&str; 16] = [
     "include",
     "model",
@@ -26,18 +26,19 @@ const WITHOUT_BEARING: [&str; 16] = [
     "road",
     "name",
 ];
-/// Included models that every world of ours has: a floor and light.
+/// Included models to skip: every world already has a floor and light.
 const ALWAYS_THERE: [&str; 2] = ["ground_plane", "sun"];
-/// Gap between the edge of a surface and the middle of a robot's base that works at it. Unit: metres.
+/// Distance between the edge of a surface and the middle of the base of a robot working at it. Unit: metres.
 const FRONT_GAP_M: f64 = 0.69;
-/// A model that leans by more than this can't stand in a world. Unit: cosine.
+/// A model that is tilted by more than this is rejected. Unit: cosine.
 const UPRIGHT_COSINE: f64 = 0.999;
 
-/// Reads a Gazebo world. Models are looked up by `model`, and are the same as those that configurations name.
+/// Reads a Gazebo world. `model` looks up the models that configurations can also name. The world is `None` if there
+/// are errors.
 ///
 /// # Errors
-/// Every fault of the text: it is not XML (W031) or no world (W032), includes models that are not there (W040), has two
-/// things of one name (W041), or says what has no counterpart (W035).
+/// All faults of the text: it is not XML (W031) or not SDF (W032), includes missing models (W040), has duplicate names
+/// (W041), or contains unsupported elements (W035).
 pub(crate) fn read<'a>(
     name: &str,
     source: &Source,
@@ -56,12 +57,12 @@ pub(crate) fn read<'a>(
     {
         reader.leaves_out(world, &WITHOUT_BEARING);
         for inline in xml::children(world, "model").filter(|inline| !is_floor(*inline)) {
-            let message = "a model that is written into a world is not read".to_owned();
+            let message = "a model defined inside a world is not supported".to_owned();
             reader.error(
                 "W035",
                 inline,
                 message,
-                "give it a folder of its own and include it: `<include><uri>model://NAME</uri></include>`",
+                "move it to its own folder and include it: `<include><uri>model://NAME</uri></include>`",
             );
         }
         for include in xml::children(world, "include") {
@@ -80,7 +81,7 @@ pub(crate) fn read<'a>(
     (complete.then_some(map), found)
 }
 
-/// Whether a model of a world is a floor: a level plane.
+/// Whether a model of a world is a floor, which contains a plane.
 fn is_floor(model: Node) -> bool {
     model.descendants().any(|node| node.tag_name().name() == "plane")
 }
@@ -103,21 +104,21 @@ fn read_include<'a>(
         return None;
     };
     if !included.fixed && xml::child(include, "static").is_none_or(|fixed| xml::text(fixed) != "true") {
-        let message = format!("`{named}` may move in Gazebo, and stands still in a world here");
-        reader.warning(
-            "W036",
-            include,
-            message,
-            "what shall move belongs into `[surfaceObjects]` or `nav_obstacle_list`",
-        );
+        let message = format!("`{named}` can move in Gazebo, but is static in a world here");
+        reader.warning("W036", include, message, "put movable objects into `[surfaceObjects]` or `nav_obstacle_list`");
     }
     let at = pose(include, reader)?;
     if (at.rotation * Vector3::z()).z < UPRIGHT_COSINE {
-        reader.error("W035", include, "a model that leans can't stand in a world".to_owned(), "turn it about z alone");
+        reader.error(
+            "W035",
+            include,
+            "a tilted model is not supported in a world".to_owned(),
+            "rotate it about z only",
+        );
         return None;
     }
     let name = xml::child(include, "name").map_or(named, xml::text);
-    // Our models have their origin below their middle, and the file's may be elsewhere.
+    // A model's origin is below its middle; the file's origin may differ.
     let foot = at * Point3::from(included.origin_m.map(|x| -x));
     Some(Furniture { name: name.to_owned(), model: named.to_owned(), pose: upright(&at, foot) })
 }
@@ -126,7 +127,7 @@ fn upright(at: &Isometry3<f64>, foot: Point3<f64>) -> Pose {
     Pose::upright([foot.x, foot.y, foot.z], Pose::from_isometry(at).yaw())
 }
 
-/// The place in front of a surface, where a robot stands to work on it.
+/// Returns the location in front of a surface, from which a robot can work on it.
 fn front(piece: &Furniture, model: Option<&ObjectModel>) -> Option<Location> {
     let surface = model?.surface?;
     let at = piece.pose.to_isometry() * Point3::new(-surface.size_m[0] / 2.0 - FRONT_GAP_M, 0.0, 0.0);
