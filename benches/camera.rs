@@ -10,10 +10,10 @@ mod support;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
-use actcheck::base::{Choice, ChoiceKind, Choices, Digest, Source};
+use actcheck::base::{Digest, Source};
 use actcheck::campaign::Env;
 use actcheck::config::Overrides;
-use actcheck::scenario::{Scene, Shape};
+use actcheck::data::{Choice, ChoiceKind, Choices, Scene, Shape};
 use actcheck::world::{DepthImage, World};
 use actcheck::{scenario, world};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};

@@ -14,7 +14,7 @@ use actcheck::analysis::{
     FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternOptions, Subject, TableFilter, Values, cascades, columns,
     judged, mine, property_findings, table_failure_modes, trend,
 };
-use actcheck::verdict::Outcome;
+use actcheck::base::Outcome;
 use support::{made_up, planted};
 
 #[path = "../tests/support"]

@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-use actcheck::base::Choices;
 use actcheck::campaign::Env;
-use actcheck::config::{Overrides, Shape};
+use actcheck::config::Overrides;
+use actcheck::data::{Choices, Role, Scene, Shape};
 use actcheck::rules::Budget;
-use actcheck::scenario::{self, Role, Scene};
+use actcheck::scenario;
 use actcheck::world::{self, Command};
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude as engine;

@@ -10,9 +10,9 @@ use std::sync::LazyLock;
 use std::time::Instant;
 
 use actcheck::actions::{self, ActionCall};
-use actcheck::base::Choices;
 use actcheck::campaign::{Clock, Env, Manner, run_line};
 use actcheck::config::Overrides;
+use actcheck::data::Choices;
 use actcheck::history::{CampaignEnd, History};
 use actcheck::rules::Budget;
 use actcheck::{facts, scenario, world};

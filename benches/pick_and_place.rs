@@ -15,9 +15,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use actcheck::actions::{self, ActionCall};
-use actcheck::base::Choices;
 use actcheck::campaign::{Clock, Env, Manner, Options, run_all, run_line};
 use actcheck::config::Overrides;
+use actcheck::data::Choices;
 use actcheck::history::History;
 use actcheck::rules::Budget;
 use actcheck::{facts, scenario, world};

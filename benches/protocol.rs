@@ -18,9 +18,10 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use actcheck::base::{Choices, Source};
+use actcheck::base::Source;
 use actcheck::campaign::{Clock, Env, Manner, run_line};
 use actcheck::config::Overrides;
+use actcheck::data::Choices;
 use serde_json::json;
 use support::thread_secs;
 

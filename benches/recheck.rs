@@ -8,9 +8,10 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use actcheck::base::{Choices, Files};
+use actcheck::base::Files;
 use actcheck::campaign::{Clock, Ending, Env, Manner, RecheckOptions, RuleSet, recheck, run_line};
 use actcheck::config::Overrides;
+use actcheck::data::Choices;
 use actcheck::history::{History, RunFilter};
 
 const SIMULATED: u64 = 40;

@@ -9,9 +9,10 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use actcheck::history::{History, RunDetail, Trace};
+use actcheck::base::Outcome;
+use actcheck::data::Trace;
+use actcheck::history::{History, RunDetail};
 use actcheck::report::Replays;
-use actcheck::verdict::Outcome;
 use support::chromium::Chromium;
 use support::{made_up, paged, planted};
 

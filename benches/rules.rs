@@ -8,8 +8,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
-use actcheck::base::{Files, Source, Term, digest_of, names};
-use actcheck::facts::RunFacts;
+use actcheck::base::{Files, RunFacts, Source, Term, digest_of, names};
 use actcheck::ontology::{self, RuleLanguage};
 use actcheck::rules::standalone::{Engine, Program};
 use actcheck::rules::{Budget, RuleBook};

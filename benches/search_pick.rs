@@ -13,11 +13,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use actcheck::base::names;
+use actcheck::base::{Outcome, names};
 use actcheck::campaign::{Clock, Env, Failure, Manner, Planned, Told, run_line, schedule_of};
 use actcheck::config::Overrides;
 use actcheck::search::Strategy;
-use actcheck::verdict::Outcome;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};

@@ -8,13 +8,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use actcheck::base::{Choices, names};
+use actcheck::base::{Outcome, names};
 use actcheck::campaign::shrink::{ShrinkOptions, Shrunk, shrink};
 use actcheck::campaign::{Clock, Env, Manner, run_line};
 use actcheck::config::Overrides;
-use actcheck::history::{Role, RunRecord};
+use actcheck::data::{Choices, Role};
+use actcheck::history::RunRecord;
 use actcheck::report::{Caption, run_picture};
-use actcheck::verdict::Outcome;
 
 /// Default number of failing runs.
 const RUNS: usize = 24;

@@ -41,36 +41,21 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::unwrap_used)]
 
-pub mod base;
-
-pub mod search;
-
-pub mod config;
-
-pub mod ontology;
-
-pub mod scenario;
-
-pub mod world;
-
-pub mod actions;
-
-pub mod protocol;
-
-pub mod facts;
-
-pub mod rules;
-
-pub mod verdict;
-
-pub mod history;
-
-pub mod campaign;
-
-pub mod analysis;
-
-pub mod report;
-
-pub mod serve;
-
-pub mod cli;
+pub use actcheck_actions as actions;
+pub use actcheck_analysis as analysis;
+pub use actcheck_base as base;
+pub use actcheck_campaign as campaign;
+pub use actcheck_cli as cli;
+pub use actcheck_config as config;
+pub use actcheck_data as data;
+pub use actcheck_facts as facts;
+pub use actcheck_history as history;
+pub use actcheck_ontology as ontology;
+pub use actcheck_protocol as protocol;
+pub use actcheck_report as report;
+pub use actcheck_rules as rules;
+pub use actcheck_scenario as scenario;
+pub use actcheck_search as search;
+pub use actcheck_serve as serve;
+pub use actcheck_verdict as verdict;
+pub use actcheck_world as world;

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    actcheck::cli::run()
+    actcheck::cli::run(env!("ACTCHECK_SOURCES_DIGEST"))
 }

@@ -2,11 +2,11 @@
 
 use std::sync::atomic::AtomicBool;
 
+use actcheck::base::Outcome;
 use actcheck::campaign::{Clock, Ending, Env, Manner, Options, run_all};
 use actcheck::config::Overrides;
 use actcheck::history::{History, RunFilter, RunStatus};
 use actcheck::report::RunSummary;
-use actcheck::verdict::Outcome;
 use actcheck::world::{Poison, World};
 
 use crate::support::root;

@@ -11,8 +11,9 @@ use crate::support::chromium::Chromium;
 use crate::support::planted::Dice;
 use crate::support::{actcheck, made_up, paged, shipped, stderr, stdout};
 
+use actcheck::base::Outcome;
 use actcheck::report::{Explained, PropertyWords, Replays};
-use actcheck::verdict::{Outcome, wilson};
+use actcheck::verdict::wilson;
 
 const VIEWS: [&str; 7] = ["/", "/properties", "/modes", "/patterns", "/map", "/history", "/runs"];
 const DESKTOP: (u32, u32) = (1280, 860);

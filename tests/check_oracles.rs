@@ -5,10 +5,10 @@ use std::sync::atomic::AtomicBool;
 
 use actcheck::actions::{Sabotage, Saboteur};
 use actcheck::analysis::{Notice, OracleGap, OracleMatrix, OracleTrial, oracle_matrix};
-use actcheck::base::Choices;
 use actcheck::campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
 use actcheck::campaign::{Clock, Env, Manner, run_line, run_sabotaged};
 use actcheck::config::Overrides;
+use actcheck::data::Choices;
 use serde_json::Value;
 
 use crate::support::{COARSE, actcheck, edit, project, root, stderr, stdout};

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use actcheck::analysis::{Compared, ComparedRun, Comparison, PairedTable, compare, compared_runs};
-use actcheck::base::{Choices, names};
+use actcheck::base::{Outcome, names};
+use actcheck::data::Choices;
 use actcheck::history::{History, OutcomeRow, RunRow, RunStatus, SceneDigest};
-use actcheck::verdict::Outcome;
 use serde_json::Value;
 
 use crate::history::{sample_campaign, sample_run};

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use actcheck::actions::{
-    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Frames, Percept, Phase, SceneMap, Trace,
+use actcheck::base::{RunFacts, Term, TermId, names};
+use actcheck::data::{
+    ActionEnd, ActionReport, ActionTrace, BodyState, Choices, ContactEpisode, Extremes, Frames, JointState, Percept,
+    Phase, Pose, RobotState, SceneMap, Snapshot, Trace,
 };
-use actcheck::base::{Choices, Pose, Term, TermId, names};
-use actcheck::facts::{RunFacts, extract};
-use actcheck::world::{BodyState, JointState, RobotState, Snapshot};
+use actcheck::facts::extract;
 
 /// A number as physics has it.
 fn single(choices: &mut Choices, low: f64, high: f64) -> f64 {

@@ -6,9 +6,9 @@ use actcheck::analysis::{
     Condition, FINDING_COLUMNS, Hierarchy, Interval, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades,
     columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
+use actcheck::base::Outcome::{self, Failed, Inapplicable, Passed, Untested};
 use actcheck::history::{Repetition, RunDetail};
 use actcheck::report::{FindingsSummary, PropertyReport, patterns_picture};
-use actcheck::verdict::Outcome::{self, Failed, Inapplicable, Passed, Untested};
 
 use crate::support::made_up;
 use crate::support::planted::Dice;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use actcheck::base::{Files, Term, names};
+use actcheck::base::{Files, Outcome, Term, names};
 use actcheck::history::{CampaignRow, RunDetail, RunStatus};
 use actcheck::ontology;
 use actcheck::report::{
@@ -12,7 +12,6 @@ use actcheck::report::{
     observation,
 };
 use actcheck::rules::owl_closure;
-use actcheck::verdict::Outcome;
 use oxigraph::io::{RdfFormat, RdfParser};
 use serde_json::Value;
 

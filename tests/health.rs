@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use actcheck::analysis::{Ailment, Coverage, Health, HealthMeter};
-use actcheck::base::Choices;
 use actcheck::campaign::{Clock, Ending, Env, Manner, Options, run_all};
 use actcheck::config::Overrides;
+use actcheck::data::Choices;
 use actcheck::history::{History, RunFilter};
 use actcheck::scenario;
 use actcheck::world::{Mishap, World};

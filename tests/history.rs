@@ -5,15 +5,15 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use actcheck::actions::{ActionEnd, Quality};
-use actcheck::base::{Choice, ChoiceKind, Diagnostics, Pose, Source, Term, digest_of, names};
-use actcheck::config::{Camera, ObjectModel, Odometry, Physics, RobotProfile, Sensing};
-use actcheck::facts::{RunFacts, extract};
+use actcheck::base::{Diagnostics, Judgement, Outcome, RunFacts, Source, Term, digest_of, names};
+use actcheck::data::{
+    ActionEnd, Camera, Choice, ChoiceKind, ObjectModel, Odometry, Physics, Pose, Quality, RobotProfile, RobotStart,
+    Role, Scene, SceneObject, Sensing,
+};
+use actcheck::facts::extract;
 use actcheck::history::{
     CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus, SkillRecord,
 };
-use actcheck::scenario::{RobotStart, Role, Scene, SceneObject};
-use actcheck::verdict::{Judgement, Outcome};
 use tempfile::TempDir;
 
 use crate::facts::{BODIES, sample_trace};
@@ -71,7 +71,7 @@ fn scene() -> Scene {
         restitution: 0.05,
     };
     Scene {
-        map: actcheck::scenario::SceneMap::default(),
+        map: actcheck::data::SceneMap::default(),
         world: "living room".to_owned(),
         objects: BODIES.iter().enumerate().map(object).collect(),
         robot: RobotStart { profile: robot(), base: [-0.6, 0.0, 0.1], knows: Arc::new([]) },
@@ -274,7 +274,7 @@ fn of_each_pair_the_graphs_keep_the_strongest_contact() {
     );
     let trace = sample_run("z2", 3).trace;
     let strongest = |link: &str| {
-        let of_link = |contact: &&actcheck::actions::ContactEpisode| contact.pair[1] == format!("robot/{link}");
+        let of_link = |contact: &&actcheck::data::ContactEpisode| contact.pair[1] == format!("robot/{link}");
         trace.actions[0].contacts.iter().filter(of_link).map(|contact| contact.max_force_n).fold(0.0, f64::max)
     };
     let links = ["finger_left", "finger_right", "hand"];

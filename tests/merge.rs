@@ -5,10 +5,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use actcheck::base::Term;
+use actcheck::base::{Outcome, Term};
 use actcheck::history::merge::{MergeOptions, Merged, carry_out, plan};
 use actcheck::history::{CampaignEnd, CampaignRecord, History, QueryAnswer, RunFilter};
-use actcheck::verdict::Outcome;
 use serde_json::Value;
 
 use crate::history::{sample_campaign, sample_run};

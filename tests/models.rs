@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use actcheck::base::{Diagnostics, Files, Source};
 use actcheck::campaign::Env;
-use actcheck::config::{self, Campaign, Overrides, Shape};
+use actcheck::config::{self, Campaign, Overrides};
+use actcheck::data::Shape;
 use actcheck::rules::Budget;
 
 use crate::support::wrong::all_are_told;

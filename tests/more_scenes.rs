@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use actcheck::analysis::{Column, ColumnKind, Condition, Parameter, Values, columns};
-use actcheck::base::Choices;
 use actcheck::campaign::{Clock, Env, Failure, Manner, run_line};
 use actcheck::config::Overrides;
+use actcheck::data::Choices;
 use actcheck::report::scene_rule;
 
 use crate::support::planted::{kind, range};

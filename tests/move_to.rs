@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use actcheck::actions::ActionReport;
-use actcheck::base::{Choices, Pose};
+use actcheck::base::Outcome;
 use actcheck::campaign::{Disturbance, Env};
 use actcheck::config::Overrides;
+use actcheck::data::{ActionReport, Choices, Pose};
 use actcheck::history::RunRecord;
-use actcheck::verdict::Outcome;
 use actcheck::world::{Poison, World};
 
 use crate::support::line::{self, env_of, run};

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use actcheck::base::{Choices, Diagnostics, Files};
+use actcheck::base::{Diagnostics, Files};
 use actcheck::config::{self, Overrides};
+use actcheck::data::Choices;
 use actcheck::ontology;
 use actcheck::scenario::{self, Space};
 

@@ -1,10 +1,9 @@
 //! What the robot makes of its depth camera, from scenes to verdicts, and that it acts on that and nothing else.
 
-use actcheck::actions::PerceivedThing;
-use actcheck::base::{Choice, Choices, Pose};
+use actcheck::base::Outcome;
 use actcheck::campaign::Env;
+use actcheck::data::{Choice, Choices, PerceivedThing, Pose};
 use actcheck::history::RunRecord;
-use actcheck::verdict::Outcome;
 use actcheck::world::{Poison, World};
 
 use crate::support::line::{env_of, nominal, outcomes, report, run};

@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use actcheck::actions::{ActionCall, ActionEnd, Trace, perform};
-use actcheck::base::{Choices, Files, Pose};
-use actcheck::config::{Budget, Camera, ObjectModel, Odometry, Part, Physics, RobotProfile, Sensing, Shape};
-use actcheck::scenario::{RobotStart, Role, Scene, SceneObject};
-use actcheck::world::{BodyState, GRAVITY, Poison, World, build};
+use actcheck::actions::{ActionCall, perform};
+use actcheck::base::Files;
+use actcheck::data::{
+    ActionEnd, BodyState, Budget, Camera, Choices, ObjectModel, Odometry, Part, Physics, Pose, RobotProfile,
+    RobotStart, Role, Scene, SceneObject, Sensing, Shape, Trace,
+};
+use actcheck::world::{GRAVITY, Poison, World, build};
 
 const PERFECT: Sensing = Sensing {
     position_noise_m: 0.0,
@@ -74,7 +76,7 @@ fn object(id: &str, model: Arc<ObjectModel>, role: Role, pose: Pose, mass_kg: f6
 /// A scene with the robot out of the way.
 fn scene(objects: Vec<SceneObject>) -> Scene {
     Scene {
-        map: actcheck::scenario::SceneMap::default(),
+        map: actcheck::data::SceneMap::default(),
         world: "empty".to_owned(),
         objects,
         robot: RobotStart { profile: robot(), base: [-5.0, 0.0, 0.0], knows: Arc::new([]) },

@@ -1,9 +1,9 @@
 //! Placing what was picked, from scenes to verdicts: by what the robot sees and feels, and by nothing else.
 
-use actcheck::base::{Choices, Pose};
+use actcheck::base::Outcome;
 use actcheck::campaign::{Disturbance, Env};
+use actcheck::data::{Choices, Pose};
 use actcheck::history::RunRecord;
-use actcheck::verdict::Outcome;
 use actcheck::world::{Mishap, Poison, World};
 use serde_json::Value;
 

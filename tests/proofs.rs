@@ -5,8 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use actcheck::base::{Term, TermId, names};
-use actcheck::facts::RunFacts;
+use actcheck::base::{RunFacts, Term, TermId, names};
 use actcheck::rules::explain::{Premise, Proof, Support};
 use actcheck::rules::{Budget, RuleBook};
 

@@ -3,12 +3,11 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use actcheck::actions::ActionEnd;
-use actcheck::base::{Files, Term, names};
+use actcheck::base::{Files, Outcome, Term, names};
 use actcheck::campaign::{Ending, RecheckEnd, RecheckOptions, RuleSet, recheck};
+use actcheck::data::ActionEnd;
 use actcheck::facts::extract;
 use actcheck::history::{History, QueryAnswer, Recheck, RunFilter, RunStatus};
-use actcheck::verdict::Outcome;
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -26,9 +26,10 @@ mod with_recordings {
     use std::collections::BTreeMap;
     use std::path::Path;
 
-    use actcheck::history::{History, Part, RunDetail, RunFilter, Shape, Trace};
+    use actcheck::base::Outcome;
+    use actcheck::data::{Part, Shape, Trace};
+    use actcheck::history::{History, RunDetail, RunFilter};
     use actcheck::report::{Explained, Recordings};
-    use actcheck::verdict::Outcome;
     use re_chunk::{Chunk, ChunkId, ComponentIdentifier, RowId};
     use re_log_encoding::DecoderApp;
     use re_log_types::{EntityPath, LogMsg};

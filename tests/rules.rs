@@ -8,12 +8,9 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use actcheck::base::{Files, Source, Term, digest_of, names};
-use actcheck::facts::{ActionFacts, RunFacts};
+use actcheck::base::{ActionFacts, Files, Findings, RuleFault, RunFacts, Source, Term, digest_of, names};
 use actcheck::ontology::{self, Ontology, Property, RuleFile, RuleLanguage};
-use actcheck::rules::explain::Support;
-use actcheck::rules::standalone::Program;
-use actcheck::rules::{Budget, Findings, RuleBook, RuleFault, owl_closure};
+use actcheck::rules::{Budget, RuleBook, explain::Support, owl_closure, standalone::Program};
 
 pub const TESTED: &str = "http://actions#Tested";
 

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use actcheck::base::{Choices, Pose};
-use actcheck::config::{self, ObjectModel, Overrides, Shape};
+use actcheck::config::{self, Overrides};
+use actcheck::data::{Choices, ObjectModel, Pose, Role, Scene, SceneObject, Shape};
 use actcheck::ontology;
-use actcheck::scenario::{self, CLEARANCE_M, Role, Scene, SceneObject, Solid, Space};
+use actcheck::scenario::{self, CLEARANCE_M, Solid, Space};
 use parry3d::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d::query;
 use parry3d::shape::{Cuboid, Cylinder, Shape as ParryShape};

@@ -7,12 +7,12 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use actcheck::base::{Choice, ChoiceKind};
+use actcheck::base::Outcome;
 use actcheck::campaign::{Env, Planned, Schedule, Told, ToldOutcome, schedule_of};
 use actcheck::config::Overrides;
+use actcheck::data::{Choice, ChoiceKind};
 use actcheck::scenario;
 use actcheck::search::{GENERATION, Strategy};
-use actcheck::verdict::Outcome;
 
 use crate::support::look::looking;
 use crate::support::{actcheck, edit, project, stderr, stdout};

@@ -2,8 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use actcheck::base::{Choice, ChoiceKind, Choices};
 use actcheck::campaign::shrink::{Limits, Plan, Search, Tried, explain, reduce};
+use actcheck::data::{Choice, ChoiceKind, Choices};
 
 /// Things in the list at first.
 const THINGS: usize = 12;

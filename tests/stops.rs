@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use actcheck::base::{Choices, Files, Source, digest_of};
+use actcheck::base::{Files, Findings, RuleFault, RunFacts, Source, digest_of};
 use actcheck::campaign::{Clock, Env, Failure, Manner, run_line};
 use actcheck::config::Overrides;
-use actcheck::facts::RunFacts;
+use actcheck::data::Choices;
 use actcheck::ontology::{self, RuleLanguage};
 use actcheck::rules::standalone::{Engine, Program, run};
-use actcheck::rules::{Budget, Findings, RuleBook, RuleFault};
+use actcheck::rules::{Budget, RuleBook};
 
 use crate::support::{root, signal, stderr};
 

@@ -4,11 +4,12 @@
 
 use std::path::Path;
 
-use actcheck::base::{Choices, Diagnostics, Source, Term, names};
+use actcheck::base::{Diagnostics, Source, Term, names};
 use actcheck::campaign::Env;
 use actcheck::config::{self, Campaign, Overrides};
+use actcheck::data::{Choices, Role, Scene};
 use actcheck::rules::Budget;
-use actcheck::scenario::{Role, Scene, Solid, draw};
+use actcheck::scenario::{Solid, draw};
 
 use crate::support::{actcheck, root, stderr};
 
@@ -49,7 +50,7 @@ fn shipped_worlds_leave_room() {
         ));
         let mut scene = draw(&env.space, 0, &mut Choices::recorded(&[])).unwrap();
         scene.objects.retain(|object| object.role == Role::Platform);
-        let walls = |object: &&actcheck::scenario::SceneObject| object.model.name == "wall";
+        let walls = |object: &&actcheck::data::SceneObject| object.model.name == "wall";
         let solids: Vec<(String, Solid)> =
             scene.objects.iter().filter(|o| !walls(o)).map(|o| (o.id.clone(), Solid::new(&o.model, &o.pose))).collect();
         for (idx, (id, solid)) in solids.iter().enumerate() {
@@ -149,7 +150,7 @@ fn the_place_can_be_cluttered() {
         "[world]\nworlds = [\"apartment\"]\n[objectSurface]\nobject_surfaces = [\"dining_table\"]\n[placeSurface]\nplace_object_surfaces = [\"side_table\", \"coffee_table\"]\n",
         "[objectSurface]\nobject_surfaces = [\"table\"]\n[placeSurface]\nplace_object_surfaces = [\"coffee_table\"]\n",
     ] {
-        let at_place = |scene: &Scene| -> Vec<actcheck::scenario::SceneObject> {
+        let at_place = |scene: &Scene| -> Vec<actcheck::data::SceneObject> {
             scene.objects.iter().filter(|object| object.role == Role::PlaceOther).cloned().collect()
         };
         let (_folder, bare) = env(&format!("{world}{others}"));
@@ -200,8 +201,7 @@ fn scenes_use_every_parameter() {
     let bottle = others.iter().find(|object| object.model.name == "bottle" && object.pose.tilt() > 1.5).unwrap();
     let low = bottle.model.parts.iter().map(|part| {
         let at = bottle.pose.to_isometry() * part.pose.to_isometry();
-        actcheck::config::Part { pose: actcheck::base::Pose::from_isometry(&at), shape: part.shape.clone() }.bounds().0
-            [2]
+        actcheck::data::Part { pose: actcheck::data::Pose::from_isometry(&at), shape: part.shape.clone() }.bounds().0[2]
     });
     let lowest = low.fold(f64::INFINITY, f64::min);
     assert!((lowest - 0.74).abs() < 0.005, "{lowest}");
@@ -214,10 +214,10 @@ fn the_map_is_facts() {
         object_surfaces = [\"dining_table\"]\n";
     let (_folder, env) = env(&format!("{text}{TABLES}"));
     let scene = scenes(&env, 1).remove(0);
-    let trace = actcheck::actions::Trace {
+    let trace = actcheck::data::Trace {
         snapshots: vec![actcheck::world::build(&scene).unwrap().snapshot()],
         actions: Vec::new(),
-        frames: actcheck::actions::Frames::default(),
+        frames: actcheck::data::Frames::default(),
         hash: String::new(),
         map: scene.map.clone(),
         forms: vec![],

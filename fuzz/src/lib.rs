@@ -6,11 +6,10 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use actcheck::base::{Diagnostics, Files, Source, Term, Terms, digest_of, names};
-use actcheck::facts::RunFacts;
+use actcheck::base::{Diagnostics, Files, RuleFault, RunFacts, Source, Term, Terms, digest_of, names};
 use actcheck::ontology::{self, Ontology, Property, RuleFile, RuleLanguage};
 use actcheck::rules::standalone::{Engine, Program};
-use actcheck::rules::{Budget, RuleBook, RuleFault, parse as parse_rules};
+use actcheck::rules::{Budget, RuleBook, parse as parse_rules};
 
 /// Small enough for many inputs a second; a sound engine comes back from any input within it.
 fn budget() -> Budget {

@@ -2,10 +2,10 @@
 //!
 //! A velocity is a moving setpoint that the position controllers follow, as on most robots.
 
-use crate::actions::memory;
-use crate::actions::operator::{Interrupt, Operator};
-use crate::scenario::Camera;
-use crate::world::Sighting;
+use crate::memory;
+use crate::operator::{Interrupt, Operator};
+use actcheck_data::Camera;
+use actcheck_world::Sighting;
 
 /// How far a moving setpoint may run ahead of a blocked joint, as time at the joint's velocity limit. Unit: seconds. A
 /// smaller value makes the joint feel weak, a larger one makes it jerk when it comes free.

@@ -1,6 +1,6 @@
 //! Limits that cut a run off, regardless of its actions.
 
-/// When a run is cut off. The action in progress then ends as [`crate::actions::ActionEnd::Cut`].
+/// When a run is cut off. The action in progress then ends as [`actcheck_data::ActionEnd::Cut`].
 #[derive(Debug, Clone, Copy, Default)]
 pub enum Cut {
     /// Never.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use crate::world::Sighting;
+use actcheck_world::Sighting;
 
 /// Approach direction of the hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,7 +142,7 @@ fn width_across(thing: &Sighting, heading: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Pose;
+    use actcheck_data::Pose;
 
     fn thing(size_m: [f64; 3]) -> Sighting {
         Sighting { id: "t".to_owned(), pose: Pose::upright([1.0, 0.0, 0.7], 0.4), size_m, furniture: false }

@@ -1,7 +1,7 @@
 //! Grip sensing: whether the fingers hold something, and whether it slips.
 
-use crate::actions::operator::{Interrupt, Operator};
-use crate::world::Observation;
+use crate::operator::{Interrupt, Operator};
+use actcheck_world::Observation;
 
 /// A smaller gap means that the fingers met with nothing between them. Unit: metres. Three times the usual noise.
 pub const EMPTY_M: f64 = 0.006;

@@ -4,10 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::actions::{Perceived, PerceivedPlane, PerceivedThing};
-use crate::base::Pose;
-use crate::scenario::KnownKind;
-use crate::world::Sighting;
+use actcheck_data::{KnownKind, Perceived, PerceivedPlane, PerceivedThing, Pose};
+use actcheck_world::Sighting;
 
 /// The robot's beliefs about its surroundings. Empty at the start of a run.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -2,14 +2,14 @@
 
 use nalgebra::Isometry3;
 
-use crate::actions::controls::Drives;
-use crate::actions::grip::GripWatch;
-use crate::actions::memory::{Held, Memory, Standing};
-use crate::actions::sabotage::IDLE_SECS;
-use crate::actions::{ActionReport, Cut, OutsideFault, Perceived, Percept, Phase, Saboteur};
-use crate::base::Choices;
-use crate::scenario::{FloorPlan, KnownKind, RobotProfile};
-use crate::world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
+use crate::controls::Drives;
+use crate::grip::GripWatch;
+use crate::memory::{Held, Memory, Standing};
+use crate::sabotage::IDLE_SECS;
+use crate::{Cut, OutsideFault, Saboteur};
+use actcheck_data::{ActionReport, Choices, KnownKind, Perceived, Percept, Phase, RobotProfile};
+use actcheck_scenario::FloorPlan;
+use actcheck_world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
 
 /// Reason why a skill has to stop.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,8 +1,9 @@
 //! External skills that replace the reference skills.
 
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::{ActionCall, ActionReport};
-use crate::world::World;
+use crate::ActionCall;
+use crate::operator::{Interrupt, Operator};
+use actcheck_data::ActionReport;
+use actcheck_world::World;
 
 /// Performs actions with a skill that is not part of actcheck.
 pub trait Outside {

@@ -1,16 +1,15 @@
 //! Performs a list of actions and records the trace.
 
-use crate::actions::cut::{self, Cut};
-use crate::actions::memory::Memory;
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::skills::skill;
-use crate::actions::{
-    ActionCall, ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Outside, OutsideFault,
-    RobotCourse, Saboteur, Trace,
+use crate::cut::{self, Cut};
+use crate::memory::Memory;
+use crate::operator::{Interrupt, Operator};
+use crate::skills::skill;
+use crate::{ActionCall, Outside, OutsideFault, Saboteur};
+use actcheck_data::{
+    ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames, RobotCourse,
+    SceneMap, Trace,
 };
-use crate::base::Choices;
-use crate::scenario::{Budget, SceneMap};
-use crate::world::World;
+use actcheck_world::World;
 
 /// Performs the actions in order with the reference skills.
 ///

@@ -1,13 +1,13 @@
 //! The pick skill: look (or recall an earlier percept), drive, reach, close, lift, retreat.
 
-use crate::actions::grip::{EMPTY_M, close, feels};
-use crate::actions::memory::Held;
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::perceive::look_again;
-use crate::actions::plan::{self, Plan, Wanted};
-use crate::actions::{ActionCall, ActionReport, grasp, memory};
-use crate::base::Pose;
-use crate::world::Sighting;
+use crate::grip::{EMPTY_M, close, feels};
+use crate::memory::Held;
+use crate::operator::{Interrupt, Operator};
+use crate::perceive::look_again;
+use crate::plan::{self, Plan, Wanted};
+use crate::{ActionCall, grasp, memory};
+use actcheck_data::{ActionReport, Pose};
+use actcheck_world::Sighting;
 
 /// Designator of the object to pick.
 const TARGET: &str = "pickObject";

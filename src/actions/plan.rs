@@ -2,12 +2,12 @@
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
-use crate::actions::grasp::{Approach, Grasp};
-use crate::actions::motion::Samples;
-use crate::actions::operator::Operator;
-use crate::actions::route::{Block, Ground, Pillar, length};
-use crate::actions::standing;
-use crate::world::{Kinematics, Layout, SelfContact, Sighting, ik};
+use crate::grasp::{Approach, Grasp};
+use crate::motion::Samples;
+use crate::operator::Operator;
+use crate::route::{Block, Ground, Pillar, length};
+use crate::standing;
+use actcheck_world::{Kinematics, Layout, SelfContact, Sighting, ik};
 
 /// Joint positions for each leg of a pick.
 #[derive(Debug, Clone)]

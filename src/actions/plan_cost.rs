@@ -1,8 +1,8 @@
 //! The cost of a mobile robot's plan, and arm paths around obstacles.
 
-use crate::actions::motion::{self, ArmSpace, Room, Samples};
-use crate::actions::plan::{AMPLE_CLEAR_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, Plan, Planner};
-use crate::actions::route::length;
+use crate::motion::{self, ArmSpace, Room, Samples};
+use crate::plan::{AMPLE_CLEAR_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, Plan, Planner};
+use crate::route::length;
 
 /// Number of postures checked along the path of an unfolding arm.
 const N_CHECKS: usize = 12;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point2, Point3};
 
-use crate::world::Sighting;
+use actcheck_world::Sighting;
 
 /// Clearance beside the base on its path. Unit: metres. The error of perceived furniture.
 const ROOM_M: f64 = 0.04;
@@ -162,7 +162,7 @@ pub fn length(x: f64, y: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Pose;
+    use actcheck_data::Pose;
 
     fn table() -> Block {
         let pose = Pose::IDENTITY;

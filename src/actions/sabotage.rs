@@ -3,9 +3,9 @@
 //!
 //! The skill is unmodified and the recorder sees only physics: neither is informed of the fault.
 
-use crate::actions::{ActionCall, ActionReport};
-use crate::base::Pose;
-use crate::world::{BodyState, Command, Mishap, Observation, Sighting, Snapshot, World};
+use crate::ActionCall;
+use actcheck_data::{ActionReport, BodyState, Pose, Snapshot};
+use actcheck_world::{Command, Mishap, Observation, Sighting, World};
 
 /// Designators of the object that the action handles and of the surface it is placed on.
 const OBJECT: &str = "pickObject";

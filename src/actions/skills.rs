@@ -1,12 +1,13 @@
 //! The actions that the reference skills perform.
 
-use crate::actions::navigate::move_to;
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::perceive::perceive_plane;
-use crate::actions::pick::pick;
-use crate::actions::place::place;
-use crate::actions::{ActionCall, ActionReport};
-use crate::base::{Diagnostic, did_you_mean};
+use crate::ActionCall;
+use crate::navigate::move_to;
+use crate::operator::{Interrupt, Operator};
+use crate::perceive::perceive_plane;
+use crate::pick::pick;
+use crate::place::place;
+use actcheck_base::{Diagnostic, did_you_mean};
+use actcheck_data::ActionReport;
 
 /// Performs an action through commands and observations and returns the action's own report.
 pub(super) type Skill = fn(&ActionCall, &mut Operator<'_>) -> Result<ActionReport, Interrupt>;

@@ -2,14 +2,14 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::actions::grasp::{Approach, Grasp};
-use crate::actions::motion::{self, ArmSpace, Room, Samples};
-use crate::actions::operator::Operator;
-use crate::actions::plan::{
+use crate::grasp::{Approach, Grasp};
+use crate::motion::{self, ArmSpace, Room, Samples};
+use crate::operator::Operator;
+use crate::plan::{
     AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, Wanted, wrapped,
 };
-use crate::actions::route::{Block, Pillar};
-use crate::world::{JointKind, Kinematics, Layout, Sighting, ik};
+use crate::route::{Block, Pillar};
+use actcheck_world::{JointKind, Kinematics, Layout, Sighting, ik};
 
 /// Samples allowed for one plan over all grasps: half a second's work together with the limit per grasp.
 const MOST_SAMPLES: u32 = 3000;

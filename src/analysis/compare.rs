@@ -3,9 +3,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::analysis::{Difference, PairedTable, PairedTest, holm};
-use crate::history::{OutcomeRow, RunRow, RunStatus, SceneDigest};
-use crate::verdict::{Counts, Outcome};
+use crate::{Difference, PairedTable, PairedTest, holm};
+use actcheck_base::Outcome;
+use actcheck_history::{OutcomeRow, RunRow, RunStatus, SceneDigest};
+use actcheck_verdict::Counts;
 
 /// The subject of a comparison: whole runs, or one property of one action.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::{Interval, wilson_share};
+use crate::{Interval, wilson_share};
 
 /// A decided run of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use crate::base::{Choice, ChoiceKind};
+use actcheck_data::{Choice, ChoiceKind};
 
 /// Number of bins of a numeric parameter. Fifths show gaps in the middle and at both ends, and a hundred draws fill
 /// them.
@@ -203,7 +203,7 @@ fn is_number(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Choices;
+    use actcheck_data::Choices;
 
     /// Choices of a scene with two objects. `lean` is the number of times that the colour is redrawn if it is the last
     /// one.

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::analysis::{Interval, SceneRuns};
-use crate::history::OutcomeRow;
-use crate::verdict::Outcome;
+use crate::{Interval, SceneRuns};
+use actcheck_base::Outcome;
+use actcheck_history::OutcomeRow;
 
 /// A set of failed properties, and the runs with exactly this set.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,7 +62,7 @@ fn signatures(rows: &[OutcomeRow]) -> Vec<(&str, BTreeSet<&str>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::wilson;
+    use crate::wilson;
 
     fn row(run: &str, property: &str, outcome: Outcome) -> OutcomeRow {
         OutcomeRow {

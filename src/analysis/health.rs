@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::{Coverage, PairCoverage, ParameterCoverage};
-use crate::base::Digest;
-use crate::history::{OutcomeRow, RunVitals};
-use crate::verdict::Outcome;
+use crate::{Coverage, PairCoverage, ParameterCoverage};
+use actcheck_base::{Digest, Outcome};
+use actcheck_history::{OutcomeRow, RunVitals};
 
 /// Maximum share of discarded scenes. A crowded table causes up to a tenth; a larger share biases the tested scenes.
 const MOST_DISCARDS: f64 = 0.1;
@@ -220,7 +219,7 @@ fn badly_simulated(health: &Health) -> Vec<Ailment> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Choices;
+    use actcheck_data::Choices;
 
     fn run(index: u64) -> RunVitals {
         let mut choices = Choices::random(7, index);

@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::PairedTable;
-use crate::verdict::Outcome;
+use crate::PairedTable;
+use actcheck_base::Outcome;
 
 /// Significance level at which a property notices a fault: of all pairs of a property and an unrelated fault, at most
 /// one in a hundred counts as noticed.

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::{Interval, wilson};
-use crate::history::OutcomeRow;
-use crate::verdict::Outcome;
+use crate::{Interval, wilson};
+use actcheck_base::Outcome;
+use actcheck_history::OutcomeRow;
 
 /// Outcomes of one property of one action over some runs.
 #[derive(Debug, Clone, PartialEq)]

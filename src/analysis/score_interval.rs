@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
-use crate::analysis::Interval;
+use crate::Interval;
 
 /// Returns the mean of the finite scores with Student's 95 % interval, clamped to [0, 1], or `None` for fewer than two
 /// scores.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::base::{Source, Span};
+use crate::{Source, Span};
 
 /// Severity of a diagnostic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,9 +1,20 @@
 //! Content hashes, for provenance and for the comparison of traces.
 
+use std::sync::OnceLock;
+
 use sha2::{Digest as _, Sha256};
 
-/// Digest of the sources that this program was built from, including its dependencies.
-pub const PROGRAM_DIGEST: &str = env!("ACTCHECK_SOURCES_DIGEST");
+static PROGRAM_DIGEST: OnceLock<&'static str> = OnceLock::new();
+
+/// Sets the digest of the sources that this program was built from, including its dependencies. Only the first call counts.
+pub fn name_program(sources_digest: &'static str) {
+    PROGRAM_DIGEST.get_or_init(|| sources_digest);
+}
+
+/// The digest that was given to [`name_program`]; empty in a program that did not call it.
+pub fn program_digest() -> &'static str {
+    PROGRAM_DIGEST.get().copied().unwrap_or_default()
+}
 
 /// An incremental SHA-256 over parts. Each part is preceded by its length, so that different splits give different
 /// digests.

@@ -2,28 +2,8 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use crate::base::Source;
-
-/// One struct for each embedded folder: embedding the whole checkout with exclusions would walk through the target
-/// folder.
-#[derive(rust_embed::RustEmbed)]
-#[folder = "ontology/"]
-#[prefix = "ontology/"]
-struct Ontology;
-
-#[derive(rust_embed::RustEmbed)]
-#[folder = "rules/"]
-#[prefix = "rules/"]
-struct Rules;
-
-#[derive(rust_embed::RustEmbed)]
-#[folder = "models/"]
-#[prefix = "models/"]
-struct Models;
-
-fn carried(key: &str) -> Option<rust_embed::EmbeddedFile> {
-    Ontology::get(key).or_else(|| Rules::get(key)).or_else(|| Models::get(key))
-}
+use crate::Source;
+use crate::shipped;
 
 /// A source of files, by path.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,8 +22,7 @@ impl Files {
     pub fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, String> {
         match self {
             Self::Shipped => {
-                let file = carried(&slashed(&normalised(path))).ok_or("no built-in file has this path")?;
-                Ok(file.data.into_owned())
+                shipped::read(&slashed(&normalised(path))).ok_or_else(|| "no built-in file has this path".to_owned())
             }
             Self::Disk => std::fs::read(path).map_err(|error| describe(&error)),
         }
@@ -67,12 +46,7 @@ impl Files {
         let mut paths: Vec<PathBuf> = match self {
             Self::Shipped => {
                 let folder = normalised(folder);
-                Ontology::iter()
-                    .chain(Rules::iter())
-                    .chain(Models::iter())
-                    .map(|name| PathBuf::from(name.as_ref()))
-                    .filter(|path| path.parent() == Some(&folder))
-                    .collect()
+                shipped::paths().into_iter().filter(|path| path.parent() == Some(&folder)).collect()
             }
             Self::Disk => std::fs::read_dir(folder)
                 .into_iter()
@@ -88,9 +62,8 @@ impl Files {
 
     /// Returns the paths of all shipped files in a folder and its subfolders, sorted.
     pub fn all_shipped(folder: &Path) -> Vec<PathBuf> {
-        let files = Ontology::iter().chain(Rules::iter()).chain(Models::iter());
-        let mut paths: Vec<PathBuf> =
-            files.map(|name| PathBuf::from(name.as_ref())).filter(|path| path.starts_with(folder)).collect();
+        let mut paths = shipped::paths();
+        paths.retain(|path| path.starts_with(folder));
         paths.sort();
         paths
     }
@@ -100,8 +73,7 @@ impl Files {
         let mut paths: Vec<PathBuf> = match self {
             Self::Shipped => {
                 let folder = normalised(folder);
-                let parents = Models::iter().map(|name| PathBuf::from(name.as_ref()));
-                let below = parents.filter_map(|path| {
+                let below = shipped::paths().into_iter().filter_map(|path| {
                     let mut below = path.strip_prefix(&folder).ok()?.components();
                     let first = below.next()?;
                     below.next().map(|_| folder.join(first))

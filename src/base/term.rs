@@ -6,7 +6,7 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use crate::base::names;
+use crate::names;
 
 /// An RDF term. Equality compares terms, not values: `1`, `1.0` and `"1"` are three different terms.
 #[derive(Debug, Clone)]

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use crate::campaign::{Env, Told};
-use crate::config::{Limits, Overrides};
-use crate::verdict::{Outcome, trials_for_width, wilson_share};
+use crate::{Env, Told};
+use actcheck_base::Outcome;
+use actcheck_config::{Limits, Overrides};
+use actcheck_verdict::{trials_for_width, wilson_share};
 
 /// Runs per test of a campaign that only time ends: more than any campaign makes.
 const MOST_RUNS: u32 = 10_000_000;
@@ -118,7 +119,7 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::ToldOutcome;
+    use crate::ToldOutcome;
 
     fn told(outcomes: [Outcome; 2]) -> Told {
         let outcomes = ["a", "b"].into_iter().zip(outcomes).map(|(property, outcome)| ToldOutcome {

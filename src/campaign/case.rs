@@ -4,14 +4,16 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::base::{Choice, ChoiceKind, Choices, Diagnostic, Diagnostics, nearest};
-use crate::campaign::make_run::cut_of;
-use crate::campaign::replay::again;
-use crate::campaign::{Env, Manner};
-use crate::config::{Campaign, Case};
-use crate::history::{CampaignEnd, History, RunRecord, RunStatus};
-use crate::scenario::{self, Scene, Space};
-use crate::verdict::{Counts, Outcome, Recurrence};
+use crate::make_run::cut_of;
+use crate::replay::again;
+use crate::{Env, Manner};
+use actcheck_base::{Diagnostic, Diagnostics, Outcome, nearest};
+use actcheck_config::{Campaign, Case};
+use actcheck_data::{Choice, ChoiceKind, Choices, Scene};
+use actcheck_history::{CampaignEnd, History, RunRecord, RunStatus};
+use actcheck_scenario as scenario;
+use actcheck_scenario::Space;
+use actcheck_verdict::{Counts, Recurrence};
 
 /// Names of the choices that are made only during a run: sensor noise, and the seeds of planner and skill. The choices
 /// of single objects are in `SENSES_OF_OBJECT`.
@@ -94,7 +96,7 @@ fn keep(
     mut record: RunRecord,
     manner: &Manner,
 ) -> Result<CaseRun, Diagnostics> {
-    let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
+    let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     record.id = format!("{id}-1");
     record.campaign.clone_from(&id);
     // The record of a crash has no start time.

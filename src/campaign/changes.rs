@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::history::CampaignRecord;
+use actcheck_history::CampaignRecord;
 
 /// An input that changed since a campaign ran.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -101,7 +101,7 @@ fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::SkillRecord;
+    use actcheck_history::SkillRecord;
 
     fn record(digest: &str) -> CampaignRecord {
         CampaignRecord {

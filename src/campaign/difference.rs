@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::actions::{BodyState, Frames, RobotState, Snapshot, Trace};
-use crate::base::Pose;
+use actcheck_data::{BodyState, Frames, Pose, RobotState, Snapshot, Trace};
 
 /// Tolerance for rounding errors in times, as a share of the frame period.
 const SLACK: f64 = 1e-6;

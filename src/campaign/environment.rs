@@ -3,21 +3,24 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::actions;
-use crate::base::{Choice, Diagnostic, Diagnostics, PROGRAM_DIGEST, Source};
-use crate::campaign::budget::ceiling;
-use crate::campaign::case::check_case;
-use crate::campaign::line::TEST_LEFT_OUT;
-use crate::campaign::requirement::Requirement;
-use crate::campaign::solids;
-use crate::config::{self, Campaign, Launcher, Overrides};
-use crate::history::{CampaignRecord, History, SkillRecord};
-use crate::ontology::{self, Ontology};
-use crate::protocol::Programs;
-use crate::rules::{Budget, RuleBook};
-use crate::scenario::Space;
-use crate::search::Strategy;
-use crate::world;
+use crate::budget::ceiling;
+use crate::case::check_case;
+use crate::line::TEST_LEFT_OUT;
+use crate::requirement::Requirement;
+use crate::solids;
+use actcheck_actions as actions;
+use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
+use actcheck_config as config;
+use actcheck_config::{Campaign, Launcher, Overrides};
+use actcheck_data::Choice;
+use actcheck_history::{CampaignRecord, History, SkillRecord};
+use actcheck_ontology as ontology;
+use actcheck_ontology::Ontology;
+use actcheck_protocol::Programs;
+use actcheck_rules::{Budget, RuleBook};
+use actcheck_scenario::Space;
+use actcheck_search::Strategy;
+use actcheck_world as world;
 
 /// A configuration with its ontology, scene space and rules, prepared once and shared by all workers.
 pub struct Env {
@@ -174,7 +177,7 @@ impl Env {
             id,
             name,
             config_text: self.campaign.source.text.to_string(),
-            config_digest: crate::base::digest_of(&self.campaign.source.text),
+            config_digest: actcheck_base::digest_of(&self.campaign.source.text),
             config_path: path_from(&self.campaign.history, Path::new(&*self.campaign.source.name)),
             ontology_digest: self.ontology.digest.clone(),
             rules,
@@ -190,7 +193,7 @@ impl Env {
             strategy: self.campaign.search.name().to_owned(),
             started,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
-            program_digest: PROGRAM_DIGEST.to_owned(),
+            program_digest: program_digest().to_owned(),
         }
     }
 

@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Choice, Diagnostics, Source, names};
-use crate::campaign::line::TEST_LEFT_OUT;
-use crate::campaign::shrink::{accepted_places, unit_of};
-use crate::campaign::{Env, Recalled};
-use crate::config::{self, CaseText, Launcher, Overrides};
-use crate::history::{CampaignRecord, History, RunDetail};
-use crate::verdict::Outcome;
+use crate::line::TEST_LEFT_OUT;
+use crate::shrink::{accepted_places, unit_of};
+use crate::{Env, Recalled};
+use actcheck_base::{Diagnostics, Outcome, Source, names};
+use actcheck_config as config;
+use actcheck_config::{CaseText, Launcher, Overrides};
+use actcheck_data::Choice;
+use actcheck_history::{CampaignRecord, History, RunDetail};
 
 /// Name of the folder in which a project keeps its cases.
 const REGRESSIONS: &str = "regressions";

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::actions::ActionEnd;
-use crate::campaign::Failure;
-use crate::facts::ActionFacts;
-use crate::ontology::{Action, Ontology};
-use crate::rules::{Budget, Findings, RuleBook, RuleFault};
-use crate::verdict::{Fate, Judgement, Outcome, judge};
+use crate::Failure;
+use actcheck_base::{ActionFacts, Findings, Judgement, Outcome, RuleFault};
+use actcheck_data::ActionEnd;
+use actcheck_ontology::{Action, Ontology};
+use actcheck_rules::{Budget, RuleBook};
+use actcheck_verdict::{Fate, judge};
 
 /// Returns the outcomes of an action's success properties. Rules are evaluated only for completed actions.
 ///

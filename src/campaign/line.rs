@@ -1,15 +1,18 @@
 //! One run from start to end: choices → scene → world → trace → facts → findings → verdict.
 
-use crate::actions::{self, ActionCall, ActionEnd, Cut, Interference, Outside, Quality, Saboteur, Trace};
-use crate::base::Choices;
-use crate::campaign::Env;
-use crate::campaign::judging::judge_action;
-use crate::facts::{self, RunFacts};
-use crate::history::{RunRecord, RunStatus};
-use crate::protocol::{Performance, RunName};
-use crate::scenario::{self, Scene};
-use crate::verdict::{Judgement, action_score, run_score};
-use crate::world::{self, World};
+use crate::Env;
+use crate::judging::judge_action;
+use actcheck_actions as actions;
+use actcheck_actions::{ActionCall, Cut, Interference, Outside, Saboteur};
+use actcheck_base::{Judgement, RunFacts};
+use actcheck_data::{ActionEnd, Choices, Quality, Scene, Trace};
+use actcheck_facts as facts;
+use actcheck_history::{RunRecord, RunStatus};
+use actcheck_protocol::{Performance, RunName};
+use actcheck_scenario as scenario;
+use actcheck_verdict::{action_score, run_score};
+use actcheck_world as world;
+use actcheck_world::World;
 
 /// The caller's clock: the stages have none of their own.
 #[derive(Debug, Clone, Copy)]
@@ -221,15 +224,15 @@ fn calls(test: &[String], scene: &Scene) -> Vec<ActionCall> {
 fn never_performed(test: &[String], scene: &Scene, reason: &str) -> Trace {
     let actions = calls(test, scene)
         .into_iter()
-        .map(|call| actions::ActionTrace {
+        .map(|call| actcheck_data::ActionTrace {
             end: ActionEnd::Broken(reason.to_owned()),
-            ..actions::ActionTrace::not_reached(&call.action, &call.parameters)
+            ..actcheck_data::ActionTrace::not_reached(&call.action, &call.parameters)
         })
         .collect();
     Trace {
         snapshots: Vec::new(),
         actions,
-        frames: actions::Frames::default(),
+        frames: actcheck_data::Frames::default(),
         hash: String::new(),
         map: scene.map.clone(),
         forms: Vec::new(),

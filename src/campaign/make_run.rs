@@ -2,11 +2,11 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::actions::Cut;
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::line::{crashed, run_line_until};
-use crate::campaign::{Env, Failure, Manner, Planned, Told};
-use crate::history::RunRecord;
+use crate::line::{crashed, run_line_until};
+use crate::{Env, Failure, Manner, Planned, Told};
+use actcheck_actions::Cut;
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_history::RunRecord;
 
 /// Maximum number of scenes drawn for one run; then the campaign stops.
 ///

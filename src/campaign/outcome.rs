@@ -1,8 +1,8 @@
 //! How a campaign ended.
 
-use crate::base::Diagnostics;
-use crate::campaign::Spent;
-use crate::search::Estimate;
+use crate::Spent;
+use actcheck_base::Diagnostics;
+use actcheck_search::Estimate;
 
 /// The result of a campaign.
 #[derive(Debug)]

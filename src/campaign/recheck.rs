@@ -4,13 +4,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use crate::actions::{ActionEnd, ActionTrace};
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::judging::judge_action;
-use crate::campaign::{Ending, RuleSet};
-use crate::facts::{self, RunFacts};
-use crate::history::{History, Recheck, RunRow, StoredJudgement};
-use crate::rules::Budget;
+use crate::judging::judge_action;
+use crate::{Ending, RuleSet};
+use actcheck_base::{Diagnostic, Diagnostics, RunFacts};
+use actcheck_data::{ActionEnd, ActionTrace};
+use actcheck_facts as facts;
+use actcheck_history::{History, Recheck, RunRow, StoredJudgement};
+use actcheck_rules::Budget;
 
 /// Options of [`recheck`]. The number of workers does not change the result.
 #[derive(Debug, Clone)]

@@ -5,12 +5,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
 
-use crate::actions::{ActionEnd, Cut, Trace};
-use crate::base::{Choice, Choices, Diagnostic, Diagnostics};
-use crate::campaign::line::{crashed, run_line_until};
-use crate::campaign::make_run::panic_text;
-use crate::campaign::{Change, Difference, Env, Failure, Manner, changes, first_difference};
-use crate::history::{CampaignRecord, History, RunDetail, RunRecord};
+use crate::line::{crashed, run_line_until};
+use crate::make_run::panic_text;
+use crate::{Change, Difference, Env, Failure, Manner, changes, first_difference};
+use actcheck_actions::Cut;
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_data::{ActionEnd, Choice, Choices, Trace};
+use actcheck_history::{CampaignRecord, History, RunDetail, RunRecord};
 
 /// Maximum number of choices named in a message.
 const MOST_NAMED: usize = 8;
@@ -274,7 +275,7 @@ fn outcome_changes(was: &RunDetail, is: &RunRecord) -> Vec<OutcomeChange> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::ChoiceKind;
+    use actcheck_data::ChoiceKind;
 
     fn real(name: &str, high: f64, value: f64) -> Choice {
         Choice { name: name.into(), kind: ChoiceKind::Real { low: 0.0, high, nominal: 0.0 }, value }

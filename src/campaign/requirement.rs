@@ -1,14 +1,13 @@
 //! A rule file of the configuration that scenes must satisfy before a run begins.
 
-use crate::actions::{ActionTrace, Frames, Trace};
-use crate::base::{Diagnostics, digest_of, names};
-use crate::campaign::{Failure, scene_facts};
-use crate::config::Campaign;
-use crate::facts::{self, ActionFacts};
-use crate::ontology::{Ontology, Property, RuleFile, RuleLanguage};
-use crate::rules::{Budget, RuleBook, RuleFault};
-use crate::scenario::Scene;
-use crate::world::World;
+use crate::{Failure, scene_facts};
+use actcheck_base::{ActionFacts, Diagnostics, RuleFault, digest_of, names};
+use actcheck_config::Campaign;
+use actcheck_data::{ActionTrace, Frames, Scene, Trace};
+use actcheck_facts as facts;
+use actcheck_ontology::{Ontology, Property, RuleFile, RuleLanguage};
+use actcheck_rules::{Budget, RuleBook};
+use actcheck_world::World;
 
 /// The rules that `[scene] require` names, prepared for evaluation.
 pub(super) struct Requirement {

@@ -6,13 +6,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::environment::asked_for;
-use crate::campaign::shrink::SHRUNK;
-use crate::campaign::{Change, Env, Told, changes};
-use crate::config;
-use crate::history::{CampaignRecord, CampaignRow, History, RunDetail};
-use crate::rules::Budget;
+use crate::environment::asked_for;
+use crate::shrink::SHRUNK;
+use crate::{Change, Env, Told, changes};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_config as config;
+use actcheck_history::{CampaignRecord, CampaignRow, History, RunDetail};
+use actcheck_rules::Budget;
 
 /// The stored part of a resumed campaign.
 #[derive(Debug, Clone, Default)]

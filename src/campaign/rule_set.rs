@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
-use crate::ontology::{self, Action, Ontology};
-use crate::rules::RuleBook;
+use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
+use actcheck_ontology as ontology;
+use actcheck_ontology::{Action, Ontology};
+use actcheck_rules::RuleBook;
 
 /// A prepared ontology with its rules, and the success properties to judge.
 pub struct RuleSet {

@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::budget::Tally;
-use crate::campaign::make_run::{Making, make_run};
-use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Planned, Schedule, Spent, Told, schedule_of};
-use crate::config::Launcher;
-use crate::history::{History, RunRecord};
+use crate::budget::Tally;
+use crate::make_run::{Making, make_run};
+use crate::{CampaignEnd, Ending, Env, Kept, Manner, Planned, Schedule, Spent, Told, schedule_of};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_config::Launcher;
+use actcheck_history::{History, RunRecord};
 
 /// Maximum time between flushes of the store to disk. Unit: seconds.
 const FLUSH_SECS: f64 = 1.0;

@@ -3,11 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::{Term, names};
-use crate::facts::{RunFacts, Triple, thing_iri};
-use crate::history;
-use crate::ontology::VocabularyTerm;
-use crate::scenario::Scene;
+use actcheck_base::{RunFacts, Term, Triple, names};
+use actcheck_data::Scene;
+use actcheck_facts::thing_iri;
+use actcheck_history as history;
+use actcheck_ontology::VocabularyTerm;
 
 /// Local names of the terms for objects and worlds, as in histories.
 const NAMED: [&str; 3] = ["role", "model", "worldName"];

@@ -6,12 +6,12 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::base::{Choices, Shard};
-use crate::campaign::searching::Searching;
-use crate::campaign::{Env, WeightedRate};
-use crate::history::{Repetition, RunDetail, RunRecord};
-use crate::search::Strategy;
-use crate::verdict::{Judgement, Outcome};
+use crate::searching::Searching;
+use crate::{Env, WeightedRate};
+use actcheck_base::{Judgement, Outcome, Shard};
+use actcheck_data::Choices;
+use actcheck_history::{Repetition, RunDetail, RunRecord};
+use actcheck_search::Strategy;
 
 /// Runs in a batch of a campaign without a search. Workers wait for each other only between batches, so a large number
 /// costs nothing; the limit bounds the memory of a campaign of millions of runs.

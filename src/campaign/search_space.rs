@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::campaign::Env;
-use crate::scenario::ParameterKind;
-use crate::search::{Dimension, Space};
+use crate::Env;
+use actcheck_scenario::ParameterKind;
+use actcheck_search::{Dimension, Space};
 
 /// The axes of the cube, each with the names of the choices that it determines.
 #[derive(Debug, Clone)]

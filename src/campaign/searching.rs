@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::campaign::search_space::SearchSpace;
-use crate::campaign::{Env, Planned, Schedule, Steering, Told, WeightedRate};
-use crate::search::{Ask, Search, Told as ToldOfOne};
-use crate::verdict::Outcome;
+use crate::search_space::SearchSpace;
+use crate::{Env, Planned, Schedule, Steering, Told, WeightedRate};
+use actcheck_base::Outcome;
+use actcheck_search::{Ask, Search, Told as ToldOfOne};
 
 /// Asks the searches of the tests in turn for a generation of scenes, and returns the results to them.
 ///

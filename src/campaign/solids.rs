@@ -5,9 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::base::{Diagnostic, Diagnostics, Digest};
-use crate::config::{Campaign, Mesh, ObjectModel, Part, Shape};
-use crate::world;
+use actcheck_base::{Diagnostic, Diagnostics, Digest};
+use actcheck_config::Campaign;
+use actcheck_data::{Mesh, ObjectModel, Part, Shape};
+use actcheck_world as world;
 
 /// Cache folder in the history's folder.
 const FOLDER: &str = "hulls";

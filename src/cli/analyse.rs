@@ -4,22 +4,22 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::analysis::{
+use crate::args::Format;
+use crate::chosen::{self, ChosenRuns, is_meant};
+use crate::output;
+use crate::picture::Picture;
+use actcheck_analysis::{
     FINDING_COLUMNS, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns,
     flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
-use crate::base::{Diagnostic, Diagnostics, did_you_mean};
-use crate::cli::args::Format;
-use crate::cli::chosen::{self, ChosenRuns, is_meant};
-use crate::cli::output;
-use crate::cli::picture::Picture;
-use crate::history::History;
-use crate::ontology::Ontology;
-use crate::report::{
+use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
+use actcheck_history::History;
+use actcheck_ontology::Ontology;
+use actcheck_report::{
     FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table, patterns_picture,
     scene_rule,
 };
-use crate::verdict::Counts;
+use actcheck_verdict::Counts;
 
 /// Default heat maps of a requested property: the target's position on its surface, and its category and orientation.
 const USUAL_MAPS: [[&str; 2]; 2] = [["surface_y_m", "surface_x_m"], ["target_category", "target_turned_rad"]];

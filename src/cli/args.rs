@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::base::{Shard, did_you_mean};
-use crate::cli::export::ExportArgs;
-use crate::cli::recheck::RecheckArgs;
-use crate::cli::shrink::ShrinkArgs;
-use crate::config::duration_secs;
-use crate::report::TableFormat;
-use crate::search::Strategy;
+use crate::export::ExportArgs;
+use crate::recheck::RecheckArgs;
+use crate::shrink::ShrinkArgs;
+use actcheck_base::{Shard, did_you_mean};
+use actcheck_config::duration_secs;
+use actcheck_report::TableFormat;
+use actcheck_search::Strategy;
 
 /// QuickCheck for robot actions: generated scenes, physics simulation, verdicts by rules that you edit.
 #[derive(Debug, Parser)]
@@ -37,7 +37,7 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  actcheck analyse    (after `actcheck run configs/pick.toml --runs 300`)\n  actcheck analyse --property ObjectInGripper --by target_category,target_turned_rad\n  actcheck analyse --picture patterns.png"
     )]
-    Analyse(crate::cli::analyse::AnalyseArgs),
+    Analyse(crate::analyse::AnalyseArgs),
     /// Run a campaign: generate scenes, perform the actions, judge the outcomes, store every run
     ///
     /// The campaign ends after the last planned run, or when a budget is spent: time, number of failures, or precision
@@ -60,7 +60,7 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  actcheck replay k7f3-3    (a run id from `actcheck list`; a prefix is enough)\n  actcheck replay --sample 100 --jobs 2    (a random sample, after `actcheck run configs/pick.toml`)"
     )]
-    Replay(crate::cli::replay::ReplayArgs),
+    Replay(crate::replay::ReplayArgs),
     /// Check configuration, ontology, rules and models without simulating; reports all mistakes at once
     #[command(after_help = "Example:\n  actcheck check configs/pick.toml")]
     Check(CheckArgs),
@@ -82,7 +82,7 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  actcheck run configs/pick.toml --history /tmp/before\n  actcheck run configs/pick.toml --history /tmp/after    (with another skill, robot or physics)\n  actcheck compare /tmp/before /tmp/after --fail-if-worse 0.05\n  actcheck compare k7f3 k7f3@rechecked    (one campaign, before and after `actcheck recheck`)"
     )]
-    Compare(crate::cli::compare::CompareArgs),
+    Compare(crate::compare::CompareArgs),
     /// Test the properties themselves: inject faults into the world and the robot, and see which property detects them
     ///
     /// Runs every scene without a fault and once with each fault (a robot that does nothing, a gripper that opens in
@@ -92,7 +92,7 @@ pub enum Command {
     /// Exit code: 0 every fault is detected and every property detects one, 1 there is a gap, 2 the check failed,
     /// 130 interrupted by Ctrl-C.
     #[command(after_help = "Example:\n  actcheck check-oracles configs/pick.toml")]
-    CheckOracles(crate::cli::check_oracles::CheckOraclesArgs),
+    CheckOracles(crate::check_oracles::CheckOraclesArgs),
     /// Export a stored run as a configuration, or the history as tables or RDF
     ///
     /// A run becomes one readable file (a case) that recreates its scene. `actcheck run` accepts the file like any
@@ -115,7 +115,7 @@ pub enum Command {
     #[command(
         after_help = "Example:\n  actcheck health    (the newest campaign, after `actcheck run configs/pick.toml`)"
     )]
-    Health(crate::cli::health::HealthArgs),
+    Health(crate::health::HealthArgs),
     /// List the runs of a history
     #[command(after_help = "Example:\n  actcheck list --format csv")]
     List(ListArgs),
@@ -131,7 +131,7 @@ pub enum Command {
     #[command(
         after_help = "Example:\n  actcheck run configs/pick.toml --shard 1/2 --history /tmp/h1\n  actcheck run configs/pick.toml --shard 2/2 --history /tmp/h2\n  actcheck merge /tmp/h1 /tmp/h2 --into /tmp/all"
     )]
-    Merge(crate::cli::merge::MergeArgs),
+    Merge(crate::merge::MergeArgs),
     /// Serve a history over HTTP: a read-only SPARQL 1.1 endpoint, a query page, and the current report
     ///
     /// Each query runs in its own process, which is stopped if it exceeds its limit of time, memory or answer size.
@@ -143,10 +143,10 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  actcheck serve    (after `actcheck run configs/pick.toml`)\n  curl -H 'Accept: text/csv' --data-urlencode 'query=SELECT ?run { ?run a act:Run }' http://localhost:7878/sparql"
     )]
-    Serve(crate::cli::serve::ServeArgs),
+    Serve(crate::serve::ServeArgs),
     /// Answer one query of `actcheck serve`
     #[command(hide = true, after_help = "Example:\n  actcheck serve    (starts this for each query)")]
-    ServeQuery(crate::cli::serve::ServeQueryArgs),
+    ServeQuery(crate::serve::ServeQueryArgs),
     /// Show one run: its scene, and every property's outcome with margin and witness
     #[command(after_help = "Example:\n  actcheck show k7f3-3    (a run id from `actcheck list`; a prefix is enough)")]
     Show(ShowArgs),
@@ -195,13 +195,13 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper\n  actcheck report --rrd runs.rrd    (built with `--features rerun`; `rerun runs.rrd` shows it)\n  actcheck report --allure allure-results --junit junit.xml --markdown"
     )]
-    Report(crate::cli::report::ReportArgs),
+    Report(crate::report::ReportArgs),
     /// List all properties: label, language, rule file, actions, and how often each passed in the history
     #[command(after_help = "Example:\n  actcheck rules --format csv")]
-    Rules(crate::cli::rules::RulesArgs),
+    Rules(crate::rules::RulesArgs),
     /// Write a configuration or a property, ready to edit
     #[command(after_help = "Examples:\n  actcheck new campaign\n  actcheck new property StaysUpright --for Pick")]
-    New(crate::cli::new::NewArgs),
+    New(crate::new::NewArgs),
     /// Run a standalone Datalog program, with its imports and exports
     #[command(after_help = "Example:\n  actcheck datalog program.rls -D results")]
     Datalog(DatalogArgs),
@@ -216,10 +216,10 @@ pub enum Command {
     /// Save it where the shell finds it: `~/.local/share/bash-completion/completions/actcheck` for bash, `_actcheck` in
     /// a folder of `$fpath` for zsh, `~/.config/fish/completions/actcheck.fish` for fish.
     #[command(after_help = "Examples:\n  actcheck completions bash > actcheck.bash\n  . ./actcheck.bash")]
-    Completions(crate::cli::completions::CompletionsArgs),
+    Completions(crate::completions::CompletionsArgs),
     /// Print the manual as a man page, or write one page for each command
     #[command(after_help = "Examples:\n  actcheck man | man -l -\n  actcheck man --out man1")]
-    Man(crate::cli::man::ManArgs),
+    Man(crate::man::ManArgs),
 }
 
 /// Parses the name of a search strategy.

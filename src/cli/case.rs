@@ -4,13 +4,13 @@ use std::path::Path;
 
 use serde_json::json;
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::{CaseRun, Env, Manner, run_cases};
-use crate::cli::args::{Format, RunArgs};
-use crate::cli::run::quietly;
-use crate::cli::{clock, output, show};
-use crate::history::History;
-use crate::report::{CaseSummary, case_json, case_text, run_json, run_text};
+use crate::args::{Format, RunArgs};
+use crate::run::quietly;
+use crate::{clock, output, show};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_campaign::{CaseRun, Env, Manner, run_cases};
+use actcheck_history::History;
+use actcheck_report::{CaseSummary, case_json, case_text, run_json, run_text};
 
 /// Runs a case and prints whether it still fails in the same way. Returns the exit code.
 pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {

@@ -4,12 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::base::Diagnostics;
-use crate::campaign::Env;
-use crate::cli::args::CheckArgs;
-use crate::cli::{configurations, output, regressions};
-use crate::config::Overrides;
-use crate::rules::Budget;
+use crate::args::CheckArgs;
+use crate::{configurations, output, regressions};
+use actcheck_base::Diagnostics;
+use actcheck_campaign::Env;
+use actcheck_config::Overrides;
+use actcheck_rules::Budget;
 
 /// Prints what a campaign would use, or returns everything that is wrong with it. `stop` interrupts it.
 pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {

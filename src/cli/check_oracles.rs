@@ -7,16 +7,16 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-use crate::analysis::{OracleTrial, oracle_matrix};
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
-use crate::campaign::{Env, Manner};
-use crate::cli::args::Format;
-use crate::cli::run::{all_cores, quietly};
-use crate::cli::{clock, output, stop};
-use crate::config::Overrides;
-use crate::report::{OracleSummary, oracles_json, oracles_table, oracles_text};
-use crate::rules::Budget;
+use crate::args::Format;
+use crate::run::{all_cores, quietly};
+use crate::{clock, output, stop};
+use actcheck_analysis::{OracleTrial, oracle_matrix};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
+use actcheck_campaign::{Env, Manner};
+use actcheck_config::Overrides;
+use actcheck_report::{OracleSummary, oracles_json, oracles_table, oracles_text};
+use actcheck_rules::Budget;
 
 /// `actcheck check-oracles`
 #[derive(Debug, Args)]

@@ -6,12 +6,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::analysis::{Hierarchy, TableFilter};
-use crate::base::{Diagnostic, Diagnostics, did_you_mean, names};
-use crate::cli::args::HistoryArgs;
-use crate::cli::{history_dir, since, why};
-use crate::history::History;
-use crate::ontology::{self, Ontology};
+use crate::args::HistoryArgs;
+use crate::{history_dir, since, why};
+use actcheck_analysis::{Hierarchy, TableFilter};
+use actcheck_base::{Diagnostic, Diagnostics, did_you_mean, names};
+use actcheck_history::History;
+use actcheck_ontology as ontology;
+use actcheck_ontology::Ontology;
 
 /// Runs of a history, and the ontology that explains them.
 #[derive(Debug, Args)]

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use crate::campaign::Clock;
+use actcheck_campaign::Clock;
 
 /// The machine's clock.
 pub fn system() -> Clock {

@@ -2,7 +2,7 @@
 
 use clap::{Command, CommandFactory as _};
 
-use crate::cli::Arguments;
+use crate::Arguments;
 
 /// The program with all commands except the hidden ones.
 pub(super) fn command_tree() -> Command {

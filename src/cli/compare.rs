@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::analysis::{Comparison, compare as compare_runs, compared_runs};
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::changes;
-use crate::cli::args::{Format, HistoryArgs};
-use crate::cli::{history_dir, output};
-use crate::history::{CampaignRecord, History, RunFilter, RunRow, SceneDigest};
-use crate::report::{CompareSummary, ComparedSide, SideChange, compare_json, compare_table, compare_text};
+use crate::args::{Format, HistoryArgs};
+use crate::{history_dir, output};
+use actcheck_analysis::{Comparison, compare as compare_runs, compared_runs};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_campaign::changes;
+use actcheck_history::{CampaignRecord, History, RunFilter, RunRow, SceneDigest};
+use actcheck_report::{CompareSummary, ComparedSide, SideChange, compare_json, compare_table, compare_text};
 
 /// Suffix of a campaign: use its newest judgements.
 const RECHECKED: &str = "@rechecked";
@@ -123,7 +123,7 @@ struct Side {
     record: CampaignRecord,
     rows: Vec<RunRow>,
     scenes: BTreeMap<String, SceneDigest>,
-    outcomes: Vec<crate::history::OutcomeRow>,
+    outcomes: Vec<actcheck_history::OutcomeRow>,
 }
 
 impl Side {
@@ -147,7 +147,7 @@ impl Side {
         Ok(Self { name: text.to_owned(), record, scenes: history.scenes(&rows)?, rows, outcomes })
     }
 
-    fn runs(&self) -> Vec<crate::analysis::ComparedRun> {
+    fn runs(&self) -> Vec<actcheck_analysis::ComparedRun> {
         compared_runs(&self.rows, &self.scenes, &self.outcomes)
     }
 

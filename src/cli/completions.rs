@@ -4,8 +4,8 @@ use clap::{Args, ValueEnum};
 use clap_complete::generate;
 use clap_complete::shells;
 
-use crate::cli::command_tree::command_tree;
-use crate::cli::output;
+use crate::command_tree::command_tree;
+use crate::output;
 
 /// `actcheck completions`
 #[derive(Debug, Args)]

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Files};
-use crate::config::Table;
+use actcheck_base::{Diagnostic, Files};
+use actcheck_config::Table;
 
 /// Names beyond this number are counted instead of listed.
 const MOST_LISTED: usize = 12;

@@ -4,13 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::base::{Diagnostic, Diagnostics, Files};
-use crate::cli::args::{DatalogArgs, ProofFormat};
-use crate::cli::output;
-use crate::report::Table;
-use crate::rules::Budget;
-use crate::rules::explain::Explanation;
-use crate::rules::standalone::{self, Program};
+use crate::args::{DatalogArgs, ProofFormat};
+use crate::output;
+use actcheck_base::{Diagnostic, Diagnostics, Files};
+use actcheck_report::Table;
+use actcheck_rules::standalone::{self, Program};
+use actcheck_rules::{Budget, explain::Explanation};
 
 /// Runs a standalone program, or explains why one of its facts holds or does not.
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
@@ -32,7 +31,7 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnos
     for (predicate, tuples) in summary.tuples {
         table.rows.push(vec![predicate.into(), tuples.into()]);
     }
-    output::print(&table.render(crate::report::TableFormat::Table));
+    output::print(&table.render(actcheck_report::TableFormat::Table));
     for (file, lines) in summary.written {
         output::print(&format!("{}: {lines} lines\n", file.display()));
     }

@@ -4,34 +4,36 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use crate::cli::args::{Arguments, Command};
-use crate::cli::{
+use crate::args::{Arguments, Command};
+use crate::{
     check, check_oracles, completions, datalog, export, list, man, new, output, query, recheck, rules, show, shrink,
     stop, why,
 };
-use crate::config::SCHEMA;
+use actcheck_base::name_program;
+use actcheck_config::SCHEMA;
 
 /// Parses the process's arguments and runs the command.
 ///
 /// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed, 2 the command failed, 130
 /// interrupted.
-pub fn run() -> ExitCode {
+pub fn run(sources_digest: &'static str) -> ExitCode {
+    name_program(sources_digest);
     // clap prints help, version and usage errors itself; after a usage error it exits with 2.
     let arguments = Arguments::parse();
     let done = match arguments.command {
-        Command::Analyse(args) => crate::cli::analyse::analyse(&args).map(|()| 0),
-        Command::Report(args) => crate::cli::report::report(&args).map(|()| 0),
-        Command::Run(args) => crate::cli::run::run(&args),
-        Command::Replay(args) => crate::cli::replay::replay(&args),
+        Command::Analyse(args) => crate::analyse::analyse(&args).map(|()| 0),
+        Command::Report(args) => crate::report::report(&args).map(|()| 0),
+        Command::Run(args) => crate::run::run(&args),
+        Command::Replay(args) => crate::replay::replay(&args),
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),
-        Command::Compare(args) => crate::cli::compare::compare(&args),
+        Command::Compare(args) => crate::compare::compare(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
         Command::Export(args) => export::export(&args).map(|()| 0),
-        Command::Health(args) => crate::cli::health::health(&args),
+        Command::Health(args) => crate::health::health(&args),
         Command::List(args) => list::list(&args).map(|()| 0),
-        Command::Merge(args) => crate::cli::merge::merge(&args),
-        Command::Serve(args) => crate::cli::serve::serve(&args).map(|()| 0),
-        Command::ServeQuery(args) => crate::cli::serve::serve_query(&args).map(|()| 0),
+        Command::Merge(args) => crate::merge::merge(&args),
+        Command::Serve(args) => crate::serve::serve(&args).map(|()| 0),
+        Command::ServeQuery(args) => crate::serve::serve_query(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Shrink(args) => shrink::shrink(&args),
         Command::Query(args) => query::query(&args).map(|()| 0),

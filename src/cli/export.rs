@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::analysis::{Dataset, Mirror, export_csv, export_dataset, export_parquet};
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::{self, Env};
-use crate::cli::chosen::{self, ChosenRuns};
-use crate::cli::{output, written};
-use crate::history::History;
+use crate::chosen::{self, ChosenRuns};
+use crate::{output, written};
+use actcheck_analysis::{Dataset, Mirror, export_csv, export_dataset, export_parquet};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_campaign as campaign;
+use actcheck_campaign::Env;
+use actcheck_history::History;
 
 /// `actcheck export`
 #[derive(Debug, Args)]

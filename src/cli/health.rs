@@ -2,12 +2,12 @@
 
 use clap::Args;
 
-use crate::analysis::HealthMeter;
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::args::{Format, HistoryArgs};
-use crate::cli::{compare, history_dir, output};
-use crate::history::{History, RunFilter};
-use crate::report::{HealthSummary, health_json, health_table, health_text};
+use crate::args::{Format, HistoryArgs};
+use crate::{compare, history_dir, output};
+use actcheck_analysis::HealthMeter;
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_history::{History, RunFilter};
+use actcheck_report::{HealthSummary, health_json, health_table, health_text};
 
 /// `actcheck health`
 #[derive(Debug, Args)]

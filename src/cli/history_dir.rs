@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::args::HistoryArgs;
-use crate::history::History;
+use crate::args::HistoryArgs;
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_history::History;
 
 /// Code of the fault for a missing history.
 const NONE_FOUND: &str = "X002";

@@ -2,11 +2,11 @@
 
 use serde_json::Value;
 
-use crate::base::Diagnostics;
-use crate::cli::args::ListArgs;
-use crate::cli::{history_dir, output};
-use crate::history::{RunFilter, RunRow};
-use crate::report::Table;
+use crate::args::ListArgs;
+use crate::{history_dir, output};
+use actcheck_base::Diagnostics;
+use actcheck_history::{RunFilter, RunRow};
+use actcheck_report::Table;
 
 /// Returns a run's value in a column.
 type Cell = fn(&RunRow) -> Value;

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Command};
 use clap_mangen::Man;
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::command_tree::command_tree;
-use crate::cli::{output, written};
+use crate::command_tree::command_tree;
+use crate::{output, written};
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// `actcheck man`
 #[derive(Debug, Args)]

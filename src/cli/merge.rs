@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::args::Format;
-use crate::cli::progress::Progress;
-use crate::cli::{output, stop};
-use crate::history::History;
-use crate::history::merge::{MergeOptions, MergePlan, PlannedMerge, carry_out, plan};
-use crate::report::Table;
+use crate::args::Format;
+use crate::progress::Progress;
+use crate::{output, stop};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_history::History;
+use actcheck_history::merge::{MergeOptions, MergePlan, PlannedMerge, carry_out, plan};
+use actcheck_report::Table;
 
 /// Maximum number of run numbers in a message; the JSON table has all.
 const TOLD: usize = 10;

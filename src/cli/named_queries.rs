@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
 
 /// Their folder, in the project and in the shipped files.
 const FOLDER: &str = "ontology/queries";

@@ -2,9 +2,9 @@
 
 use clap::{Args, Subcommand};
 
-use crate::base::Diagnostics;
-use crate::cli::new_campaign::{self, NewCampaignArgs};
-use crate::cli::new_property::{self, NewPropertyArgs};
+use crate::new_campaign::{self, NewCampaignArgs};
+use crate::new_property::{self, NewPropertyArgs};
+use actcheck_base::Diagnostics;
 
 /// `actcheck new`
 #[derive(Debug, Args)]

@@ -4,14 +4,14 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 
-use crate::base::{Diagnostic, Diagnostics, Files};
-use crate::cli::new_files::NewFiles;
-use crate::cli::output;
-use crate::config::{CampaignTemplate, campaign_template};
-use crate::ontology;
+use crate::new_files::NewFiles;
+use crate::output;
+use actcheck_base::{Diagnostic, Diagnostics, Files};
+use actcheck_config::{CampaignTemplate, campaign_template};
+use actcheck_ontology as ontology;
 
 /// The example of a skill in Python.
-const SKILL: &str = include_str!("../../clients/python/examples/pick.py");
+const SKILL: &str = include_str!("shipped/pick.py");
 /// Its path in a new project.
 const SKILL_FILE: &str = "skills/pick.py";
 /// The ontology's path in a project.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Files};
-use crate::cli::written;
+use crate::written;
+use actcheck_base::{Diagnostic, Diagnostics, Files};
 
 /// Files to write, relative to the folder that the program runs in. None may exist.
 #[derive(Debug, Default)]

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
-use crate::cli::new_files::NewFiles;
-use crate::cli::{configurations, output, why, written};
-use crate::config::{LinksOntology, link_ontology};
-use crate::ontology::{self, Ontology, Template, property_template};
+use crate::new_files::NewFiles;
+use crate::{configurations, output, why, written};
+use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
+use actcheck_config::{LinksOntology, link_ontology};
+use actcheck_ontology as ontology;
+use actcheck_ontology::{Ontology, Template, property_template};
 
 /// `actcheck new property`
 #[derive(Debug, Args)]

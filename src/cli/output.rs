@@ -4,7 +4,7 @@ use std::io::{IsTerminal, Write};
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
 
-use crate::base::{Diagnostic, Diagnostics, Severity};
+use actcheck_base::{Diagnostic, Diagnostics, Severity};
 
 /// Writes results. A reader that has gone away (`| head`) ends the process quietly.
 pub fn print(text: &str) {

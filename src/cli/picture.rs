@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::written;
-use crate::history::{History, RunDetail};
-use crate::report::{Caption, Drawing, run_picture};
+use crate::written;
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_history::{History, RunDetail};
+use actcheck_report::{Caption, Drawing, run_picture};
 
 /// A picture file in a supported format.
 pub(super) struct Picture<'a> {

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::report::RunSummary;
+use actcheck_report::RunSummary;
 
 /// A bar on the error stream: runs done, rate, time left, failures so far.
 pub struct Progress {

@@ -2,11 +2,11 @@
 
 use std::io::Read as _;
 
-use crate::base::{Diagnostic, Diagnostics, Files, Source, Term, names};
-use crate::cli::args::{QueryArgs, QueryFormat};
-use crate::cli::{history_dir, named_queries, output, stop};
-use crate::history::{Cancel, QueryAnswer};
-use crate::report::{Table, TableFormat, answer_table};
+use crate::args::{QueryArgs, QueryFormat};
+use crate::{history_dir, named_queries, output, stop};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Term, names};
+use actcheck_history::{Cancel, QueryAnswer};
+use actcheck_report::{Table, TableFormat, answer_table};
 
 /// Runs a query and prints its answer. Ctrl-C stops a long query.
 pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean};
-use crate::campaign::{Ending, RecheckOptions, RuleSet, recheck as judge_anew};
-use crate::cli::args::{Format, HistoryArgs};
-use crate::cli::progress::Progress;
-use crate::cli::why::ontology_file;
-use crate::cli::{clock, history_dir, output, stop};
-use crate::history::{History, RunFilter, RunRow};
-use crate::report::{RecheckSummary, recheck_json, recheck_table, recheck_text};
+use crate::args::{Format, HistoryArgs};
+use crate::progress::Progress;
+use crate::why::ontology_file;
+use crate::{clock, history_dir, output, stop};
+use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean};
+use actcheck_campaign::{Ending, RecheckOptions, RuleSet, recheck as judge_anew};
+use actcheck_history::{History, RunFilter, RunRow};
+use actcheck_report::{RecheckSummary, recheck_json, recheck_table, recheck_text};
 
 /// Maximum number of faults that are reported; the rest are counted.
 const TOLD: usize = 5;

@@ -2,14 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::campaign::{self, Env, Manner, run_cases};
-use crate::cli::run::quietly;
-use crate::cli::{case, clock};
-use crate::config::Overrides;
-use crate::history::History;
-use crate::report::CaseSummary;
-use crate::rules::Budget;
+use crate::run::quietly;
+use crate::{case, clock};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_campaign as campaign;
+use actcheck_campaign::{Env, Manner, run_cases};
+use actcheck_config::Overrides;
+use actcheck_history::History;
+use actcheck_report::CaseSummary;
+use actcheck_rules::Budget;
 
 /// Prepares the cases of a campaign, sorted by file name. Of a campaign in parts, only the first part gets them.
 /// Their runs go into the campaign's history.

@@ -6,13 +6,14 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-use crate::base::{Choices, Diagnostic, Diagnostics};
-use crate::campaign::{Env, Fit, Manner, Recalled, Replay, replay_all};
-use crate::cli::args::{Format, HistoryArgs};
-use crate::cli::replay_text::{replay_json, replay_table, replay_text};
-use crate::cli::run::{all_cores, quietly};
-use crate::cli::{clock, history_dir, output};
-use crate::history::{History, RunDetail, RunFilter};
+use crate::args::{Format, HistoryArgs};
+use crate::replay_text::{replay_json, replay_table, replay_text};
+use crate::run::{all_cores, quietly};
+use crate::{clock, history_dir, output};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_campaign::{Env, Fit, Manner, Recalled, Replay, replay_all};
+use actcheck_data::Choices;
+use actcheck_history::{History, RunDetail, RunFilter};
 
 /// `actcheck replay`
 #[derive(Debug, Args)]

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::base::names;
-use crate::campaign::{Difference, Replay};
-use crate::report::Table;
+use actcheck_base::names;
+use actcheck_campaign::{Difference, Replay};
+use actcheck_report::Table;
 
 /// Maximum number of lines of one kind below a run; the rest are counted.
 const MOST_LINES: usize = 12;

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::analyse::{Analysed, Question, analysed};
-use crate::cli::chosen::{ChosenRuns, is_meant};
-use crate::cli::report_formats::{self, FormatArgs};
-use crate::cli::{output, report_html, written};
-use crate::history::{History, RunDetail};
-use crate::report::HTML_COLUMNS;
+use crate::analyse::{Analysed, Question, analysed};
+use crate::chosen::{ChosenRuns, is_meant};
+use crate::report_formats::{self, FormatArgs};
+use crate::{output, report_html, written};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_history::{History, RunDetail};
+use actcheck_report::HTML_COLUMNS;
 
 /// Maximum number of conditions of a pattern, and the false discovery rate: the defaults of `actcheck analyse`.
 const DEPTH: u8 = 3;
@@ -122,7 +122,7 @@ fn write_watched(args: &ReportArgs, history: &History) -> Result<Vec<String>, Di
     }
     #[cfg(feature = "rerun")]
     if let Some(file) = &args.rrd {
-        told.extend(crate::cli::report_rrd::write(file, args, &found, history, room)?);
+        told.extend(crate::report_rrd::write(file, args, &found, history, room)?);
     }
     Ok(told)
 }

@@ -7,16 +7,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::base::Diagnostics;
-use crate::cli::report::ReportArgs;
-use crate::cli::{chosen, output, watched, written};
-use crate::history::{CampaignRow, History, RunDetail, RunFilter, RunRow};
-use crate::report::{
+use crate::report::ReportArgs;
+use crate::{chosen, output, watched, written};
+use actcheck_base::{Diagnostics, Outcome};
+use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow};
+use actcheck_report::{
     Attachment, Caption, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results, markdown,
     observation, run_picture,
 };
-use crate::rules::{Budget, RuleBook};
-use crate::verdict::Outcome;
+use actcheck_rules::{Budget, RuleBook};
 
 /// Formats of other tools.
 #[derive(Debug, Args)]

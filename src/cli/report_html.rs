@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-use crate::base::Diagnostics;
-use crate::cli::analyse::Analysed;
-use crate::cli::{clock, watched};
-use crate::history::History;
-use crate::ontology::Ontology;
-use crate::report::{HtmlReport, PropertyWords, Replays, html, replay_order};
+use crate::analyse::Analysed;
+use crate::{clock, watched};
+use actcheck_base::Diagnostics;
+use actcheck_history::History;
+use actcheck_ontology::Ontology;
+use actcheck_report::{HtmlReport, PropertyWords, Replays, html, replay_order};
 
 /// Renders the whole page, with as many replays as fit into `room` bytes.
 ///
@@ -29,7 +29,7 @@ pub(super) fn page(found: &Analysed, history: &History, room: f64) -> Result<Str
 }
 
 fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
-    let told = |property: &crate::ontology::Property| PropertyWords {
+    let told = |property: &actcheck_ontology::Property| PropertyWords {
         label: property.label.clone(),
         comment: property.comment.clone(),
         rule: property.rule.path.clone(),

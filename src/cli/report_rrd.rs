@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::analyse::Analysed;
-use crate::cli::report::ReportArgs;
-use crate::cli::{output, watched, written};
-use crate::history::History;
-use crate::report::{RecordingFault, Recordings, replay_order};
+use crate::analyse::Analysed;
+use crate::report::ReportArgs;
+use crate::{output, watched, written};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_history::History;
+use actcheck_report::{RecordingFault, Recordings, replay_order};
 
 /// Writes recordings of the requested runs, as many as fit into `room` bytes. Returns the message to print.
 ///

@@ -6,14 +6,15 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::Value;
 
-use crate::base::Diagnostics;
-use crate::cli::args::{Format, HistoryArgs};
-use crate::cli::why::ontology_file;
-use crate::cli::{history_dir, output};
-use crate::history::RunFilter;
-use crate::ontology::{self, Action, Ontology, Property, RuleLanguage};
-use crate::report::{Share, Table};
-use crate::verdict::{Counts, Outcome};
+use crate::args::{Format, HistoryArgs};
+use crate::why::ontology_file;
+use crate::{history_dir, output};
+use actcheck_base::{Diagnostics, Outcome};
+use actcheck_history::RunFilter;
+use actcheck_ontology as ontology;
+use actcheck_ontology::{Action, Ontology, Property, RuleLanguage};
+use actcheck_report::{Share, Table};
+use actcheck_verdict::Counts;
 
 /// `actcheck rules`
 #[derive(Debug, Args)]

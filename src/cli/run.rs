@@ -6,20 +6,22 @@ use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
 
-use crate::analysis::{self, Interval, Mirror};
-use crate::base::Diagnostics;
-use crate::campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, WeightedRate, resume_all};
-use crate::cli::args::{Format, RunArgs};
-use crate::cli::progress::Progress;
-use crate::cli::session::{self, Opened, Session};
-use crate::cli::{case, clock, health, output, shrink, stop};
-use crate::history::{self, History, RunFilter};
-use crate::report::{
+use crate::args::{Format, RunArgs};
+use crate::progress::Progress;
+use crate::session::{self, Opened, Session};
+use crate::{case, clock, health, output, shrink, stop};
+use actcheck_analysis as analysis;
+use actcheck_analysis::{Interval, Mirror};
+use actcheck_base::{Diagnostics, Outcome};
+use actcheck_campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, WeightedRate, resume_all};
+use actcheck_history as history;
+use actcheck_history::{History, RunFilter};
+use actcheck_report::{
     CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json, campaign_table,
     campaign_text, health_json, health_lines, shrunk_json, shrunk_text, with_shrunk,
 };
-use crate::rules::Budget;
-use crate::verdict::{Counts, Outcome, mean};
+use actcheck_rules::Budget;
+use actcheck_verdict::{Counts, mean};
 
 /// The tables beside the history are updated each time this many runs were stored.
 const MIRROR_EVERY: usize = 1_000;

@@ -6,11 +6,12 @@ use std::sync::mpsc::channel;
 
 use clap::Args;
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::args::HistoryArgs;
-use crate::cli::{history_dir, named_queries, output, stop};
-use crate::history::History;
-use crate::serve::{self, Example, Options};
+use crate::args::HistoryArgs;
+use crate::{history_dir, named_queries, output, stop};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_history::History;
+use actcheck_serve as serve;
+use actcheck_serve::{Example, Options};
 
 /// `actcheck serve`
 #[derive(Debug, Args)]

@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use crate::base::{Diagnostics, digest_of};
-use crate::campaign::{Env, unfinished};
-use crate::cli::args::{HistoryArgs, RunArgs};
-use crate::cli::{configurations, history_dir, regressions};
-use crate::config::{self, Overrides};
-use crate::history::{ActionDetail, CampaignRecord, History, RunDetail, RunFilter};
-use crate::report::CaseSummary;
-use crate::rules::Budget;
+use crate::args::{HistoryArgs, RunArgs};
+use crate::{configurations, history_dir, regressions};
+use actcheck_base::{Diagnostics, digest_of};
+use actcheck_campaign::{Env, unfinished};
+use actcheck_config as config;
+use actcheck_config::Overrides;
+use actcheck_history::{ActionDetail, CampaignRecord, History, RunDetail, RunFilter};
+use actcheck_report::CaseSummary;
+use actcheck_rules::Budget;
 
 /// The kind of work that a configuration describes.
 pub enum Opened {

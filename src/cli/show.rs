@@ -1,11 +1,11 @@
 //! `actcheck show`
 
-use crate::base::Diagnostics;
-use crate::cli::args::{Format, ShowArgs};
-use crate::cli::picture::Picture;
-use crate::cli::{history_dir, output};
-use crate::history::RunDetail;
-use crate::report::{Table, run_json, run_text};
+use crate::args::{Format, ShowArgs};
+use crate::picture::Picture;
+use crate::{history_dir, output};
+use actcheck_base::Diagnostics;
+use actcheck_history::RunDetail;
+use actcheck_report::{Table, run_json, run_text};
 
 /// Prints one run, and draws it if a picture is requested.
 pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {

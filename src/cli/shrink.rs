@@ -5,16 +5,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Args, ValueEnum};
 
-use crate::base::{Choice, Diagnostic, Diagnostics};
-use crate::campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk, unit_of};
-use crate::campaign::{Env, Manner};
-use crate::cli::args::HistoryArgs;
-use crate::cli::picture::Picture;
-use crate::cli::run::{all_cores, quietly};
-use crate::cli::{clock, history_dir, output, stop};
-use crate::history::{History, RunRecord};
-use crate::report::{ShrunkChoice, ShrunkSummary, shrunk_json, shrunk_text};
-use crate::rules::Budget;
+use crate::args::HistoryArgs;
+use crate::picture::Picture;
+use crate::run::{all_cores, quietly};
+use crate::{clock, history_dir, output, stop};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk, unit_of};
+use actcheck_campaign::{Env, Manner};
+use actcheck_data::Choice;
+use actcheck_history::{History, RunRecord};
+use actcheck_report::{ShrunkChoice, ShrunkSummary, shrunk_json, shrunk_text};
+use actcheck_rules::Budget;
 
 /// `actcheck shrink`
 #[derive(Debug, Args)]
@@ -186,7 +187,7 @@ fn why(env: &Env, record: &RunRecord, shrunk: &Shrunk) -> Result<Vec<String>, Di
     for (step, judgements) in record.judgements.iter().enumerate() {
         let Some(facts) = record.facts.action(step) else { continue };
         for judgement in judgements {
-            if judgement.outcome == crate::verdict::Outcome::Failed && shrunk.failed.contains(&judgement.property) {
+            if judgement.outcome == actcheck_base::Outcome::Failed && shrunk.failed.contains(&judgement.property) {
                 let explained = env.rules.explain(&facts, &judgement.property, &Budget::default());
                 let explained =
                     explained.map_err(|fault| Diagnostic::error("X008", format!("{}: {fault}", judgement.property)))?;

@@ -1,6 +1,6 @@
 //! Points in time on the command line.
 
-use crate::config::duration_secs;
+use actcheck_config::duration_secs;
 
 /// Parses a day, a point in time or a duration before now. Returns the time as histories store it (RFC 3339, in UTC).
 ///

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::cli::output;
+use crate::output;
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Exit code of a command that was interrupted.
 pub const INTERRUPTED: u8 = 130;

@@ -3,12 +3,12 @@
 
 use std::ops::ControlFlow;
 
-use crate::base::Diagnostics;
-use crate::history::{History, RunDetail, Trace};
-use crate::ontology::Ontology;
-use crate::report::Explained;
-use crate::rules::{Budget, RuleBook};
-use crate::verdict::Outcome;
+use actcheck_base::{Diagnostics, Outcome};
+use actcheck_data::Trace;
+use actcheck_history::{History, RunDetail};
+use actcheck_ontology::Ontology;
+use actcheck_report::Explained;
+use actcheck_rules::{Budget, RuleBook};
 
 /// Number of runs that a worker reads ahead.
 const RUNS_OF_A_WORKER: usize = 8;

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
-use crate::cli::args::WhyArgs;
-use crate::cli::datalog::rendered;
-use crate::cli::{history_dir, output};
-use crate::history::{ActionDetail, RunDetail};
-use crate::ontology;
-use crate::rules::{Budget, RuleBook};
+use crate::args::WhyArgs;
+use crate::datalog::rendered;
+use crate::{history_dir, output};
+use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
+use actcheck_history::{ActionDetail, RunDetail};
+use actcheck_ontology as ontology;
+use actcheck_rules::{Budget, RuleBook};
 
 /// Prints, for each requested outcome of a run, the proof that the property holds or how close it came.
 pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
@@ -27,7 +27,7 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
             let title = format!("{} {}, {}", run.row.run, names::local(&action.action), names::local(&property));
             let explained = rules.explain(&seen, &property, &budget);
             let explained = explained.map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
-            if args.format == crate::cli::args::ProofFormat::Text {
+            if args.format == crate::args::ProofFormat::Text {
                 output::print(&format!("{title}\n"));
             }
             output::print(&format!("{}\n", rendered(&explained, args.format)));

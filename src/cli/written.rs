@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics, write_whole};
+use actcheck_base::{Diagnostic, Diagnostics, write_whole};
 
 /// Writes a file. If that fails, for instance on a full disk, the previous content is kept.
 ///

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::{Diagnostics, Span, did_you_mean};
-use crate::config::designators::Designators;
-use crate::config::{Located, OtherCounts, Table};
+use crate::designators::Designators;
+use crate::{Located, OtherCounts, Table};
+use actcheck_base::{Diagnostics, Span, did_you_mean};
 
 /// Choices that pick a name from a designator's candidates. They are written by name, so that a case stays valid when
 /// candidates are added. `*` matches a number.
@@ -29,7 +29,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// Returns the key of a choice in [`crate::config::Campaign::places`].
+    /// Returns the key of a choice in [`crate::Campaign::places`].
     pub fn place_of(choice: &str) -> String {
         format!("case.choices.{choice}")
     }

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 
 use toml::Value;
 
-use crate::base::{Choice, ChoiceKind, Diagnostic, Diagnostics, Source};
-use crate::config::Campaign;
-use crate::config::case::Form;
+use crate::Campaign;
+use crate::case::Form;
+use actcheck_base::{Diagnostic, Diagnostics, Source};
+use actcheck_data::{Choice, ChoiceKind};
 
 /// Keys without a meaning for a single scene.
 const OF_CAMPAIGNS: [&str; 5] = ["case", "history", "repeat", "search", "seed"];

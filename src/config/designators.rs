@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostics, Span};
-use crate::config::shelf::Shelf;
-use crate::config::{Located, OtherCounts, Table};
+use crate::shelf::Shelf;
+use crate::{Located, OtherCounts, Table};
+use actcheck_base::{Diagnostics, Span};
 
 /// The kind of thing that a table's candidates name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

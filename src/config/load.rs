@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Files, Severity, Source, Span, did_you_mean};
-use crate::config::designators::{self, Designators};
-use crate::config::{Campaign, Overrides, Table, case, ranges, shelf, skill};
-use crate::search::Strategy;
+use crate::designators::{self, Designators};
+use crate::{Campaign, Overrides, Table, case, ranges, shelf, skill};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Source, Span, did_you_mean};
+use actcheck_search::Strategy;
 
 /// The ontology embedded in the program.
 const SHIPPED_ONTOLOGY: &str = "ontology/actions.ttl";
@@ -101,7 +101,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
 }
 
 /// Sorts the faults of each text by position; texts keep the order in which they were read.
-pub(crate) fn in_order_of_place(found: Diagnostics) -> Diagnostics {
+pub fn in_order_of_place(found: Diagnostics) -> Diagnostics {
     let mut names: Vec<String> = Vec::new();
     let mut faults: Vec<(usize, usize, Diagnostic)> = Vec::new();
     for fault in found {
@@ -188,7 +188,7 @@ fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Pa
 }
 
 /// Resolves a path of a configuration relative to `folder`, without `..` where removing it does not change the target.
-pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
+pub fn beside(folder: &Path, written: &str) -> PathBuf {
     let (mut base, mut rest) = (folder.to_path_buf(), Path::new(written));
     while let Ok(shorter) = rest.strip_prefix("..") {
         if base.file_name().is_none() || base.is_symlink() || !base.pop() {

@@ -1,110 +1,10 @@
 //! Models of objects and furniture.
 
+use actcheck_base::{Diagnostic, Diagnostics, Source, digest_of, names};
+use actcheck_data::{ObjectModel, Part, Pose, Shape, Surface, bounds};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
 
-use crate::base::{Diagnostic, Diagnostics, Pose, Source, digest_of, names};
-use crate::config::shape::bounds;
-use crate::config::{Part, Shape, Table};
-
-/// A rigid object or piece of furniture, made of shapes.
-///
-/// Frame: the model's own, z up, in its upright pose; the origin is on the ground below its middle.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ObjectModel {
-    /// Name in configurations; the file's name without its extension.
-    pub name: String,
-    /// Its class in the ontology: an IRI.
-    pub category: String,
-    /// Unit: kilograms.
-    pub mass_kg: f64,
-    /// Sliding friction coefficient against a surface of the same friction.
-    pub friction: f64,
-    /// Coefficient of restitution in [0, 1].
-    pub restitution: f64,
-    /// Position of the file's origin in the model's frame; nonzero only for SDF and URDF models. Unit: metres.
-    pub origin_m: [f64; 3],
-    /// Outer dimensions in the upright pose. Unit: metres. Shape: x, y, z.
-    pub size_m: [f64; 3],
-    /// Shapes of the model. The mass is distributed by their volumes.
-    pub parts: Vec<Part>,
-    /// Whether it is static.
-    pub fixed: bool,
-    /// Centre of mass and moments of inertia from its file; if `None`, the parts have a uniform density.
-    pub inertia: Option<Inertia>,
-    /// For furniture: the flat rectangle on top that can hold objects.
-    pub surface: Option<Surface>,
-    /// Digest of the model's files.
-    pub digest: String,
-}
-
-/// Mass distribution of a model. Frame: the model's.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Inertia {
-    /// Centre of mass. Unit: metres.
-    pub com_m: [f64; 3],
-    /// Inertia tensor about the centre of mass for the model's mass, row by row. Unit: kg·m².
-    pub about_com: [[f64; 3]; 3],
-}
-
-/// A horizontal rectangle that can hold objects. Frame: the model's, centred on its origin.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Surface {
-    /// Height above the ground. Unit: metres.
-    pub height_m: f64,
-    /// Extent. Unit: metres. Shape: x, y.
-    pub size_m: [f64; 2],
-}
-
-impl ObjectModel {
-    /// Returns the convex solids of the model: its parts, with each tube split into boxes. Frame: the model's.
-    pub fn solids(&self) -> Vec<Part> {
-        let mut solids = Vec::new();
-        for part in &self.parts {
-            if let Shape::Tube { .. } = part.shape {
-                let outer = part.pose.to_isometry();
-                solids.extend(part.shape.staves().into_iter().map(|stave| Part {
-                    pose: Pose::from_isometry(&(outer * stave.pose.to_isometry())),
-                    shape: stave.shape,
-                }));
-            } else {
-                solids.push(part.clone());
-            }
-        }
-        solids
-    }
-
-    /// Scales the model uniformly; the mass stays the same.
-    #[must_use]
-    pub fn scaled(&self, by: f64) -> Self {
-        let placed = |pose: &Pose| Pose { position: pose.position.map(|x| x * by), rotation: pose.rotation };
-        let surface = |surface: Surface| Surface {
-            height_m: surface.height_m * by,
-            size_m: surface.size_m.map(|extent| extent * by),
-        };
-        let inertia = |inertia: Inertia| Inertia {
-            com_m: inertia.com_m.map(|x| x * by),
-            about_com: inertia.about_com.map(|row| row.map(|moment| moment * by * by)),
-        };
-        Self {
-            size_m: self.size_m.map(|extent| extent * by),
-            origin_m: self.origin_m.map(|x| x * by),
-            parts: self
-                .parts
-                .iter()
-                .map(|part| Part { pose: placed(&part.pose), shape: part.shape.sized(by) })
-                .collect(),
-            surface: self.surface.map(surface),
-            inertia: self.inertia.map(inertia),
-            ..self.clone()
-        }
-    }
-
-    /// Volume of the material. Unit: cubic metres.
-    pub fn volume(&self) -> f64 {
-        self.parts.iter().map(|part| part.shape.volume()).sum()
-    }
-}
+use crate::Table;
 
 /// Tolerance between the parts' bounding box and `size_m`: the staves of a tube lie a few millimetres inside it.
 const SIZE_TOLERANCE_M: f64 = 0.006;
@@ -210,7 +110,7 @@ fn read_shape(table: &mut Table) -> Option<Shape> {
         "tube" => read_tube(table),
         other => {
             let message = format!("unknown shape `{other}`");
-            let help = crate::base::did_you_mean(other, ["box", "capsule", "cylinder", "sphere", "tube"]);
+            let help = actcheck_base::did_you_mean(other, ["box", "capsule", "cylinder", "sphere", "tube"]);
             table.fault("W001", kind.span, message, help);
             None
         }

@@ -1,15 +1,12 @@
 //! Reads the tables of numbers: physics, sensing, camera and budget.
 
+use actcheck_base::Diagnostics;
+use actcheck_data::{Budget, CONTROL_HZ, Camera, Odometry, Physics, Sensing};
 use std::ops::Bound;
 
-use crate::base::Diagnostics;
-use crate::config::{Budget, Camera, Limits, Odometry, Physics, Sensing, Table, duration_secs};
+use crate::{Limits, Table, duration_secs};
 
 const ABOVE_ZERO: (Bound<f64>, Bound<f64>) = (Bound::Excluded(0.0), Bound::Included(100.0));
-
-/// Control commands and contact records per second of simulated time. Every physics rate is a multiple of it, so that
-/// a control period is a whole number of physics steps.
-pub const CONTROL_HZ: u32 = 60;
 
 /// Reads `[physics]`: the ranges of each object's mass, friction, size and restitution, and the time step.
 pub(crate) fn read_physics(root: &mut Table, found: &mut Diagnostics) -> Physics {

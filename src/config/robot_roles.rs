@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::{Span, did_you_mean};
-use crate::config::foreign::robot_tree::{Motion, Tree};
-use crate::config::{Located, Table};
+use crate::foreign::robot_tree::{Motion, Tree};
+use crate::{Located, Table};
+use actcheck_base::{Span, did_you_mean};
 
 /// Tolerance at joint limits, whose values are often rounded. Unit: metres or radians.
 const SLACK: f64 = 1e-3;

@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::base::{Diagnostic, Diagnostics, Files, Severity, did_you_mean};
-use crate::config::foreign::{self, Lookup};
-use crate::config::load::beside;
-use crate::config::{Furniture, Located, ObjectModel, Range, RobotProfile, Table, WorldMap, model, robot, world_map};
+use crate::foreign::{self, Lookup};
+use crate::load::beside;
+use crate::{Furniture, Located, Table, WorldMap, model, robot, world_map};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, did_you_mean};
+use actcheck_data::{ObjectModel, Range, RobotProfile};
 
 /// Folder of the models embedded in the program.
 const SHIPPED_MODELS: &str = "models";

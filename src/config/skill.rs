@@ -6,9 +6,9 @@ use std::ops::Bound;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Digest, Span};
-use crate::config::load::beside;
-use crate::config::{Launcher, Located, Table};
+use crate::load::beside;
+use crate::{Launcher, Located, Table};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Span};
 
 /// A program that performs actions, located and ready to start.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::ops::{RangeBounds, RangeInclusive};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
-use crate::config::value::{self, Entry, Located, Value};
-use crate::config::words::{example, in_words};
+use crate::value::{self, Entry, Located, Value};
+use crate::words::{example, in_words};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 
 /// A table that is being read.
 ///
@@ -98,7 +98,7 @@ impl Table {
             if !self.entries.contains_key(*key) {
                 let message = format!("{} is missing", self.name(key));
                 let near = self.entries.keys().map(String::as_str).filter(|name| !keys.contains(name));
-                let help = match crate::base::nearest(key, near) {
+                let help = match actcheck_base::nearest(key, near) {
                     Some(found) => format!("is `{found}` meant to be `{key}`?"),
                     None => format!("add `{key} = …`{}", self.place_in_words()),
                 };

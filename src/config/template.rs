@@ -1,10 +1,10 @@
 //! The template of new configurations: `configs/pick.toml` without the paths of a checkout.
 
-use crate::base::Source;
-use crate::config::Table;
+use crate::Table;
+use actcheck_base::Source;
 
 /// The configuration that new ones are derived from.
-const PICK: &str = include_str!("../../configs/pick.toml");
+const PICK: &str = include_str!("shipped/pick.toml");
 
 /// The uncommented `ontology` line of a new configuration.
 const ONTOLOGY_LINE: &str = "ontology = \"ontology/actions.ttl\"";

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span};
 
 /// Largest number of reported syntax errors; further ones usually follow from the first.
 const MOST_SYNTAX_ERRORS: usize = 3;

@@ -1,11 +1,10 @@
 //! Worlds: the walls and furniture that all their scenes share, and their named locations and rooms.
 
+use actcheck_base::{Diagnostics, Source, Span, did_you_mean, digest_of, names};
+use actcheck_data::{Location, ObjectModel, Part, Pose, Room, Shape};
 use std::collections::BTreeSet;
 
-use serde::{Deserialize, Serialize};
-
-use crate::base::{Diagnostics, Pose, Source, Span, did_you_mean, digest_of, names};
-use crate::config::{Located, ObjectModel, Part, Shape, Table};
+use crate::{Located, Table};
 
 /// A world for scenes. Frame: world; the floor is at z = 0.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,28 +41,6 @@ pub struct Furniture {
     pub model: String,
     /// Pose of its model's origin.
     pub pose: Pose,
-}
-
-/// A named pose on the floor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Location {
-    /// Unique among the world's locations.
-    pub name: String,
-    /// Units: metres, metres, radians. Shape: x, y, heading.
-    pub at: [f64; 3],
-    /// Name of the surface that it is in front of, if any.
-    pub surface: Option<String>,
-}
-
-/// A room.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Room {
-    /// Unique among the world's rooms.
-    pub name: String,
-    /// Lowest x and y. Unit: metres.
-    pub low_m: [f64; 2],
-    /// Highest x and y. Unit: metres.
-    pub high_m: [f64; 2],
 }
 
 /// Default height of a wall: that of a low room. Unit: metres.

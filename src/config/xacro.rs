@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::base::Source;
+use actcheck_base::Source;
 
 /// The program, as installed by ROS or by `pip install xacro`.
 const PROGRAM: &str = "xacro";

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::actions::{ActionTrace, ContactEpisode, Extremes, Perceived, Percept};
-use crate::base::names;
-use crate::facts::writer::Writer;
+use crate::writer::Writer;
+use actcheck_base::names;
+use actcheck_data::{ActionTrace, ContactEpisode, Extremes, Perceived, Percept};
 
 /// Number of contact episodes that become facts for each pair: the strongest ones.
 ///

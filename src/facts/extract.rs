@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::actions::{ActionEnd, SceneMap, Trace};
-use crate::base::{Term, TermId, names};
-use crate::facts::writer::Writer;
-use crate::facts::{RunFacts, during, places, robot_course, snapshot};
+use crate::writer::Writer;
+use crate::{during, places, robot_course, snapshot};
+use actcheck_base::{RunFacts, Term, TermId, names};
+use actcheck_data::{ActionEnd, SceneMap, Trace};
 
 /// Extracts the facts of a run: one list for each snapshot, and for each action one list of events and one of
 /// designators.

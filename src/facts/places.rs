@@ -1,8 +1,8 @@
 //! Facts about a world's map: its locations, rooms and surfaces. They hold in every snapshot.
 
-use crate::actions::SceneMap;
-use crate::base::names;
-use crate::facts::writer::Writer;
+use crate::writer::Writer;
+use actcheck_base::names;
+use actcheck_data::SceneMap;
 
 /// Writes every named place.
 pub(super) fn write(map: &SceneMap, writer: &mut Writer) {
@@ -34,7 +34,7 @@ pub(super) fn write(map: &SceneMap, writer: &mut Writer) {
     }
 }
 
-fn in_room(map: &SceneMap, subject: crate::base::TermId, [x, y]: [f64; 2], writer: &mut Writer) {
+fn in_room(map: &SceneMap, subject: actcheck_base::TermId, [x, y]: [f64; 2], writer: &mut Writer) {
     if let Some(room) = map.room_of(x, y) {
         let room = writer.named("room", &room.name);
         writer.state(subject, "inRoom", room);

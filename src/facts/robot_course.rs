@@ -1,8 +1,8 @@
 //! Facts about the robot's joints, self-contacts and held objects during one action.
 
-use crate::actions::RobotCourse;
-use crate::base::names;
-use crate::facts::writer::Writer;
+use crate::writer::Writer;
+use actcheck_base::names;
+use actcheck_data::RobotCourse;
 
 /// A joint that used less than this share of its maximum speed counts as unmoved: its speed is not written.
 const STANDS_STILL: f64 = 0.01;

@@ -1,8 +1,8 @@
 //! Facts about one snapshot.
 
-use crate::actions::{BodyState, JointState, RobotState, Snapshot};
-use crate::base::{Pose, TermId, names};
-use crate::facts::writer::Writer;
+use crate::writer::Writer;
+use actcheck_base::{TermId, names};
+use actcheck_data::{BodyState, JointState, Pose, RobotState, Snapshot};
 
 const POSITION: [&str; 3] = ["x", "y", "z"];
 const ROTATION: [&str; 4] = ["qx", "qy", "qz", "qw"];

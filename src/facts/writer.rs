@@ -2,8 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::base::{Term, TermId, Terms, names};
-use crate::facts::Triple;
+use actcheck_base::{Term, TermId, Terms, Triple, names};
 
 /// Returns the IRI of an object with this ID in the simulation: `w:robot`, `w:floor`, `w:link/NAME` for `robot/NAME`,
 /// and `obj:ID` for the rest.

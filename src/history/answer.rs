@@ -2,7 +2,7 @@
 
 use oxigraph::sparql::CancellationToken;
 
-use crate::base::Term;
+use actcheck_base::Term;
 
 /// Result of a SPARQL query.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,13 +5,12 @@ use std::collections::BTreeMap;
 use oxigraph::model::{GraphNameRef, NamedNode, Term};
 use oxigraph::store::{StorageError, Store};
 
-use crate::base::names;
-use crate::history::read::{Node, id_of, subjects, text_of};
-use crate::history::statements::iri;
-use crate::history::write_scene::NOISE_TERMS;
-use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail, RunRow, RunStatus};
-use crate::scenario::Role;
-use crate::verdict::{Judgement, Outcome};
+use crate::read::{Node, id_of, subjects, text_of};
+use crate::statements::iri;
+use crate::write_scene::NOISE_TERMS;
+use crate::{ActionDetail, ObjectDetail, Repetition, RunDetail, RunRow, RunStatus};
+use actcheck_base::{Judgement, Outcome, names};
+use actcheck_data::Role;
 
 /// Reads an existing run.
 pub(super) fn read(store: &Store, run: &NamedNode) -> Result<RunDetail, StorageError> {

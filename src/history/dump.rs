@@ -7,9 +7,9 @@ use std::path::Path;
 use oxigraph::io::RdfFormat;
 use oxigraph::model::GraphNameRef;
 
-use crate::base::{Diagnostic, Diagnostics};
-use crate::history::rdf_text::serializer;
-use crate::history::{History, RdfSyntax};
+use crate::rdf_text::serializer;
+use crate::{History, RdfSyntax};
+use actcheck_base::{Diagnostic, Diagnostics};
 
 impl History {
     /// Writes the whole history as N-Quads, including facts and later judgements in their named graphs.

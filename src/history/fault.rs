@@ -5,7 +5,7 @@ use std::path::Path;
 
 use oxigraph::store::StorageError;
 
-use crate::base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// H001: a folder can't be used as a history, or can't be accessed.
 pub(super) fn unusable(dir: &Path, why: &str) -> Diagnostics {

@@ -8,8 +8,8 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostics, write_whole};
-use crate::history::fault;
+use crate::fault;
+use actcheck_base::{Diagnostics, write_whole};
 
 /// Format of the folder that this program writes, and the newest that it reads.
 pub(super) const FORMAT: u64 = 1;

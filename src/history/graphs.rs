@@ -8,9 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
 
-use crate::base::{TermId, Terms, names};
-use crate::facts::{RunFacts, Triple};
-use crate::history::terms::to_store;
+use crate::terms::to_store;
+use actcheck_base::{RunFacts, TermId, Terms, Triple, names};
 
 /// Properties of the world vocabulary that the graphs omit.
 ///
@@ -92,7 +91,7 @@ impl Kept {
 }
 
 fn w(terms: &Terms, local: &str) -> Option<TermId> {
-    terms.id(&crate::base::Term::iri(names::w(local)))
+    terms.id(&actcheck_base::Term::iri(names::w(local)))
 }
 
 /// Contacts whose pair of bodies has a stronger contact, or an equal one with a smaller id.

@@ -6,12 +6,12 @@ use oxigraph::model::{Literal, Term};
 use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::Store;
 
-use crate::history::detail::{outcome, status, version};
-use crate::history::read::{Node, id_of, select, text_of};
-use crate::history::read_campaign::skill;
-use crate::history::write_campaign::campaign_node;
-use crate::history::{CampaignRow, OutcomeRow, Repetition, RunFilter, RunRow};
-use crate::verdict::Outcome;
+use crate::detail::{outcome, status, version};
+use crate::read::{Node, id_of, select, text_of};
+use crate::read_campaign::skill;
+use crate::write_campaign::campaign_node;
+use crate::{CampaignRow, OutcomeRow, Repetition, RunFilter, RunRow};
+use actcheck_base::Outcome;
 
 const CAMPAIGNS: &str = "
 SELECT ?campaign (COUNT(?run) AS ?runs) WHERE {

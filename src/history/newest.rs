@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::Diagnostics;
-use crate::history::{History, OutcomeRow, RunFilter, lists};
+use crate::{History, OutcomeRow, RunFilter, lists};
+use actcheck_base::Diagnostics;
 
 /// The newest outcomes of runs: later judgements where they exist, otherwise those of the campaign itself.
 #[derive(Debug, Clone, PartialEq, Default)]

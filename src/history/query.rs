@@ -6,10 +6,10 @@ use std::time::Duration;
 use oxigraph::sparql::{QueryEvaluationError, QueryResults, SparqlEvaluator};
 use oxigraph::store::Store;
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, names};
-use crate::history::syntax_fault::syntax_fault;
-use crate::history::terms::from_store;
-use crate::history::{Cancel, QueryAnswer};
+use crate::syntax_fault::syntax_fault;
+use crate::terms::from_store;
+use crate::{Cancel, QueryAnswer};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, names};
 
 /// Words with which an update begins.
 const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREATE", "ADD", "MOVE", "COPY", "WITH"];

@@ -3,8 +3,8 @@
 use oxigraph::io::{RdfFormat, RdfSerializer};
 use oxigraph::model::{NamedOrBlankNode, Term as StoreTerm, Triple};
 
-use crate::base::{Term, names};
-use crate::history::terms::to_store;
+use crate::terms::to_store;
+use actcheck_base::{Term, names};
 
 /// A text format of a graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

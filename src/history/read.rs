@@ -6,10 +6,10 @@ use oxigraph::model::{GraphNameRef, NamedNodeRef, NamedOrBlankNode, NamedOrBlank
 use oxigraph::sparql::{QueryEvaluationError, QueryResults};
 use oxigraph::store::{StorageError, Store};
 
-use crate::base::names;
-use crate::history::Cancel;
-use crate::history::query::evaluator;
-use crate::history::statements::iri;
+use crate::Cancel;
+use crate::query::evaluator;
+use crate::statements::iri;
+use actcheck_base::names;
 
 /// All statements of a graph about one subject.
 #[derive(Debug, Default)]

@@ -3,11 +3,11 @@
 use oxigraph::model::Term;
 use oxigraph::store::{StorageError, Store};
 
-use crate::base::Shard;
-use crate::history::detail::version;
-use crate::history::read::{Node, text_of};
-use crate::history::write_campaign::campaign_node;
-use crate::history::{CampaignRecord, SkillRecord};
+use crate::detail::version;
+use crate::read::{Node, text_of};
+use crate::write_campaign::campaign_node;
+use crate::{CampaignRecord, SkillRecord};
+use actcheck_base::Shard;
 
 /// Reads the record of a campaign. Returns `None` if the history has no such campaign.
 pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord>, StorageError> {

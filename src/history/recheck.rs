@@ -9,14 +9,13 @@ use std::collections::BTreeSet;
 use oxigraph::model::{GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term};
 use oxigraph::store::{StorageError, Store};
 
-use crate::base::Diagnostics;
-use crate::history::History;
-use crate::history::detail::judgement;
-use crate::history::graphs::below;
-use crate::history::read::{Node, subjects_in};
-use crate::history::statements::{Statements, iri, time};
-use crate::history::write_run::{run_node, unique, write_assertion};
-use crate::verdict::Judgement;
+use crate::History;
+use crate::detail::judgement;
+use crate::graphs::below;
+use crate::read::{Node, subjects_in};
+use crate::statements::{Statements, iri, time};
+use crate::write_run::{run_node, unique, write_assertion};
+use actcheck_base::{Diagnostics, Judgement};
 
 /// The graph of judgements made after the run.
 const GRAPH: &str = "act:rechecked";

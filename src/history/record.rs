@@ -2,11 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::actions::{Quality, Trace};
-use crate::base::{Choice, Shard};
-use crate::facts::RunFacts;
-use crate::scenario::Scene;
-use crate::verdict::{Judgement, Outcome};
+use actcheck_base::{Judgement, Outcome, RunFacts, Shard};
+use actcheck_data::{Choice, Quality, Scene, Trace};
 
 /// A campaign, written before its first run.
 #[derive(Debug, Clone, PartialEq)]

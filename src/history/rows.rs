@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::history::{Repetition, RunStatus, SkillRecord};
-use crate::scenario::Role;
-use crate::verdict::{Judgement, Outcome};
+use crate::{Repetition, RunStatus, SkillRecord};
+use actcheck_base::{Judgement, Outcome};
+use actcheck_data::Role;
 
 /// Selects runs; the default selects all.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use oxigraph::model::NamedNode;
 use oxigraph::store::{StorageError, Store};
 
-use crate::base::{Diagnostics, Digest};
-use crate::history::detail::{designators, objects};
-use crate::history::read::Node;
-use crate::history::write_run::run_node;
-use crate::history::{History, ObjectDetail, RunRow};
+use crate::detail::{designators, objects};
+use crate::read::Node;
+use crate::write_run::run_node;
+use crate::{History, ObjectDetail, RunRow};
+use actcheck_base::{Diagnostics, Digest};
 
 /// The scene of a run, in two digests.
 #[derive(Debug, Clone, PartialEq, Eq)]

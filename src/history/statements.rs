@@ -2,7 +2,7 @@
 
 use oxigraph::model::{GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term};
 
-use crate::base::names;
+use actcheck_base::names;
 
 /// Expands a prefixed name of [`names::PREFIXES`], such as `act:score`; any other text is used as an IRI.
 pub(super) fn iri(name: &str) -> NamedNode {

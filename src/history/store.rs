@@ -9,19 +9,19 @@ use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
 use oxigraph::sparql::QueryEvaluationError;
 use oxigraph::store::{StorageError, Store};
 
-use crate::actions::Trace;
-use crate::base::{Choice, Diagnostic, Diagnostics, Digest, Source, nearest, write_whole};
-use crate::facts::{RunFacts, extract};
-use crate::history::folder::Folder;
-use crate::history::read::{short_id, subjects, text_of};
-use crate::history::statements::iri;
-use crate::history::write_campaign::{self, campaign_node};
-use crate::history::write_run::{self, run_node};
-use crate::history::{
+use crate::folder::Folder;
+use crate::read::{short_id, subjects, text_of};
+use crate::statements::iri;
+use crate::write_campaign::{self, campaign_node};
+use crate::write_run::{self, run_node};
+use crate::{
     CampaignEnd, CampaignRecord, CampaignRow, Cancel, OutcomeRow, QueryAnswer, RunDetail, RunFilter, RunRecord, RunRow,
     RunVitals, detail, fault, query, trace_file, vitals,
 };
-use crate::history::{lists, read_campaign};
+use crate::{lists, read_campaign};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, RunFacts, Source, nearest, write_whole};
+use actcheck_data::{Choice, Trace};
+use actcheck_facts::extract;
 
 /// A history that only this process has open (except after [`History::open_to_read`], which shares it).
 ///
@@ -329,7 +329,7 @@ impl History {
         Ok(extract(&self.states(name)?))
     }
 
-    /// Answers a SPARQL query. The prefixes of [`crate::base::names::PREFIXES`] need no declaration.
+    /// Answers a SPARQL query. The prefixes of [`actcheck_base::names::PREFIXES`] need no declaration.
     ///
     /// The default graph holds campaigns, runs, executions, scenes and outcomes; facts are in the graphs that
     /// `act:before`, `act:after` and `act:during` name.

@@ -4,7 +4,7 @@
 //! The reported place of a failed keyword is off by the keyword's length; this module corrects it, so that the place is
 //! the one that users expect.
 
-use crate::base::{Diagnostic, Source, names};
+use actcheck_base::{Diagnostic, Source, names};
 
 /// Expected words that a message lists; a syntax error can have a hundred.
 const EXPECTED_SHOWN: usize = 8;

@@ -3,7 +3,7 @@
 use oxigraph::model::vocab::{rdf, xsd};
 use oxigraph::model::{BlankNode, Literal, NamedNode, Term as StoreTerm};
 
-use crate::base::Term;
+use actcheck_base::Term;
 
 /// Converts a term to the store's type.
 pub(super) fn to_store(term: &Term) -> StoreTerm {

@@ -9,10 +9,8 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
-use crate::actions::Snapshot;
-use crate::actions::{ActionTrace, Form, Frames, RobotCourse, SceneMap, Trace};
-use crate::base::Choice;
-use crate::history::frames;
+use crate::frames;
+use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, SceneMap, Snapshot, Trace};
 
 /// Magic bytes at the start of each file. The last one is the format version; it increases whenever a type of the trace
 /// changes.

@@ -2,10 +2,10 @@
 
 use oxigraph::store::{StorageError, Store};
 
-use crate::base::Choice;
-use crate::history::detail;
-use crate::history::read::Node;
-use crate::history::write_run::run_node;
+use crate::detail;
+use crate::read::Node;
+use crate::write_run::run_node;
+use actcheck_data::Choice;
 
 /// The values of one run.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,11 +5,11 @@ use std::io;
 use oxigraph::sparql::results::{QueryResultsFormat, QueryResultsSerializer};
 use oxigraph::sparql::{QueryEvaluationError, QueryResults, QuerySolutionIter, QueryTripleIter};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span};
-use crate::history::query::{evaluation_fault, evaluator, refuse_update};
-use crate::history::rdf_text::serializer;
-use crate::history::syntax_fault::syntax_fault;
-use crate::history::{Cancel, History, RdfSyntax};
+use crate::query::{evaluation_fault, evaluator, refuse_update};
+use crate::rdf_text::serializer;
+use crate::syntax_fault::syntax_fault;
+use crate::{Cancel, History, RdfSyntax};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span};
 
 /// A format of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

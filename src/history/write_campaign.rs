@@ -2,10 +2,9 @@
 
 use oxigraph::model::{Literal, NamedNode, Quad};
 
-use crate::base::names;
-use crate::history::statements::{Statements, count, iri, time};
-use crate::history::{CampaignEnd, CampaignRecord};
-use crate::verdict::Outcome;
+use crate::statements::{Statements, count, iri, time};
+use crate::{CampaignEnd, CampaignRecord};
+use actcheck_base::{Outcome, names};
 
 /// A campaign's node.
 pub(super) fn campaign_node(id: &str) -> NamedNode {

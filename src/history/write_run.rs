@@ -4,15 +4,14 @@ use std::collections::BTreeMap;
 
 use oxigraph::model::{BlankNode, Literal, NamedNode, Quad};
 
-use crate::actions::{ActionEnd, ActionTrace};
-use crate::base::{Digest, names};
-use crate::facts::thing_iri;
-use crate::history::RunRecord;
-use crate::history::graphs::{self, below, during_graph, state_graph};
-use crate::history::statements::{About, Statements, count, iri, time};
-use crate::history::write_campaign::{campaign_node, program};
-use crate::history::write_scene;
-use crate::verdict::Judgement;
+use crate::RunRecord;
+use crate::graphs::{self, below, during_graph, state_graph};
+use crate::statements::{About, Statements, count, iri, time};
+use crate::write_campaign::{campaign_node, program};
+use crate::write_scene;
+use actcheck_base::{Digest, Judgement, names};
+use actcheck_data::{ActionEnd, ActionTrace};
+use actcheck_facts::thing_iri;
 
 /// A run's node.
 pub(super) fn run_node(id: &str) -> NamedNode {

@@ -2,11 +2,11 @@
 
 use oxigraph::model::{Literal, NamedNode};
 
-use crate::base::names;
-use crate::facts::thing_iri;
-use crate::history::RunRecord;
-use crate::history::statements::{Statements, iri};
-use crate::scenario::{Role, Scene, SceneObject};
+use crate::RunRecord;
+use crate::statements::{Statements, iri};
+use actcheck_base::names;
+use actcheck_data::{Role, Scene, SceneObject};
+use actcheck_facts::thing_iri;
 
 /// Local names of the terms for sensing errors, in the order of [`noise`].
 pub const NOISE_TERMS: [&str; 13] = [

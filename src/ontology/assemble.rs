@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names};
-use crate::ontology::graph::{Graph, rdfs};
-use crate::ontology::read::Statement;
-use crate::ontology::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
-use crate::ontology::{check, read, rule_files};
+use crate::graph::{Graph, rdfs};
+use crate::read::Statement;
+use crate::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
+use crate::{check, read, rule_files};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names};
 
 /// Loads an ontology with its imports and linked rule files.
 ///

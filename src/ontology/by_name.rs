@@ -1,7 +1,7 @@
 //! Finds the class of an object from its name.
 
-use crate::base::names;
-use crate::ontology::Ontology;
+use crate::Ontology;
+use actcheck_base::names;
 
 impl Ontology {
     /// Returns the IRI of the class whose label or local name matches the longest suffix of the name's words. Digits

@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, names, nearest};
-use crate::ontology::Action;
-use crate::ontology::graph::Graph;
-use crate::ontology::read::Statement;
+use crate::Action;
+use crate::graph::Graph;
+use crate::read::Statement;
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean, names, nearest};
 
 /// Individuals of `act:Action` or of its subclasses, and individuals of those (a special kind of Pick is a Pick).
 pub(super) fn action_iris(graph: &Graph) -> BTreeSet<String> {

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Source, Span, Term, names};
-use crate::ontology::read::{Home, Reading, Statement};
+use crate::read::{Home, Reading, Statement};
+use actcheck_base::{Source, Span, Term, names};
 
 /// Index of the statements of an ontology.
 pub(super) struct Graph {

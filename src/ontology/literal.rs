@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use oxigraph::model::vocab::xsd;
-use oxigraph::model::{Literal, NamedOrBlankNode, Term as RdfTerm};
+use oxrdf::vocab::xsd;
+use oxrdf::{Literal, NamedOrBlankNode, Term as RdfTerm};
 
-use crate::base::Term;
+use actcheck_base::Term;
 
 /// Converts a subject; `blank` names blank nodes.
 pub(super) fn subject(node: &NamedOrBlankNode, blank: impl FnOnce(&str) -> Arc<str>) -> Term {

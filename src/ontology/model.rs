@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Source, Span, Term};
+use actcheck_base::{Source, Span, Term};
 
 /// A checked ontology, including its imports.
 #[derive(Debug, Clone)]

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use oxigraph::io::{RdfFormat, RdfParseError, RdfParser};
+use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 
-use crate::base::{Diagnostic, Diagnostics, Files, Source, Span, Term, names};
-use crate::ontology::{file_iri, literal};
+use crate::{file_iri, literal};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Span, Term, names};
 
 /// Importing this IRI adds the ontology embedded in the program, independent of the importing file's location.
 const SHIPPED: &str = "https://w3id.org/actcheck/ontology";

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics, Files, Term, digest_of, nearest};
-use crate::ontology::file_iri::{beside, path_of_plain};
-use crate::ontology::graph::Graph;
-use crate::ontology::read::Statement;
-use crate::ontology::{RuleFile, RuleLanguage};
+use crate::file_iri::{beside, path_of_plain};
+use crate::graph::Graph;
+use crate::read::Statement;
+use crate::{RuleFile, RuleLanguage};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Term, digest_of, nearest};
 
 /// Reads the rule file that a statement's object names: an IRI or a string with a path relative to the ontology file.
 ///

@@ -3,10 +3,10 @@
 
 use serde::Serialize;
 
-use crate::actions::Operator;
-use crate::base::Pose;
-use crate::protocol::message::{Ask, Binary, What, WireObject, WirePose};
-use crate::world::DepthImage;
+use crate::message::{Ask, Binary, What, WireObject, WirePose};
+use actcheck_actions::Operator;
+use actcheck_data::Pose;
+use actcheck_world::DepthImage;
 
 /// An answer.
 #[derive(Debug, Serialize)]

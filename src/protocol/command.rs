@@ -5,8 +5,8 @@ use std::fmt;
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 
-use crate::actions::{Controls, OutsideFault};
-use crate::protocol::hello::{Joints, Role};
+use crate::hello::{Joints, Role};
+use actcheck_actions::{Controls, OutsideFault};
 
 /// A command as it is on the wire.
 #[derive(Debug, Deserialize)]
@@ -129,7 +129,7 @@ impl Taken<'_> {
 
     fn joint(&mut self, name: &str) -> Result<usize, OutsideFault> {
         let Some((joint, role)) = self.joints.by_name.get(name) else {
-            let help = crate::base::did_you_mean(name, self.joints.by_name.keys().map(String::as_str));
+            let help = actcheck_base::did_you_mean(name, self.joints.by_name.keys().map(String::as_str));
             return Err(wrong(format!("the robot has no joint `{name}`: {help}")));
         };
         if *role == Role::Gripper {

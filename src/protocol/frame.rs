@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
-use crate::actions::OutsideFault;
+use actcheck_actions::OutsideFault;
 
 /// Longest payload sent to a program. Unit: bytes.
 pub const TO_PROGRAM_LIMIT: usize = 64 << 20;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::protocol::message::PROTOCOL;
-use crate::world::{Joint, JointKind, World};
+use crate::message::PROTOCOL;
+use actcheck_world::{Joint, JointKind, World};
 
 /// Data that can be observed or requested.
 const SENSORS: [&str; 6] = ["joints", "odometry", "gripper", "depth", "cloud", "objects"];

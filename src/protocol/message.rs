@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::actions::OutsideFault;
-use crate::base::Pose;
-use crate::protocol::observation::Observed;
+use crate::observation::Observed;
+use actcheck_actions::OutsideFault;
+use actcheck_data::Pose;
 
 /// Version of the protocol. Versions are incompatible with each other.
 pub const PROTOCOL: u32 = 1;

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::actions::Operator;
-use crate::protocol::message::{Truth, WireObject, WirePose};
-use crate::world::Observation;
+use crate::message::{Truth, WireObject, WirePose};
+use actcheck_actions::Operator;
+use actcheck_world::Observation;
 
 /// An observation. Joints are in the order of the introduction.
 #[derive(Debug, Serialize)]
@@ -54,7 +54,7 @@ impl<'a> Observed<'a> {
             // Headings are not wrapped.
             Some([x, y, heading]) => ([positions[x], positions[y]], positions[heading]),
             None => {
-                let root = crate::base::Pose::from_isometry(&robot.base_of(positions));
+                let root = actcheck_data::Pose::from_isometry(&robot.base_of(positions));
                 ([root.position[0], root.position[1]], root.yaw())
             }
         };

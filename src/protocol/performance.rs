@@ -2,15 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use crate::actions::{ActionCall, ActionReport, Interrupt, Operator, Outside, OutsideFault};
-use crate::protocol::answer::answer;
-use crate::protocol::command::WireCommand;
-use crate::protocol::message::{Ask, End, ToProgram, WireKind, kind_of, parse};
-use crate::protocol::observation::Observed;
-use crate::protocol::pool::{Lent, Programs};
-use crate::protocol::remember::{Grasped, remember};
-use crate::protocol::session::Session;
-use crate::world::World;
+use crate::answer::answer;
+use crate::command::WireCommand;
+use crate::message::{Ask, End, ToProgram, WireKind, kind_of, parse};
+use crate::observation::Observed;
+use crate::pool::{Lent, Programs};
+use crate::remember::{Grasped, remember};
+use crate::session::Session;
+use actcheck_actions::{ActionCall, Interrupt, Operator, Outside, OutsideFault};
+use actcheck_data::ActionReport;
+use actcheck_world::World;
 
 /// Longest final message of an action that is kept. Unit: characters.
 const LONGEST_MESSAGE: usize = 1000;

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
-use crate::config::Skill;
-use crate::protocol::session::Session;
+use crate::session::Session;
+use actcheck_config::Skill;
 
 /// The pool of programs.
 #[derive(Debug)]

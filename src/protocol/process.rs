@@ -13,10 +13,10 @@ use std::time::Duration;
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 
-use crate::actions::OutsideFault;
-use crate::config::Skill;
-use crate::protocol::message::PROTOCOL;
-use crate::protocol::output::Output;
+use crate::message::PROTOCOL;
+use crate::output::Output;
+use actcheck_actions::OutsideFault;
+use actcheck_config::Skill;
 
 /// Polling interval while waiting for a process.
 const POLL: Duration = Duration::from_millis(5);

@@ -3,10 +3,10 @@
 
 use nalgebra::Isometry3;
 
-use crate::actions::{ActionCall, Held, Operator, OutsideFault, Perceived, PerceivedPlane, PerceivedThing, feels_in};
-use crate::base::Pose;
-use crate::protocol::message::{End, WirePose};
-use crate::world::Observation;
+use crate::message::{End, WirePose};
+use actcheck_actions::{ActionCall, Held, Operator, OutsideFault, feels_in};
+use actcheck_data::{Perceived, PerceivedPlane, PerceivedThing, Pose};
+use actcheck_world::Observation;
 
 /// Designator of the object to grasp.
 const TARGET: &str = "pickObject";

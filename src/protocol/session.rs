@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use crate::actions::OutsideFault;
-use crate::config::Skill;
-use crate::protocol::frame::Wire;
-use crate::protocol::hello::{Joints, introduction};
-use crate::protocol::message::{Hello, PROTOCOL, Plain, ToProgram, kind_of, parse};
-use crate::protocol::process::Process;
-use crate::world::World;
+use crate::frame::Wire;
+use crate::hello::{Joints, introduction};
+use crate::message::{Hello, PROTOCOL, Plain, ToProgram, kind_of, parse};
+use crate::process::Process;
+use actcheck_actions::OutsideFault;
+use actcheck_config::Skill;
+use actcheck_world::World;
 
 /// Longest program name that is kept. Unit: characters.
 const LONGEST_NAME: usize = 80;

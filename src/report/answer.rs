@@ -2,9 +2,9 @@
 
 use serde_json::Value;
 
-use crate::base::{Term, names};
-use crate::history::QueryAnswer;
-use crate::report::Table;
+use crate::Table;
+use actcheck_base::{Term, names};
+use actcheck_history::QueryAnswer;
 
 /// Converts an answer to a table: its rows, a single `true` or `false`, or its triples.
 ///
@@ -49,7 +49,7 @@ fn value(term: &Term, short: bool) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::TableFormat;
+    use crate::TableFormat;
 
     #[test]
     fn programs_get_whole_iris_and_people_short_ones() {

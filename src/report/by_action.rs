@@ -3,9 +3,10 @@
 
 use comfy_table::{Attribute, Cell, Color};
 
-use crate::report::table::ruled;
-use crate::report::{ActionSummary, CampaignSummary, PropertyLine, RunSummary};
-use crate::verdict::{Counts, Outcome, mean};
+use crate::table::ruled;
+use crate::{ActionSummary, CampaignSummary, PropertyLine, RunSummary};
+use actcheck_base::Outcome;
+use actcheck_verdict::{Counts, mean};
 
 /// Whether any run has more than one action.
 pub(super) fn has_several_actions(summary: &CampaignSummary) -> bool {
@@ -104,8 +105,8 @@ pub(super) fn properties_table(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::RunStatus;
-    use crate::report::summary::tests::{campaign, run};
+    use crate::summary::tests::{campaign, run};
+    use actcheck_history::RunStatus;
 
     /// A run with two actions, each with both properties.
     fn two(index: u64, first: [Outcome; 2], second: [Outcome; 2]) -> RunSummary {

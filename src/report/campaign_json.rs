@@ -2,13 +2,13 @@
 
 use serde_json::{Value, json};
 
-use crate::analysis::FailureMode;
-use crate::report::repeated_text::repeated_json;
-use crate::report::weighted::weighted_json;
-use crate::report::{CampaignSummary, RunSummary, Share, case_json};
-use crate::verdict::Judgement;
+use crate::repeated_text::repeated_json;
+use crate::weighted::weighted_json;
+use crate::{CampaignSummary, RunSummary, Share, case_json};
+use actcheck_analysis::FailureMode;
+use actcheck_base::Judgement;
 
-/// Returns the content of [`crate::report::campaign_text`] as one JSON object.
+/// Returns the content of [`crate::campaign_text`] as one JSON object.
 pub fn campaign_json(summary: &CampaignSummary) -> Value {
     let properties: Vec<Value> = summary
         .property_lines()

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::base::names;
-use crate::report::{CampaignSummary, Table};
+use crate::{CampaignSummary, Table};
+use actcheck_base::names;
 
 /// Builds the flat table.
 pub fn campaign_table(summary: &CampaignSummary) -> Table {

@@ -4,13 +4,12 @@ use std::fmt::Write as _;
 
 use comfy_table::{Attribute, Cell, Color};
 
-use crate::base::names;
-use crate::history::SkillRecord;
-use crate::report::repeated_text::repeated_text;
-use crate::report::table::ruled;
-use crate::report::weighted::weighted_text;
-use crate::report::{CampaignSummary, PropertyLine, RunSummary, Share, by_action, regressions_text};
-use crate::verdict::Outcome;
+use crate::repeated_text::repeated_text;
+use crate::table::ruled;
+use crate::weighted::weighted_text;
+use crate::{CampaignSummary, PropertyLine, RunSummary, Share, by_action, regressions_text};
+use actcheck_base::{Outcome, names};
+use actcheck_history::SkillRecord;
 
 /// Maximum number of rows in the table of runs. The text names the command that lists the rest.
 const RUNS_SHOWN: usize = 40;
@@ -207,8 +206,8 @@ fn failures(out: &mut String, summary: &CampaignSummary) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::RunStatus;
-    use crate::report::summary::tests::{campaign, run};
+    use crate::summary::tests::{campaign, run};
+    use actcheck_history::RunStatus;
 
     #[test]
     fn a_failed_property_is_told_in_words_with_the_command_that_shows_more() {

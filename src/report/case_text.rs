@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::verdict::Recurrence;
+use actcheck_verdict::Recurrence;
 
 /// Summary of one case.
 #[derive(Debug, Clone, PartialEq)]

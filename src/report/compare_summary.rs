@@ -1,7 +1,7 @@
 //! A comparison of two campaigns, with a description of each side.
 
-use crate::analysis::{Compared, Comparison};
-use crate::base::names;
+use actcheck_analysis::{Compared, Comparison};
+use actcheck_base::names;
 
 /// One side of a comparison.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::analysis::{Compared, ComparedLine};
-use crate::report::{CompareSummary, Table};
+use crate::{CompareSummary, Table};
+use actcheck_analysis::{Compared, ComparedLine};
 
 /// One row for each property. The first row is for whole runs and has neither action nor property.
 pub fn compare_table(summary: &CompareSummary) -> Table {

@@ -2,11 +2,12 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::{ComparedLine, PairedTable};
-use crate::report::compare_summary::compared_name;
-use crate::report::table::ruled;
-use crate::report::{CompareSummary, ComparedSide};
-use crate::verdict::{Counts, Outcome};
+use crate::compare_summary::compared_name;
+use crate::table::ruled;
+use crate::{CompareSummary, ComparedSide};
+use actcheck_analysis::{ComparedLine, PairedTable};
+use actcheck_base::Outcome;
+use actcheck_verdict::Counts;
 
 /// Maximum number of runs, settings or names in a line or list; `--format json` has all.
 const TOLD: usize = 10;

@@ -1,6 +1,6 @@
 //! Selects the contacts of an action that are shown.
 
-use crate::history::ContactEpisode;
+use actcheck_data::ContactEpisode;
 
 /// Maximum number of contacts shown for an action.
 const MOST_CONTACTS: usize = 60;

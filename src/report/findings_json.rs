@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::analysis::{Cascade, Condition, Judged, Parameter, Pattern, TwoByTwo, TwoWay};
-use crate::report::findings_summary::{FindingsSummary, PropertyReport};
+use crate::findings_summary::{FindingsSummary, PropertyReport};
+use actcheck_analysis::{Cascade, Condition, Judged, Parameter, Pattern, TwoByTwo, TwoWay};
 
 /// Returns all findings as JSON.
 pub fn findings_json(summary: &FindingsSummary) -> Value {
@@ -98,7 +98,7 @@ fn condition(condition: &Condition, parameter: &Parameter) -> Value {
 }
 
 fn map(map: &TwoWay) -> Value {
-    let cell = |cell: &crate::analysis::TwoWayCell| json!({ "runs": cell.runs, "failed": cell.failed, "failing": cell.failing });
+    let cell = |cell: &actcheck_analysis::TwoWayCell| json!({ "runs": cell.runs, "failed": cell.failed, "failing": cell.failing });
     let rows: Vec<Vec<Value>> = map.cells.iter().map(|row| row.iter().map(cell).collect()).collect();
     json!({ "by": map.by, "down": map.down, "across": map.across, "cells": rows })
 }

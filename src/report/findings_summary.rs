@@ -1,11 +1,11 @@
 //! Findings of the analysis, with the names needed to print them.
 
-use crate::analysis::{
+use crate::Table;
+use actcheck_analysis::{
     Cascade, Condition, FailureMode, FlakyScene, Parameter, Pattern, PropertyFindings, Trend, TwoWay,
 };
-use crate::base::names;
-use crate::report::Table;
-use crate::verdict::Counts;
+use actcheck_base::names;
+use actcheck_verdict::Counts;
 
 /// The output of `actcheck analyse`.
 #[derive(Debug, Clone, PartialEq)]

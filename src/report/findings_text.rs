@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::{Judged, Pattern, TwoWay, TwoWayCell};
-use crate::base::names;
-use crate::report::findings_summary::{FindingsSummary, PropertyReport, percent};
-use crate::report::table::ruled;
-use crate::report::{Share, scene_rule};
-use crate::verdict::{Counts, Outcome};
+use crate::findings_summary::{FindingsSummary, PropertyReport, percent};
+use crate::table::ruled;
+use crate::{Share, scene_rule};
+use actcheck_analysis::{Judged, Pattern, TwoWay, TwoWayCell};
+use actcheck_base::{Outcome, names};
+use actcheck_verdict::Counts;
 
 /// Maximum number of runs or scenes listed in one line; `--format json` has all.
 const TOLD: usize = 8;

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::analysis::{Ailment, Health, ParameterCoverage};
-use crate::base::{Diagnostic, Diagnostics, names};
-use crate::report::Table;
-use crate::report::table::ruled;
+use crate::Table;
+use crate::table::ruled;
+use actcheck_analysis::{Ailment, Health, ParameterCoverage};
+use actcheck_base::{Diagnostic, Diagnostics, names};
 
 /// A campaign's health, with the names that messages refer to.
 #[derive(Debug, Clone, PartialEq)]

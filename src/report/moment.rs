@@ -1,6 +1,6 @@
 //! Finds the moment of a run at which a failed property was decided, as the starting point for playback.
 
-use crate::history::Trace;
+use actcheck_data::Trace;
 
 /// A displacement beyond this counts as moved. Unit: metres.
 const MOVED_M: f64 = 0.01;

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::analysis::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow};
-use crate::base::{Diagnostic, Diagnostics};
-use crate::report::Table;
-use crate::report::table::ruled;
+use crate::Table;
+use crate::table::ruled;
+use actcheck_analysis::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow};
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Result of testing the oracles of a configuration.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::history::Recheck;
-use crate::verdict::{Counts, Judgement, Outcome};
+use actcheck_base::{Judgement, Outcome};
+use actcheck_history::Recheck;
+use actcheck_verdict::Counts;
 
 /// Why an outcome changed or is new.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::base::names;
-use crate::report::recheck_summary::{Change, Why};
-use crate::report::table::ruled;
-use crate::report::{RecheckSummary, Table};
-use crate::verdict::{Counts, Outcome};
+use crate::recheck_summary::{Change, Why};
+use crate::table::ruled;
+use crate::{RecheckSummary, Table};
+use actcheck_base::{Outcome, names};
+use actcheck_verdict::Counts;
 
 /// Maximum number of changes printed at a terminal; `--format csv` has all.
 const TOLD: usize = 20;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::analysis::wilson;
-use crate::report::CampaignSummary;
-use crate::verdict::Outcome;
+use crate::CampaignSummary;
+use actcheck_analysis::wilson;
+use actcheck_base::Outcome;
 
 /// Minimum number of judgements for a "never" remark: with 4 of 4, the lower bound of the interval is still near one
 /// half.
@@ -83,7 +83,7 @@ impl CampaignSummary {
     }
 
     fn run_that_shows(&self, oddity: Oddity, property: &str) -> Option<String> {
-        let shows = |judgement: &&crate::verdict::Judgement| {
+        let shows = |judgement: &&actcheck_base::Judgement| {
             judgement.property == property
                 && match oddity {
                     Oddity::HeldBefore => judgement.held_before == Some(true),
@@ -143,8 +143,8 @@ impl CampaignSummary {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::RunStatus;
-    use crate::report::summary::tests::{campaign, run};
+    use crate::summary::tests::{campaign, run};
+    use actcheck_history::RunStatus;
 
     fn told(runs: u64, outcomes: [Outcome; 2], held_before: Option<bool>) -> Vec<(Oddity, u64, u64, bool)> {
         let runs = (0..runs).map(|index| {

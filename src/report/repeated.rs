@@ -1,8 +1,9 @@
 //! Consistency of repeated scenes, for each property and for whole runs.
 
-use crate::analysis::{Consistency, Interval, Repeated, consistency};
-use crate::report::{CampaignSummary, RunSummary};
-use crate::verdict::{Counts, Judgement, Outcome};
+use crate::{CampaignSummary, RunSummary};
+use actcheck_analysis::{Consistency, Interval, Repeated, consistency};
+use actcheck_base::{Judgement, Outcome};
+use actcheck_verdict::Counts;
 
 /// Consistency of repeated runs in one property, or of whole runs.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +52,7 @@ impl CampaignSummary {
         let of = |run: &RunSummary| {
             let scene = run.repetition?.scene;
             let Some(property) = property else {
-                let judged = run.status != crate::history::RunStatus::Broken;
+                let judged = run.status != actcheck_history::RunStatus::Broken;
                 return judged.then(|| Repeated { scene, passed: run.passed(), margin: None });
             };
             let judgements = run.actions.iter().flat_map(|action| &action.judgements);

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::analysis::{Flaky, PassPower, Variance};
-use crate::report::table::ruled;
-use crate::report::{CampaignSummary, RepeatedProperty};
+use crate::table::ruled;
+use crate::{CampaignSummary, RepeatedProperty};
+use actcheck_analysis::{Flaky, PassPower, Variance};
 
 /// Maximum number of pass^k columns; the JSON has all.
 const POWERS_SHOWN: usize = 5;

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::base::names;
-use crate::history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
-use crate::report::table::ruled;
+use crate::table::ruled;
+use actcheck_base::names;
+use actcheck_history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 
 /// Formats a run: its scene, the reports of its actions, and every outcome with margin and witness.
 pub fn run_text(run: &RunDetail) -> String {

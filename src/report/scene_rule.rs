@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::{Condition, Parameter};
-use crate::base::names;
+use actcheck_analysis::{Condition, Parameter};
+use actcheck_base::names;
 
 /// Maps each numeric table parameter to the facts of a scene: the body of a rule for `value(?v)`, where `?o` is the
 /// target, `?s` its surface and `?n` any other object that is not a platform. `ontology/world.ttl` and

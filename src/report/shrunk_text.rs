@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::base::names;
-use crate::history::RunDetail;
-use crate::report::Table;
-use crate::report::table::ruled;
+use crate::Table;
+use crate::table::ruled;
+use actcheck_base::names;
+use actcheck_history::RunDetail;
 
 /// The result of shrinking, as plain data.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,10 +1,10 @@
 //! The summary of a finished campaign, as plain data.
 
-use crate::analysis::{FailureMode, Interval, wilson};
-use crate::base::names;
-use crate::history::{Repetition, RunDetail, RunRecord, RunStatus};
-use crate::report::{CaseSummary, GuidedSearch};
-use crate::verdict::{Counts, Judgement, Outcome, mean};
+use crate::{CaseSummary, GuidedSearch};
+use actcheck_analysis::{FailureMode, Interval, wilson};
+use actcheck_base::{Judgement, Outcome, names};
+use actcheck_history::{Repetition, RunDetail, RunRecord, RunStatus};
+use actcheck_verdict::{Counts, mean};
 
 /// Summary of a campaign.
 #[derive(Debug, Clone, PartialEq)]
@@ -293,7 +293,7 @@ pub(super) mod tests {
                 held_before: None,
             })
             .collect();
-        let score = crate::verdict::action_score(outcomes.iter().copied());
+        let score = actcheck_verdict::action_score(outcomes.iter().copied());
         RunSummary {
             id: format!("k7f3-{}", index + 1),
             index,

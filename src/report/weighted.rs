@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::analysis::Interval;
-use crate::report::table::ruled;
-use crate::report::{CampaignSummary, Share};
+use crate::table::ruled;
+use crate::{CampaignSummary, Share};
+use actcheck_analysis::Interval;
 
 /// A guided search that chose a campaign's scenes; counts of its runs are not failure rates.
 #[derive(Debug, Clone, PartialEq)]

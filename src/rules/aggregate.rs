@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Term, TermId};
-use crate::rules::builtins;
-use crate::rules::meter::{Meter, Stop};
-use crate::rules::plan::operand_value;
-use crate::rules::program::{AggregateKind, Aggregation, Operand, Rule, Variable};
-use crate::rules::universe::Universe;
-use crate::rules::values::{Number, double_term, is_beyond_64_bits};
+use crate::builtins;
+use crate::meter::{Meter, Stop};
+use crate::plan::operand_value;
+use crate::program::{AggregateKind, Aggregation, Operand, Rule, Variable};
+use crate::universe::Universe;
+use crate::values::{Number, double_term, is_beyond_64_bits};
+use actcheck_base::{Term, TermId};
 
 /// Returns the operands that an aggregation reads: the group, then each aggregate's input and distinct variables.
 pub(crate) fn projection(aggregation: &Aggregation) -> Vec<Operand> {

@@ -2,20 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::{Diagnostics, Terms};
-use crate::facts::ActionFacts;
-use crate::ontology::Ontology;
-use crate::rules::dataset::Statements;
-use crate::rules::evaluate::{Layers, Planned, Stopped, Tables, evaluate};
-use crate::rules::findings::{Budget, Findings, RuleFault};
-use crate::rules::load::Given;
-use crate::rules::meter::Meter;
-use crate::rules::plan::Indexes;
-use crate::rules::prepare::Preparing;
-use crate::rules::program::Predicates;
-use crate::rules::reading::{Verdict, findings};
-use crate::rules::sparql::Query;
-use crate::rules::universe::Universe;
+use crate::dataset::Statements;
+use crate::evaluate::{Layers, Planned, Stopped, Tables, evaluate};
+use crate::findings::Budget;
+use crate::load::Given;
+use crate::meter::Meter;
+use crate::plan::Indexes;
+use crate::prepare::Preparing;
+use crate::program::Predicates;
+use crate::reading::{Verdict, findings};
+use crate::sparql::Query;
+use crate::universe::Universe;
+use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Terms};
+use actcheck_ontology::Ontology;
 
 /// Every property's rules with the libraries, parsed, checked and planned. Shared between threads.
 pub struct RuleBook {

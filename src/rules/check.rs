@@ -2,14 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, Terms, did_you_mean, names};
-use crate::ontology::Vocabulary;
-use crate::rules::builtins;
-use crate::rules::given::{GIVEN, VERDICT};
-use crate::rules::limits::{FAULT_LIMIT, LITERAL_LIMIT, RULE_LIMIT, WARNING_LIMIT};
-use crate::rules::program::{MAX_ARITY, Predicate, Predicates, Program, Scope};
-use crate::rules::syntax::{AtomSyntax, LiteralSyntax, Statement, Syntax};
-use crate::rules::translate::translate;
+use crate::builtins;
+use crate::given::{GIVEN, VERDICT};
+use crate::limits::{FAULT_LIMIT, LITERAL_LIMIT, RULE_LIMIT, WARNING_LIMIT};
+use crate::program::{MAX_ARITY, Predicate, Predicates, Program, Scope};
+use crate::syntax::{AtomSyntax, LiteralSyntax, Statement, Syntax};
+use crate::translate::translate;
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, Terms, did_you_mean, names};
+use actcheck_ontology::Vocabulary;
 
 /// The role of a rule file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -206,7 +206,7 @@ impl<'a> Checking<'a> {
         }
         let place = if name == "state" { 2 } else { 1 };
         match head.args.get(place).map(|arg| &arg.kind) {
-            Some(crate::rules::syntax::ExpressionKind::Constant(Term::Iri(iri))) => {
+            Some(crate::syntax::ExpressionKind::Constant(Term::Iri(iri))) => {
                 self.derived_terms.insert(iri.to_string());
             }
             Some(_) => self.split = false,
@@ -238,7 +238,7 @@ impl<'a> Checking<'a> {
         } else if !success && !violation {
             let own: Vec<String> =
                 self.defined.keys().filter(|(known, _)| *known == scope).map(|(_, name)| name.clone()).collect();
-            let near = own.iter().find(|name| crate::base::nearest(name, ["success", "violation"]).is_some());
+            let near = own.iter().find(|name| actcheck_base::nearest(name, ["success", "violation"]).is_some());
             let help = match near {
                 Some(name) => format!("`{name}` is neither of them: {}", did_you_mean(name, ["success", "violation"])),
                 None => "add a rule such as `success(?o) :- parameter(act:pickObject, ?o), … .`".to_owned(),
@@ -283,7 +283,7 @@ impl<'a> Checking<'a> {
                     .chain(self.derived_terms.iter().filter_map(|known| known.strip_prefix(namespace)))
                     .collect();
                 let local = &iri[namespace.len()..];
-                let help = match crate::base::nearest(local, locals.iter().copied()) {
+                let help = match actcheck_base::nearest(local, locals.iter().copied()) {
                     Some(found) => format!("did you mean `{}`?", names::shorten(&format!("{namespace}{found}"))),
                     None => "describe it in the ontology, or derive it in a library".to_owned(),
                 };

@@ -3,13 +3,13 @@
 use std::convert::Infallible;
 use std::hash::{Hash, Hasher};
 
-use oxigraph::model::{BlankNode, Literal, NamedNode, Term as RdfTerm};
+use oxrdf::{BlankNode, Literal, NamedNode, Term as RdfTerm};
 use spareval::{InternalQuad, QueryableDataset};
 
-use crate::base::{Term, TermId, Terms, names};
-use crate::rules::ledger::{Entry, Ledger};
-use crate::rules::universe::Universe;
-use crate::rules::values;
+use crate::ledger::{Entry, Ledger};
+use crate::universe::Universe;
+use crate::values;
+use actcheck_base::{Term, TermId, Terms, names};
 
 /// Statements in the two orders that lookups use.
 #[derive(Debug, Default)]

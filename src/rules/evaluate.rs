@@ -2,15 +2,15 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use crate::base::TermId;
-use crate::rules::aggregate::{aggregate, projection};
-use crate::rules::join::{Join, Sink};
-use crate::rules::meter::{Meter, Stop};
-use crate::rules::plan::{Indexes, Op, Part, RulePlan, Sizes, Variant, plan_rule};
-use crate::rules::program::{PredicateId, Predicates, Program, Rule};
-use crate::rules::relation::{Batch, Finished, Growing, finished, growing};
-use crate::rules::stratify::Stratum;
-use crate::rules::universe::Universe;
+use crate::aggregate::{aggregate, projection};
+use crate::join::{Join, Sink};
+use crate::meter::{Meter, Stop};
+use crate::plan::{Indexes, Op, Part, RulePlan, Sizes, Variant, plan_rule};
+use crate::program::{PredicateId, Predicates, Program, Rule};
+use crate::relation::{Batch, Finished, Growing, finished, growing};
+use crate::stratify::Stratum;
+use crate::universe::Universe;
+use actcheck_base::TermId;
 
 /// Finished tuples by predicate.
 #[derive(Default)]

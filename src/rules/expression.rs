@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 use std::cmp::Ordering;
 
-use crate::base::{Term, TermId};
-use crate::rules::builtins::{self, Builtin, Value};
-use crate::rules::program::Variable;
-use crate::rules::syntax::Comparison;
-use crate::rules::universe::Universe;
+use crate::builtins::{self, Builtin, Value};
+use crate::program::Variable;
+use crate::syntax::Comparison;
+use crate::universe::Universe;
+use actcheck_base::{Term, TermId};
 
 /// A checked expression.
 #[derive(Debug, Clone)]

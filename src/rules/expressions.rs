@@ -1,12 +1,12 @@
 //! Translates the expressions and aggregates of one rule from syntax to checked expressions.
 
-use crate::base::{Span, Term, did_you_mean};
-use crate::rules::builtins;
-use crate::rules::check::counted;
-use crate::rules::expression::Expr;
-use crate::rules::program::{Aggregate, AggregateKind, Aggregation, Literal, Variable};
-use crate::rules::syntax::{Expression, ExpressionKind};
-use crate::rules::translate::Translation;
+use crate::builtins;
+use crate::check::counted;
+use crate::expression::Expr;
+use crate::program::{Aggregate, AggregateKind, Aggregation, Literal, Variable};
+use crate::syntax::{Expression, ExpressionKind};
+use crate::translate::Translation;
+use actcheck_base::{Span, Term, did_you_mean};
 
 impl Translation<'_, '_> {
     /// Translates a head expression that contains aggregates. Variables outside the aggregates are grouping variables.
@@ -151,7 +151,7 @@ impl Translation<'_, '_> {
                 return None;
             }
             let shown = name.strip_prefix(builtins::GEO3D).map_or(name.to_owned(), |local| format!("geo3d:{local}"));
-            let help = match crate::base::nearest(&shown, builtins::builtin_names()) {
+            let help = match actcheck_base::nearest(&shown, builtins::builtin_names()) {
                 Some(found) => format!("did you mean `{found}`?"),
                 None => "built-in functions are listed in rules/README.md".to_owned(),
             };

@@ -1,8 +1,7 @@
 //! The given predicates: the snapshots, the designators, the ontology.
 
-use crate::base::Term;
-use crate::base::{TermId, Terms, names};
-use crate::rules::program::{Predicate, PredicateId, Predicates};
+use crate::program::{Predicate, PredicateId, Predicates};
+use actcheck_base::{Term, TermId, Terms, names};
 
 /// Name, signature and arity of each given predicate.
 pub(crate) const GIVEN: [(&str, &str, usize); 6] = [

@@ -1,12 +1,12 @@
 //! Evaluates one variant of a rule: finds all bindings that satisfy its conditions by lookups in sorted rows.
 
-use crate::base::{Term, TermId};
-use crate::rules::expression::holds;
-use crate::rules::meter::{Meter, Stop};
-use crate::rules::plan::{Column, Op, operand_value};
-use crate::rules::program::{MAX_ARITY, Operand};
-use crate::rules::relation::Batch;
-use crate::rules::universe::Universe;
+use crate::expression::holds;
+use crate::meter::{Meter, Stop};
+use crate::plan::{Column, Op, operand_value};
+use crate::program::{MAX_ARITY, Operand};
+use crate::relation::Batch;
+use crate::universe::Universe;
+use actcheck_base::{Term, TermId};
 
 /// Collects the rows that a rule derives.
 #[derive(Debug, Default)]

@@ -8,8 +8,8 @@
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use crate::rules::findings::Budget;
-use crate::rules::meter::{Stop, Watch};
+use crate::findings::Budget;
+use crate::meter::{Stop, Watch};
 
 /// Terms copied between two checks of the clock: under 0.1 ms.
 const COPIES_PER_LOOK: u32 = 1024;

@@ -1,7 +1,7 @@
 //! Lexer: splits a rule text into tokens with source spans.
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span};
-use crate::rules::limits::FAULT_LIMIT;
+use crate::limits::FAULT_LIMIT;
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span};
 
 /// A token. Text is already decoded: without quotes and without sigils such as `?` or `$`.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! Lexer for strings: escapes, multi-line strings, and f-strings with embedded expressions.
 
-use crate::rules::lex::{FormatPiece, Lexer, Spanned, Token};
+use crate::lex::{FormatPiece, Lexer, Spanned, Token};
 
 /// Maximum nesting depth of f-strings.
 const FORMAT_DEPTH: usize = 8;

@@ -2,14 +2,13 @@
 
 use std::collections::HashMap;
 
-use crate::base::TermId;
-use crate::facts::{ActionFacts, Triple};
-use crate::rules::evaluate::Tables;
-use crate::rules::given::Phases;
-use crate::rules::plan::Indexes;
-use crate::rules::program::{PredicateId, Predicates};
-use crate::rules::relation::finished;
-use crate::rules::universe::Universe;
+use crate::evaluate::Tables;
+use crate::given::Phases;
+use crate::plan::Indexes;
+use crate::program::{PredicateId, Predicates};
+use crate::relation::finished;
+use crate::universe::Universe;
+use actcheck_base::{ActionFacts, TermId, Triple};
 
 /// The given predicates that the rules read.
 #[derive(Debug, Clone)]

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::rules::findings::{Budget, RuleFault};
-use crate::rules::program::Rule;
+use crate::findings::Budget;
+use crate::program::Rule;
+use actcheck_base::RuleFault;
 
 /// Why an evaluation stopped before its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,14 +4,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Term, TermId};
-use crate::rules::aggregate::{aggregate, projection};
-use crate::rules::expression::holds;
-use crate::rules::meter::{Meter, Stop};
-use crate::rules::plan::operand_value;
-use crate::rules::program::{Atom, Literal, Operand, PredicateId, Rule};
-use crate::rules::stratify::Stratum;
-use crate::rules::universe::Universe;
+use crate::aggregate::{aggregate, projection};
+use crate::expression::holds;
+use crate::meter::{Meter, Stop};
+use crate::plan::operand_value;
+use crate::program::{Atom, Literal, Operand, PredicateId, Rule};
+use crate::stratify::Stratum;
+use crate::universe::Universe;
+use actcheck_base::{Term, TermId};
 
 /// Tuples by predicate.
 pub(crate) type Sets = BTreeMap<PredicateId, BTreeSet<Vec<TermId>>>;

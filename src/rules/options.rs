@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::Term;
-use crate::rules::check::{Checking, Role};
-use crate::rules::syntax::{Expression, ExpressionKind, Statement, Syntax, Transfer};
-use crate::rules::translate::Translation;
+use crate::check::{Checking, Role};
+use crate::syntax::{Expression, ExpressionKind, Statement, Syntax, Transfer};
+use crate::translate::Translation;
+use actcheck_base::Term;
 
 /// Computes the values of a file's parameters. Each may use the parameters above it.
 pub(crate) fn globals(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> BTreeMap<String, Term> {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics, Files, Term, names};
-use crate::rules::findings::Budget;
-use crate::rules::standalone::{Engine, Program};
+use crate::findings::Budget;
+use crate::standalone::{Engine, Program};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Term, names};
 
 /// The rule file, embedded in the program.
 const RULES: &str = "rules/lib/owl-rl.rls";
@@ -53,7 +53,7 @@ fn told(program: &Program, contradictions: &[Vec<Term>]) -> Diagnostics {
     for tuple in contradictions.iter().take(TOLD) {
         let args: Vec<String> = tuple.iter().map(Term::to_string).collect();
         let about = args.iter().skip(1).cloned().collect::<Vec<_>>().join(" and ");
-        let rule = tuple.first().map_or(String::new(), crate::rules::values::lexical);
+        let rule = tuple.first().map_or(String::new(), crate::values::lexical);
         let proof = program
             .explain(&format!("contradiction({})", args.join(", ")), &Budget::default())
             .map_or(String::new(), |explanation| explanation.to_text());

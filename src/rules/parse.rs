@@ -1,11 +1,9 @@
 //! Parser: turns tokens into statements. It continues after an error, so that one pass reports several.
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
-use crate::rules::lex::{Spanned, Token, lex};
-use crate::rules::limits::{FAULT_LIMIT, PREFIX_LIMIT, SIZE_LIMIT};
-use crate::rules::syntax::{
-    AtomSyntax, Comparison, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer,
-};
+use crate::lex::{Spanned, Token, lex};
+use crate::limits::{FAULT_LIMIT, PREFIX_LIMIT, SIZE_LIMIT};
+use crate::syntax::{AtomSyntax, Comparison, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax, Transfer};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 
 /// Directives of the language.
 const DIRECTIVES: [&str; 7] = ["base", "declare", "export", "import", "output", "parameter", "prefix"];

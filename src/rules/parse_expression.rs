@@ -1,12 +1,12 @@
 //! Parser for expressions: terms, calls, arithmetic.
 
-use crate::base::{Span, Term, did_you_mean, names};
-use crate::rules::builtins;
-use crate::rules::lex::{FormatPiece, Token};
-use crate::rules::limits::ARGUMENT_LIMIT;
-use crate::rules::parse::{Lost, Parser};
-use crate::rules::syntax::{Expression, ExpressionKind};
-use crate::rules::values::{double_term, integer, literal};
+use crate::builtins;
+use crate::lex::{FormatPiece, Token};
+use crate::limits::ARGUMENT_LIMIT;
+use crate::parse::{Lost, Parser};
+use crate::syntax::{Expression, ExpressionKind};
+use crate::values::{double_term, integer, literal};
+use actcheck_base::{Span, Term, did_you_mean, names};
 
 /// Maximum nesting depth of expressions, so that recursion over them is safe everywhere.
 const DEPTH_LIMIT: usize = 64;

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::base::TermId;
-use crate::rules::expression::Expr;
-use crate::rules::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule, Variable};
-use crate::rules::stratify::Stratum;
-use crate::rules::syntax::Comparison;
+use crate::expression::Expr;
+use crate::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule, Variable};
+use crate::stratify::Stratum;
+use crate::syntax::Comparison;
+use actcheck_base::TermId;
 
 /// The columns of a predicate in the order of one index.
 pub(crate) type Order = Vec<usize>;

@@ -2,27 +2,27 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostic, Diagnostics, Digest, TermId, Terms};
-use crate::ontology::{Ontology, Property, RuleLanguage};
-use crate::rules::book::{Judge, JudgeRules, RuleBook, fault};
-use crate::rules::check::{Checking, Role, unique, used_names};
-use crate::rules::dataset::Statements;
-use crate::rules::evaluate::{Layers, Planned, Tables, evaluate};
-use crate::rules::findings::Budget;
-use crate::rules::given::{Phases, add_given};
-use crate::rules::load::Given;
-use crate::rules::meter::Meter;
-use crate::rules::owl::owl_closure_within;
-use crate::rules::parse::parse;
-use crate::rules::plan::Indexes;
-use crate::rules::program::{Atom, Literal, Operand, Origin, Predicates, Program, Rule};
-use crate::rules::ranges::Ranges;
-use crate::rules::reading::Verdict;
-use crate::rules::sparql::Query;
-use crate::rules::stratify::stratify;
-use crate::rules::syntax::Syntax;
-use crate::rules::units::Units;
-use crate::rules::universe::Universe;
+use crate::book::{Judge, JudgeRules, RuleBook, fault};
+use crate::check::{Checking, Role, unique, used_names};
+use crate::dataset::Statements;
+use crate::evaluate::{Layers, Planned, Tables, evaluate};
+use crate::findings::Budget;
+use crate::given::{Phases, add_given};
+use crate::load::Given;
+use crate::meter::Meter;
+use crate::owl::owl_closure_within;
+use crate::parse::parse;
+use crate::plan::Indexes;
+use crate::program::{Atom, Literal, Operand, Origin, Predicates, Program, Rule};
+use crate::ranges::Ranges;
+use crate::reading::Verdict;
+use crate::sparql::Query;
+use crate::stratify::stratify;
+use crate::syntax::Syntax;
+use crate::units::Units;
+use crate::universe::Universe;
+use actcheck_base::{Diagnostic, Diagnostics, Digest, TermId, Terms};
+use actcheck_ontology::{Ontology, Property, RuleLanguage};
 
 /// The state of preparing a book.
 #[derive(Default)]
@@ -283,7 +283,7 @@ fn gather(predicates: &mut Predicates) -> Vec<Rule> {
     for (id, property) in single {
         let variables = [Operand::Variable(0), Operand::Variable(1), Operand::Variable(2)];
         let args = vec![variables[0], variables[1], Operand::Constant(property), variables[2]];
-        let source = crate::base::Source::new("(given)", "");
+        let source = actcheck_base::Source::new("(given)", "");
         rules.push(Rule {
             head: Atom { predicate: general, args, span: 0..0 },
             body: vec![Literal::Positive(Atom { predicate: id, args: variables.to_vec(), span: 0..0 })],
@@ -357,10 +357,10 @@ fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) 
 /// Warns about predicates of a property's file that no rule reads and that are not part of the verdict.
 fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
     let used = used_names(syntax);
-    let verdict = crate::rules::given::VERDICT.map(|(name, _)| name);
+    let verdict = crate::given::VERDICT.map(|(name, _)| name);
     let mut unused = BTreeMap::new();
     for statement in &syntax.statements {
-        if let crate::rules::syntax::Statement::Rule(rule) = statement {
+        if let crate::syntax::Statement::Rule(rule) = statement {
             for head in &rule.heads {
                 if !used.contains(head.predicate.as_str()) && !verdict.contains(&head.predicate.as_str()) {
                     unused.entry(head.predicate.clone()).or_insert(head.name_span.clone());
@@ -371,7 +371,7 @@ fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
     for (name, span) in unused {
         let known = checking.defined.contains_key(&(scope, name.clone()));
         if known {
-            let help = crate::base::did_you_mean(&name, verdict);
+            let help = actcheck_base::did_you_mean(&name, verdict);
             checking.warning("R040", &syntax.source, &span, format!("`{name}` is never used"), help);
         }
     }

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use crate::base::{Source, Span, TermId};
-use crate::rules::expression::Expr;
-use crate::rules::syntax::Comparison;
+use crate::expression::Expr;
+use crate::syntax::Comparison;
+use actcheck_base::{Source, Span, TermId};
 
 /// Index of a predicate in [`Predicates`].
 pub(crate) type PredicateId = usize;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Span, names};
+use actcheck_base::{Span, names};
 
 /// A word of the text.
 #[derive(Debug, Clone)]

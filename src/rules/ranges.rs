@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostic, Diagnostics, Term, TermId, Terms, names};
-use crate::ontology::Ontology;
-use crate::rules::expression::Expr;
-use crate::rules::program::{Atom, Literal, Operand, Predicates, Rule, Variable};
-use crate::rules::syntax::Comparison;
+use crate::expression::Expr;
+use crate::program::{Atom, Literal, Operand, Predicates, Rule, Variable};
+use crate::syntax::Comparison;
+use actcheck_base::{Diagnostic, Diagnostics, Term, TermId, Terms, names};
+use actcheck_ontology::Ontology;
 
 /// The types of property values, as declared by the ontology.
 pub(crate) struct Ranges {
@@ -59,7 +59,7 @@ impl Ranges {
                     continue;
                 };
                 if let Some((property, datatype)) = typed.get(variable)
-                    && crate::rules::values::datatype(term) != *datatype
+                    && crate::values::datatype(term) != *datatype
                     && !same_integer(term, datatype)
                 {
                     let fault = never(property, datatype, term);
@@ -86,7 +86,7 @@ impl Ranges {
     ) {
         let literal = !matches!(term, Term::Iri(_) | Term::Blank(_));
         let fault = match datatype {
-            Some(datatype) if crate::rules::values::datatype(term) != datatype && !same_integer(term, datatype) => {
+            Some(datatype) if crate::values::datatype(term) != datatype && !same_integer(term, datatype) => {
                 never(property, datatype, term)
             }
             None if literal && self.of_things.contains(property) => {

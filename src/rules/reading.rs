@@ -1,11 +1,10 @@
 //! Reads a property's findings from the tuples of its rules.
 
-use crate::base::Term;
-use crate::rules::evaluate::Layers;
-use crate::rules::findings::{Findings, RuleFault, WitnessRow};
-use crate::rules::program::{PredicateId, Predicates, Program};
-use crate::rules::universe::Universe;
-use crate::rules::values::{Number, lexical};
+use crate::evaluate::Layers;
+use crate::program::{PredicateId, Predicates, Program};
+use crate::universe::Universe;
+use crate::values::{Number, lexical};
+use actcheck_base::{Findings, RuleFault, Term, WitnessRow};
 
 /// The predicates of a property that determine the verdict.
 #[derive(Debug, Clone)]

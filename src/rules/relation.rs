@@ -6,8 +6,8 @@ use std::sync::{Arc, OnceLock};
 
 use datafrog::{Iteration, Relation, Variable};
 
-use crate::base::TermId;
-use crate::rules::plan::{Order, Part};
+use crate::plan::{Order, Part};
+use actcheck_base::TermId;
 
 /// Tuples that no longer change. Rows are stored one after another, sorted by the index's column order.
 pub(crate) trait Finished: Send + Sync {

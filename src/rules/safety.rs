@@ -1,9 +1,9 @@
 //! Safety: checks that every variable of a rule is bound, and orders comparisons and assignments after their inputs.
 
-use crate::rules::expression::Expr;
-use crate::rules::program::{Aggregation, Atom, Literal, Operand, Variable};
-use crate::rules::syntax::{Comparison, RuleSyntax};
-use crate::rules::translate::Translation;
+use crate::expression::Expr;
+use crate::program::{Aggregation, Atom, Literal, Operand, Variable};
+use crate::syntax::{Comparison, RuleSyntax};
+use crate::translate::Translation;
 
 /// Turns equalities that bind a variable into assignments, orders the conditions by dependency, and resolves negations.
 /// Reports an error for each unbound variable. Returns `false` if there was one.

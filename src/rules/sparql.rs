@@ -2,22 +2,23 @@
 
 use std::collections::BTreeSet;
 
-use oxigraph::model::{NamedNode, Term as RdfTerm};
 use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, QuerySolutionIter, SparqlEvaluator};
+use oxrdf::{NamedNode, Term as RdfTerm};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, TermId, names};
-use crate::facts::ActionFacts;
-use crate::ontology::{Ontology, Vocabulary};
-use crate::rules::book::RuleBook;
-use crate::rules::builtins;
-use crate::rules::dataset::{Graph, Snapshot, View, from_rdf, to_rdf};
-use crate::rules::evaluate::Tables;
-use crate::rules::findings::{Budget, Findings, RuleFault, WitnessRow};
-use crate::rules::ledger::Ledger;
-use crate::rules::meter::Stop;
-use crate::rules::query_text::{first_group, groups, scan, variables};
-use crate::rules::universe::Universe;
-use crate::rules::values::{Number, lexical};
+use crate::book::RuleBook;
+use crate::builtins;
+use crate::dataset::{Graph, Snapshot, View, from_rdf, to_rdf};
+use crate::evaluate::Tables;
+use crate::findings::Budget;
+use crate::ledger::Ledger;
+use crate::meter::Stop;
+use crate::query_text::{first_group, groups, scan, variables};
+use crate::universe::Universe;
+use crate::values::{Number, lexical};
+use actcheck_base::{
+    ActionFacts, Diagnostic, Diagnostics, Findings, RuleFault, Source, Span, TermId, WitnessRow, names,
+};
+use actcheck_ontology::{Ontology, Vocabulary};
 
 /// A prepared query.
 pub(crate) struct Query {
@@ -290,7 +291,7 @@ fn check_vocabulary(
             continue;
         }
         let known = vocabulary.terms.keys().chain(derived).filter_map(|known| known.strip_prefix(namespace));
-        let help = match crate::base::nearest(local, known) {
+        let help = match actcheck_base::nearest(local, known) {
             Some(found) => format!("did you mean `{}`?", names::shorten(&format!("{namespace}{found}"))),
             None => "describe it in the ontology".to_owned(),
         };

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use crate::base::{Diagnostic, Diagnostics, names};
-use crate::rules::limits::{CYCLE_SHOWN, FAULT_LIMIT};
-use crate::rules::program::{Literal, PredicateId, Predicates, Rule};
-use crate::rules::universe::Universe;
+use crate::limits::{CYCLE_SHOWN, FAULT_LIMIT};
+use crate::program::{Literal, PredicateId, Predicates, Rule};
+use crate::universe::Universe;
+use actcheck_base::{Diagnostic, Diagnostics, names};
 
 /// Rules that are evaluated together.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
 //! The syntax tree of a rule text, with source spans. Nothing in it is checked yet.
 
-use crate::base::{Source, Span};
+use actcheck_base::{Source, Span};
 
 /// A parsed rule text.
 #[derive(Debug, Clone)]
@@ -158,7 +158,7 @@ pub struct Expression {
 #[derive(Debug, Clone)]
 pub enum ExpressionKind {
     /// A constant.
-    Constant(crate::base::Term),
+    Constant(actcheck_base::Term),
     /// `?x`.
     Variable(String),
     /// `_`.

@@ -2,20 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::{Source, Span, Term, TermId, Terms, did_you_mean};
-use crate::rules::builtins;
-use crate::rules::check::{Checking, Role, counted};
-use crate::rules::expression::Expr;
-use crate::rules::expressions::{contains_aggregate, push_new};
-use crate::rules::given::{GIVEN, add_given, phase_of, property_place};
-use crate::rules::limits::{FAULT_LIMIT, LITERAL_LIMIT, VARIABLE_LIMIT};
-use crate::rules::options::globals;
-use crate::rules::program::{Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule, Variable};
-use crate::rules::safety;
-use crate::rules::syntax::{
-    AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax,
-};
-use crate::rules::universe::Universe;
+use crate::builtins;
+use crate::check::{Checking, Role, counted};
+use crate::expression::Expr;
+use crate::expressions::{contains_aggregate, push_new};
+use crate::given::{GIVEN, add_given, phase_of, property_place};
+use crate::limits::{FAULT_LIMIT, LITERAL_LIMIT, VARIABLE_LIMIT};
+use crate::options::globals;
+use crate::program::{Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule, Variable};
+use crate::safety;
+use crate::syntax::{AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax};
+use crate::universe::Universe;
+use actcheck_base::{Source, Span, Term, TermId, Terms, did_you_mean};
 
 /// Translates the rules and facts of a file. Statements with errors are reported and left out.
 pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> Program {

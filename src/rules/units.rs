@@ -2,11 +2,11 @@
 
 use std::collections::HashMap;
 
-use crate::base::{Diagnostic, Diagnostics, Span, Terms};
-use crate::ontology::Vocabulary;
-use crate::rules::expression::Expr;
-use crate::rules::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
-use crate::rules::syntax::Comparison;
+use crate::expression::Expr;
+use crate::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
+use crate::syntax::Comparison;
+use actcheck_base::{Diagnostic, Diagnostics, Span, Terms};
+use actcheck_ontology::Vocabulary;
 
 /// Exponents of metre, kilogram, second and radian.
 type Dimension = [i8; 4];
@@ -154,7 +154,7 @@ impl<'a> Units<'a> {
             }
         }
         for aggregate in rule.aggregation.iter().flat_map(|aggregation| &aggregation.aggregates) {
-            use crate::rules::program::AggregateKind::Count;
+            use crate::program::AggregateKind::Count;
             seen.units[aggregate.output] = if aggregate.kind == Count { None } else { seen.units[aggregate.input] };
         }
         for (variable, value) in rule.aggregation.iter().flat_map(|aggregation| &aggregation.after) {

@@ -1,6 +1,6 @@
 //! Common term ids for the rules, the facts of a run, and the terms created by an evaluation.
 
-use crate::base::{Term, TermId, Terms};
+use actcheck_base::{Term, TermId, Terms};
 
 /// Terms of three origins with common ids. The terms of the rules and of the run are borrowed, not copied.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! Values of terms: canonical literals, numbers, lexical forms.
 
-use crate::base::{Term, names};
+use actcheck_base::{Term, names};
 
 /// A number with its type.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use crate::base::{Choices, Pose};
-use crate::config::{Location, ObjectModel, Surface};
-use crate::scenario::overlap::Solid;
-use crate::scenario::surroundings::Surroundings;
-use crate::scenario::{RobotStart, Role, Scene, SceneMap, SceneObject, Space, placement};
+use crate::overlap::Solid;
+use crate::surroundings::Surroundings;
+use crate::{Space, placement};
+use actcheck_data::{Choices, Location, ObjectModel, Pose, RobotStart, Role, Scene, SceneMap, SceneObject, Surface};
 
 /// Maximum number of tries to place one object; then the scene is discarded. On a half-full table about every second
 /// try succeeds, so after fifty failures further tries are not worthwhile.
@@ -74,7 +73,7 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
     let base = if drives { hand.start_elsewhere(world)? } else { hand.start_robot(surface.as_ref())? };
     hand.set_obstacles(base, world, drives)?;
     let name = hand.designators.get("world").and_then(|names| names.first()).cloned();
-    let mut map = world.map(SceneMap::of).unwrap_or_default();
+    let mut map = world.map(Surroundings::scene_map).unwrap_or_default();
     map.locations.extend(hand.front);
     Ok(Scene {
         world: name.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),

@@ -5,13 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use crate::base::Pose;
-use crate::config::{Location, ObjectModel, Part, Shape, Surface};
-use crate::scenario::draw::{Discard, Hand, TRIES};
-use crate::scenario::floor_plan::{FRONT_GAP_M, front_of};
-use crate::scenario::overlap::Solid;
-use crate::scenario::surroundings::Surroundings;
-use crate::scenario::{Role, SceneObject};
+use crate::draw::{Discard, Hand, TRIES};
+use crate::floor_plan::{FRONT_GAP_M, front_of};
+use crate::overlap::Solid;
+use crate::surroundings::Surroundings;
+use actcheck_data::{Location, ObjectModel, Part, Pose, Role, SceneObject, Shape, Surface};
 
 /// Gap between the surface's edge and the centre of the robot's base. Unit: metres. Shape: minimum, nominal, maximum.
 const BASE_GAP_M: [f64; 3] = [0.59, FRONT_GAP_M, 0.79];

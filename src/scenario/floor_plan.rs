@@ -4,9 +4,7 @@
 
 use nalgebra::Point3;
 
-use crate::base::Pose;
-use crate::config::{Location, ObjectModel, Room};
-use crate::scenario::{Role, Scene, SceneObject};
+use actcheck_data::{Location, ObjectModel, Pose, Role, Room, Scene, SceneObject};
 
 /// Gap between a surface's edge and the centre of a base in front of it. Unit: metres.
 pub(super) const FRONT_GAP_M: f64 = 0.69;

@@ -8,8 +8,7 @@ use parry3d::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d::query;
 use parry3d::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Cylinder, Shape as ParryShape};
 
-use crate::base::Pose;
-use crate::config::{ObjectModel, Part, Shape};
+use actcheck_data::{ObjectModel, Part, Pose, Shape};
 
 /// Minimum distance between objects. It is twice the prediction distance of contact detection, so that nothing touches
 /// at the start. Unit: metres.

@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
-use crate::config::Range;
-use crate::scenario::Space;
+use crate::Space;
+use actcheck_data::Range;
 
 /// A parameter of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Parameter {
-    /// The name of its choice in [`crate::scenario::draw`].
+    /// The name of its choice in [`crate::draw`].
     pub name: String,
     /// Its values.
     pub kind: ParameterKind,

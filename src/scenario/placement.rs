@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::config::{ObjectModel, Surface};
+use actcheck_data::{ObjectModel, Surface};
 
 /// Minimum distance of objects from the edge: a nearer one falls off when it is touched. Unit: metres.
 const EDGE_MARGIN_M: f64 = 0.01;

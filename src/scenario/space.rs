@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::base::{Diagnostics, did_you_mean, names, nearest};
-use crate::config::{
-    self, Campaign, Location, ObjectModel, OtherCounts, Physics, RobotProfile, Sensing, Surface, WorldMap,
-};
-use crate::ontology::Ontology;
-use crate::scenario::surroundings::Surroundings;
-use crate::scenario::{KnownKind, placement};
+use crate::placement;
+use crate::surroundings::Surroundings;
+use actcheck_base::{Diagnostics, did_you_mean, names, nearest};
+use actcheck_config as config;
+use actcheck_config::{Campaign, OtherCounts, WorldMap};
+use actcheck_data::{KnownKind, Location, ObjectModel, Physics, RobotProfile, Sensing, Surface};
+use actcheck_ontology::Ontology;
 
 /// Designators with a meaning for scene generation, whether or not an ontology declares them.
 const SPECIAL: [&str; 6] = ["world", "objectLocation", "objectSurface", "placeSurface", "pickObject", "surfaceObjects"];

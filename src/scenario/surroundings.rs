@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::config::{ObjectModel, WorldMap};
-use crate::scenario::SceneObject;
-use crate::scenario::draw::platform;
+use crate::draw::platform;
+use actcheck_config::WorldMap;
+use actcheck_data::{NamedSurface, ObjectModel, SceneMap, SceneObject};
 
 /// A world with its furniture and walls as objects of a scene.
 #[derive(Debug, Clone)]
@@ -16,6 +16,16 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
+    /// The names of its places.
+    pub(super) fn scene_map(&self) -> SceneMap {
+        let surfaces = self.surfaces().filter_map(|object| {
+            let surface = object.model.surface?;
+            let [x, y, z] = object.pose.position;
+            Some(NamedSurface { id: object.id.clone(), at: [x, y, z + surface.height_m], size_m: surface.size_m })
+        });
+        SceneMap { locations: self.map.locations.clone(), rooms: self.map.rooms.clone(), surfaces: surfaces.collect() }
+    }
+
     pub(super) fn new(map: &Arc<WorldMap>, models: &BTreeMap<String, Arc<ObjectModel>>) -> Self {
         let furniture = map.furniture.iter().filter_map(|piece| {
             let model = models.get(&piece.model)?;

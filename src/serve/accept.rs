@@ -1,6 +1,6 @@
 //! Content negotiation: the header `Accept` (RFC 9110, 12.5.1).
 
-use crate::history::WireSyntax;
+use actcheck_history::WireSyntax;
 
 /// Returns the offered format with the highest quality; of equal ones, the first. Returns `None` if the client accepts
 /// none.

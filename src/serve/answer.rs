@@ -5,9 +5,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::base::{Diagnostics, Source};
-use crate::history::{History, WireFault};
-use crate::serve::{accept, watch};
+use crate::{accept, watch};
+use actcheck_base::{Diagnostics, Source};
+use actcheck_history::{History, WireFault};
 
 /// The input of the worker process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use std::net::IpAddr;
 
-use crate::serve::question::Refusal;
+use crate::question::Refusal;
 
 /// Checks the headers `Host` and `Origin`.
 ///

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::base::names;
+use actcheck_base::names;
 
 /// The stylesheet.
 pub(super) const STYLE: &str = include_str!("web/style.css");

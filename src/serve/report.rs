@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError, RwLock};
 use std::time::{Duration, SystemTime};
 
-use crate::serve::question::Refusal;
-use crate::serve::worker::{Ended, Worker};
+use crate::question::Refusal;
+use crate::worker::{Ended, Worker};
 
 /// Time limit; a report takes longer than a query.
 const MOST_TIME: Duration = Duration::from_secs(300);

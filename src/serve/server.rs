@@ -11,13 +11,13 @@ use oxhttp::Server;
 use oxhttp::model::header::{self, HeaderName, HeaderValue};
 use oxhttp::model::{Body, Request, Response, StatusCode};
 
-use crate::serve::answer::{Head, Question};
-use crate::serve::guard::guard;
-use crate::serve::page::{self, Example};
-use crate::serve::question::{Parts, Refusal, question};
-use crate::serve::report::LiveReport;
-use crate::serve::watch;
-use crate::serve::worker::{Ended, Worker};
+use crate::answer::{Head, Question};
+use crate::guard::guard;
+use crate::page::{self, Example};
+use crate::question::{Parts, Refusal, question};
+use crate::report::LiveReport;
+use crate::watch;
+use crate::worker::{Ended, Worker};
 
 /// Maximum size of a request body. Unit: bytes.
 const MOST_BODY: u64 = 1 << 20;
@@ -46,7 +46,7 @@ pub struct Options {
     pub history: PathBuf,
     /// Path of this program, which is started for each query.
     pub program: PathBuf,
-    /// Arguments with which it answers a query ([`crate::serve::answer()`]).
+    /// Arguments with which it answers a query ([`crate::answer()`]).
     pub query_arguments: Vec<String>,
     /// Arguments with which it prints the report.
     pub report_arguments: Vec<String>,

@@ -2,10 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::{Term, names};
-use crate::ontology::{Action, Ontology, Property};
-use crate::rules::{Findings, RuleFault, WitnessRow};
-use crate::verdict::{Judgement, Outcome};
+use actcheck_base::{Findings, Judgement, Outcome, RuleFault, Term, WitnessRow, names};
+use actcheck_ontology::{Action, Ontology, Property};
 
 /// How an action ended.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::base::names;
-use crate::verdict::{Judgement, Outcome};
+use actcheck_base::{Judgement, Outcome, names};
 
 /// How the failures of a scene compare with the expected ones. Properties are identified by their local names.
 #[derive(Debug, Clone, PartialEq, Eq)]

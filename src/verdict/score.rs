@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::verdict::Outcome;
+use actcheck_base::Outcome;
 
 /// How often each outcome occurred.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]

@@ -6,13 +6,13 @@ use rapier3d::prelude::{
     RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
 };
 
-use crate::scenario::RobotProfile;
-use crate::world::WorldError;
-use crate::world::convert::{to_pose, to_real, to_vector};
-use crate::world::description::{Joint, JointKind, RobotModel};
-use crate::world::engine::{Owner, collider, off_floor};
-use crate::world::layout::{Layout, Named};
-use crate::world::robot::Motor;
+use crate::WorldError;
+use crate::convert::{to_pose, to_real, to_vector};
+use crate::description::{Joint, JointKind, RobotModel};
+use crate::engine::{Owner, collider, off_floor};
+use crate::layout::{Layout, Named};
+use crate::robot::Motor;
+use actcheck_data::RobotProfile;
 
 /// Position error at which a motor reaches its effort limit. Unit: metres. Stiffness is the effort limit divided by
 /// this.

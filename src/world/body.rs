@@ -2,9 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
-use crate::base::Pose;
-use crate::scenario::{Part, Shape};
-use crate::world::Kinematics;
+use crate::Kinematics;
+use actcheck_data::{Part, Pose, Shape};
 
 /// The robot's collision shapes in one posture.
 #[derive(Debug, Clone)]

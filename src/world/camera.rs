@@ -9,12 +9,11 @@ use nalgebra::{Isometry3, Point3};
 use parry3d::shape::Shape;
 use rapier3d::prelude::Collider;
 
-use crate::base::{Choices, Stream};
-use crate::scenario::Camera;
-use crate::world::World;
-use crate::world::convert::{from_pose, to_real};
-use crate::world::engine::Owner;
-use crate::world::rays::{Lens, Solids};
+use crate::World;
+use crate::convert::{from_pose, to_real};
+use crate::engine::Owner;
+use crate::rays::{Lens, Solids};
+use actcheck_data::{Camera, Choices, Stream};
 
 /// Number of noise seeds, including 0 (no noise).
 const FRAMES: usize = 1 << 32;

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use rapier3d::prelude::PhysicsWorld;
 
-use crate::world::convert::from_vector;
-use crate::world::engine::Owner;
+use crate::convert::from_vector;
+use crate::engine::Owner;
 
 /// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model. Unit: newtons.
 pub const CONTACT_FLOOR_NEWTONS: f64 = 0.05;

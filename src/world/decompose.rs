@@ -6,9 +6,9 @@ use parry3d::math::Vector;
 use parry3d::transformation::try_convex_hull;
 use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
 
-use crate::base::Digest;
-use crate::scenario::{Mesh, Shape};
-use crate::world::convert::to_real;
+use crate::convert::to_real;
+use actcheck_base::Digest;
+use actcheck_data::{Mesh, Shape};
 
 /// Version of the algorithm: increment it if the same mesh and parameters give different solids.
 const ALGORITHM: u32 = 1;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::base::{Pose, did_you_mean};
-use crate::scenario::{Part, RobotProfile, Shape};
-use crate::world::WorldError;
+use crate::WorldError;
+use actcheck_base::did_you_mean;
+use actcheck_data::{Part, Pose, RobotProfile, Shape};
 
 /// The type of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

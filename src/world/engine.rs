@@ -6,10 +6,10 @@ use rapier3d::prelude::{
     PhysicsWorld, SpringCoefficients,
 };
 
-use crate::scenario::{Part, Physics, Shape};
-use crate::world::convert::{to_pose, to_real, to_vector};
-use crate::world::kinematics::GRAVITY;
-use crate::world::{WorldError, fault, fresh};
+use crate::convert::{to_pose, to_real, to_vector};
+use crate::kinematics::GRAVITY;
+use crate::{WorldError, fault, fresh};
+use actcheck_data::{Part, Physics, Shape};
 
 /// The owner of a collider.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,6 +1,6 @@
 //! Errors of building a simulation.
 
-use crate::base::Diagnostic;
+use actcheck_base::Diagnostic;
 
 /// A scene or a robot that can't be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::base::Pose;
+use actcheck_data::Pose;
 
 /// Radius of the world: a body farther from the origin, horizontally, has left it. Unit: metres. The floor ends a metre
 /// farther out; scenes are a few metres wide.

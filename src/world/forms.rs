@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::scenario::{Part, Shape};
-use crate::world::World;
+use crate::World;
+use actcheck_data::{Part, Shape};
 
 impl World {
     /// Returns the shapes of all objects and links by their names in traces, in the frame of the object or link. Pieces

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector6};
 
-use crate::world::Kinematics;
+use crate::Kinematics;
 
 /// A request to the solver.
 #[derive(Debug, Clone)]

@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6xX, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::base::Pose;
-use crate::scenario::{Part, Shape};
-use crate::world::description::{Joint, JointKind, RobotModel};
+use crate::description::{Joint, JointKind, RobotModel};
+use actcheck_data::{Part, Pose, Shape};
 
 /// Gravitational acceleration. Unit: m/s².
 pub const GRAVITY: f64 = 9.81;

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use crate::scenario::RobotProfile;
-use crate::world::WorldError;
-use crate::world::description::RobotModel;
+use crate::WorldError;
+use crate::description::RobotModel;
+use actcheck_data::RobotProfile;
 
 /// Indices of the robot's joints by their role.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::base::Pose;
-use crate::world::convert::{to_pose, to_real, to_vector};
-use crate::world::{Mishap, World};
+use crate::convert::{to_pose, to_real, to_vector};
+use crate::{Mishap, World};
+use actcheck_data::Pose;
 
 /// Gap below an object that is laid down, so that it drops into contact instead of being pushed out. Unit: metres.
 const DROP_M: f64 = 2e-3;

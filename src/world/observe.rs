@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use crate::base::Pose;
-use crate::world::contacts::touches;
-use crate::world::convert::from_vector;
-use crate::world::engine::Owner;
-use crate::world::simulation::Object;
-use crate::world::{BodyState, RobotState, Snapshot, World};
+use crate::World;
+use crate::contacts::touches;
+use crate::convert::from_vector;
+use crate::engine::Owner;
+use crate::simulation::Object;
+use actcheck_data::{BodyState, Pose, RobotState, Snapshot};
 
 /// Share of a body's weight that a contact must carry for the body to rest on it. Low enough for several supports.
 const CARRIED_SHARE: f64 = 0.1;
@@ -31,7 +31,7 @@ impl World {
         let pose = self.pose_of(object);
         let mut touching = BTreeSet::new();
         let mut carriers = BTreeSet::new();
-        let enough = CARRIED_SHARE * object.mass_kg * crate::world::kinematics::GRAVITY;
+        let enough = CARRIED_SHARE * object.mass_kg * crate::kinematics::GRAVITY;
         for pair in pairs {
             let (other, lift) = match (pair.first, pair.second) {
                 (other, Owner::Object(own)) if own == idx => (other, pair.lift_on_second_n),

@@ -6,9 +6,8 @@
 
 use nalgebra::Vector2;
 
-use crate::base::{Choices, Pose};
-use crate::scenario::Odometry;
-use crate::world::World;
+use crate::World;
+use actcheck_data::{Choices, Odometry, Pose};
 
 /// Length of a stretch with constant wheel errors: distance plus rotation. Units: metres and radians.
 const STRETCH: f64 = 0.5;

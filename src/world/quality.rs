@@ -2,21 +2,10 @@
 //!
 //! Reads the engine's state after a tick without changing it.
 
-use serde::{Deserialize, Serialize};
-
-use crate::world::World;
-use crate::world::engine::Owner;
-use crate::world::kinematics::GRAVITY;
-
-/// The worst errors of physics in a run.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Quality {
-    /// Deepest penetration of two bodies in contact. Unit: metres.
-    pub deepest_penetration_m: f64,
-    /// Largest rise of the kinetic and potential energy of the objects that the robot could not have pushed: it touched
-    /// neither them nor their neighbours. Unit: joules. Real objects only lose energy.
-    pub energy_gain_j: f64,
-}
+use crate::World;
+use crate::engine::Owner;
+use crate::kinematics::GRAVITY;
+use actcheck_data::Quality;
 
 /// Measures penetration and energy tick by tick.
 #[derive(Debug, Default)]

@@ -9,8 +9,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::query::Ray;
 use parry3d::shape::{Shape, TypedShape};
 
-use crate::world::convert::{from_vector, to_real, to_vector};
-use crate::world::silhouette::Silhouette;
+use crate::convert::{from_vector, to_real, to_vector};
+use crate::silhouette::Silhouette;
 
 /// Side of a tile in pixels: small enough for few shapes per tile, large enough for few tiles.
 const TILE: usize = 8;
@@ -298,8 +298,8 @@ mod tests {
     use parry3d::shape::{Ball, Cone, Cuboid, Cylinder};
 
     use super::*;
-    use crate::base::Stream;
-    use crate::world::convert::to_pose;
+    use crate::convert::to_pose;
+    use actcheck_data::Stream;
 
     const LENS: Lens = Lens { width: 60, height: 44, focal_px: 55.0 };
 

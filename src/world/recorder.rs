@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::RigidBodyHandle;
 
-use crate::base::{Digest, Pose};
-use crate::world::World;
-use crate::world::contacts::{Touch, touches};
-use crate::world::convert::{from_pose, from_vector};
-use crate::world::engine::Owner;
-use crate::world::motion::MotionMeter;
-use crate::world::quality::QualityMeter;
-use crate::world::robot_course::{RobotCourse, RobotMeter};
+use crate::World;
+use crate::contacts::{Touch, touches};
+use crate::convert::{from_pose, from_vector};
+use crate::engine::Owner;
+use crate::motion::MotionMeter;
+use crate::quality::QualityMeter;
+use crate::robot_course::RobotMeter;
+use actcheck_base::Digest;
+use actcheck_data::{Pose, RobotCourse};
 
 /// Time between two frames. Unit: seconds. Enough for images and replays, and it keeps traces small.
 const FRAME_SECS: f64 = 0.1;

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use rapier3d::prelude::{JointAxis, MultibodyDofCoupling, MultibodyJointHandle, PhysicsWorld, RigidBodyHandle};
 
-use crate::base::Pose;
-use crate::scenario::{RobotProfile, RobotStart};
-use crate::world::assemble::{home, insert_joints, insert_links};
-use crate::world::convert::to_real;
-use crate::world::description::{Joint, RobotModel};
-use crate::world::layout::{Layout, Named};
-use crate::world::{JointState, Kinematics, WorldError};
+use crate::assemble::{home, insert_joints, insert_links};
+use crate::convert::to_real;
+use crate::description::{Joint, RobotModel};
+use crate::layout::{Layout, Named};
+use crate::{Kinematics, WorldError};
+use actcheck_data::{JointState, Pose, RobotProfile, RobotStart};
 
 /// The motor of one joint.
 #[derive(Debug, Clone)]
@@ -316,19 +315,21 @@ pub(super) mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::base::{Choices, Files};
-    use crate::config::{Camera, Odometry, Physics, Sensing};
-    use crate::scenario::Scene;
-    use crate::world::convert::from_pose;
-    use crate::world::layout::check_robot;
-    use crate::world::{World, build, ik};
+    use crate::convert::from_pose;
+    use crate::layout::check_robot;
+    use crate::{World, build, ik};
+    use actcheck_base::Files;
+    use actcheck_data::Choices;
+    use actcheck_data::Scene;
+    use actcheck_data::{Camera, Odometry, Physics, Sensing};
 
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let profile = Arc::new(crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is right"));
+        let profile =
+            Arc::new(actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is right"));
         let one = (1.0, 1.0);
         let scene = Scene {
-            map: crate::scenario::SceneMap::default(),
+            map: actcheck_data::SceneMap::default(),
             world: "empty".to_owned(),
             objects: Vec::new(),
             robot: RobotStart { profile, base: [-1.0, 0.3, 0.4], knows: Arc::new([]) },

@@ -3,18 +3,17 @@
 //! In the simulation the robot's links pass through each other (a self-colliding posture is not a fault of physics), so
 //! self-collisions are detected separately, from the links' shapes and poses.
 
+use actcheck_data::{HeldCourse, JointCourse, Motion, Pose, RobotCourse, SelfCollision};
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Point3};
 use parry3d::query::contact;
 use rapier3d::prelude::{Collider, RigidBodyHandle};
-use serde::{Deserialize, Serialize};
 
-use crate::base::Pose;
-use crate::world::contacts::Touch;
-use crate::world::convert::{from_pose, from_vector};
-use crate::world::engine::Owner;
-use crate::world::{Motion, World};
+use crate::World;
+use crate::contacts::Touch;
+use crate::convert::{from_pose, from_vector};
+use crate::engine::Owner;
 
 /// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per second: a link at 1
 /// m/s moves 5 cm between them.
@@ -23,55 +22,6 @@ const TICKS_PER_LOOK: u64 = 3;
 const OVERLOAD_SHARE: f64 = 0.99;
 /// Links that penetrate each other by no more than this only touch. Unit: metres.
 const TOUCH_M: f64 = 1e-4;
-
-/// The robot's course during one action.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct RobotCourse {
-    /// One for each joint, in the robot's order.
-    pub joints: Vec<JointCourse>,
-    /// Pairs of links that penetrated each other, sorted.
-    pub self_contacts: Vec<SelfCollision>,
-    /// Objects that both fingers touched at the same time, in scene order.
-    pub held: Vec<HeldCourse>,
-    /// Its measurements and commands. Stored with the bodies' tracks, which not every reader needs.
-    #[serde(skip)]
-    pub motion: Motion,
-}
-
-/// Extremes of one joint. Units: metres or radians, by kind.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JointCourse {
-    /// Name in the URDF.
-    pub name: String,
-    /// Largest excess of its position beyond its limits; negative if it stayed within them.
-    pub max_excess: f64,
-    /// Largest speed as a share of the joint's limit.
-    pub max_speed_share: f64,
-    /// Longest uninterrupted time at the motor's effort limit; 0 for fingers, which hold by force. Unit: seconds.
-    pub overload_secs: f64,
-}
-
-/// Two links of the robot that penetrated each other, and did not when the run began.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SelfCollision {
-    /// `robot/LINK`, sorted.
-    pub pair: [String; 2],
-    /// Time of its first detection since the action began. Unit: seconds.
-    pub start_secs: f64,
-    /// Largest penetration depth. Unit: metres.
-    pub max_depth_m: f64,
-}
-
-/// An object held between both fingers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct HeldCourse {
-    /// Id of the object.
-    pub id: String,
-    /// Total time held. Unit: seconds.
-    pub held_secs: f64,
-    /// Largest angle from the vertical while held. Unit: radians.
-    pub max_tilt_rad: f64,
-}
 
 /// Measures a [`RobotCourse`].
 #[derive(Default)]
@@ -241,7 +191,7 @@ fn ball(solid: &Collider) -> (Point3<f64>, f64) {
 
 #[cfg(test)]
 mod tests {
-    use crate::world::robot::tests::lonely;
+    use crate::robot::tests::lonely;
 
     /// A posture with the hand inside the robot's body is detected; the home posture has no self-collision.
     #[test]

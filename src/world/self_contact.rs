@@ -5,9 +5,9 @@ use parry3d::query::intersection_test;
 use rapier3d::math::Pose as EnginePose;
 use rapier3d::prelude::SharedShape;
 
-use crate::world::Kinematics;
-use crate::world::convert::to_pose;
-use crate::world::engine::{Owner, collider};
+use crate::Kinematics;
+use crate::convert::to_pose;
+use crate::engine::{Owner, collider};
 
 /// The shapes of a robot's links, and the pairs of links that could collide.
 #[derive(Clone)]
@@ -72,7 +72,7 @@ impl SelfContact {
 }
 
 impl Form {
-    fn new(solids: &[crate::scenario::Part]) -> Self {
+    fn new(solids: &[actcheck_data::Part]) -> Self {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
         for solid in solids {

@@ -4,9 +4,9 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::base::{Choices, Pose};
-use crate::world::World;
-use crate::world::simulation::Object;
+use crate::World;
+use crate::simulation::Object;
+use actcheck_data::{Choices, Pose};
 
 /// Tilt beyond which an object counts as lying: it is then seen as its upright bounding box. Unit: radians.
 const LYING_RAD: f64 = 0.3;

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::world::rays::Lens;
+use crate::rays::Lens;
 
 /// Distance of the near clipping plane. Unit: metres. No shape of a robot is this close to its camera.
 const NEAR_M: f64 = 1e-3;
@@ -93,7 +93,7 @@ fn sides(points: &[[f64; 2]]) -> Vec<([f64; 2], f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Stream;
+    use actcheck_data::Stream;
 
     const LENS: Lens = Lens { width: 80, height: 60, focal_px: 60.0 };
 

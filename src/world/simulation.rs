@@ -7,16 +7,16 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 
-use crate::base::Pose;
-use crate::scenario::{
-    CONTROL_HZ, Camera, FloorPlan, Inertia, KnownKind, ObjectModel, RobotProfile, Role, Scene, SceneObject, Sensing,
+use crate::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
+use crate::engine::{Owner, add_floor, collider, engine};
+use crate::odometry::Tracker;
+use crate::recorder::Recorder;
+use crate::robot::Robot;
+use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
+use actcheck_data::{
+    CONTROL_HZ, Camera, Inertia, KnownKind, ObjectModel, Pose, RobotProfile, Role, Scene, SceneObject, Sensing,
 };
-use crate::world::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
-use crate::world::engine::{Owner, add_floor, collider, engine};
-use crate::world::odometry::Tracker;
-use crate::world::recorder::Recorder;
-use crate::world::robot::Robot;
-use crate::world::{Fault, Kinematics, Layout, Poison, WorldError, fault};
+use actcheck_scenario::FloorPlan;
 
 /// A body slower than this may fall asleep. Unit: m/s of its farthest point.
 const SLEEP_SPEED: f32 = 0.02;

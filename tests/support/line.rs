@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use actcheck::actions::ActionReport;
-use actcheck::base::{Choices, names};
+use actcheck::base::{Outcome, names};
 use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
 use actcheck::config::Overrides;
+use actcheck::data::{ActionReport, Choices};
 use actcheck::history::RunRecord;
-use actcheck::verdict::Outcome;
 
 /// What a configuration prepares that is written to a folder of its own.
 pub fn env_of(text: &str) -> Env {

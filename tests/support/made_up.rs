@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use actcheck::history::{ActionDetail, ObjectDetail, Role, RunDetail, RunRow, RunStatus};
-use actcheck::verdict::{Judgement, Outcome};
+use actcheck::base::{Judgement, Outcome};
+use actcheck::data::Role;
+use actcheck::history::{ActionDetail, ObjectDetail, RunDetail, RunRow, RunStatus};
 
 use super::planted::Dice;
 

@@ -3,8 +3,8 @@
 //! Two trees of postures grow from both ends towards samples and towards each other (Kuffner and LaValle 2000, "RRT-Connect:
 //! an efficient approach to single-query path planning").
 
-use crate::actions::motion::space::between;
-use crate::actions::motion::{ArmSpace, Room, Samples};
+use crate::motion::space::between;
+use crate::motion::{ArmSpace, Room, Samples};
 
 /// Length of a branch. Unit: metres, as [`ArmSpace::span`] counts.
 const BRANCH_M: f64 = 0.4;

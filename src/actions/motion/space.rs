@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::actions::route::{Block, Pillar};
-use crate::world::{JointKind, Kinematics, Layout, SelfContact};
+use crate::route::{Block, Pillar};
+use actcheck_world::{JointKind, Kinematics, Layout, SelfContact};
 
 /// Spacing of checked points on the arm, and the largest movement of a point between checked postures. Unit: metres.
 const CHECK_M: f64 = 0.03;

@@ -3,17 +3,17 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::actions::motion::{ArmSpace, Room, Samples, way};
-use crate::actions::route::{Block, Pillar};
-use crate::base::{Files, Pose};
-use crate::scenario::RobotStart;
-use crate::world::{Kinematics, Layout, Sighting, geometry};
+use crate::motion::{ArmSpace, Room, Samples, way};
+use crate::route::{Block, Pillar};
+use actcheck_base::Files;
+use actcheck_data::{Pose, RobotStart};
+use actcheck_world::{Kinematics, Layout, Sighting, geometry};
 
 const LEAST: Room = Room { furniture_m: 0.01, things_m: 0.01 };
 
 fn arm() -> (Kinematics, Layout, Vec<f64>) {
     let path = Path::new("models/robots/fixed_arm.toml");
-    let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is valid");
+    let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
     let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
     geometry(&start).expect("the shipped robot is valid")
 }

@@ -1,6 +1,6 @@
 //! Follows a path: the base pose at each tick, within speed and acceleration limits.
 
-use crate::actions::route::length;
+use crate::route::length;
 
 /// Largest change of velocity at a corner of the path. Unit: m/s.
 const JOLT: f64 = 0.08;

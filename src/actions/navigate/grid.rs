@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::actions::memory::Standing;
-use crate::actions::route::length;
-use crate::scenario::{FloorPlan, Outline, Room};
+use crate::memory::Standing;
+use crate::route::length;
+use actcheck_data::Room;
+use actcheck_scenario::{FloorPlan, Outline};
 
 /// Edge of a cell. Unit: metres.
 pub const CELL_M: f64 = 0.05;
@@ -238,7 +239,7 @@ fn mapped(plan: &FloorPlan, outlines: &[(Isometry3<f64>, [f64; 2])], [x, y]: [f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::Pose;
+    use actcheck_data::Pose;
 
     fn hall() -> Grid {
         let outline = Outline { pose: Pose::upright([1.0, 0.0, 0.0], 0.3), size_m: [0.4, 0.2] };

@@ -3,8 +3,8 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::actions::navigate::grid::CELL_M;
-use crate::actions::navigate::terrain::Terrain;
+use crate::navigate::grid::CELL_M;
+use crate::navigate::terrain::Terrain;
 
 /// Costs are integer multiples of this, so that sums don't depend on their order. Unit: metres.
 const GRAIN_M: f64 = 1e-5;

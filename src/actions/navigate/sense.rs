@@ -2,10 +2,10 @@
 
 use nalgebra::Point3;
 
-use crate::actions::navigate::grid::{Evidence, Grid};
-use crate::actions::operator::Operator;
-use crate::actions::route::length;
-use crate::world::OwnBody;
+use crate::navigate::grid::{Evidence, Grid};
+use crate::operator::Operator;
+use crate::route::length;
+use actcheck_world::OwnBody;
 
 /// Points below this are floor. Unit: metres. Four times the range noise at 3 m, seen at a slant. The robot drives over
 /// lower objects.

@@ -1,7 +1,7 @@
 //! Shortens a path over cells to a few straight legs.
 
-use crate::actions::navigate::search::cheapest;
-use crate::actions::navigate::terrain::Terrain;
+use crate::navigate::search::cheapest;
+use crate::navigate::terrain::Terrain;
 
 /// Factor by which a straight leg may cost more than the cells it replaces, which only go in eight directions.
 const TOLERATED: f64 = 1.001;
@@ -46,10 +46,11 @@ fn shortened(terrain: &Terrain<'_>, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::actions::navigate::grid::Grid;
-    use crate::actions::route::length;
-    use crate::base::Pose;
-    use crate::scenario::{FloorPlan, Outline, Room};
+    use crate::navigate::grid::Grid;
+    use crate::route::length;
+    use actcheck_data::Pose;
+    use actcheck_data::Room;
+    use actcheck_scenario::{FloorPlan, Outline};
 
     /// A room divided by a wall that leaves a door of 90 cm at the upper end.
     fn two_rooms() -> Grid {

@@ -2,15 +2,16 @@
 
 use nalgebra::Point3;
 
-use crate::actions::navigate::follow::{Follower, Limits, wrapped};
-use crate::actions::navigate::grid::{CELL_M, Grid};
-use crate::actions::navigate::sense::{Size, look};
-use crate::actions::navigate::shorten::way;
-use crate::actions::navigate::terrain::Terrain;
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::perceive::towards;
-use crate::actions::route::length;
-use crate::actions::{ActionCall, ActionReport};
+use crate::ActionCall;
+use crate::navigate::follow::{Follower, Limits, wrapped};
+use crate::navigate::grid::{CELL_M, Grid};
+use crate::navigate::sense::{Size, look};
+use crate::navigate::shorten::way;
+use crate::navigate::terrain::Terrain;
+use crate::operator::{Interrupt, Operator};
+use crate::perceive::towards;
+use crate::route::length;
+use actcheck_data::ActionReport;
 
 /// Designators of the goal; the first one present is used.
 const PLACES: [&str; 2] = ["objectLocation", "objectSurface"];

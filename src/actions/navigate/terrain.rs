@@ -1,7 +1,7 @@
 //! The cost of a position for a base of a given radius.
 
-use crate::actions::navigate::grid::{CELL_M, Grid};
-use crate::actions::route::length;
+use crate::navigate::grid::{CELL_M, Grid};
+use crate::route::length;
 
 /// Clearance beside the base beyond which more brings no benefit. Unit: metres.
 const AMPLE_M: f64 = 0.35;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::world::DepthImage;
+use actcheck_world::DepthImage;
 
 /// The points seen by all pixels with a depth. `camera` is the pose of the camera; the points are in its parent frame.
 pub fn points(image: &DepthImage, camera: &Isometry3<f64>) -> Vec<Point3<f64>> {

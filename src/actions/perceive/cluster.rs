@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use crate::actions::perceive::cloud::cube_of;
+use crate::perceive::cloud::cube_of;
 
 /// Groups in which each point has another at most `reach` away; by index, in the order of their first points.
 pub fn clusters(points: &[Point3<f64>], reach: f64) -> Vec<Vec<usize>> {
@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn every_point_is_in_one_cluster() {
-        let stream = crate::base::Stream::new(2);
+        let stream = actcheck_data::Stream::new(2);
         let points: Vec<Point3<f64>> =
             (0..600).map(|i| Point3::new(stream.unit(3 * i), stream.unit(3 * i + 1), stream.unit(3 * i + 2))).collect();
         let found = clusters(&points, 0.07);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Point3, Vector2};
 
-use crate::world::{Kinematics, Layout};
+use actcheck_world::{Kinematics, Layout};
 
 /// Joint displacement used to measure its effect on the gaze. Unit: radians.
 const PROBE_RAD: f64 = 1e-4;
@@ -71,16 +71,16 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::base::Files;
-    use crate::scenario::RobotStart;
-    use crate::world::geometry;
+    use actcheck_base::Files;
+    use actcheck_data::RobotStart;
+    use actcheck_world::geometry;
 
     /// Regression: a head turned far to the right could not look ahead again, because the short way crosses a joint
     /// limit of the neck.
     #[test]
     fn the_head_finds_a_point_before_it_wherever_it_looked() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let profile = crate::scenario::read_robot(&Files::Shipped, path).expect("the shipped robot is valid");
+        let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
         let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };
         let (kinematics, layout, mut posture) = geometry(&start).expect("the shipped robot is valid");
         for pan in [-3.8, -3.0, -1.0, 0.0, 1.7] {

@@ -4,14 +4,12 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 
-use crate::actions::perceive::cloud::{cube_of, thinned};
-use crate::actions::perceive::cluster::clusters;
-use crate::actions::perceive::kinds::recognise;
-use crate::actions::perceive::plane::{Plane, Prior, find};
-use crate::actions::perceive::rectangle::{Rectangle, smallest_around};
-use crate::actions::{PerceivedPlane, PerceivedThing};
-use crate::base::Pose;
-use crate::scenario::KnownKind;
+use crate::perceive::cloud::{cube_of, thinned};
+use crate::perceive::cluster::clusters;
+use crate::perceive::kinds::recognise;
+use crate::perceive::plane::{Plane, Prior, find};
+use crate::perceive::rectangle::{Rectangle, smallest_around};
+use actcheck_data::{KnownKind, PerceivedPlane, PerceivedThing, Pose};
 
 /// Edge of the grid cubes used for downsampling. Unit: metres. About the pixel spacing at a distance of one metre.
 pub const GRID_M: f64 = 0.005;

@@ -1,6 +1,6 @@
 //! Recognises objects by their size.
 
-use crate::scenario::KnownKind;
+use actcheck_data::KnownKind;
 
 /// How much larger than its true length a side may appear. Unit: metres. Noise at the outline, and the grid of points.
 const WIDER_M: f64 = 0.008;

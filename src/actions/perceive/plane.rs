@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::base::Stream;
+use actcheck_data::Stream;
 
 /// Prior knowledge about the plane.
 #[derive(Debug, Clone)]

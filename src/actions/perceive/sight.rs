@@ -2,11 +2,11 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::perceive::cloud::{points, thinned};
-use crate::actions::perceive::gaze::towards;
-use crate::actions::perceive::interpret::{GRID_M, Surface};
-use crate::world::{DepthImage, OwnBody};
+use crate::operator::{Interrupt, Operator};
+use crate::perceive::cloud::{points, thinned};
+use crate::perceive::gaze::towards;
+use crate::perceive::interpret::{GRID_M, Surface};
+use actcheck_world::{DepthImage, OwnBody};
 
 /// Time for the head to come to rest. Unit: seconds.
 const REST_SECS: f64 = 0.3;

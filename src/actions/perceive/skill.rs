@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 
 use nalgebra::Point3;
 
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::perceive::interpret::Surface;
-use crate::actions::perceive::sight::Sight;
-use crate::actions::perceive::survey::near;
-use crate::actions::route::length;
-use crate::actions::{ActionCall, ActionReport, Perceived};
-use crate::base::names;
-use crate::world::Sighting;
+use crate::ActionCall;
+use crate::operator::{Interrupt, Operator};
+use crate::perceive::interpret::Surface;
+use crate::perceive::sight::Sight;
+use crate::perceive::survey::near;
+use crate::route::length;
+use actcheck_base::names;
+use actcheck_data::{ActionReport, Perceived};
+use actcheck_world::Sighting;
 
 /// Where to look for a surface: distance in front of the base, and height. Unit: metres. A table, a low table, a far
 /// one.

@@ -2,14 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::actions::memory::{furniture, sighting};
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::perceive::interpret::Surface;
-use crate::actions::perceive::sight::Sight;
-use crate::actions::{PerceivedPlane, PerceivedThing};
-use crate::base::Pose;
-use crate::scenario::KnownKind;
-use crate::world::Sighting;
+use crate::memory::{furniture, sighting};
+use crate::operator::{Interrupt, Operator};
+use crate::perceive::interpret::Surface;
+use crate::perceive::sight::Sight;
+use actcheck_data::{KnownKind, PerceivedPlane, PerceivedThing, Pose};
+use actcheck_world::Sighting;
 
 /// Largest number of pictures.
 const MOST_VIEWS: usize = 5;

@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use crate::actions::memory::Held;
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::{navigate, plan};
-use crate::base::Pose;
-use crate::world::{SelfContact, Sighting, ik};
+use crate::memory::Held;
+use crate::operator::{Interrupt, Operator};
+use crate::{navigate, plan};
+use actcheck_data::Pose;
+use actcheck_world::{SelfContact, Sighting, ik};
 
 /// Distance between postures on a straight path of the hand. Unit: metres.
 const STEP_M: f64 = 0.02;

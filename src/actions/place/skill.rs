@@ -2,16 +2,17 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::actions::grip::{EMPTY_M, feels};
-use crate::actions::memory::{Held, furniture};
-use crate::actions::operator::{Interrupt, Operator};
-use crate::actions::perceive::{Survey, survey};
-use crate::actions::pick::failed;
-use crate::actions::place::touch::Touch;
-use crate::actions::place::{carry, spot};
-use crate::actions::plan::{self, Plan, Wanted};
-use crate::actions::{ActionCall, ActionReport, memory};
-use crate::world::Sighting;
+use crate::grip::{EMPTY_M, feels};
+use crate::memory::{Held, furniture};
+use crate::operator::{Interrupt, Operator};
+use crate::perceive::{Survey, survey};
+use crate::pick::failed;
+use crate::place::touch::Touch;
+use crate::place::{carry, spot};
+use crate::plan::{self, Plan, Wanted};
+use crate::{ActionCall, memory};
+use actcheck_data::ActionReport;
+use actcheck_world::Sighting;
 
 /// Designators of the object to place and of the target surface.
 const TARGET: &str = "pickObject";

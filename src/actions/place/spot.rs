@@ -2,12 +2,11 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 
-use crate::actions::PerceivedPlane;
-use crate::actions::grasp::{Approach, Grasp};
-use crate::actions::memory::Held;
-use crate::actions::route::length;
-use crate::base::Pose;
-use crate::world::Sighting;
+use crate::grasp::{Approach, Grasp};
+use crate::memory::Held;
+use crate::route::length;
+use actcheck_data::{PerceivedPlane, Pose};
+use actcheck_world::Sighting;
 
 /// Grid spacing of candidate spots. Unit: metres.
 const STEP_M: f64 = 0.03;

@@ -1,6 +1,6 @@
 //! Arm force sensing: the weight of the held object, and contact with a surface that carries it.
 
-use crate::actions::operator::Operator;
+use crate::operator::Operator;
 
 /// Drop of the carried force that counts as contact. Unit: newtons. Ten times the effect of braking and joint damping,
 /// and less than half of the force that makes an object slide between the fingers.

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::analysis::ColumnKind;
+use crate::ColumnKind;
 
 /// Description of a column.
 #[derive(Debug, Clone, Copy, Serialize)]

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use polars::io::parquet::write::BatchedWriter;
 use polars::prelude::{DataFrame, ParquetWriter, PolarsError};
 
-use crate::analysis::dataset::columns::TableSaid;
-use crate::analysis::tables::{Cell, series, unwritten};
-use crate::base::Diagnostics;
+use crate::dataset::columns::TableSaid;
+use crate::tables::{Cell, series, unwritten};
+use actcheck_base::Diagnostics;
 
 /// Approximate maximum number of rows in memory.
 const ROWS_AT_ONCE: usize = 100_000;

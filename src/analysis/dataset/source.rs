@@ -1,9 +1,10 @@
 //! Converts stored runs to rows of the dataset's tables.
 
-use crate::analysis::dataset::sheet::Sheet;
-use crate::analysis::tables::Cell;
-use crate::history::{ActionDetail, RunDetail, Trace};
-use crate::verdict::Outcome;
+use crate::dataset::sheet::Sheet;
+use crate::tables::Cell;
+use actcheck_base::Outcome;
+use actcheck_data::Trace;
+use actcheck_history::{ActionDetail, RunDetail};
 
 /// The tables with rows of runs.
 pub(super) struct Sheets {

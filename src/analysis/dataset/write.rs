@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use crate::analysis::dataset::columns::{ACTIONS, JOINTS, OBJECTS, PERCEPTS, ROBOT};
-use crate::analysis::dataset::sheet::Sheet;
-use crate::analysis::dataset::source::Sheets;
-use crate::analysis::tables::{outcomes_schema, unwritten};
-use crate::analysis::{Hierarchy, Mirror, TableFilter, export_parquet};
-use crate::base::Diagnostics;
-use crate::history::History;
+use crate::dataset::columns::{ACTIONS, JOINTS, OBJECTS, PERCEPTS, ROBOT};
+use crate::dataset::sheet::Sheet;
+use crate::dataset::source::Sheets;
+use crate::tables::{outcomes_schema, unwritten};
+use crate::{Hierarchy, Mirror, TableFilter, export_parquet};
+use actcheck_base::Diagnostics;
+use actcheck_history::History;
 
 /// A written dataset.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::findings::judged::{failed, outcomes};
-use crate::analysis::findings::scenes::Scenes;
-use crate::analysis::{OutcomeTable, TwoByTwo, benjamini_hochberg};
+use crate::findings::judged::{failed, outcomes};
+use crate::findings::scenes::Scenes;
+use crate::{OutcomeTable, TwoByTwo, benjamini_hochberg};
 
 /// A property of an action at a step.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::findings::judged::{JudgedProperty, failed, outcomes};
-use crate::analysis::{OutcomeTable, Repeated, consistency};
+use crate::findings::judged::{JudgedProperty, failed, outcomes};
+use crate::{OutcomeTable, Repeated, consistency};
 
 /// A scene with passed and failed runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub fn flaky_scenes(table: &OutcomeTable, of: &JudgedProperty) -> (Vec<FlakyScen
     }
     let found = consistency(&runs);
     let repeated = found.always_passed + found.always_failed + found.flaky.len() as u64;
-    let named = |flaky: &crate::analysis::Flaky| {
+    let named = |flaky: &crate::Flaky| {
         let (of, scene) = keys[flaky.scene as usize];
         FlakyScene { campaign: campaign.texts[of as usize].clone(), scene, passed: flaky.passed, of: flaky.of }
     };

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::OutcomeTable;
-use crate::verdict::{Counts, Outcome};
+use crate::OutcomeTable;
+use actcheck_base::Outcome;
+use actcheck_verdict::Counts;
 
 /// One property of one action in a table.
 #[derive(Debug, Clone, PartialEq, Eq)]

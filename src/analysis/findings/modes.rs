@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::analysis::findings::judged::{failed, outcomes};
-use crate::analysis::findings::scenes::Scenes;
-use crate::analysis::{FailureMode, OutcomeTable, wilson};
+use crate::findings::judged::{failed, outcomes};
+use crate::findings::scenes::Scenes;
+use crate::{FailureMode, OutcomeTable, wilson};
 
 /// Returns the failure modes of the runs of a table, most frequent first, then sorted by their properties.
 ///

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::{ColumnKind, Hierarchy, OutcomeTable, Parameter, TextColumn, Values, columns};
-use crate::base::names;
+use crate::{ColumnKind, Hierarchy, OutcomeTable, Parameter, TextColumn, Values, columns};
+use actcheck_base::names;
 
 /// Returns every scene parameter of the selected rows, and every designator that has exactly one value in each row.
 pub(super) fn parameters(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarchy) -> Vec<Parameter> {

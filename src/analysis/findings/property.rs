@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use crate::analysis::findings::judged::{JudgedProperty, failed, outcomes};
-use crate::analysis::findings::margins::{Quantiles, quantiles};
-use crate::analysis::findings::parameters::parameters;
-use crate::analysis::findings::scenes::Scenes;
-use crate::analysis::{Hierarchy, Interval, OutcomeTable, PatternOptions, Patterns, Subject, mine, wilson};
-use crate::base::digest_of;
-use crate::verdict::{Counts, Outcome};
+use crate::findings::judged::{JudgedProperty, failed, outcomes};
+use crate::findings::margins::{Quantiles, quantiles};
+use crate::findings::parameters::parameters;
+use crate::findings::scenes::Scenes;
+use crate::{Hierarchy, Interval, OutcomeTable, PatternOptions, Patterns, Subject, mine, wilson};
+use actcheck_base::{Outcome, digest_of};
+use actcheck_verdict::Counts;
 
 /// One of this many runs is held out to confirm the patterns of the others.
 const HELD_OUT_EVERY: u64 = 3;

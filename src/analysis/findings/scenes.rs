@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::analysis::{OutcomeTable, SceneRuns};
+use crate::{OutcomeTable, SceneRuns};
 
 /// The scenes of a table's runs.
 pub(super) struct Scenes<'a> {

@@ -1,8 +1,8 @@
 //! Failure rate of a property over campaigns, with change points.
 
-use crate::analysis::findings::judged::{JudgedProperty, failed, outcomes};
-use crate::analysis::findings::scenes::Scenes;
-use crate::analysis::{Interval, OutcomeTable, TwoByTwo, wilson};
+use crate::findings::judged::{JudgedProperty, failed, outcomes};
+use crate::findings::scenes::Scenes;
+use crate::{Interval, OutcomeTable, TwoByTwo, wilson};
 
 /// A campaign.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! Failure rates by one or two parameters, for heat maps.
 
-use crate::analysis::{Interval, Parameter, Subject, Values, simplest_between, wilson};
+use crate::{Interval, Parameter, Subject, Values, simplest_between, wilson};
 
 /// Maximum number of cells along a numeric axis.
 const MOST_CELLS: usize = 8;

@@ -1,8 +1,8 @@
 //! Exhaustive search for the box of cells with the highest score.
 
-use crate::analysis::patterns::Condition;
-use crate::analysis::patterns::cells::{Axis, Choices};
-use crate::analysis::patterns::likelihood::{Count, Likelihood, one};
+use crate::patterns::Condition;
+use crate::patterns::cells::{Axis, Choices};
+use crate::patterns::likelihood::{Count, Likelihood, one};
 
 /// Summing the boxes of three parameters costs as much as counting this many runs. (Measured with eight cells each.)
 const BOXES_IN_RUNS: u64 = 50_000;

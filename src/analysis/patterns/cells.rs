@@ -1,7 +1,7 @@
 //! Discretisation of parameters into cells, and the conditions that are unions of cells.
 
-use crate::analysis::patterns::likelihood::Count;
-use crate::analysis::patterns::{Condition, Parameter, Subject, Values, simplest_between};
+use crate::patterns::likelihood::Count;
+use crate::patterns::{Condition, Parameter, Subject, Values, simplest_between};
 
 /// Parameters with more kinds than this are ignored: a unique name for each scene makes no pattern.
 const MOST_KINDS: usize = 64;

@@ -1,6 +1,6 @@
 //! A condition on one parameter.
 
-use crate::analysis::patterns::{Subject, Values};
+use crate::patterns::{Subject, Values};
 
 /// A condition on one parameter of a scene.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,8 @@
 //! Confirmation of patterns on held-out runs.
 
-use crate::analysis::patterns::condition::all_hold;
-use crate::analysis::patterns::{Condition, Subject};
-use crate::analysis::{TwoByTwo, holm};
+use crate::patterns::condition::all_hold;
+use crate::patterns::{Condition, Subject};
+use crate::{TwoByTwo, holm};
 
 /// Counts failures within and outside a pattern, among the selected runs.
 pub(super) fn count(subject: &Subject, within: &[bool], among: impl Fn(usize) -> bool) -> TwoByTwo {

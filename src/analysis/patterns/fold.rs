@@ -1,11 +1,11 @@
 //! Simplification of patterns.
 
-use crate::analysis::TwoByTwo;
-use crate::analysis::patterns::Condition;
-use crate::analysis::patterns::cells::Axis;
-use crate::analysis::patterns::condition::all_hold;
-use crate::analysis::patterns::confirm::count;
-use crate::analysis::patterns::refine::Field;
+use crate::TwoByTwo;
+use crate::patterns::Condition;
+use crate::patterns::cells::Axis;
+use crate::patterns::condition::all_hold;
+use crate::patterns::confirm::count;
+use crate::patterns::refine::Field;
 
 /// Removes, one by one, conditions and ends of ranges that are not significant: those whose excluded runs do not fail
 /// significantly less, corrected for the number of alternative conditions. The result is one of the boxes tried.

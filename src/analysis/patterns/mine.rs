@@ -1,15 +1,15 @@
 //! Sequential covering: finds the strongest pattern, then the strongest among the runs that it does not explain, and so
 //! on.
 
-use crate::analysis::patterns::boxes::Runs;
-use crate::analysis::patterns::cells::{Axis, axes};
-use crate::analysis::patterns::condition::all_hold;
-use crate::analysis::patterns::confirm::{confirm, count};
-use crate::analysis::patterns::fold::fold;
-use crate::analysis::patterns::likelihood::{Likelihood, one};
-use crate::analysis::patterns::refine::{Field, refine};
-use crate::analysis::patterns::{Condition, Subject};
-use crate::analysis::{Interval, TwoByTwo, benjamini_hochberg, wilson};
+use crate::patterns::boxes::Runs;
+use crate::patterns::cells::{Axis, axes};
+use crate::patterns::condition::all_hold;
+use crate::patterns::confirm::{confirm, count};
+use crate::patterns::fold::fold;
+use crate::patterns::likelihood::{Likelihood, one};
+use crate::patterns::refine::{Field, refine};
+use crate::patterns::{Condition, Subject};
+use crate::{Interval, TwoByTwo, benjamini_hochberg, wilson};
 
 /// Minimum number of failures and of passes. With fewer, no pattern can be significant.
 const LEAST_OF_EACH: u64 = 4;

@@ -2,10 +2,10 @@
 
 use std::ops::RangeInclusive;
 
-use crate::analysis::patterns::cells::{Axis, Choices, Cut};
-use crate::analysis::patterns::condition::all_hold;
-use crate::analysis::patterns::likelihood::{Count, Likelihood, one};
-use crate::analysis::patterns::{Condition, Subject, Values, simplest_between};
+use crate::patterns::cells::{Axis, Choices, Cut};
+use crate::patterns::condition::all_hold;
+use crate::patterns::likelihood::{Count, Likelihood, one};
+use crate::patterns::{Condition, Subject, Values, simplest_between};
 
 /// Bounds depend on each other, but converge quickly.
 const MOST_PASSES: usize = 4;

@@ -2,7 +2,7 @@
 
 /// A value, or `None` if it is missing.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::analysis) enum Cell {
+pub(crate) enum Cell {
     Text(Option<String>),
     Number(Option<f64>),
     Count(Option<i64>),

@@ -3,10 +3,11 @@
 use serde::Serialize;
 use serde_json::json;
 
-use crate::analysis::tables::cell::Cell;
-use crate::analysis::tables::place::{Place, angle};
-use crate::base::names;
-use crate::history::{ObjectDetail, Role};
+use crate::tables::cell::Cell;
+use crate::tables::place::{Place, angle};
+use actcheck_base::names;
+use actcheck_data::Role;
+use actcheck_history::ObjectDetail;
 
 /// Type of a column's values. Any value may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

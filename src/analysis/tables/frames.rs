@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use polars::prelude::{Column as Series, DataFrame, NamedFrom as _, PolarsError, Series as Values};
 
-use crate::analysis::tables::cell::Cell;
-use crate::analysis::tables::columns::{ColumnKind, columns};
-use crate::analysis::tables::place::{ActionScene, Hierarchy, Place};
-use crate::base::names;
-use crate::history::RunDetail;
+use crate::tables::cell::Cell;
+use crate::tables::columns::{ColumnKind, columns};
+use crate::tables::place::{ActionScene, Hierarchy, Place};
+use actcheck_base::names;
+use actcheck_history::RunDetail;
 
 /// Columns of categories, with the columns of their superclasses.
 const KINDS: [(&str, &str); 3] = [
@@ -49,7 +49,7 @@ impl Rows {
 }
 
 /// Converts cells to a column of a data frame. Cells of another type become missing.
-pub(in crate::analysis) fn series(name: &str, kind: ColumnKind, cells: Vec<Cell>) -> Series {
+pub(crate) fn series(name: &str, kind: ColumnKind, cells: Vec<Cell>) -> Series {
     let name = name.into();
     let cells = cells.into_iter();
     match kind {

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _};
 
-use crate::analysis::tables::columns::columns;
-use crate::analysis::tables::frames::Rows;
-use crate::base::{Diagnostic, Diagnostics, digest_of};
-use crate::history::{History, RunDetail};
+use crate::tables::columns::columns;
+use crate::tables::frames::Rows;
+use actcheck_base::{Diagnostic, Diagnostics, digest_of};
+use actcheck_history::{History, RunDetail};
 
 /// Maximum number of runs in a file, and so in memory at once.
 const RUNS_IN_A_FILE: usize = 2_000;
@@ -190,7 +190,7 @@ pub(super) fn unread(file: &Path, error: &PolarsError) -> Diagnostics {
 }
 
 /// Creates the diagnostic for a table that can't be written.
-pub(in crate::analysis) fn unwritten(file: &Path, error: &impl ToString) -> Diagnostics {
+pub(crate) fn unwritten(file: &Path, error: &impl ToString) -> Diagnostics {
     Diagnostic::error("A001", format!("the table `{}` can't be written: {}", file.display(), plain(error)))
         .help("check the folder's permissions and the free disk space")
         .into()

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use polars::prelude::{BooleanChunked, DataFrame, DataType, NewChunkedArray as _, PolarsError};
 
-use crate::analysis::tables::columns::{ColumnKind, columns};
-use crate::analysis::tables::mirror::{Mirror, read, unread};
-use crate::base::Diagnostics;
+use crate::tables::columns::{ColumnKind, columns};
+use crate::tables::mirror::{Mirror, read, unread};
+use actcheck_base::Diagnostics;
 
 /// Selects rows of the table. The default is all rows.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub struct TableFilter {
 }
 
 impl TableFilter {
-    pub(in crate::analysis) fn takes_campaign(&self, campaign: &str) -> bool {
+    pub(crate) fn takes_campaign(&self, campaign: &str) -> bool {
         self.campaigns.as_ref().is_none_or(|wanted| wanted.iter().any(|wanted| wanted == campaign))
     }
 

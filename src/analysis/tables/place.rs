@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use crate::history::{ActionDetail, ObjectDetail, Role, RunDetail};
-use crate::verdict::Judgement;
+use actcheck_base::Judgement;
+use actcheck_data::Role;
+use actcheck_history::{ActionDetail, ObjectDetail, RunDetail};
 
 /// Maps each class (an IRI) to the local names of all its superclasses, nearest first.
 pub type Hierarchy = BTreeMap<String, Vec<String>>;

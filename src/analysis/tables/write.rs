@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use polars::prelude::{CsvWriter, DataFrame, ParquetWriter, PolarsError, SerWriter as _};
 use serde_json::{Value, json};
 
-use crate::analysis::tables::columns::{ColumnKind, columns};
-use crate::analysis::tables::frames::{Rows, kinds_columns, with_kinds};
-use crate::analysis::tables::mirror::{Mirror, read, unread, unwritten};
-use crate::analysis::tables::{Hierarchy, TableFilter};
-use crate::base::Diagnostics;
+use crate::tables::columns::{ColumnKind, columns};
+use crate::tables::frames::{Rows, kinds_columns, with_kinds};
+use crate::tables::mirror::{Mirror, read, unread, unwritten};
+use crate::tables::{Hierarchy, TableFilter};
+use actcheck_base::Diagnostics;
 
 /// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed. Returns the files and the number
 /// of rows.
@@ -72,7 +72,7 @@ fn export(
 }
 
 /// Returns the description of every column.
-pub(in crate::analysis) fn schema() -> Value {
+pub(crate) fn schema() -> Value {
     let mut described: Vec<Value> = columns().iter().map(|column| json!(column)).collect();
     described.extend(kinds_columns().map(|(name, description)| {
         json!({ "name": name, "type": ColumnKind::Text, "unit": "", "parameter": true, "description": description })

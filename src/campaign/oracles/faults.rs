@@ -1,6 +1,6 @@
 //! The table of faults.
 
-use crate::actions::{Accident, Defect, Moment, Sabotage};
+use actcheck_actions::{Accident, Defect, Moment, Sabotage};
 
 /// A fault that properties should detect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

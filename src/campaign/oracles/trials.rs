@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use crate::actions::Saboteur;
-use crate::base::{Choice, Choices, Diagnostic, Diagnostics};
-use crate::campaign::oracles::Fault;
-use crate::campaign::{Env, Manner, Planned, run_line, run_sabotaged};
-use crate::history::{RunRecord, RunStatus};
-use crate::verdict::{Judgement, Outcome};
+use crate::oracles::Fault;
+use crate::{Env, Manner, Planned, run_line, run_sabotaged};
+use actcheck_actions::Saboteur;
+use actcheck_base::{Diagnostic, Diagnostics, Judgement, Outcome};
+use actcheck_data::{Choice, Choices};
+use actcheck_history::{RunRecord, RunStatus};
 
 /// Maximum number of scenes drawn for one run, as in a campaign; then the run is left out.
 const SCENES_PER_RUN: u64 = 50;

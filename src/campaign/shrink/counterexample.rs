@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::base::{Choice, ChoiceKind, Choices, Diagnostic, Diagnostics, did_you_mean, names};
-use crate::campaign::case::end_of;
-use crate::campaign::line::TEST_LEFT_OUT;
-use crate::campaign::shrink::list::{accepted_places, has};
-use crate::campaign::shrink::{Explained, Limits, Plan, Search, Tried, explain, reduce};
-use crate::campaign::{Env, Manner, run_line};
-use crate::history::{History, RunRecord, RunStatus};
-use crate::scenario::Role;
-use crate::verdict::Outcome;
+use crate::case::end_of;
+use crate::line::TEST_LEFT_OUT;
+use crate::shrink::list::{accepted_places, has};
+use crate::shrink::{Explained, Limits, Plan, Search, Tried, explain, reduce};
+use crate::{Env, Manner, run_line};
+use actcheck_base::{Diagnostic, Diagnostics, Outcome, did_you_mean, names};
+use actcheck_data::{Choice, ChoiceKind, Choices, Role};
+use actcheck_history::{History, RunRecord, RunStatus};
 
 /// Prefix of the choices of sensor noise.
 const NOISE: &str = "sense.";
@@ -122,7 +121,7 @@ pub fn shrink(
 }
 
 /// Name prefix of campaigns that hold a shrunk run.
-pub(in crate::campaign) const SHRUNK: &str = "shrunk ";
+pub(crate) const SHRUNK: &str = "shrunk ";
 
 /// Runs the shrunk scene again and stores it in the history, in a campaign of its own. Returns the run, which names the
 /// run it was shrunk from.
@@ -136,7 +135,7 @@ pub fn keep(
     shrunk: &Shrunk,
     manner: &Manner,
 ) -> Result<RunRecord, Diagnostics> {
-    let id = history.next_campaign_id(&crate::base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
+    let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     let mut campaign = env.record(id.clone(), format!("{SHRUNK}{original}"), (manner.clock.now)());
     (campaign.planned_runs, campaign.repeat) = (1, 1);
     campaign.shards.clear();

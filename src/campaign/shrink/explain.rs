@@ -1,8 +1,8 @@
 //! Explains a failing list: the choices that matter, the failing range of each, and the nearest passing list.
 
-use crate::base::{Choice, ChoiceKind};
-use crate::campaign::shrink::list::{ids, is_nominal, spread, with_value};
-use crate::campaign::shrink::{Id, Plan, Search};
+use crate::shrink::list::{ids, is_nominal, spread, with_value};
+use crate::shrink::{Id, Plan, Search};
+use actcheck_data::{Choice, ChoiceKind};
 
 /// Bisections between a failing and a passing value: the gap shrinks to an eighth.
 const HALVINGS: usize = 3;

@@ -1,6 +1,6 @@
 //! Edits lists of named choices.
 
-use crate::base::{Choice, ChoiceKind};
+use actcheck_data::{Choice, ChoiceKind};
 
 /// Identifies a choice of a list: names may repeat.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -74,7 +74,7 @@ pub(super) fn spread(kind: &ChoiceKind) -> f64 {
 }
 
 /// Drops the rejected tries of placements: only the last one, which was accepted, stays.
-pub(in crate::campaign) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
+pub(crate) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
     // Sensor noise is drawn repeatedly, and every draw counts.
     let placed = |name: &str| !name.starts_with("sense.");
     let kept = list

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::{Choice, ChoiceKind};
-use crate::campaign::shrink::list::{find, has, ids, is_nominal, spread, with_choice, with_nominal, with_value};
-use crate::campaign::shrink::{Id, Search};
+use crate::shrink::list::{find, has, ids, is_nominal, spread, with_choice, with_nominal, with_value};
+use crate::shrink::{Id, Search};
+use actcheck_data::{Choice, ChoiceKind};
 
 /// Maximum number of halvings of a value towards nominal; below a quarter, further tries are not worthwhile.
 const HALVINGS: usize = 2;

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::ThreadPool;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
-use crate::base::Choice;
+use actcheck_data::Choice;
 
 /// The result of a try.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,9 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
-use crate::base::{Pose, names};
-use crate::config::shape::bounds;
-use crate::config::{Inertia, ObjectModel, Part, Shape, Surface};
+use actcheck_base::names;
+use actcheck_data::{Inertia, ObjectModel, Part, Pose, Shape, Surface, bounds};
 
 /// Density of a body without a mass: that of water, SDF's default. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;

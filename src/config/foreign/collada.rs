@@ -4,10 +4,10 @@
 
 use nalgebra::{Matrix4, Point3, Rotation3, Unit, Vector3};
 
-use crate::base::{Diagnostic, Diagnostics, Source};
-use crate::config::foreign::mesh_file::{MOST_TRIANGLES, checked};
-use crate::config::foreign::xml::{self, Node};
-use crate::config::mesh::Mesh;
+use crate::foreign::mesh_file::{MOST_TRIANGLES, checked};
+use crate::foreign::xml::{self, Node};
+use actcheck_base::{Diagnostic, Diagnostics, Source};
+use actcheck_data::Mesh;
 
 /// Limits on the depth and the number of nodes; only nodes that instance each other in a cycle exceed them.
 const DEEPEST: usize = 64;

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Files};
-use crate::config::ObjectModel;
-use crate::config::foreign::lookup::Lookup;
-use crate::config::foreign::xml::{self, Reader};
-use crate::config::foreign::{sdf, urdf};
+use crate::foreign::lookup::Lookup;
+use crate::foreign::xml::{self, Reader};
+use crate::foreign::{sdf, urdf};
+use actcheck_base::{Diagnostic, Diagnostics, Files};
+use actcheck_data::ObjectModel;
 
 /// A model found in a folder.
 #[derive(Debug, Clone)]

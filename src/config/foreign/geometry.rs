@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics, Digest};
-use crate::config::foreign::lookup::Lookup;
-use crate::config::foreign::mesh_file;
-use crate::config::foreign::xml::{self, Bound, Node, Reader};
-use crate::config::{Mesh, Shape};
+use crate::foreign::lookup::Lookup;
+use crate::foreign::mesh_file;
+use crate::foreign::xml::{self, Bound, Node, Reader};
+use actcheck_base::{Diagnostic, Diagnostics, Digest};
+use actcheck_data::{Mesh, Shape};
 
 /// Reads the shapes of one file.
 pub(crate) struct Shapes<'a> {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::Files;
+use actcheck_base::Files;
 
 /// Folders in which `model://NAME/…` and `package://NAME/…` are looked up, in order.
 pub(crate) struct Lookup<'a> {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::base::{Diagnostic, Diagnostics, Files, Source};
-use crate::config::foreign::collada;
-use crate::config::mesh::Mesh;
+use crate::foreign::collada;
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source};
+use actcheck_data::Mesh;
 
 /// Largest number of triangles: more than any collision shape needs, and a larger file could exhaust memory.
 pub(crate) const MOST_TRIANGLES: usize = 2_000_000;

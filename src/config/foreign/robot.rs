@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::base::{Diagnostics, Digest, Source};
-use crate::config::Shape;
-use crate::config::foreign::geometry::Shapes;
-use crate::config::foreign::lookup::Lookup;
-use crate::config::foreign::robot_tree::{self, Tree};
-use crate::config::foreign::xml::{self, Node, Reader};
+use crate::foreign::geometry::Shapes;
+use crate::foreign::lookup::Lookup;
+use crate::foreign::robot_tree::{self, Tree};
+use crate::foreign::xml::{self, Node, Reader};
+use actcheck_base::{Diagnostics, Digest, Source};
+use actcheck_data::Shape;
 
 /// The parts of a URDF that a profile needs.
 pub(crate) struct RobotText {

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::did_you_mean;
-use crate::config::foreign::xml::{self, Bound, Node, Reader};
+use crate::foreign::xml::{self, Bound, Node, Reader};
+use actcheck_base::did_you_mean;
 
 /// Supported joint types.
 const KINDS: [&str; 4] = ["fixed", "prismatic", "revolute", "continuous"];

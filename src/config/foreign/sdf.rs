@@ -4,12 +4,12 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3};
 
-use crate::base::{Diagnostics, Digest, Pose, Source};
-use crate::config::foreign::body::{Body, Mass, is_possible};
-use crate::config::foreign::geometry::{Shapes, has_volume};
-use crate::config::foreign::lookup::Lookup;
-use crate::config::foreign::xml::{self, Bound, Node, Reader};
-use crate::config::{Part, Shape};
+use crate::foreign::body::{Body, Mass, is_possible};
+use crate::foreign::geometry::{Shapes, has_volume};
+use crate::foreign::lookup::Lookup;
+use crate::foreign::xml::{self, Bound, Node, Reader};
+use actcheck_base::{Diagnostics, Digest, Source};
+use actcheck_data::{Part, Pose, Shape};
 
 /// Supported minor versions of SDF 1.
 const VERSIONS: std::ops::RangeInclusive<u32> = 4..=11;

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3};
 
-use crate::base::{Diagnostics, Digest, Pose, Source};
-use crate::config::foreign::body::{Body, Mass};
-use crate::config::foreign::geometry::{Shapes, has_volume};
-use crate::config::foreign::lookup::Lookup;
-use crate::config::foreign::sdf::{SdfModel, possible};
-use crate::config::foreign::xml::{self, Bound, Node, Reader};
-use crate::config::{Part, Shape};
+use crate::foreign::body::{Body, Mass};
+use crate::foreign::geometry::{Shapes, has_volume};
+use crate::foreign::lookup::Lookup;
+use crate::foreign::sdf::{SdfModel, possible};
+use crate::foreign::xml::{self, Bound, Node, Reader};
+use actcheck_base::{Diagnostics, Digest, Source};
+use actcheck_data::{Part, Pose, Shape};
 
 /// Longest chain of links; a longer one is a cycle.
 const LONGEST_CHAIN: usize = 256;

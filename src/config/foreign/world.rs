@@ -2,10 +2,11 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::base::{Diagnostics, Pose, Source, did_you_mean, digest_of};
-use crate::config::foreign::sdf::{check_version, pose};
-use crate::config::foreign::xml::{self, Node, Reader};
-use crate::config::{Furniture, Location, ObjectModel, WorldMap};
+use crate::foreign::sdf::{check_version, pose};
+use crate::foreign::xml::{self, Node, Reader};
+use crate::{Furniture, WorldMap};
+use actcheck_base::{Diagnostics, Source, did_you_mean, digest_of};
+use actcheck_data::{Location, ObjectModel, Pose};
 
 /// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
 const WITHOUT_BEARING: [&str; 16] = [

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
 
 /// An element of a document.
 pub(crate) type Node<'a> = roxmltree::Node<'a, 'a>;

@@ -6,15 +6,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use oxigraph::model::{GraphName, GraphNameRef, Literal, NamedNode, Quad};
 use oxigraph::store::{StorageError, Store};
 
-use crate::base::{Diagnostic, Diagnostics, write_whole};
-use crate::history::merge::copy::about;
-use crate::history::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
-use crate::history::merge::renames::Renames;
-use crate::history::read::text_of;
-use crate::history::statements::{Statements, iri, time};
-use crate::history::write_campaign::{self, campaign_node};
-use crate::history::write_run::run_node;
-use crate::history::{History, fault};
+use crate::merge::copy::about;
+use crate::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
+use crate::merge::renames::Renames;
+use crate::read::text_of;
+use crate::statements::{Statements, iri, time};
+use crate::write_campaign::{self, campaign_node};
+use crate::write_run::run_node;
+use crate::{History, fault};
+use actcheck_base::{Diagnostic, Diagnostics, write_whole};
 
 /// The result of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

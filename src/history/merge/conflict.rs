@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::base::Diagnostic;
-use crate::history::CampaignRecord;
-use crate::history::merge::survey::Found;
+use crate::CampaignRecord;
+use crate::merge::survey::Found;
+use actcheck_base::Diagnostic;
 
 /// Maximum number of run numbers in one message.
 const TOLD: usize = 8;

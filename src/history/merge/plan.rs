@@ -3,12 +3,12 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostic, Diagnostics, Shard, did_you_mean};
-use crate::history::merge::conflict;
-use crate::history::merge::survey::{Found, FoundRun, survey};
-use crate::history::store::campaign_id;
-use crate::history::{CampaignEnd, History, RunStatus};
-use crate::verdict::{Counts, Outcome, mean};
+use crate::merge::conflict;
+use crate::merge::survey::{Found, FoundRun, survey};
+use crate::store::campaign_id;
+use crate::{CampaignEnd, History, RunStatus};
+use actcheck_base::{Diagnostic, Diagnostics, Outcome, Shard, did_you_mean};
+use actcheck_verdict::{Counts, mean};
 
 /// Options of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use oxigraph::model::{BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term};
 
-use crate::base::names;
-use crate::history::read::text_of;
-use crate::history::statements::iri;
-use crate::history::write_run::unique;
+use crate::read::text_of;
+use crate::statements::iri;
+use crate::write_run::unique;
+use actcheck_base::names;
 
 /// New ids of the campaigns of one history.
 #[derive(Debug, Clone, Default)]

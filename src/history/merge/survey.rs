@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Diagnostics, Digest};
-use crate::history::read::Node;
-use crate::history::write_campaign::campaign_node;
-use crate::history::write_run::run_node;
-use crate::history::{CampaignRecord, CampaignRow, History, OutcomeRow, RunFilter, RunRow, lists};
-use crate::verdict::Counts;
+use crate::read::Node;
+use crate::write_campaign::campaign_node;
+use crate::write_run::run_node;
+use crate::{CampaignRecord, CampaignRow, History, OutcomeRow, RunFilter, RunRow, lists};
+use actcheck_base::{Diagnostics, Digest};
+use actcheck_verdict::Counts;
 
 /// A campaign of one of the histories.
 #[derive(Debug, Clone)]

@@ -6,11 +6,11 @@
 
 use serde_json::{Value, json};
 
-use crate::base::{digest_of, names};
-use crate::history::{ActionDetail, Role, RunDetail};
-use crate::report::formats::identity::{case_name, scene};
-use crate::report::run_text;
-use crate::verdict::{Judgement, Outcome};
+use crate::formats::identity::{case_name, scene};
+use crate::run_text;
+use actcheck_base::{Judgement, Outcome, digest_of, names};
+use actcheck_data::Role;
+use actcheck_history::{ActionDetail, RunDetail};
 
 /// Names of the files in the results folder that do not belong to a result.
 pub const RESULTS_COMMON_FILES: [&str; 2] = ["categories.json", "environment.properties"];

@@ -2,9 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::base::{Term, names};
-use crate::history::{ActionDetail, CampaignRow, RdfSyntax, RunDetail, rdf_text};
-use crate::verdict::Judgement;
+use actcheck_base::{Judgement, Term, names};
+use actcheck_history::{ActionDetail, CampaignRow, RdfSyntax, RunDetail, rdf_text};
 
 /// Namespace of the versions of this program.
 const PROGRAM: &str = "https://w3id.org/actcheck/program/";

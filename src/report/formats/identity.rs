@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use crate::base::{digest_of, names};
-use crate::history::{ActionDetail, RunDetail};
+use actcheck_base::{digest_of, names};
+use actcheck_history::{ActionDetail, RunDetail};
 
 /// Number of characters of a scene's name: enough for a million scenes without collisions, and short enough to read.
 const SCENE_LETTERS: usize = 12;

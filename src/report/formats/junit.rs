@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use crate::base::names;
-use crate::history::{ActionDetail, RunDetail};
-use crate::verdict::{Counts, Judgement, Outcome};
+use actcheck_base::{Judgement, Outcome, names};
+use actcheck_history::{ActionDetail, RunDetail};
+use actcheck_verdict::Counts;
 
 /// One suite for each campaign and test, one case for each property of each action of each run.
 ///

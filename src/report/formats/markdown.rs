@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use crate::base::names;
-use crate::history::{CampaignRow, RunDetail, RunStatus, SkillRecord};
-use crate::verdict::{Counts, Judgement, Outcome, wilson};
+use actcheck_base::{Judgement, Outcome, names};
+use actcheck_history::{CampaignRow, RunDetail, RunStatus, SkillRecord};
+use actcheck_verdict::{Counts, wilson};
 
 /// Maximum number of failed runs that are listed; the rest are counted.
 const MOST_FAILURES: usize = 10;

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::base::names;
-use crate::history::{RunDetail, RunStatus};
-use crate::report::formats::identity::scene;
-use crate::report::run_json;
-use crate::verdict::{Counts, Judgement, Outcome};
+use crate::formats::identity::scene;
+use crate::run_json;
+use actcheck_base::{Judgement, Outcome, names};
+use actcheck_history::{RunDetail, RunStatus};
+use actcheck_verdict::Counts;
 
 /// Returns the observation of a run. `campaign_started` is the start of its campaign (RFC 3339), by which viewers group
 /// observations.

@@ -4,11 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use crate::analysis::{ColumnKind, OutcomeTable, columns};
-use crate::base::names;
-use crate::report::FindingsSummary;
-use crate::report::html::pack::Pack;
-use crate::verdict::Outcome;
+use crate::FindingsSummary;
+use crate::html::pack::Pack;
+use actcheck_analysis::{ColumnKind, OutcomeTable, columns};
+use actcheck_base::{Outcome, names};
 
 /// Columns that a page needs in addition to those of the findings and the scene parameters.
 pub const HTML_COLUMNS: [&str; 9] = [

@@ -2,12 +2,12 @@
 
 use serde_json::{Value, json};
 
-use crate::base::{Pose, names};
-use crate::history::{RunDetail, Trace};
-use crate::report::contacts::strongest;
-use crate::report::html::Explained;
-use crate::report::moment::decided;
-use crate::verdict::Outcome;
+use crate::contacts::strongest;
+use crate::html::Explained;
+use crate::moment::decided;
+use actcheck_base::{Outcome, names};
+use actcheck_data::{Pose, Trace};
+use actcheck_history::RunDetail;
 
 /// Describes an action, given its index in the run.
 pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explained: &[Explained]) -> Value {

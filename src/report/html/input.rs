@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::OutcomeTable;
-use crate::history::CampaignRow;
-use crate::report::FindingsSummary;
-use crate::report::html::Replays;
+use crate::FindingsSummary;
+use crate::html::Replays;
+use actcheck_analysis::OutcomeTable;
+use actcheck_history::CampaignRow;
 
 /// The content of a page.
 #[derive(Debug)]
@@ -16,7 +16,7 @@ pub struct HtmlReport<'a> {
     pub made: &'a str,
     /// Findings of the analysis; their properties are the ones displayed.
     pub findings: &'a FindingsSummary,
-    /// The outcomes, with [`HTML_COLUMNS`](crate::report::HTML_COLUMNS) and the parameters of scenes.
+    /// The outcomes, with [`HTML_COLUMNS`](crate::HTML_COLUMNS) and the parameters of scenes.
     pub table: &'a OutcomeTable,
     /// All campaigns of the history, in order of start.
     pub campaigns: &'a [CampaignRow],

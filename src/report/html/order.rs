@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::analysis::OutcomeTable;
-use crate::report::FindingsSummary;
-use crate::verdict::Outcome;
+use crate::FindingsSummary;
+use actcheck_analysis::OutcomeTable;
+use actcheck_base::Outcome;
 
 /// Returns run ids in the order in which they should be included as replays. Failed runs come first, taken in turn from
 /// each failure mode and each property, so that the first few cover all of them. Then come runs that did not complete,

@@ -4,11 +4,11 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use sha2::{Digest as _, Sha256};
 
-use crate::report::html::HtmlReport;
-use crate::report::html::columns::{Slots, runs};
-use crate::report::html::pack::packed;
-use crate::report::html::scripts::{SCRIPT, SHELL, STYLE, THREE};
-use crate::report::html::summary::summary;
+use crate::html::HtmlReport;
+use crate::html::columns::{Slots, runs};
+use crate::html::pack::packed;
+use crate::html::scripts::{SCRIPT, SHELL, STYLE, THREE};
+use crate::html::summary::summary;
 
 /// Returns the report as one page that loads no external resources.
 ///

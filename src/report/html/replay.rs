@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::base::names;
-use crate::history::{BodyState, Form, Role, RunDetail, Trace};
-use crate::report::html::Explained;
-use crate::report::html::events::action;
-use crate::report::html::pack::{Pack, packed};
-use crate::report::html::shapes::Shapes;
+use crate::html::Explained;
+use crate::html::events::action;
+use crate::html::pack::{Pack, packed};
+use crate::html::shapes::Shapes;
+use actcheck_base::names;
+use actcheck_data::{BodyState, Form, Role, Trace};
+use actcheck_history::RunDetail;
 
 /// Smallest quantisation step of positions, which is the resolution of traces. The step is larger if a run spans more
 /// than 6.5 m. Unit: metres.

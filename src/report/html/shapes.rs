@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::history::{BodyState, Form, Part, Shape};
+use actcheck_data::{BodyState, Form, Part, Shape};
 
 /// Distinct shapes, in order of first use.
 #[derive(Debug, Default)]

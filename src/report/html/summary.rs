@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::analysis::score_interval;
-use crate::base::names;
-use crate::history::{CampaignRow, SkillRecord};
-use crate::report::findings_json;
-use crate::report::html::HtmlReport;
-use crate::report::html::columns::{Slot, Slots};
-use crate::report::html::pack::Pack;
-use crate::verdict::{Outcome, mean, wilson};
+use crate::findings_json;
+use crate::html::HtmlReport;
+use crate::html::columns::{Slot, Slots};
+use crate::html::pack::Pack;
+use actcheck_analysis::score_interval;
+use actcheck_base::{Outcome, names};
+use actcheck_history::{CampaignRow, SkillRecord};
+use actcheck_verdict::{mean, wilson};
 
 /// Packs findings, campaigns and properties. Runs are referred to by index.
 pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::names;
-use crate::history::{ActionDetail, Role, RunDetail};
-use crate::report::picture::drawing::{Drawing, Paint, Rect, Style, Words};
-use crate::report::picture::{font, paint};
-use crate::verdict::Outcome;
+use crate::picture::drawing::{Drawing, Paint, Rect, Style, Words};
+use crate::picture::{font, paint};
+use actcheck_base::{Outcome, names};
+use actcheck_data::Role;
+use actcheck_history::{ActionDetail, RunDetail};
 
 /// Maximum number of failures listed; a picture is not a report.
 const MOST_FAILURES: usize = 8;

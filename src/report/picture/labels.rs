@@ -1,8 +1,8 @@
 //! Label placement: close to the labelled object, without overlaps between labels.
 
-use crate::report::picture::drawing::{Drawing, Line, Paint, Rect, Words};
-use crate::report::picture::font;
-use crate::report::picture::paint;
+use crate::picture::drawing::{Drawing, Line, Paint, Rect, Words};
+use crate::picture::font;
+use crate::picture::paint;
 
 /// Margin around a label. Unit: pixels.
 const GAP_PX: f64 = 2.0;

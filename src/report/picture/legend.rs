@@ -1,10 +1,10 @@
 //! The legend of a picture. It only has the colours and lines that occur.
 
-use crate::history::Role;
-use crate::report::picture::drawing::{Drawing, Paint, Rect, Style, Words};
-use crate::report::picture::panel::Material;
-use crate::report::picture::paths::Mover;
-use crate::report::picture::{font, paint};
+use crate::picture::drawing::{Drawing, Paint, Rect, Style, Words};
+use crate::picture::panel::Material;
+use crate::picture::paths::Mover;
+use crate::picture::{font, paint};
+use actcheck_data::Role;
 
 /// Font size. Unit: pixels.
 const SIZE_PX: f64 = 11.5;

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::history::{Part, Shape};
-use crate::report::picture::window::Window;
+use crate::picture::window::Window;
+use actcheck_data::{Part, Shape};
 
 /// Number of corners that approximate a circle.
 const AROUND: u32 = 28;
@@ -58,7 +58,7 @@ fn rings(circles: impl IntoIterator<Item = (f64, f64)>) -> Vec<Point3<f64>> {
 }
 
 /// Convex hull of points in a plane, counter-clockwise if y is to the left of x (Andrew's monotone chain algorithm).
-pub(in crate::report) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+pub(crate) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.retain(|point| point.iter().all(|value| value.is_finite()));
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();

@@ -1,8 +1,8 @@
 //! The colours of pictures, safe for red-green colour blindness.
 
-use crate::history::Role;
-use crate::report::picture::drawing::{Line, Paint, Style};
-use crate::report::picture::paths::Mover;
+use crate::picture::drawing::{Line, Paint, Style};
+use crate::picture::paths::Mover;
+use actcheck_data::Role;
 
 /// Text and thin lines.
 pub(super) const INK: u32 = 0x1c_2430;

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use crate::base::names;
-use crate::history::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
-use crate::report::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
-use crate::report::picture::labels::{Label, Labels};
-use crate::report::picture::outline::silhouette;
-use crate::report::picture::paths::{Mover, Way, pose_at};
-use crate::report::picture::window::{Bounds, Window};
-use crate::report::picture::{font, paint};
+use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
+use crate::picture::labels::{Label, Labels};
+use crate::picture::outline::silhouette;
+use crate::picture::paths::{Mover, Way, pose_at};
+use crate::picture::window::{Bounds, Window};
+use crate::picture::{font, paint};
+use actcheck_base::names;
+use actcheck_data::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
 
 /// Upper bound of a link's extent from its origin. Links farther than this outside of the window are omitted. Unit:
 /// metres.
@@ -136,9 +136,9 @@ fn rooms(drawing: &mut Drawing, trace: &Trace, window: &Window) {
 
 /// Percepts as boxes: objects, planes, and objects that a skill queried.
 fn glimpse_parts(trace: &Trace) -> Vec<(String, Part)> {
-    let standing = |pose: &crate::base::Pose, [x, y, z]: [f64; 3]| {
+    let standing = |pose: &actcheck_data::Pose, [x, y, z]: [f64; 3]| {
         let middle = pose.to_isometry() * nalgebra::Translation3::new(0.0, 0.0, z / 2.0);
-        Part { pose: crate::base::Pose::from_isometry(&middle), shape: Shape::Box { size: [x, y, z] } }
+        Part { pose: actcheck_data::Pose::from_isometry(&middle), shape: Shape::Box { size: [x, y, z] } }
     };
     let mut parts = Vec::new();
     for action in &trace.actions {

@@ -2,8 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::base::Pose;
-use crate::history::{Snapshot, Trace};
+use actcheck_data::{Pose, Snapshot, Trace};
 
 /// The body that moves along a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! Draws patterns: scatter plots of runs over two scene parameters, with failures as crosses and the range of the
 //! pattern marked.
 
-use crate::analysis::{Condition, Parameter, Pattern, Subject, Values};
-use crate::report::FindingsSummary;
-use crate::report::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
-use crate::report::picture::{font, paint};
+use crate::FindingsSummary;
+use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
+use crate::picture::{font, paint};
+use actcheck_analysis::{Condition, Parameter, Pattern, Subject, Values};
 
 /// Width of a picture. Unit: pixels.
 const WIDTH_PX: f64 = 1200.0;

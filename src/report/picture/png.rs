@@ -6,8 +6,8 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use zeno::{Command, Fill, Join, Mask, PathBuilder, Stroke, Style as Brush};
 
-use crate::report::picture::drawing::{Drawing, Line, Mark, Paint, Rect};
-use crate::report::picture::font;
+use crate::picture::drawing::{Drawing, Line, Mark, Paint, Rect};
+use crate::picture::font;
 
 /// Pixels of the file per pixel of the drawing, so that small text stays sharp when zoomed in.
 const DENSITY: u8 = 2;

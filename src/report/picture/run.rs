@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use crate::history::{Role, Trace};
-use crate::report::picture::Caption;
-use crate::report::picture::drawing::{Drawing, Paint, Rect, Words};
-use crate::report::picture::panel::{Material, Moment};
-use crate::report::picture::paths::{Mover, ways};
-use crate::report::picture::window::{Bounds, View, Window, close_ups, overview};
-use crate::report::picture::{header, legend, paint, panel};
+use crate::picture::Caption;
+use crate::picture::drawing::{Drawing, Paint, Rect, Words};
+use crate::picture::panel::{Material, Moment};
+use crate::picture::paths::{Mover, ways};
+use crate::picture::window::{Bounds, View, Window, close_ups, overview};
+use crate::picture::{header, legend, paint, panel};
+use actcheck_data::{Role, Trace};
 
 /// Width of a picture. Unit: pixels.
 const WIDTH_PX: f64 = 1200.0;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::report::picture::drawing::{Drawing, Line, Mark, Paint, Rect, Style, Words};
+use crate::picture::drawing::{Drawing, Line, Mark, Paint, Rect, Style, Words};
 
 impl Drawing {
     /// Formats the drawing as SVG.

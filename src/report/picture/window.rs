@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::history::{BodyState, Snapshot, Trace};
-use crate::report::picture::drawing::Rect;
+use crate::picture::drawing::Rect;
+use actcheck_data::{BodyState, Snapshot, Trace};
 
 /// An axis-aligned box in the world. Unit: metres. Shape: x, y, z.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,11 +7,12 @@ use re_sdk_types::AsComponents;
 use re_sdk_types::archetypes::{Transform3D, ViewCoordinates};
 use re_sdk_types::datatypes::Quaternion;
 
-use crate::base::{Pose, names};
-use crate::history::{BodyState, Form, Role, RunDetail, Trace};
-use crate::report::recording::look::Look;
-use crate::report::recording::solids::Drawn;
-use crate::report::recording::stream::{Recording, RecordingFault, place};
+use crate::recording::look::Look;
+use crate::recording::solids::Drawn;
+use crate::recording::stream::{Recording, RecordingFault, place};
+use actcheck_base::names;
+use actcheck_data::{BodyState, Form, Pose, Role, Trace};
+use actcheck_history::RunDetail;
 
 /// Root entity of everything in 3D. Frame: world.
 const SCENE: &str = "scene";

@@ -2,12 +2,12 @@
 
 use re_sdk_types::archetypes::TextLog;
 
-use crate::base::names;
-use crate::history::{RunDetail, Trace};
-use crate::report::contacts::strongest;
-use crate::report::moment::decided;
-use crate::report::recording::stream::{Recording, RecordingFault, place};
-use crate::verdict::Outcome;
+use crate::contacts::strongest;
+use crate::moment::decided;
+use crate::recording::stream::{Recording, RecordingFault, place};
+use actcheck_base::{Outcome, names};
+use actcheck_data::Trace;
+use actcheck_history::RunDetail;
 
 /// A log line with its time. Unit: seconds since the run began.
 struct Line {

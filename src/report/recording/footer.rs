@@ -6,7 +6,7 @@ use re_log_encoding::{
 };
 use re_protos::log_msg::v1alpha1::RrdFooter;
 
-use crate::report::recording::stream::RecordingFault;
+use crate::recording::stream::RecordingFault;
 
 /// Sorts the manifest of a file: recordings by id, columns by name. The format does not define the order, and the
 /// library writes a different one each time.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::report::picture::flat_hull;
+use crate::picture::flat_hull;
 
 /// Points closer than this to a plane are considered on it. Unit: metres.
 const FLAT_M: f64 = 1e-6;

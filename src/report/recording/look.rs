@@ -1,7 +1,7 @@
 //! Colours of bodies, the same as in the HTML replay (`web/solids.js`).
 
-use crate::base::names;
-use crate::history::{BodyState, Role};
+use actcheck_base::names;
+use actcheck_data::{BodyState, Role};
 
 /// How a body is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

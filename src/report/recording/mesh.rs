@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use re_sdk_types::archetypes::Mesh3D;
 use re_sdk_types::components::AlbedoFactor;
 
-use crate::report::recording::hull::Face;
+use crate::recording::hull::Face;
 
 /// Number of sides that approximate a circle.
 const AROUND: u32 = 32;

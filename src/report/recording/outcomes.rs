@@ -2,12 +2,11 @@
 
 use std::fmt::Write as _;
 
-use crate::base::names;
-use crate::history::{ActionDetail, RunDetail};
-use crate::report::Caption;
-use crate::report::formats::plain;
-use crate::report::html::Explained;
-use crate::verdict::{Judgement, Outcome};
+use crate::Caption;
+use crate::formats::plain;
+use crate::html::Explained;
+use actcheck_base::{Judgement, Outcome, names};
+use actcheck_history::{ActionDetail, RunDetail};
 
 /// Name of a recording.
 pub(super) fn title(run: &RunDetail) -> String {

@@ -4,10 +4,11 @@ use re_log_encoding::{CrateVersion, Encoder, EncodingOptions};
 use re_log_types::EntityPath;
 use re_sdk_types::archetypes::{RecordingInfo, TextDocument};
 
-use crate::history::{RunDetail, Trace};
-use crate::report::html::Explained;
-use crate::report::recording::stream::{Recording, RecordingFault, place};
-use crate::report::recording::{course, events, footer, outcomes};
+use crate::html::Explained;
+use crate::recording::stream::{Recording, RecordingFault, place};
+use crate::recording::{course, events, footer, outcomes};
+use actcheck_data::Trace;
+use actcheck_history::RunDetail;
 
 /// Recordings of the added runs, one for each run.
 pub struct Recordings {

@@ -6,11 +6,10 @@ use re_sdk_types::archetypes::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D};
 use re_sdk_types::components::{Color, FillMode};
 use re_sdk_types::datatypes::Quaternion;
 
-use crate::base::Pose;
-use crate::history::{BodyState, Part, Shape};
-use crate::report::recording::hull::faces;
-use crate::report::recording::look::Look;
-use crate::report::recording::mesh::{Mesh, tube};
+use crate::recording::hull::faces;
+use crate::recording::look::Look;
+use crate::recording::mesh::{Mesh, tube};
+use actcheck_data::{BodyState, Part, Pose, Shape};
 
 /// Solids of one kind: sizes, centres and orientations. Frame: body.
 #[derive(Debug)]

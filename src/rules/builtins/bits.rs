@@ -1,7 +1,7 @@
 //! Bitwise operations on 64-bit integers.
 
-use crate::base::Term;
-use crate::rules::builtins::Value;
+use crate::builtins::Value;
+use actcheck_base::Term;
 
 fn integer(value: &Term) -> Option<i64> {
     match value {

@@ -1,8 +1,8 @@
 //! 3D geometry functions, an extension: a file that uses them must declare the prefix. Units: metres and radians.
 
-use crate::base::{Pose, Term};
-use crate::rules::builtins::Value;
-use crate::rules::values::{Number, double_term};
+use crate::builtins::Value;
+use crate::values::{Number, double_term};
+use actcheck_base::{Term, tilt_of, yaw_of};
 
 /// Namespace of the geometry built-ins.
 pub(crate) const GEO3D: &str = "https://w3id.org/actcheck/geo3d#";
@@ -69,18 +69,14 @@ pub(super) fn rotation(args: &[Value<'_>]) -> Option<Term> {
     finite(2.0 * libm::acos(dot.min(1.0)))
 }
 
-fn pose(args: &[Value<'_>]) -> Option<Pose> {
-    Some(Pose { position: [0.0; 3], rotation: numbers(args)? })
-}
-
 /// Yaw of a unit quaternion's x axis about the vertical: x, y, z, w.
 pub(super) fn yaw(args: &[Value<'_>]) -> Option<Term> {
-    finite(pose(args)?.yaw())
+    finite(yaw_of(numbers(args)?))
 }
 
 /// Angle between a unit quaternion's z axis and the vertical: x, y, z, w.
 pub(super) fn tilt(args: &[Value<'_>]) -> Option<Term> {
-    finite(pose(args)?.tilt())
+    finite(tilt_of(numbers(args)?))
 }
 
 /// Whether a point (x, y, z) is in an axis-aligned box (min x, y, z, max x, y, z), including its faces.

@@ -2,9 +2,9 @@
 
 use std::cmp::Ordering;
 
-use crate::base::Term;
-use crate::rules::builtins::Value;
-use crate::rules::values::Number::{self, Double, Float, Integer};
+use crate::builtins::Value;
+use crate::values::Number::{self, Double, Float, Integer};
+use actcheck_base::Term;
 
 /// Returns whether two values are the same term.
 pub(crate) fn equal(a: &Term, b: &Term) -> bool {

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use crate::base::Term;
-use crate::rules::builtins::{bits, geometry, numeric, text, types};
+use crate::builtins::{bits, geometry, numeric, text, types};
+use actcheck_base::Term;
 
 /// An argument or result; borrowed if it is an interned term.
 pub(crate) type Value<'a> = Cow<'a, Term>;

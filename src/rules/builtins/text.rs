@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::base::Term;
-use crate::rules::builtins::Value;
+use crate::builtins::Value;
+use actcheck_base::Term;
 
 /// Maximum size of a compiled pattern. Unit: bytes.
 const PATTERN_LIMIT: usize = 1 << 20;

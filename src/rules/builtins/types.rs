@@ -1,8 +1,8 @@
 //! Type tests, conversions between types, and boolean functions.
 
-use crate::base::Term;
-use crate::rules::builtins::Value;
-use crate::rules::values::{self, Number};
+use crate::builtins::Value;
+use crate::values::{self, Number};
+use actcheck_base::Term;
 
 fn truth(value: &Term) -> Option<bool> {
     match value {

@@ -1,16 +1,16 @@
 //! Explanations of properties.
 
-use crate::facts::ActionFacts;
-use crate::rules::book::{JudgeRules, RuleBook, fault};
-use crate::rules::evaluate::{Layers, Planned, Rounds, Tables, evaluate_noting};
-use crate::rules::explain::model::Explanation;
-use crate::rules::explain::proof::Prover;
-use crate::rules::explain::search::Ground;
-use crate::rules::findings::{Budget, Findings, RuleFault};
-use crate::rules::meter::Meter;
-use crate::rules::program::Rule;
-use crate::rules::reading::{Verdict, findings};
-use crate::rules::universe::Universe;
+use crate::book::{JudgeRules, RuleBook, fault};
+use crate::evaluate::{Layers, Planned, Rounds, Tables, evaluate_noting};
+use crate::explain::model::Explanation;
+use crate::explain::proof::Prover;
+use crate::explain::search::Ground;
+use crate::findings::Budget;
+use crate::meter::Meter;
+use crate::program::Rule;
+use crate::reading::{Verdict, findings};
+use crate::universe::Universe;
+use actcheck_base::{ActionFacts, Findings, RuleFault};
 
 /// Maximum number of proofs shown.
 pub(super) const PROOFS_SHOWN: usize = 3;
@@ -84,7 +84,7 @@ fn stated(programs: &[&Planned], book: &RuleBook) -> Tables {
     let mut tables = Tables::default();
     for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
         let width = book.predicates.get(*predicate).width;
-        let table = crate::rules::relation::finished(width, rows.clone(), book.indexes.of(*predicate).clone());
+        let table = crate::relation::finished(width, rows.clone(), book.indexes.of(*predicate).clone());
         tables.set(*predicate, table);
     }
     tables

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::rules::explain::model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};
+use crate::explain::model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};
 
 impl Explanation {
     /// Returns the explanation as JSON.

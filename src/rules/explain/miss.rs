@@ -2,13 +2,13 @@
 
 use std::cell::Cell;
 
-use crate::base::TermId;
-use crate::rules::explain::model::{Failure, Miss};
-use crate::rules::explain::proof::Prover;
-use crate::rules::explain::search::{Binding, Ground, STEP_LIMIT, reading_order};
-use crate::rules::naive::unify;
-use crate::rules::program::{Atom, Literal, Operand, PredicateId, Rule};
-use crate::rules::values::Number;
+use crate::explain::model::{Failure, Miss};
+use crate::explain::proof::Prover;
+use crate::explain::search::{Binding, Ground, STEP_LIMIT, reading_order};
+use crate::naive::unify;
+use crate::program::{Atom, Literal, Operand, PredicateId, Rule};
+use crate::values::Number;
+use actcheck_base::TermId;
 
 /// Maximum nesting depth of misses.
 const DEPTH_LIMIT: usize = 5;

@@ -1,6 +1,6 @@
 //! Data model of an explanation.
 
-use crate::rules::findings::Findings;
+use actcheck_base::Findings;
 
 /// Explains why a property or goal holds or does not hold.
 #[derive(Debug, Clone, PartialEq)]

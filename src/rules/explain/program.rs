@@ -1,18 +1,18 @@
 //! Explanations of the tuples of a standalone program.
 
-use crate::base::Term;
-use crate::rules::book::fault;
-use crate::rules::evaluate::{Layers, Rounds, Tables, evaluate_noting};
-use crate::rules::explain::book::PROOFS_SHOWN;
-use crate::rules::explain::model::Explanation;
-use crate::rules::explain::proof::Prover;
-use crate::rules::explain::search::Ground;
-use crate::rules::findings::{Budget, RuleFault};
-use crate::rules::meter::Meter;
-use crate::rules::program::PredicateId;
-use crate::rules::relation::finished;
-use crate::rules::standalone::Program;
-use crate::rules::universe::Universe;
+use crate::book::fault;
+use crate::evaluate::{Layers, Rounds, Tables, evaluate_noting};
+use crate::explain::book::PROOFS_SHOWN;
+use crate::explain::model::Explanation;
+use crate::explain::proof::Prover;
+use crate::explain::search::Ground;
+use crate::findings::Budget;
+use crate::meter::Meter;
+use crate::program::PredicateId;
+use crate::relation::finished;
+use crate::standalone::Program;
+use crate::universe::Universe;
+use actcheck_base::{RuleFault, Term};
 
 impl Program {
     /// Explains why the program derives a statement such as `p(1, "a")`, or why not. `_` matches any value.

@@ -3,11 +3,11 @@
 use std::cell::Cell;
 use std::collections::BTreeSet;
 
-use crate::base::TermId;
-use crate::rules::explain::model::{Premise, Proof, Support};
-use crate::rules::explain::search::{Binding, Ground, STEP_LIMIT, reading_order};
-use crate::rules::naive::unify;
-use crate::rules::program::{Literal, PredicateId, Rule};
+use crate::explain::model::{Premise, Proof, Support};
+use crate::explain::search::{Binding, Ground, STEP_LIMIT, reading_order};
+use crate::naive::unify;
+use crate::program::{Literal, PredicateId, Rule};
+use actcheck_base::TermId;
 
 /// Deeper proofs are cut, so that the tree stays small and readable.
 const DEPTH_LIMIT: usize = 40;

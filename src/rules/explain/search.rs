@@ -1,11 +1,11 @@
 //! Backward search: evaluates rules from their heads over finished tuples.
 
-use crate::base::{Term, TermId};
-use crate::rules::evaluate::{Rounds, Tables};
-use crate::rules::expression::holds;
-use crate::rules::naive::unify;
-use crate::rules::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
-use crate::rules::universe::Universe;
+use crate::evaluate::{Rounds, Tables};
+use crate::expression::holds;
+use crate::naive::unify;
+use crate::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
+use crate::universe::Universe;
+use actcheck_base::{Term, TermId};
 
 /// Values of a rule's variables; `None` if unbound.
 pub(super) type Binding = Vec<Option<TermId>>;

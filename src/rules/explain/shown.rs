@@ -1,11 +1,11 @@
 //! Formats atoms and conditions of rules with the values of a binding.
 
-use crate::base::{Term, TermId, names};
-use crate::rules::explain::model::RuleRef;
-use crate::rules::explain::search::{Binding, Ground};
-use crate::rules::expression::Expr;
-use crate::rules::given::property_place;
-use crate::rules::program::{Atom, Literal, Operand, PredicateId, Rule};
+use crate::explain::model::RuleRef;
+use crate::explain::search::{Binding, Ground};
+use crate::expression::Expr;
+use crate::given::property_place;
+use crate::program::{Atom, Literal, Operand, PredicateId, Rule};
+use actcheck_base::{Term, TermId, names};
 
 impl Ground<'_> {
     /// Formats a tuple as a statement.
@@ -93,7 +93,7 @@ impl Ground<'_> {
         expr.value(&values, self.universe).map(std::borrow::Cow::into_owned)
     }
 
-    fn source_text(&self, rule: &Rule, span: crate::base::Span) -> String {
+    fn source_text(&self, rule: &Rule, span: actcheck_base::Span) -> String {
         let text = rule.origin.source.text.get(span).unwrap_or_default();
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::rules::explain::model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};
+use crate::explain::model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};
 
 impl Explanation {
     /// Formats the explanation as indented text, one statement per line.

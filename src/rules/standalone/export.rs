@@ -3,14 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::base::{Diagnostic, Diagnostics, did_you_mean};
-use crate::rules::findings::RuleFault;
-use crate::rules::options::{OptionValue, options};
-use crate::rules::standalone::program::{Closure, Program};
-use crate::rules::standalone::table::delimiter_of;
-use crate::rules::standalone::unfinished::Unfinished;
-use crate::rules::syntax::{Statement, Syntax, Transfer};
-use crate::rules::values;
+use crate::options::{OptionValue, options};
+use crate::standalone::program::{Closure, Program};
+use crate::standalone::table::delimiter_of;
+use crate::standalone::unfinished::Unfinished;
+use crate::syntax::{Statement, Syntax, Transfer};
+use crate::values;
+use actcheck_base::{Diagnostic, Diagnostics, RuleFault, did_you_mean};
 
 const FORMATS: [&str; 3] = ["csv", "dsv", "tsv"];
 
@@ -50,7 +49,7 @@ fn export(program: &Program, syntax: &Syntax, transfer: &Transfer, diagnostics: 
         return None;
     }
     let mut terms = program.terms.clone();
-    let mut checking = crate::rules::check::Checking::new(&mut terms, None);
+    let mut checking = crate::check::Checking::new(&mut terms, None);
     let options = options(&mut checking, syntax, transfer);
     diagnostics.extend(checking.diagnostics);
     let text = |name: &str| match options.get(name) {
@@ -88,7 +87,7 @@ pub(super) fn write(export: &Export, folder: &Path, closure: &Closure, stop: &At
     if let Some(parent) = path.parent() {
         std::fs::create_dir_all(parent).map_err(|error| lower(&error))?;
     }
-    let mut tuples: Vec<Vec<&crate::base::Term>> = closure.tuples_unsorted(&export.predicate).collect();
+    let mut tuples: Vec<Vec<&actcheck_base::Term>> = closure.tuples_unsorted(&export.predicate).collect();
     tuples.sort();
     let (unfinished, file) = Unfinished::begin(path).map_err(|error| lower(&error))?;
     let mut writer = csv::WriterBuilder::new().delimiter(export.delimiter).from_writer(file);

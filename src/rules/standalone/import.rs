@@ -4,18 +4,18 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use oxigraph::io::{RdfFormat, RdfParseError, RdfParser};
-use oxigraph::model::GraphName;
+use oxrdf::GraphName;
+use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 
-use crate::base::{Diagnostic, Diagnostics, Source, Span, Term, TermId, Terms, did_you_mean};
-use crate::rules::check::{Checking, Role, counted};
-use crate::rules::dataset::from_rdf;
-use crate::rules::options::{OptionValue, options};
-use crate::rules::program::{Predicates, Program};
-use crate::rules::standalone::stoppable::Stoppable;
-use crate::rules::standalone::table::{ColumnKind, LeftOut, delimiter_of, read_table};
-use crate::rules::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
-use crate::rules::values::lexical;
+use crate::check::{Checking, Role, counted};
+use crate::dataset::from_rdf;
+use crate::options::{OptionValue, options};
+use crate::program::{Predicates, Program};
+use crate::standalone::stoppable::Stoppable;
+use crate::standalone::table::{ColumnKind, LeftOut, delimiter_of, read_table};
+use crate::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
+use crate::values::lexical;
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, TermId, Terms, did_you_mean};
 
 /// Formats of imports.
 const FORMATS: [&str; 9] = ["csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];

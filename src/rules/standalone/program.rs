@@ -4,20 +4,20 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use crate::base::{Diagnostics, Source, Term, TermId, Terms};
-use crate::rules::book::fault;
-use crate::rules::check::{Checking, Role, unique};
-use crate::rules::evaluate::{Layers, Planned, Tables, evaluate};
-use crate::rules::findings::{Budget, RuleFault};
-use crate::rules::meter::Meter;
-use crate::rules::naive;
-use crate::rules::parse::parse;
-use crate::rules::plan::Indexes;
-use crate::rules::program::{PredicateId, Predicates};
-use crate::rules::standalone::import::{define_imports, import};
-use crate::rules::stratify::stratify;
-use crate::rules::syntax::{ExpressionKind, Statement, Syntax};
-use crate::rules::universe::Universe;
+use crate::book::fault;
+use crate::check::{Checking, Role, unique};
+use crate::evaluate::{Layers, Planned, Tables, evaluate};
+use crate::findings::Budget;
+use crate::meter::Meter;
+use crate::naive;
+use crate::parse::parse;
+use crate::plan::Indexes;
+use crate::program::{PredicateId, Predicates};
+use crate::standalone::import::{define_imports, import};
+use crate::stratify::stratify;
+use crate::syntax::{ExpressionKind, Statement, Syntax};
+use crate::universe::Universe;
+use actcheck_base::{Diagnostics, RuleFault, Source, Term, TermId, Terms};
 
 /// The evaluator of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::base::{Diagnostic, Diagnostics, Files};
-use crate::rules::findings::{Budget, RuleFault, interrupted};
-use crate::rules::standalone::export::{exports, write};
-use crate::rules::standalone::program::{Engine, Program};
+use crate::findings::{Budget, interrupted};
+use crate::standalone::export::{exports, write};
+use crate::standalone::program::{Engine, Program};
+use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault};
 
 /// Results of running a program.
 #[derive(Debug, Clone, Default)]

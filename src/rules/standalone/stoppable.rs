@@ -3,7 +3,7 @@
 use std::io::{Error, Read};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::rules::findings::RuleFault;
+use actcheck_base::RuleFault;
 
 /// A reader whose reads fail once `stop` is set.
 pub(super) struct Stoppable<'a, R> {

@@ -2,8 +2,8 @@
 
 use std::io::Read;
 
-use crate::base::{Term, TermId, Terms, names};
-use crate::rules::values::{Number, double_term, integer, is_beyond_64_bits, literal};
+use crate::values::{Number, double_term, integer, is_beyond_64_bits, literal};
+use actcheck_base::{Term, TermId, Terms, names};
 
 /// How the fields of a column are parsed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

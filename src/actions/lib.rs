@@ -1,0 +1,35 @@
+//! The robot's actions, performed through commands and observations: the reference skills and the recorded trace.
+//!
+//! Never: reads ground truth inside a skill, judges an action, or knows a property.
+
+mod call;
+mod controls;
+mod cut;
+mod grasp;
+mod grip;
+mod memory;
+mod motion;
+mod navigate;
+mod operator;
+mod outside;
+mod perceive;
+mod perform;
+mod pick;
+mod place;
+mod plan;
+mod plan_cost;
+mod route;
+mod sabotage;
+mod skills;
+mod standing;
+
+pub use call::ActionCall;
+pub use controls::Controls;
+pub use cut::Cut;
+pub use grip::feels_in;
+pub use memory::Held;
+pub use operator::{Interrupt, Operator};
+pub use outside::{Outside, OutsideFault};
+pub use perform::{Interference, perform, perform_with};
+pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
+pub use skills::{UnknownSkill, known_skill, reference_skills};

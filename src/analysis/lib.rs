@@ -1,0 +1,47 @@
+//! Analyses a history: tables, rates with confidence intervals, failure modes, patterns, and comparisons of campaigns.
+//!
+//! Never: judges, changes a history (its tables are stored beside it), or exposes a type of the table library.
+
+mod compare;
+mod consistency;
+mod coverage;
+mod dataset;
+mod failure_modes;
+mod false_discovery;
+mod findings;
+mod fisher;
+mod health;
+mod holm;
+mod oracles;
+mod paired;
+mod patterns;
+mod property_rates;
+mod score_interval;
+mod tables;
+
+pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
+pub use consistency::{Consistency, Flaky, PassPower, Repeated, SceneRuns, Variance, consistency};
+pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
+pub use dataset::{Dataset, export_dataset};
+pub use failure_modes::{FailureMode, failure_modes};
+pub use false_discovery::benjamini_hochberg;
+pub use findings::{
+    Cascade, ChangePoint, Example, FINDING_COLUMNS, FlakyScene, Judged, JudgedProperty, PropertyFindings, Quantiles,
+    Trend, TrendPoint, TwoWay, TwoWayCell, cascades, flaky_scenes, judged, property_findings, quantiles,
+    table_failure_modes, trend, two_way,
+};
+pub use fisher::{FisherTest, TwoByTwo};
+pub use health::{Ailment, Health, HealthMeter};
+pub use holm::holm;
+pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
+pub use paired::{Difference, PairedTable, PairedTest};
+pub use patterns::{Condition, Parameter, Pattern, PatternOptions, Patterns, Subject, Values, mine, simplest_between};
+pub use property_rates::{PropertyRate, property_rates};
+pub use score_interval::score_interval;
+pub use tables::{
+    Column, ColumnKind, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter, TextColumn, columns, export_csv,
+    export_parquet,
+};
+
+// Re-exported for readers of tables.
+pub use actcheck_verdict::{Interval, wilson, wilson_share};

@@ -1,0 +1,31 @@
+//! Types shared by all stages: sources and diagnostics, terms, poses, recorded choices, random streams, shipped files.
+//!
+//! Never: reads a configuration, depends on actions, rules or robots, or prints.
+
+mod diagnostic;
+mod digest;
+mod files;
+mod findings;
+mod judgement;
+pub mod names;
+mod rotation;
+mod run_facts;
+mod shard;
+mod shipped;
+mod source;
+mod suggest;
+mod term;
+mod whole;
+
+pub use diagnostic::{Diagnostic, Diagnostics, Severity};
+pub use digest::{Digest, digest_of, name_program, program_digest};
+pub use files::Files;
+pub use findings::{Findings, RuleFault, WitnessRow};
+pub use judgement::{Judgement, Outcome};
+pub use rotation::{tilt_of, yaw_of};
+pub use run_facts::{ActionFacts, RunFacts, Triple};
+pub use shard::{NoShard, Shard};
+pub use source::{Source, Span};
+pub use suggest::{did_you_mean, nearest};
+pub use term::{Term, TermId, Terms};
+pub use whole::write_whole;

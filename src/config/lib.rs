@@ -1,0 +1,38 @@
+//! Parses and validates a TOML configuration into a [`Campaign`], including its models, worlds and robot.
+//!
+//! Never: samples a choice, interprets actions, or reads the ontology.
+
+mod campaign;
+mod case;
+mod case_text;
+mod designators;
+mod duration;
+mod foreign;
+mod load;
+pub mod model;
+mod other_counts;
+mod ranges;
+pub mod robot;
+mod robot_roles;
+mod schema;
+mod shelf;
+mod skill;
+mod table;
+mod template;
+mod value;
+mod words;
+mod world_map;
+mod xacro;
+
+pub use campaign::{Campaign, Launcher, Limits, Overrides};
+pub use case::Case;
+pub use case_text::{CaseText, case_text, written_paths};
+pub use duration::duration_secs;
+pub use load::{beside, in_order_of_place, load, load_text};
+pub use other_counts::OtherCounts;
+pub use schema::SCHEMA;
+pub use skill::Skill;
+pub use table::Table;
+pub use template::{CampaignTemplate, LinksOntology, campaign_template, link_ontology};
+pub use value::Located;
+pub use world_map::{Furniture, Wall, WorldMap};

@@ -1,0 +1,40 @@
+//! Plain data that the stages hand to each other: poses, recorded choices, scenes, traces.
+//!
+//! Never: reads a file, steps the simulation, or decides anything.
+
+mod choices;
+mod mesh;
+mod model;
+mod motion;
+mod places;
+mod pose;
+mod quality;
+mod robot;
+mod robot_course;
+mod scene;
+mod scene_map;
+mod settings;
+mod shape;
+mod snapshot;
+mod stream;
+mod trace;
+
+pub use choices::{Choice, ChoiceKind, Choices};
+pub use mesh::{Mesh, Top};
+pub use model::{Inertia, ObjectModel, Surface};
+pub use motion::{JointMoment, Motion, MotionRow};
+pub use places::{Location, Room};
+pub use pose::Pose;
+pub use quality::Quality;
+pub use robot::RobotProfile;
+pub use robot_course::{HeldCourse, JointCourse, RobotCourse, SelfCollision};
+pub use scene::{KnownKind, RobotStart, Role, Scene, SceneObject};
+pub use scene_map::{NamedSurface, SceneMap};
+pub use settings::{Budget, CONTROL_HZ, Camera, Odometry, Physics, Range, Sensing};
+pub use shape::{Part, Shape, bounds};
+pub use snapshot::{BodyState, JointState, RobotState, Snapshot};
+pub use stream::Stream;
+pub use trace::{
+    ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Perceived, PerceivedPlane,
+    PerceivedThing, Percept, Phase, Trace,
+};

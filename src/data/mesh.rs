@@ -1,0 +1,140 @@
+//! Triangle meshes.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use actcheck_base::Digest;
+
+/// A triangle mesh. Unit: metres. Frame: the shape's own.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Mesh {
+    /// Shape: x, y, z.
+    pub vertices: Vec<[f64; 3]>,
+    /// Indices of vertices, counterclockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Triangles whose normal is tilted by less than this count as level. Unit: cosine (about 2.5 degrees).
+const LEVEL_COSINE: f64 = 0.999;
+
+impl Mesh {
+    /// Creates a mesh with finite coordinates and valid vertex indices.
+    ///
+    /// # Errors
+    /// A lower-case message if a coordinate is not finite, an index is out of bounds, or there are no triangles.
+    pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, String> {
+        if let Some(vertex) = vertices.iter().position(|vertex| !vertex.iter().all(|x| x.is_finite())) {
+            return Err(format!("its vertex {} is not finite", vertex + 1));
+        }
+        let beyond = |idx: &u32| *idx as usize >= vertices.len();
+        if let Some(triangle) = triangles.iter().position(|corners| corners.iter().any(beyond)) {
+            return Err(format!("its triangle {} refers to a missing vertex", triangle + 1));
+        }
+        if triangles.is_empty() {
+            return Err("it has no triangles".to_owned());
+        }
+        Ok(Self { vertices, triangles })
+    }
+
+    /// Merges equal vertices, so that neighbouring triangles share them, and drops degenerate triangles.
+    #[must_use]
+    pub fn welded(&self) -> Self {
+        let mut known: BTreeMap<[u64; 3], u32> = BTreeMap::new();
+        let mut vertices: Vec<[f64; 3]> = Vec::new();
+        let mut place = |idx: u32| {
+            let vertex = self.vertices[idx as usize];
+            // Adding 0 turns -0 into +0.
+            *known.entry(vertex.map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
+                vertices.push(vertex);
+                u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
+            })
+        };
+        let has_extent = |[a, b, c]: &[u32; 3]| a != b && b != c && a != c;
+        let triangles: Vec<[u32; 3]> =
+            self.triangles.iter().map(|corners| corners.map(&mut place)).filter(has_extent).collect();
+        Self { vertices, triangles }
+    }
+
+    /// Scales each axis. Reverses the triangles of a mirrored mesh, so that they still face outwards.
+    #[must_use]
+    pub fn scaled(&self, [x, y, z]: [f64; 3]) -> Self {
+        let vertices = self.vertices.iter().map(|vertex| [vertex[0] * x, vertex[1] * y, vertex[2] * z]).collect();
+        let mirrored = x * y * z < 0.0;
+        let triangles = self.triangles.iter().map(|[a, b, c]| if mirrored { [*a, *c, *b] } else { [*a, *b, *c] });
+        Self { vertices, triangles: triangles.collect() }
+    }
+
+    /// Enclosed volume, by the divergence theorem; approximate if the mesh has small holes. Unit: cubic metres.
+    pub fn volume(&self) -> f64 {
+        let sixfold: f64 = self.corners().map(|[a, b, c]| a.dot(&b.cross(&c))).sum();
+        (sixfold / 6.0).abs()
+    }
+
+    /// Finds the triangles that, transformed by `placed`, are level, face up, and are at most `depth_m` below `top_m`.
+    /// Returns their area and bounding rectangle. Units: metres, square metres.
+    pub fn top(&self, top_m: f64, depth_m: f64, placed: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Top {
+        let mut found = Top::default();
+        for corners in self.corners() {
+            let [a, b, c] = corners.map(|corner| placed(&corner));
+            let normal = (b - a).cross(&(c - a));
+            let is_level = normal.z >= LEVEL_COSINE * normal.norm() && normal.z > 0.0;
+            if is_level && [a, b, c].iter().all(|corner| corner.z >= top_m - depth_m) {
+                found.area += normal.norm() / 2.0;
+                for corner in [a, b, c] {
+                    found.low = [found.low[0].min(corner.x), found.low[1].min(corner.y)];
+                    found.high = [found.high[0].max(corner.x), found.high[1].max(corner.y)];
+                }
+            }
+        }
+        found
+    }
+
+    /// Digest of vertices and triangles.
+    pub fn digest(&self) -> String {
+        let mut digest = Digest::new();
+        for vertex in &self.vertices {
+            vertex.iter().for_each(|x| digest.update(&x.to_bits().to_le_bytes()));
+        }
+        for corners in &self.triangles {
+            corners.iter().for_each(|idx| digest.update(&idx.to_le_bytes()));
+        }
+        digest.finish()
+    }
+
+    fn corners(&self) -> impl Iterator<Item = [Vector3<f64>; 3]> + '_ {
+        self.triangles.iter().map(|corners| corners.map(|idx| Vector3::from(self.vertices[idx as usize])))
+    }
+}
+
+/// The level part of a mesh near its top, facing up: area and bounding rectangle (lowest and highest x and y).
+pub struct Top {
+    pub area: f64,
+    pub low: [f64; 2],
+    pub high: [f64; 2],
+}
+
+impl Default for Top {
+    fn default() -> Self {
+        Self { area: 0.0, low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn volumes_scale_and_vertices_weld() {
+        let corner = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let soup: Vec<[f64; 3]> = faces.iter().flatten().map(|idx| corner[*idx]).collect();
+        let mesh =
+            Mesh::new(soup, (0..4).map(|face| [3 * face, 3 * face + 1, 3 * face + 2]).collect()).expect("it is right");
+        assert_eq!(mesh.welded().vertices.len(), 4);
+        assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
+        assert!((mesh.scaled([2.0, -1.0, 3.0]).volume() - 1.0).abs() < 1e-12);
+        assert!(Mesh::new(corner.to_vec(), vec![[0, 1, 4]]).expect_err("it is wrong").contains("triangle 1"));
+    }
+}

@@ -1,0 +1,25 @@
+//! Named places of a world.
+
+use serde::{Deserialize, Serialize};
+
+/// A named pose on the floor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Location {
+    /// Unique among the world's locations.
+    pub name: String,
+    /// Units: metres, metres, radians. Shape: x, y, heading.
+    pub at: [f64; 3],
+    /// Name of the surface that it is in front of, if any.
+    pub surface: Option<String>,
+}
+
+/// A room.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Room {
+    /// Unique among the world's rooms.
+    pub name: String,
+    /// Lowest x and y. Unit: metres.
+    pub low_m: [f64; 2],
+    /// Highest x and y. Unit: metres.
+    pub high_m: [f64; 2],
+}

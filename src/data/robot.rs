@@ -1,0 +1,50 @@
+//! Robots: the URDF and the roles of its joints and links.
+
+use std::collections::BTreeMap;
+
+use crate::Shape;
+use actcheck_base::Source;
+
+/// A robot: its URDF and the roles of its joints and links. Read from a profile next to the URDF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotProfile {
+    /// Display name.
+    pub name: String,
+    /// The URDF's text.
+    pub urdf: Source,
+    /// Joints of an omnidirectional base in the order x, y, heading; `None` if the base is fixed.
+    pub base_joints: Option<[String; 3]>,
+    /// Whether those joints are added below the URDF's root instead of being part of it: `base = "planar"`.
+    pub planar_base: bool,
+    /// Height of the root above the floor, for a base on a mount; the mount itself is not simulated. Unit: metres.
+    pub mount_height_m: f64,
+    /// Joints that position the hand (lift and arm), from the base outwards.
+    pub arm_joints: Vec<String>,
+    /// Finger joints, left then right; they move the same distance.
+    pub finger_joints: [String; 2],
+    /// Head joints, pan then tilt; empty if the head does not move.
+    pub head_joints: Vec<String>,
+    /// Link between the fingertips; its x axis points along the fingers, its y axis across them.
+    pub grasp_link: String,
+    /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its fixed x, y and z axes,
+    /// in this order. Unit: radians.
+    pub grasp_turned_rad: [f64; 3],
+    /// Links of the fingers, left then right.
+    pub finger_links: [String; 2],
+    /// Link of the depth camera: its x axis points forwards, its z axis up in the image.
+    pub camera_link: String,
+    /// Widest gap between the fingers. Unit: metres.
+    pub max_opening_m: f64,
+    /// Arm posture for driving, in the order of `arm_joints`. Units: metres or radians.
+    pub home: Vec<f64>,
+    /// Seeds of inverse kinematics: arm postures in the order of `arm_joints`.
+    pub postures: Vec<Vec<f64>>,
+    /// Friction coefficient of the fingertips.
+    pub finger_friction: f64,
+    /// Closing force of one finger. Unit: newtons.
+    pub grip_force_n: f64,
+    /// Collision meshes by the file name in the URDF, in the file's own scale.
+    pub meshes: BTreeMap<String, Vec<Shape>>,
+    /// Digest of profile, URDF and meshes.
+    pub digest: String,
+}

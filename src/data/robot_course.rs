@@ -1,0 +1,54 @@
+//! What the robot itself went through during one action: joints at their limits, colliding links, held objects.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Motion;
+
+/// The robot's course during one action.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct RobotCourse {
+    /// One for each joint, in the robot's order.
+    pub joints: Vec<JointCourse>,
+    /// Pairs of links that penetrated each other, sorted.
+    pub self_contacts: Vec<SelfCollision>,
+    /// Objects that both fingers touched at the same time, in scene order.
+    pub held: Vec<HeldCourse>,
+    /// Its measurements and commands. Stored with the bodies' tracks, which not every reader needs.
+    #[serde(skip)]
+    pub motion: Motion,
+}
+
+/// Extremes of one joint. Units: metres or radians, by kind.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointCourse {
+    /// Name in the URDF.
+    pub name: String,
+    /// Largest excess of its position beyond its limits; negative if it stayed within them.
+    pub max_excess: f64,
+    /// Largest speed as a share of the joint's limit.
+    pub max_speed_share: f64,
+    /// Longest uninterrupted time at the motor's effort limit; 0 for fingers, which hold by force. Unit: seconds.
+    pub overload_secs: f64,
+}
+
+/// Two links of the robot that penetrated each other, and did not when the run began.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SelfCollision {
+    /// `robot/LINK`, sorted.
+    pub pair: [String; 2],
+    /// Time of its first detection since the action began. Unit: seconds.
+    pub start_secs: f64,
+    /// Largest penetration depth. Unit: metres.
+    pub max_depth_m: f64,
+}
+
+/// An object held between both fingers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeldCourse {
+    /// Id of the object.
+    pub id: String,
+    /// Total time held. Unit: seconds.
+    pub held_secs: f64,
+    /// Largest angle from the vertical while held. Unit: radians.
+    pub max_tilt_rad: f64,
+}

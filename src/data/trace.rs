@@ -1,0 +1,198 @@
+//! The record of a run's actions, as plain data.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Pose;
+use crate::{Part, SceneMap};
+use crate::{RobotCourse, Snapshot};
+
+/// A whole run as recorded by the simulation.
+///
+/// `snapshots` has one more element than there are performed actions: the state after one action is the state before
+/// the next and is stored once.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trace {
+    /// States before, between and after the actions.
+    pub snapshots: Vec<Snapshot>,
+    /// The actions in order, including those that were never reached.
+    pub actions: Vec<ActionTrace>,
+    /// The motion of all bodies, for replay and pictures.
+    pub frames: Frames,
+    /// Digest over the bits of every state at every control tick.
+    pub hash: String,
+    /// The names of places in the world.
+    pub map: SceneMap,
+    /// Shapes of objects and links, for pictures. Empty in traces of earlier versions.
+    pub forms: Vec<Form>,
+    /// The robot's course during each performed action. Empty in traces of earlier versions.
+    pub robot_courses: Vec<RobotCourse>,
+}
+
+/// The shape of a body, detailed enough for an outline. Mesh pieces are reduced to their outermost points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Form {
+    /// Id of the object, or `robot/LINK`.
+    pub name: String,
+    /// Convex solids and tubes. Frame: the body's.
+    pub parts: Vec<Part>,
+}
+
+/// One action as it was performed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ActionTrace {
+    /// Name of the action, as the test lists it (`Pick`).
+    pub action: String,
+    /// Values of the designators in force.
+    pub parameters: BTreeMap<String, Vec<String>>,
+    /// How it ended.
+    pub end: ActionEnd,
+    /// The action's own report, if it made one.
+    pub report: Option<ActionReport>,
+    /// Simulated duration. Unit: seconds.
+    pub duration_secs: f64,
+    /// Contacts that overlap the action in time.
+    pub contacts: Vec<ContactEpisode>,
+    /// What perception returned, in order.
+    pub percepts: Vec<Percept>,
+    /// The interpretation of the camera's pictures, if any were taken.
+    pub perceived: Option<Perceived>,
+    /// Extremes during the action, one for each body of the scene, in scene order.
+    pub extremes: Vec<Extremes>,
+    /// Smallest and largest true x and y of the base during the action; `None` for a fixed base. Unit: metres.
+    pub base: Option<[[f64; 2]; 2]>,
+    /// Phases of the action with their start times, for the timeline.
+    pub phases: Vec<Phase>,
+}
+
+impl ActionTrace {
+    /// An action that was not reached.
+    pub fn not_reached(action: &str, parameters: &BTreeMap<String, Vec<String>>) -> Self {
+        Self {
+            action: action.to_owned(),
+            parameters: parameters.clone(),
+            end: ActionEnd::NotReached,
+            report: None,
+            duration_secs: 0.0,
+            contacts: Vec::new(),
+            percepts: Vec::new(),
+            perceived: None,
+            extremes: Vec::new(),
+            base: None,
+            phases: Vec::new(),
+        }
+    }
+}
+
+/// How an action ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ActionEnd {
+    /// The action ended with its own report.
+    Completed,
+    /// A fault of the simulation or the tool, with the reason.
+    Broken(String),
+    /// The action exceeded its budget, which the text names.
+    Timeout(String),
+    /// An earlier action ended the run.
+    NotReached,
+    /// The run exceeded its wall-clock limit: a timeout that says nothing about the robot.
+    Cut(String),
+}
+
+/// The action's own report. It can be wrong.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ActionReport {
+    /// Whether the action believes it succeeded.
+    pub succeeded: bool,
+    /// The reason, in words.
+    pub message: String,
+}
+
+/// One uninterrupted contact between two bodies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ContactEpisode {
+    /// The pair, sorted: ids of objects, `robot/LINK`, or `floor`.
+    pub pair: [String; 2],
+    /// Start, since the action began. Unit: seconds.
+    pub start_secs: f64,
+    /// End, since the action began. Unit: seconds.
+    pub end_secs: f64,
+    /// Largest normal force. Unit: newtons.
+    pub max_force_n: f64,
+}
+
+/// One object as perceived. Frame: world, by the base's belief.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Percept {
+    /// Id of the requested object, or the name given to the detection.
+    pub id: String,
+    /// Perceived pose of the object's foot.
+    pub pose: Pose,
+    /// Perceived dimensions. Unit: metres.
+    pub size_m: [f64; 3],
+}
+
+/// Perception's interpretation of the pictures. Frame: world, by the base's belief.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Perceived {
+    /// The surface, if one was found.
+    pub plane: Option<PerceivedPlane>,
+    /// The objects perceived on it, in no particular order.
+    pub things: Vec<PerceivedThing>,
+}
+
+/// A level surface as perceived.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PerceivedPlane {
+    /// Pose of its centre: z is the normal of its upper side, x runs along its first side.
+    pub pose: Pose,
+    /// Lengths of its sides. Unit: metres.
+    pub size_m: [f64; 2],
+}
+
+/// An object on a surface, as perceived.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PerceivedThing {
+    /// The recognised category: the IRI of an ontology class. `None` if no known kind has its size.
+    pub category: Option<String>,
+    /// Upright pose of the centre of its foot.
+    pub pose: Pose,
+    /// Dimensions along the axes of that pose; hidden sides get the length known for its kind. Unit: metres.
+    pub size_m: [f64; 3],
+}
+
+/// Extremes of a body's motion during one action.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Extremes {
+    /// Id of the body.
+    pub id: String,
+    /// Largest angle from the vertical. Unit: radians.
+    pub max_tilt_rad: f64,
+    /// Largest speed of its origin. Unit: m/s.
+    pub max_speed: f64,
+    /// Largest rise of its origin above the initial height. Unit: metres.
+    pub max_rise_m: f64,
+    /// Largest distance of its origin from the initial position. Unit: metres.
+    pub max_displacement_m: f64,
+}
+
+/// A named part of an action.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Phase {
+    /// Name of the phase, such as `approach`.
+    pub name: String,
+    /// Start, since the action began. Unit: seconds.
+    pub start_secs: f64,
+}
+
+/// Poses of all moving bodies, sampled at a fixed rate.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Frames {
+    /// Time between two frames. Unit: seconds.
+    pub period_secs: f64,
+    /// Bodies with a track: ids of movable objects, then `robot/LINK`.
+    pub names: Vec<String>,
+    /// One row per frame: for each name x, y, z (metres) and qx, qy, qz, qw. Shape: frames × (7 · names).
+    pub rows: Vec<Vec<f32>>,
+}

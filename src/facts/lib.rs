@@ -1,0 +1,13 @@
+//! Turns a trace into RDF facts: raw quantities with their units, interned once.
+//!
+//! Never: steps the simulation, holds a threshold, depends on a rule, or decides a verdict.
+
+mod during;
+mod extract;
+mod places;
+mod robot_course;
+mod snapshot;
+mod writer;
+
+pub use extract::extract;
+pub use writer::thing_iri;

@@ -1,0 +1,44 @@
+//! The history: campaigns, runs, scenes, facts and outcomes in an RDF store on disk, with traces in files beside it.
+//!
+//! Never: judges, simulates, changes stored runs, or reads a clock.
+
+mod answer;
+mod detail;
+mod dump;
+mod fault;
+mod folder;
+mod frames;
+mod graphs;
+mod lists;
+pub mod merge;
+mod newest;
+mod query;
+mod rdf_text;
+mod read;
+mod read_campaign;
+mod recheck;
+mod record;
+mod rows;
+mod scene_digest;
+mod statements;
+mod store;
+mod syntax_fault;
+mod terms;
+mod trace_file;
+mod vitals;
+mod wire;
+mod write_campaign;
+mod write_run;
+mod write_scene;
+
+pub use answer::{Cancel, QueryAnswer};
+pub use newest::NewestOutcomes;
+pub use rdf_text::{RdfSyntax, rdf_text};
+pub use recheck::{Recheck, StoredJudgement};
+pub use record::{CampaignEnd, CampaignRecord, Repetition, RunRecord, RunStatus, SkillRecord};
+pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
+pub use scene_digest::SceneDigest;
+pub use store::History;
+pub use vitals::RunVitals;
+pub use wire::{WireFault, WireSyntax};
+pub use write_scene::{NOISE_TERMS, noise};

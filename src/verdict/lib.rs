@@ -1,0 +1,13 @@
+//! Turns the rules' findings into outcomes with witness and margin, and outcomes into scores and rates.
+//!
+//! Never: evaluates a rule, reads a trace, or reduces the six outcomes to pass and fail.
+
+mod judge;
+mod recurrence;
+mod score;
+mod wilson;
+
+pub use judge::{Fate, judge};
+pub use recurrence::Recurrence;
+pub use score::{Counts, action_score, mean, run_score};
+pub use wilson::{Interval, trials_for_width, wilson, wilson_share};

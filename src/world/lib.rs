@@ -1,0 +1,49 @@
+//! Simulates a `Scene`: the only module that uses the physics engine.
+//!
+//! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint.
+
+mod assemble;
+mod body;
+mod camera;
+mod contacts;
+mod convert;
+mod decompose;
+mod description;
+mod engine;
+mod error;
+mod fault;
+mod forms;
+mod fresh;
+pub mod ik;
+mod kinematics;
+mod layout;
+mod mishap;
+mod motion;
+mod observe;
+mod odometry;
+mod quality;
+mod rays;
+mod recorder;
+mod robot;
+mod robot_course;
+mod self_contact;
+mod sense;
+mod settle;
+mod silhouette;
+mod simulation;
+
+pub use body::OwnBody;
+pub use camera::DepthImage;
+pub use contacts::CONTACT_FLOOR_NEWTONS;
+pub use decompose::{decompose, decomposition_key};
+pub use description::{Joint, JointKind};
+pub use error::WorldError;
+pub use fault::{Fault, Mishap, Poison};
+pub use kinematics::{GRAVITY, Kinematics};
+pub use layout::{Layout, check_robot};
+pub use recorder::{Contact, Course, Record, Tracks};
+pub use robot::geometry;
+pub use self_contact::SelfContact;
+pub use sense::Sighting;
+pub use settle::Settling;
+pub use simulation::{Command, Observation, World, build};
