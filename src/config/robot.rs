@@ -1,7 +1,7 @@
 //! Robot profiles: the roles of a URDF's joints and links.
 
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, did_you_mean, digest_of};
-use actcheck_data::{RobotProfile, Shape};
+use actcheck_data::RobotProfile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

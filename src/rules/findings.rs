@@ -1,6 +1,6 @@
 //! The result of evaluating the rules of one property for one action.
 
-use actcheck_base::{Diagnostic, RuleFault, Term};
+use actcheck_base::{Diagnostic, RuleFault};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::overlap::Solid;
 use crate::surroundings::Surroundings;
 use crate::{Space, placement};
-use actcheck_data::{Choices, Location, ObjectModel, Pose, RobotStart, Role, Scene, SceneMap, SceneObject, Surface};
+use actcheck_data::{Choices, Location, ObjectModel, Pose, RobotStart, Role, Scene, SceneObject, Surface};
 
 /// Maximum number of tries to place one object; then the scene is discarded. On a half-full table about every second
 /// try succeeds, so after fifty failures further tries are not worthwhile.
