@@ -1,4 +1,4 @@
-//! `actcheck export --dataset`: what is in it, by other people's reader, and that it agrees with the history.
+//! `actcheck export --dataset`: its contents, read by an independent reader, and their agreement with the history.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::support::{actcheck, copy, foreign, made_history, root, stderr, stdout};
 
-/// Exports into the folder `data` of one that passes. The history is a copy: others may have the first open.
+/// Exports into the folder `data`. The history is a copy, since other tests may have the original open.
 fn export(arguments: &[&str]) -> (tempfile::TempDir, Output) {
     let folder = tempfile::tempdir().unwrap();
     copy(made_history(), &folder.path().join("history"));
@@ -27,7 +27,7 @@ fn schema(folder: &Path) -> Value {
 }
 
 #[test]
-fn every_table_is_told_and_described() {
+fn every_table_is_listed_and_described() {
     let (folder, told) = exported(&[]);
     let schema = schema(folder.path());
     let files: Vec<&str> =
@@ -47,7 +47,7 @@ fn every_table_is_told_and_described() {
 }
 
 #[test]
-fn the_tables_agree_with_each_other_by_another_reader() {
+fn the_tables_are_consistent_for_an_independent_reader() {
     let Some(python) = foreign::python() else { return };
     let (folder, _) = exported(&[]);
     let output = Command::new(python)
@@ -60,7 +60,7 @@ fn the_tables_agree_with_each_other_by_another_reader() {
 }
 
 #[test]
-fn only_what_is_asked_for_is_in_it() {
+fn the_dataset_has_only_the_requested_runs() {
     let (_folder, told) = exported(&["--since", "2999-01-01"]);
     assert!(told.contains("joints.parquet holds 0 rows") && told.contains("of 0 runs"), "{told}");
     assert_eq!(export(&["--campaign", "none"]).1.status.code(), Some(2));

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Each module, the modules that it may import, in the order of the line. `cli` may import all.
+/// Each module and the modules it may import, in the order of the pipeline. `cli` may import all.
 const FLOORS: [(&str, &[&str]); 16] = [
     ("base", &[]),
     ("search", &["base"]),
@@ -30,7 +30,7 @@ const FLOORS: [(&str, &[&str]); 16] = [
     ("serve", &["base", "history"]),
 ];
 
-/// Libraries of the field and where they may be named.
+/// Libraries of the field and the modules that may name them.
 const FENCES: [(&str, &[&str]); 22] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
@@ -68,7 +68,7 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Code lines of each module: comments and what is behind them left out.
+/// Code lines of each module, without comments.
 fn code() -> BTreeMap<String, Vec<(PathBuf, usize, String)>> {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut files = Vec::new();
@@ -78,7 +78,7 @@ fn code() -> BTreeMap<String, Vec<(PathBuf, usize, String)>> {
         let relative = file.strip_prefix(&src).unwrap().to_path_buf();
         let module = relative.components().next().unwrap().as_os_str().to_string_lossy().into_owned();
         let text = std::fs::read_to_string(&file).unwrap();
-        // Tests inside a file stand at its end and may reach further.
+        // Tests inside a file are at its end and may import more.
         let outside_tests = text.lines().take_while(|line| *line != "#[cfg(test)]");
         for (idx, line) in outside_tests.enumerate() {
             let line = line.split("//").next().unwrap().to_owned();
@@ -88,7 +88,7 @@ fn code() -> BTreeMap<String, Vec<(PathBuf, usize, String)>> {
     modules
 }
 
-/// Names behind every `crate::` in a line, groups included: `crate::{base, world}` and `crate::base::Pose`.
+/// Names after every `crate::` in a line, groups included: `crate::{base, world}` and `crate::base::Pose`.
 fn crate_modules(line: &str) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     for behind in line.split("crate::").skip(1) {
@@ -107,7 +107,7 @@ fn crate_modules(line: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn every_import_points_up_the_table() {
+fn every_module_imports_only_modules_above_it() {
     let mut wrong = Vec::new();
     for (module, lines) in code() {
         let Some((_, allowed)) = FLOORS.iter().find(|(name, _)| *name == module) else { continue };
@@ -123,7 +123,7 @@ fn every_import_points_up_the_table() {
 }
 
 #[test]
-fn every_library_stays_behind_its_fence() {
+fn every_library_is_used_only_in_its_modules() {
     let mut wrong = Vec::new();
     for (module, lines) in code() {
         for (file, number, line) in lines {
@@ -141,14 +141,14 @@ fn every_library_stays_behind_its_fence() {
 }
 
 #[test]
-fn every_module_has_a_floor() {
+fn every_module_is_in_the_table() {
     let known: BTreeSet<&str> = FLOORS.iter().map(|(name, _)| *name).chain(["cli", "lib.rs", "main.rs"]).collect();
     let unknown: Vec<String> = code().into_keys().filter(|module| !known.contains(module.as_str())).collect();
     assert!(unknown.is_empty(), "no floor for {unknown:?}");
 }
 
 #[test]
-fn the_reader_of_imports_sees_groups_and_paths() {
+fn the_import_reader_handles_groups_and_paths() {
     let names =
         crate_modules("use crate::{base::Pose, world}; crate::facts::extract(); pub(crate) use crate::rules::x;");
     assert_eq!(names.into_iter().collect::<Vec<_>>(), ["base", "facts", "rules", "world"]);

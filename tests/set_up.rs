@@ -1,5 +1,5 @@
-//! What the build's scripts do on machines that lack something: made-up roots and search paths, and an apt-get that writes down what it
-//! is asked for.
+//! The build scripts on incomplete machines: made-up roots and search paths, and an apt-get that records its
+//! arguments.
 
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
@@ -15,13 +15,13 @@ const TOOLS: [&str; 29] = [
     "ld", "ln", "mkdir", "mktemp", "mv", "rm", "sed", "sh", "sort", "tail", "tee", "touch", "tr", "uname",
 ];
 
-/// A machine that has only what it is given: a search path of its own, and a root in which libclang is looked for.
+/// A machine with only the given tools: its own search path, and a root in which libclang is searched.
 struct Machine {
     folder: TempDir,
 }
 
 impl Machine {
-    /// With Rust and compilers, and an apt-get that has nothing to install.
+    /// With Rust and compilers, and an apt-get that has no packages.
     fn new() -> Self {
         let machine = Self::bare();
         for tool in ["cc", "c++"] {
@@ -47,7 +47,7 @@ impl Machine {
         self.folder.path().join(name)
     }
 
-    /// A command of this machine's.
+    /// Links a command of the real machine.
     fn has(&self, name: &str) {
         let folders = std::env::var_os("PATH").unwrap();
         let found = std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| path.is_file());
@@ -66,12 +66,12 @@ impl Machine {
         std::fs::remove_file(self.path("bin").join(name)).unwrap();
     }
 
-    /// A library in the folder of LLVM.
+    /// A library in LLVM's folder.
     fn library(&self, name: &str, file: &Path) {
         symlink(file, self.path("root/usr/lib/llvm-14/lib").join(name)).unwrap();
     }
 
-    /// Runs a script of `.ci`: its exit code and what it printed to the error stream.
+    /// Runs a script of `.ci`. Returns its exit code and its error stream.
     fn run(&self, script: &str, variables: &[(&str, &str)]) -> (i32, String) {
         let output = Command::new("/bin/sh")
             .arg(root().join(".ci").join(script))
@@ -88,13 +88,13 @@ impl Machine {
         (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
     }
 
-    /// What apt-get was asked for.
+    /// The arguments of apt-get.
     fn installed(&self) -> String {
         std::fs::read_to_string(self.path("apt")).unwrap_or_default()
     }
 }
 
-/// The libclang that this program was built with, unless it was named by `LIBCLANG_PATH`.
+/// The libclang that this program was built with, unless it was set by `LIBCLANG_PATH`.
 fn libclang() -> Option<PathBuf> {
     let folders =
         ["/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib64", "/usr/lib"].map(PathBuf::from);
@@ -106,13 +106,13 @@ fn libclang() -> Option<PathBuf> {
         (name.starts_with("libclang.so") || name.starts_with("libclang-1")) && name.contains(".so") && path.is_file()
     });
     if found.is_none() {
-        left_out("the search for libclang", "this machine's is in none of the usual folders");
+        left_out("the search for libclang", "libclang is in none of the usual folders");
     }
     found
 }
 
 #[test]
-fn libclang_cpp_is_not_taken_for_libclang() {
+fn libclang_cpp_is_not_mistaken_for_libclang() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang-cpp.so.14", &real);
@@ -121,7 +121,7 @@ fn libclang_cpp_is_not_taken_for_libclang() {
     assert!(machine.installed().contains("install -y -qq --no-install-recommends clang\n"), "{}", machine.installed());
     assert!(told.contains("'clang' is installed, but there is no libclang"), "{told}");
 
-    // The same, where apt-get brings it.
+    // The same, if apt-get installs it.
     let brings = format!(
         "case $1 in install) ln -sf '{}' \"$ACTCHECK_ROOT/usr/lib/llvm-14/lib/libclang.so.1\" ;; esac",
         real.display()
@@ -131,10 +131,10 @@ fn libclang_cpp_is_not_taken_for_libclang() {
 }
 
 #[test]
-fn a_library_of_another_machine_is_not_taken() {
+fn a_library_of_another_architecture_is_not_accepted() {
     let machine = Machine::new();
     let other = machine.path("other");
-    // The head of a 32-bit library.
+    // The header of a 32-bit library.
     std::fs::write(&other, b"\x7fELF\x01\x01\x01").unwrap();
     machine.library("libclang.so.1", &other);
     let (code, told) = machine.run("system", &[]);
@@ -143,7 +143,7 @@ fn a_library_of_another_machine_is_not_taken() {
 }
 
 #[test]
-fn libclang_without_the_name_for_linkers_is_enough() {
+fn libclang_without_the_linker_name_is_enough() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
@@ -152,7 +152,7 @@ fn libclang_without_the_name_for_linkers_is_enough() {
 }
 
 #[test]
-fn a_libclang_path_that_leads_nowhere_is_named() {
+fn a_wrong_libclang_path_is_named() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
@@ -161,8 +161,8 @@ fn a_libclang_path_that_leads_nowhere_is_named() {
     let expected = "actcheck needs libclang. LIBCLANG_PATH is wrong: there is no libclang at /nowhere. Unset LIBCLANG_PATH, or set \
                     it to the folder that has it\n";
     assert_eq!(told, expected);
-    assert_eq!(machine.installed(), "", "installing would not change it");
-    // As a folder and as a file it is taken, whatever lies elsewhere.
+    assert_eq!(machine.installed(), "", "installing packages would not help");
+    // It is accepted as a folder and as a file, wherever else libclang is installed.
     let named = machine.path("root/usr/lib/llvm-14/lib");
     let file = named.join("libclang.so.1");
     for named in [named, file] {
@@ -197,7 +197,7 @@ fn without_apt_the_packages_are_named() {
 }
 
 #[test]
-fn packages_that_are_not_necessary_may_be_missing() {
+fn optional_packages_may_be_missing() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
@@ -209,7 +209,7 @@ fn packages_that_are_not_necessary_may_be_missing() {
 }
 
 #[test]
-fn rust_is_asked_for_before_anything_else() {
+fn rust_is_checked_before_anything_else() {
     let machine = Machine::new();
     machine.command("rustc", "echo 'rustc 1.70.0 (90c541806 2023-05-31)'");
     let wanted = env!("CARGO_PKG_RUST_VERSION");
@@ -241,7 +241,7 @@ fn a_full_disk_is_named_before_and_after() {
         told.contains("but only 200 MB are free; free some space, or set CARGO_TARGET_DIR to a folder on another disk"),
         "{told}"
     );
-    // It fills up while crates compile.
+    // The disk fills up while crates compile.
     machine.command("df", "[ -e \"$MACHINE/full\" ] && free=0 || free=9000000; echo head; echo \"disk 1 1 $free 1 /\"");
     machine.command("cargo", "[ \"$1\" = fetch ] || { touch \"$MACHINE/full\"; exit 101; }");
     let (code, told) = machine.run("build", &[]);
@@ -262,7 +262,7 @@ fn a_missing_network_is_named() {
     );
 }
 
-/// A fault of the code itself is cargo's to explain.
+/// A fault of the code itself is reported by cargo.
 #[test]
 fn a_failed_build_keeps_its_exit_code() {
     let machine = Machine::new();
