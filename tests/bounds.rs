@@ -225,8 +225,12 @@ fn a_fault_in_a_very_long_line_is_shown_with_nearby_text_only() {
     {
         std::fs::write(folder.path().join(format!("{name}.rls")), text).unwrap();
         let output = crate::support::actcheck(folder.path(), &["datalog", &format!("{name}.rls")]);
-        let told = crate::support::stderr(&output);
-        assert_eq!(output.status.code(), Some(2), "{name}: {told}");
-        assert!(told.contains(&format!("{name}.rls:1:")) && told.len() < 200_000, "{name}: {} bytes", told.len());
+        let printed = crate::support::stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{name}: {printed}");
+        assert!(
+            printed.contains(&format!("{name}.rls:1:")) && printed.len() < 200_000,
+            "{name}: {} bytes",
+            printed.len()
+        );
     }
 }

@@ -70,10 +70,10 @@ fn shows_the_counts_of_the_program(browser: &mut Chromium, file: &Path, folder: 
     let counts: Vec<&Value> = Outcome::ALL.iter().map(|outcome| &analysed["outcomes"][outcome.word()]).collect();
     assert_eq!(tiles, json!(counts));
     for (successes, trials) in [(3u64, 20u64), (0, 7), (7, 7), (811, 1234)] {
-        let told = browser.value(&format!("wilson({successes}, {trials})"));
+        let interval = browser.value(&format!("wilson({successes}, {trials})"));
         let known = wilson(successes, trials).unwrap();
         for (name, value) in [("rate", known.rate), ("low", known.low), ("high", known.high)] {
-            assert!((told[name].as_f64().unwrap() - value).abs() < 1e-12, "{successes} of {trials}: {told}");
+            assert!((interval[name].as_f64().unwrap() - value).abs() < 1e-12, "{successes} of {trials}: {interval}");
         }
     }
     for view in VIEWS {
@@ -119,8 +119,8 @@ fn watches(browser: &mut Chromium, file: &Path, id: &str) {
     browser.open(file, &format!("/run/{id}"));
     browser.until("document.querySelector('.watch').dataset.ready");
     let slider = "Number(document.querySelector('.slider').value)";
-    let told = browser.value("document.querySelector('.failure button').textContent.match(/[\\d.]+/)[0]");
-    let decided: f64 = told.as_str().unwrap().parse().unwrap();
+    let moment = browser.value("document.querySelector('.failure button').textContent.match(/[\\d.]+/)[0]");
+    let decided: f64 = moment.as_str().unwrap().parse().unwrap();
     let opened = browser.value(slider).as_f64().unwrap();
     assert!(opened <= decided + 0.06, "the playback opens at {opened}, but the outcome was decided at {decided}");
     for words in
@@ -245,7 +245,7 @@ fn texts_of_models_rules_and_messages_never_become_markup() {
     }
     browser.open(&file, &run);
     browser.until("document.querySelector('.details .failure')");
-    let told = browser.value("document.querySelector('.details').textContent");
-    assert!(told.as_str().unwrap().contains(HOSTILE), "the hostile text is shown as text");
+    let text = browser.value("document.querySelector('.details').textContent");
+    assert!(text.as_str().unwrap().contains(HOSTILE), "the hostile text is shown as text");
     assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
 }

@@ -121,8 +121,8 @@ fn a_case_survives_edits_of_rules_comments_and_ontology() {
     let (code, case) = run_case(project.path(), "case.toml");
     assert_eq!((code, &case["recurrence"]), (Some(1), &"otherwise".into()), "{case:#}");
     let output = actcheck(project.path(), &["run", "case.toml", "--history", "h2"]);
-    let told = "fails differently: MovedObject + NoGraspCollisions (was NoGraspCollisions); same trace";
-    assert!(stdout(&output).contains(told), "{}", stdout(&output));
+    let printed = "fails differently: MovedObject + NoGraspCollisions (was NoGraspCollisions); same trace";
+    assert!(stdout(&output).contains(printed), "{}", stdout(&output));
 
     let ontology = project.path().join("ontology/actions.ttl");
     let added = "\nact:Extra a owl:Class ; rdfs:label \"extra\" .\n";
@@ -165,9 +165,9 @@ fn impossible_values_are_refused_with_their_lines() {
     ];
     for (text, code, line, help) in cases {
         std::fs::write(&file, &text).unwrap();
-        let told = refused(project.path(), &["run", "case.toml", "--history", "h2"]);
-        assert!(told.contains(code) && told.contains(line) && told.contains(help), "{code} {line}: {told}");
-        assert!(told.contains("case.toml:"), "the place: {told}");
+        let printed = refused(project.path(), &["run", "case.toml", "--history", "h2"]);
+        assert!(printed.contains(code) && printed.contains(line) && printed.contains(help), "{code} {line}: {printed}");
+        assert!(printed.contains("case.toml:"), "the place: {printed}");
         let checked = refused(project.path(), &["check", "case.toml"]);
         assert!(checked.contains(code), "{checked}");
     }
@@ -175,8 +175,8 @@ fn impossible_values_are_refused_with_their_lines() {
     let (_, case) = run_case(project.path(), "case.toml");
     assert_eq!(case["same_trace"], false, "an edited value counts: {case:#}");
     std::fs::write(&file, &good).unwrap();
-    let told = refused(project.path(), &["run", "case.toml", "--runs", "5", "--seed", "3", "--shrink"]);
-    assert_eq!(told.matches("X040").count(), 3, "{told}");
+    let printed = refused(project.path(), &["run", "case.toml", "--runs", "5", "--seed", "3", "--shrink"]);
+    assert_eq!(printed.matches("X040").count(), 3, "{printed}");
 }
 
 #[test]
@@ -217,18 +217,18 @@ fn a_campaign_runs_its_regressions_first_and_reports_them_separately() {
     assert_eq!(json["runs"].as_array().unwrap().len(), 1, "regressions are not counted among the runs");
     assert_eq!((json["exit_code"].as_i64(), output.status.code()), (Some(1), Some(1)));
     let text = stdout(&campaign(&["--jobs", "1"]));
-    let told = format!("regressions: 1 ran, 1 fails again: {run}.toml (NoGraspCollisions)\n");
-    assert!(text.starts_with(&told), "{text}");
+    let printed = format!("regressions: 1 ran, 1 fails again: {run}.toml (NoGraspCollisions)\n");
+    assert!(text.starts_with(&printed), "{text}");
 
     let file = project.path().join(format!("regressions/{run}.toml"));
     edit(&file, "target.model = \"glass\"", "target.model = \"glas\"");
     std::fs::copy(project.path().join("configs/pick.toml"), project.path().join("regressions/pick.toml")).unwrap();
-    let told = refused(project.path(), &arguments);
-    assert!(told.contains("C015") && told.contains(&format!("{run}.toml:")), "{told}");
+    let printed = refused(project.path(), &arguments);
+    assert!(printed.contains("C015") && printed.contains(&format!("{run}.toml:")), "{printed}");
     assert!(refused(project.path(), &["check", "configs/lone_glass.toml"]).contains("C015"));
     edit(&file, "target.model = \"glas\"", "target.model = \"glass\"");
-    let told = refused(project.path(), &arguments);
-    assert!(told.contains("regressions/pick.toml") && told.contains("S0"), "{told}");
+    let printed = refused(project.path(), &arguments);
+    assert!(printed.contains("regressions/pick.toml") && printed.contains("S0"), "{printed}");
 }
 
 #[test]

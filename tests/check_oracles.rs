@@ -76,10 +76,10 @@ fn the_shipped_properties_notice_every_fault() {
     let project = project();
     sure(project.path());
     let output = actcheck(project.path(), &["check-oracles", "configs/pick.toml", "--runs", "8", "--format", "json"]);
-    let told: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
-    assert_eq!(output.status.code(), Some(0), "{}", told["gaps"]);
-    assert_eq!(told["gaps"], serde_json::json!([]));
-    let faults = told["faults"].as_array().unwrap();
+    let printed: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(output.status.code(), Some(0), "{}", printed["gaps"]);
+    assert_eq!(printed["gaps"], serde_json::json!([]));
+    let faults = printed["faults"].as_array().unwrap();
     assert_eq!(faults.len(), of_pick());
     let notices = |fault: &Value, idx: usize| fault["properties"][idx]["verdict"] == "noticed";
     for fault in faults {
@@ -194,11 +194,11 @@ fn too_few_scenes_are_reported_as_inconclusive() {
     let output =
         actcheck(folder.path(), &["check-oracles", config.to_str().unwrap(), "--runs", "1", "--format", "csv"]);
     assert_eq!(output.status.code(), Some(1));
-    let (rows, told) = (stdout(&output), stderr(&output));
+    let (rows, printed) = (stdout(&output), stderr(&output));
     assert_eq!(rows.lines().count(), 1 + 5 * of_pick(), "{rows}");
     assert!(rows.lines().skip(1).all(|line| line.ends_with(",too few")), "{rows}");
-    assert!(told.contains("V003") && told.contains("V004") && told.contains("--runs"), "{told}");
-    assert!(!told.contains("V001") && !told.contains("V002"), "too few scenes must not prove a gap:\n{told}");
+    assert!(printed.contains("V003") && printed.contains("V004") && printed.contains("--runs"), "{printed}");
+    assert!(!printed.contains("V001") && !printed.contains("V002"), "too few scenes must not prove a gap:\n{printed}");
     // Sabotaged runs are not counted among the robot's runs.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     let missing = actcheck(folder.path(), &["check-oracles", "nowhere.toml"]);

@@ -28,7 +28,7 @@ fn schema(folder: &Path) -> Value {
 
 #[test]
 fn every_table_is_listed_and_described() {
-    let (folder, told) = exported(&[]);
+    let (folder, printed) = exported(&[]);
     let schema = schema(folder.path());
     let files: Vec<&str> =
         schema["tables"].as_array().unwrap().iter().map(|table| table["file"].as_str().unwrap()).collect();
@@ -37,7 +37,7 @@ fn every_table_is_listed_and_described() {
         ["actions", "joints", "robot", "objects", "percepts", "outcomes"].map(|name| format!("{name}.parquet"))
     );
     for file in files {
-        assert!(folder.path().join("data").join(file).is_file() && told.contains(file), "{told}");
+        assert!(folder.path().join("data").join(file).is_file() && printed.contains(file), "{printed}");
     }
     for table in schema["tables"].as_array().unwrap() {
         for column in table["columns"].as_array().unwrap() {
@@ -61,7 +61,7 @@ fn the_tables_are_consistent_for_an_independent_reader() {
 
 #[test]
 fn the_dataset_has_only_the_requested_runs() {
-    let (_folder, told) = exported(&["--since", "2999-01-01"]);
-    assert!(told.contains("joints.parquet holds 0 rows") && told.contains("of 0 runs"), "{told}");
+    let (_folder, printed) = exported(&["--since", "2999-01-01"]);
+    assert!(printed.contains("joints.parquet holds 0 rows") && printed.contains("of 0 runs"), "{printed}");
     assert_eq!(export(&["--campaign", "none"]).1.status.code(), Some(2));
 }

@@ -64,12 +64,12 @@ fn a_pattern_is_reported_with_its_runs() {
     let found = property_findings(&table, &judged[0], &hierarchy(), &PatternOptions::default());
     let patterns: Vec<_> = found.patterns.confirmed().collect();
     assert_eq!(patterns.len(), 1, "{:#?}", found.patterns);
-    let told: Vec<&str> = patterns[0]
+    let parameters: Vec<&str> = patterns[0]
         .conditions
         .iter()
         .map(|condition| found.subject.parameters[condition.parameter()].name.as_str())
         .collect();
-    assert_eq!(told, ["target_category", "target_friction"]);
+    assert_eq!(parameters, ["target_category", "target_friction"]);
     for run in &patterns[0].runs {
         let row = found.examples[*run].row as usize;
         assert_eq!(table.text("target_category").get(row), Some("http://actions#Bottle"));
@@ -118,11 +118,11 @@ fn summary(table: &OutcomeTable, property: usize) -> FindingsSummary {
 #[test]
 fn a_pattern_is_drawn_with_its_sentence_and_every_run_in_its_colour() {
     let table = table(runs("k", 1_500, 0.05), &TableFilter::default());
-    let told = summary(&table, 0);
-    let svg = patterns_picture(&told).expect("there is a pattern").to_svg();
+    let found = summary(&table, 0);
+    let svg = patterns_picture(&found).expect("there is a pattern").to_svg();
     assert!(svg.contains("InHand fails") && svg.contains("Bottle"), "{svg}");
     // All runs of the pattern's kind are drawn, with two strokes for each failed run.
-    let findings = &told.properties[0].findings;
+    let findings = &found.properties[0].findings;
     let pattern = findings.patterns.confirmed().next().unwrap();
     let kind = pattern.conditions.iter().find(|condition| matches!(condition, Condition::Kind { .. })).unwrap();
     let holds = kind.holds(&findings.subject);

@@ -254,9 +254,9 @@ fn a_run_that_tested_nothing_is_not_a_passed_observation() {
     assert_eq!(observation(&run, "")["status"], "gave_up");
     run.row.status = RunStatus::Timeout;
     run.reason = Some("300 s on the clock".to_owned());
-    let told = observation(&run, "no moment");
-    assert_eq!([&told["status"], &told["status_reason"]], ["gave_up", "300 s on the clock"]);
-    assert_eq!(told["run_start"], 0.0);
+    let observed = observation(&run, "no moment");
+    assert_eq!([&observed["status"], &observed["status_reason"]], ["gave_up", "300 s on the clock"]);
+    assert_eq!(observed["run_start"], 0.0);
 }
 
 fn turtle(text: &str) -> Vec<[Term; 3]> {
@@ -360,12 +360,12 @@ fn report_writes_the_requested_formats() {
         (output.status.code(), stdout(&output), stderr(&output))
     };
     let files = ["--allure", "a", "--junit", "j.xml", "--earl", "e.ttl", "--jsonl", "o.jsonl", "--markdown"];
-    let (code, printed, told) = report(&files);
-    assert_eq!(code, Some(0), "{told}");
+    let (code, printed, messages) = report(&files);
+    assert_eq!(code, Some(0), "{messages}");
     assert!(printed.starts_with("## actcheck: "), "{printed}");
     assert!(
-        !printed.contains("holds") && told.contains("j.xml holds"),
-        "stdout must have only the summary: {printed}{told}"
+        !printed.contains("holds") && messages.contains("j.xml holds"),
+        "stdout must have only the summary: {printed}{messages}"
     );
     let read = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
     // Three properties of PerceivePlane, five of Pick.
@@ -395,7 +395,7 @@ fn report_writes_the_requested_formats() {
         (vec!["--junit", "no/folder/j.xml"], "X007"),
         (vec![], "--allure"),
     ] {
-        let (code, _, told) = report(&wrong);
-        assert!(code == Some(2) && told.contains(fault), "{wrong:?}: {told}");
+        let (code, _, messages) = report(&wrong);
+        assert!(code == Some(2) && messages.contains(fault), "{wrong:?}: {messages}");
     }
 }

@@ -83,9 +83,9 @@ fn a_crowded_table_and_an_idle_property_are_reported() {
 
     let output = actcheck(project.path(), &["health", "--history", "h", "--format", "json"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    let told: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let printed: Value = serde_json::from_str(&stdout(&output)).unwrap();
     let codes: Vec<&str> =
-        told["warnings"].as_array().unwrap().iter().map(|warning| warning["code"].as_str().unwrap()).collect();
+        printed["warnings"].as_array().unwrap().iter().map(|warning| warning["code"].as_str().unwrap()).collect();
     assert_eq!(codes[..2], ["S032", "Q001"]);
     assert!(stderr(&output).contains("larger surface"), "no help:\n{}", stderr(&output));
     let table = stdout(&actcheck(project.path(), &["health", "--history", "h", "--format", "csv"]));

@@ -115,8 +115,8 @@ fn the_manual_has_every_command_with_options_and_examples() {
     assert!(words.contains("--until-width") && words.contains("actcheck run configs/pick.toml --runs 5"), "{words}");
     assert!(!text.contains("serve-query") && !text.contains("EXTRA"), "{text}");
 
-    let told = stdout(&actcheck(folder.path(), &["man", "--out", "man1"]));
-    assert!(told.contains("man -l man1/actcheck.1"), "{told}");
+    let printed = stdout(&actcheck(folder.path(), &["man", "--out", "man1"]));
+    assert!(printed.contains("man -l man1/actcheck.1"), "{printed}");
     for command in commands().into_iter().chain(["new-campaign".to_owned(), "new-property".to_owned()]) {
         let text = rendered(&folder.path().join(format!("man1/actcheck-{command}.1")));
         assert!(text.contains("DESCRIPTION"), "{text}");

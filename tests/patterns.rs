@@ -26,7 +26,7 @@ fn is(found: &Pattern, planted: &[Condition]) -> bool {
         && planted.iter().all(|wanted| found.conditions.iter().any(|condition| same(condition, wanted)))
 }
 
-fn told(found: &Patterns) -> Vec<&Vec<Condition>> {
+fn conditions(found: &Patterns) -> Vec<&Vec<Condition>> {
     found.patterns.iter().map(|pattern| &pattern.conditions).collect()
 }
 
@@ -37,9 +37,9 @@ fn only_planted_patterns_are_found_in_ten_thousand_runs() {
             let found = mine(&subject(10_000, seed, &planted), &PatternOptions::default());
             for wanted in &planted {
                 let confirmed = found.confirmed().any(|pattern| is(pattern, wanted));
-                assert!(confirmed, "{name}, seed {seed}: {wanted:?} is not in {:#?}", told(&found));
+                assert!(confirmed, "{name}, seed {seed}: {wanted:?} is not in {:#?}", conditions(&found));
             }
-            assert_eq!(found.patterns.len(), planted.len(), "{name}, seed {seed}: {:#?}", told(&found));
+            assert_eq!(found.patterns.len(), planted.len(), "{name}, seed {seed}: {:#?}", conditions(&found));
         }
     }
 }

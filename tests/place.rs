@@ -29,8 +29,8 @@ fn with_target(env: &Env, model: usize) -> RunRecord {
 
 fn all_passed(run: &RunRecord, step: usize) {
     assert_eq!(outcomes(run, step).len(), if step + 1 == run.judgements.len() { 4 } else { 5 });
-    let told = format!("{}: {:?}", report(run, step).message, run.judgements[step]);
-    assert!(outcomes(run, step).values().all(|outcome| *outcome == Outcome::Passed), "{told}");
+    let context = format!("{}: {:?}", report(run, step).message, run.judgements[step]);
+    assert!(outcomes(run, step).values().all(|outcome| *outcome == Outcome::Passed), "{context}");
 }
 
 /// The final pose of a body.
@@ -188,8 +188,8 @@ fn without_noise_clutter_and_obstacles_nearly_all_runs_pass() {
         |line: &str| ["_noise", "_drift", "dropout"].iter().any(|word| line.split('=').next().unwrap().contains(word));
     let quiet: Vec<&str> = text.lines().filter(|line| line.starts_with('#') || !is_noise(line)).collect();
     std::fs::write(&config, quiet.join("\n")).unwrap();
-    let told = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "4", "--history", "h"]);
-    assert!(told["score"].as_f64().unwrap() > 0.9, "{told:#}");
+    let whole = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "4", "--history", "h"]);
+    assert!(whole["score"].as_f64().unwrap() > 0.9, "{whole:#}");
 }
 
 #[test]

@@ -41,8 +41,8 @@ fn run(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
 }
 
 /// Joins wrapped output into one line.
-fn unwrapped(told: &str) -> String {
-    told.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+fn unwrapped(text: &str) -> String {
+    text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
 }
 
 fn runs(json: &Value) -> &[Value] {
@@ -136,8 +136,8 @@ fn ground_truth_is_sent_only_on_request_and_reports_mention_it() {
         let folder = project("truth.py", "[[\"Pick\"]]", 1, &format!("privileged = {privileged}"));
         let (_, json, complaints) = run(folder.path(), &[]);
         let message = of(&shown(folder.path(), of(&runs(&json)[0], "run"))["actions"][0], "message").to_owned();
-        let told = if privileged { "told of coffee_table_1, glass_1" } else { "told nothing" };
-        assert_eq!((message.as_str(), json["privileged"].as_bool()), (told, Some(privileged)), "{complaints}");
+        let expected = if privileged { "received coffee_table_1, glass_1" } else { "received nothing" };
+        assert_eq!((message.as_str(), json["privileged"].as_bool()), (expected, Some(privileged)), "{complaints}");
         let report = |format: &str| stdout(&actcheck(folder.path(), &["report", format, "--history", ".actcheck"]));
         assert_eq!(report("--markdown").contains("the ground truth"), privileged);
         let text = stdout(&actcheck(folder.path(), &["run", "c.toml"]));
@@ -212,9 +212,9 @@ fn wrong_about((fault, status, words): (&str, &str, &str)) -> Option<String> {
         let all = stdout(&actcheck(folder.path(), &["show", of(first, "run"), "--history", ".actcheck"]));
         assert!(all.contains("the program printed last:\n  Traceback (most recent call last)"), "{all}");
     }
-    let told = of(first, "reason");
-    let right = of(first, "status") == status && told.contains(words) && of(second, "status") == "completed";
-    (!right).then(|| format!("{fault}: {} ({told}), then {}", of(first, "status"), of(second, "status")))
+    let reason = of(first, "reason");
+    let right = of(first, "status") == status && reason.contains(words) && of(second, "status") == "completed";
+    (!right).then(|| format!("{fault}: {} ({reason}), then {}", of(first, "status"), of(second, "status")))
 }
 
 #[test]
@@ -283,19 +283,19 @@ fn launch_files_are_started_with_ros_if_it_is_installed() {
         };
         let refused = with_path("/nowhere", &["check", "c.toml"]);
         assert_eq!(refused.status.code(), Some(2));
-        let told = unwrapped(&stderr(&refused));
-        assert!(told.contains("C033") && told.contains(&format!("{file} needs `{program}`")), "{told}");
+        let message = unwrapped(&stderr(&refused));
+        assert!(message.contains("C033") && message.contains(&format!("{file} needs `{program}`")), "{message}");
         let tools = folder.path().join("tools");
         std::fs::create_dir(&tools).unwrap();
-        let script = "#!/bin/sh\necho \"$@\" > told\nexec python3 well_behaved.py\n";
+        let script = "#!/bin/sh\necho \"$@\" > arguments\nexec python3 well_behaved.py\n";
         std::fs::write(tools.join(program), script).unwrap();
         std::fs::set_permissions(tools.join(program), std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
         let path = format!("{}:{}", tools.display(), std::env::var("PATH").unwrap());
         let ran = with_path(&path, &["run", "c.toml", "--format", "csv"]);
         assert_eq!(ran.status.code(), Some(1), "{}", stderr(&ran));
-        let told = std::fs::read_to_string(folder.path().join("told")).unwrap();
+        let arguments = std::fs::read_to_string(folder.path().join("arguments")).unwrap();
         let here = std::fs::canonicalize(folder.path()).unwrap();
-        assert_eq!(told, format!("{words}{} speed:=0.5\n", here.join(file).display()));
+        assert_eq!(arguments, format!("{words}{} speed:=0.5\n", here.join(file).display()));
     }
 }
 
@@ -309,8 +309,8 @@ fn an_exported_run_finds_its_program() {
     let exported = actcheck(folder.path(), &["export", id, "--history", ".actcheck", "-o", "cases/one.toml"]);
     assert!(exported.status.success(), "{}", stderr(&exported));
     let again = actcheck(folder.path(), &["run", "cases/one.toml", "--history", "h", "--format", "json"]);
-    let told: Value = serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
-    assert!(told.to_string().contains("\"same_trace\":true"), "{told:#}");
+    let replayed: Value = serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
+    assert!(replayed.to_string().contains("\"same_trace\":true"), "{replayed:#}");
 }
 
 #[test]
@@ -321,8 +321,8 @@ fn an_action_over_its_budget_also_ends_for_the_program() {
     std::fs::write(&config, text + "[budget]\naction_secs = 2\n").unwrap();
     let (_, json, complaints) = run(folder.path(), &["--jobs", "1"]);
     for run in runs(&json) {
-        let told = (of(run, "status"), of(run, "reason"));
-        assert_eq!(told, ("timeout", "the action took longer than its budget of 2 s"), "{complaints}");
+        let end = (of(run, "status"), of(run, "reason"));
+        assert_eq!(end, ("timeout", "the action took longer than its budget of 2 s"), "{complaints}");
     }
     // The same process performed both runs.
     assert_eq!(std::fs::read_to_string(folder.path().join("starts")).unwrap().lines().count(), 1);

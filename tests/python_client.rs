@@ -22,10 +22,10 @@ fn the_clients_tests_pass_on_the_installed_package() {
     let place = stdout(&python(&["-c", "import actcheck; print(actcheck.__file__)"]));
     assert!(place.contains("site-packages"), "{place}");
     let output = python(&["-W", "error::DeprecationWarning", "-m", "unittest"]);
-    let told = stderr(&output);
-    assert!(output.status.success(), "{told}");
-    let ran = told.lines().find_map(|line| line.strip_prefix("Ran ")?.split(' ').next()?.parse::<u32>().ok());
-    assert!(ran.is_some_and(|ran| ran >= 40), "{told}");
+    let text = stderr(&output);
+    assert!(output.status.success(), "{text}");
+    let ran = text.lines().find_map(|line| line.strip_prefix("Ran ")?.split(' ').next()?.parse::<u32>().ok());
+    assert!(ran.is_some_and(|ran| ran >= 40), "{text}");
 }
 
 #[test]
@@ -73,10 +73,10 @@ fn a_python_pick_is_the_same_with_any_number_of_workers() {
     let (two, again) = campaign(folder.path(), "pick.py", &["--runs", "3", "--jobs", "2"]);
     assert_eq!(hashes.lines().count(), 4, "{hashes}");
     assert_eq!(hashes, again);
-    let told = |campaign: &Value| {
+    let text = |campaign: &Value| {
         campaign["runs"].as_array().unwrap().iter().map(|run| run["actions"].clone()).collect::<Vec<_>>()
     };
-    assert_eq!(told(&one), told(&two));
+    assert_eq!(text(&one), text(&two));
     // It succeeds in most scenes of any campaign.
     let score = one["runs"].as_array().unwrap().iter().map(|run| run["score"].as_f64().unwrap()).sum::<f64>() / 3.0;
     assert!(score > 0.5, "{one:#}");
@@ -87,8 +87,8 @@ fn a_python_pick_is_the_same_with_any_number_of_workers() {
 fn the_other_examples_perform_their_actions() {
     let folder = project();
     for (example, words) in [("clumsy_pick.py", "of course"), ("learned_pick.py", "hold")] {
-        let (told, _) = campaign(folder.path(), example, &["--runs", "2"]);
-        for run in told["runs"].as_array().unwrap() {
+        let (text, _) = campaign(folder.path(), example, &["--runs", "2"]);
+        for run in text["runs"].as_array().unwrap() {
             assert_eq!((&run["status"], &run["reason"]), (&"completed".into(), &Value::Null), "{example}: {run:#}");
         }
         let messages = "SELECT ?message { [] act:ofRun ?run ; act:message ?message }";

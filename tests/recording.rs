@@ -139,9 +139,11 @@ mod with_recordings {
             let expected: Vec<i64> =
                 (0..frames.rows.len()).map(|idx| (idx as f64 * period_nanos).round() as i64).collect();
             assert_eq!(moments(course), expected);
-            let told: Vec<[f32; 3]> = course.iter_slices::<[f32; 3]>(translation).map(|at| at[0]).collect();
+            let printed: Vec<[f32; 3]> = course.iter_slices::<[f32; 3]>(translation).map(|at| at[0]).collect();
             let traced: Vec<&[f32]> = frames.rows.iter().map(|row| &row[7 * slot..7 * slot + 3]).collect();
-            assert!(told.iter().zip(&traced).all(|(told, traced)| told == traced) && told.len() == traced.len());
+            assert!(
+                printed.iter().zip(&traced).all(|(printed, traced)| printed == traced) && printed.len() == traced.len()
+            );
         }
         let bodies =
             chunks.iter().filter(|chunk| chunk.is_static() && chunk.entity_path().to_string().starts_with("/scene/"));
@@ -157,8 +159,8 @@ mod with_recordings {
             assert_eq!(text.matches(&format!(": **{}**", outcome.word())).count(), count, "{text}");
         }
         let not_passed = judged.iter().filter(|judgement| judgement.outcome != Outcome::Passed).count();
-        let told = at(chunks, "/events/outcomes", false);
-        assert_eq!(told.iter().map(|chunk| chunk.num_rows()).sum::<usize>(), not_passed);
+        let printed = at(chunks, "/events/outcomes", false);
+        assert_eq!(printed.iter().map(|chunk| chunk.num_rows()).sum::<usize>(), not_passed);
     }
 
     /// A project with a history of two runs.
@@ -197,8 +199,8 @@ mod with_recordings {
             holds_the_trace(chunks, trace);
             holds_the_outcomes(chunks, run);
             let [actions] = at(chunks, "/events/actions", false)[..] else { panic!("actions are recorded once") };
-            let told = texts(actions, TextLog::descriptor_text().component);
-            assert!(told[0].ends_with("PerceivePlane begins") && moments(actions).is_sorted(), "{told:?}");
+            let printed = texts(actions, TextLog::descriptor_text().component);
+            assert!(printed[0].ends_with("PerceivePlane begins") && moments(actions).is_sorted(), "{printed:?}");
             let mut ids: Vec<ChunkId> = chunks.iter().map(Chunk::id).collect();
             let mut rows: Vec<RowId> = chunks.iter().flat_map(Chunk::row_ids).collect();
             let (all_ids, all_rows) = (ids.len(), rows.len());
@@ -232,9 +234,9 @@ mod with_recordings {
             let mut recordings = Recordings::new().unwrap();
             recordings.add(&run, trace, std::slice::from_ref(&why)).unwrap();
             assert_eq!(recordings.runs(), 1);
-            let told = recordings.bytes();
+            let printed = recordings.bytes();
             let bytes = recordings.finish().unwrap();
-            assert!(told > 0 && told <= bytes.len() as u64);
+            assert!(printed > 0 && printed <= bytes.len() as u64);
             read(&bytes).remove(&run.row.run).unwrap()
         };
         let chunks = recorded(Some(&trace));

@@ -60,12 +60,12 @@ fn repetitions_share_the_scene_and_differ_in_noise() {
 fn repeated_runs_can_be_replayed_and_shrunk() {
     let project = looking();
     let folder = project.path();
-    let told = json(folder, &["run", "configs/look.toml", "--runs", "12", "--repeat", "2", "--history", "h"]);
+    let printed = json(folder, &["run", "configs/look.toml", "--runs", "12", "--repeat", "2", "--history", "h"]);
     let rows = list(folder, "h");
     let runs: Vec<&str> = rows.iter().map(|row| row["run"].as_str().unwrap()).collect();
     let replayed = actcheck(folder, &[&["replay", "--history", "h"], &runs[..]].concat());
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
-    let failing = told["runs"].as_array().unwrap().iter().rev().find(|run| run["score"].as_f64().unwrap() < 1.0);
+    let failing = printed["runs"].as_array().unwrap().iter().rev().find(|run| run["score"].as_f64().unwrap() < 1.0);
     let failing = failing.expect("one in four looks misses a thing or sees a wrong one")["run"].as_str().unwrap();
     let shrunk = actcheck(folder, &["shrink", failing, "--history", "h", "--trials", "8"]);
     assert_eq!(shrunk.status.code(), Some(0), "{}{}", stdout(&shrunk), stderr(&shrunk));
@@ -81,11 +81,11 @@ fn repeated_runs_can_be_replayed_and_shrunk() {
 fn the_report_agrees_with_the_runs() {
     let project = looking();
     let folder = project.path();
-    let told = json(folder, &["run", "configs/look.toml", "--runs", "6", "--repeat", "3", "--history", "h"]);
-    let whole = told["repetitions"].as_array().unwrap().last().unwrap().clone();
+    let printed = json(folder, &["run", "configs/look.toml", "--runs", "6", "--repeat", "3", "--history", "h"]);
+    let whole = printed["repetitions"].as_array().unwrap().last().unwrap().clone();
     assert_eq!(whole["property"], Value::Null);
     let mut passed: BTreeMap<u64, u64> = (0..6).map(|scene| (scene, 0)).collect();
-    for run in told["runs"].as_array().unwrap() {
+    for run in printed["runs"].as_array().unwrap() {
         let all =
             run["actions"][0]["outcomes"].as_array().unwrap().iter().all(|outcome| outcome["outcome"] == "passed");
         *passed.get_mut(&(run["index"].as_u64().unwrap() / 3)).unwrap() += u64::from(all);

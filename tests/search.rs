@@ -62,13 +62,13 @@ fn made_up(env: &Env, planned: &Planned) -> Told {
 /// Every batch of a schedule, with the results of the made-up robot.
 fn made_up_campaign(env: &Env) -> (Vec<Vec<Planned>>, Box<dyn Schedule>) {
     let mut schedule = schedule_of(env);
-    let (mut batches, mut told) = (Vec::new(), Vec::new());
+    let (mut batches, mut results) = (Vec::new(), Vec::new());
     loop {
-        let batch = schedule.next_batch(&told);
+        let batch = schedule.next_batch(&results);
         if batch.is_empty() {
             return (batches, schedule);
         }
-        told = batch.iter().map(|planned| made_up(env, planned)).collect();
+        results = batch.iter().map(|planned| made_up(env, planned)).collect();
         batches.push(batch);
     }
 }
@@ -88,19 +88,19 @@ fn chosen_scenes_depend_on_the_seed_and_the_results() {
         }
         // A robot that never fails, with margins, leads to other scenes.
         let mut other = schedule_of(&env);
-        let mut told = Vec::new();
+        let mut results = Vec::new();
         let mut same = true;
         for batch in &batches {
-            let asked = other.next_batch(&told);
+            let asked = other.next_batch(&results);
             same &= asked == *batch;
-            told = asked
+            results = asked
                 .iter()
                 .map(|planned| {
-                    let mut told = made_up(&env, planned);
-                    told.outcomes.iter_mut().for_each(|outcome| {
+                    let mut results = made_up(&env, planned);
+                    results.outcomes.iter_mut().for_each(|outcome| {
                         (outcome.outcome, outcome.margin) = (Outcome::Passed, Some(1.0 + planned.index as f64));
                     });
-                    told
+                    results
                 })
                 .collect();
         }
@@ -161,7 +161,7 @@ fn a_guided_campaign_is_the_same_with_any_number_of_workers() {
     let project = looking();
     let folder = project.path();
     let run = ["run", "configs/look.toml", "--runs", "22"];
-    let told = json(folder, &[&run[..], &["--strategy", "boundary", "--jobs", "1", "--history", "one"]].concat());
+    let results = json(folder, &[&run[..], &["--strategy", "boundary", "--jobs", "1", "--history", "one"]].concat());
     edit(&folder.join("configs/look.toml"), "[camera]", "[search]\nstrategy = \"boundary\"\n\n[camera]");
     let text = stdout(&actcheck(folder, &[&run[..], &["--jobs", "2", "--history", "two"]].concat()));
     let list = |history: &str| json(folder, &["list", "--history", history]).as_array().unwrap().clone();
@@ -189,13 +189,16 @@ fn a_guided_campaign_is_the_same_with_any_number_of_workers() {
     let three = list("three");
     assert_eq!(of(&one, "trace_hash"), of(&three, "trace_hash"));
     assert_eq!(of(&one, "weight"), of(&three, "weight"));
-    assert_eq!(resumed["search"], told["search"]);
+    assert_eq!(resumed["search"], results["search"]);
 
     assert!(text.contains("are not failure rates") && text.contains("weighted, 22 scenes"), "{text}");
-    assert_eq!((&told["search"]["strategy"], &told["search"]["counts_are_rates"]), (&"boundary".into(), &false.into()));
-    let rates = told["search"]["weighted_failure_rates"].as_array().unwrap();
+    assert_eq!(
+        (&results["search"]["strategy"], &results["search"]["counts_are_rates"]),
+        (&"boundary".into(), &false.into())
+    );
+    let rates = results["search"]["weighted_failure_rates"].as_array().unwrap();
     assert_eq!(rates.len(), 3);
-    let weights: BTreeMap<String, f64> = told["runs"]
+    let weights: BTreeMap<String, f64> = results["runs"]
         .as_array()
         .unwrap()
         .iter()
@@ -203,7 +206,7 @@ fn a_guided_campaign_is_the_same_with_any_number_of_workers() {
         .collect();
     for rate in rates {
         // The weights are those of the runs: the rate is their sum over the failed runs.
-        let failing = told["runs"].as_array().unwrap().iter().filter(|run| {
+        let failing = results["runs"].as_array().unwrap().iter().filter(|run| {
             let outcomes = run["actions"][0]["outcomes"].as_array().unwrap();
             outcomes.iter().any(|outcome| outcome["property"] == rate["property"] && outcome["outcome"] == "failed")
         });

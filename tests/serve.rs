@@ -479,8 +479,8 @@ fn external_clients_work() {
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(told["GET"], told["POST"]);
-    assert!(told["GET"].as_u64().is_some_and(|rows| rows > 0));
-    assert!(told["triples"].as_u64().is_some_and(|triples| triples > 0));
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(printed["GET"], printed["POST"]);
+    assert!(printed["GET"].as_u64().is_some_and(|rows| rows > 0));
+    assert!(printed["triples"].as_u64().is_some_and(|triples| triples > 0));
 }

@@ -116,10 +116,10 @@ fn libclang_cpp_is_not_mistaken_for_libclang() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang-cpp.so.14", &real);
-    let (code, told) = machine.run("system", &[]);
-    assert_eq!(code, 2, "{told}");
+    let (code, printed) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{printed}");
     assert!(machine.installed().contains("install -y -qq --no-install-recommends clang\n"), "{}", machine.installed());
-    assert!(told.contains("'clang' is installed, but there is no libclang"), "{told}");
+    assert!(printed.contains("'clang' is installed, but there is no libclang"), "{printed}");
 
     // The same, if apt-get installs it.
     let brings = format!(
@@ -137,9 +137,9 @@ fn a_library_of_another_architecture_is_not_accepted() {
     // The header of a 32-bit library.
     std::fs::write(&other, b"\x7fELF\x01\x01\x01").unwrap();
     machine.library("libclang.so.1", &other);
-    let (code, told) = machine.run("system", &[]);
-    assert_eq!(code, 2, "{told}");
-    assert!(told.contains("there is no libclang"), "{told}");
+    let (code, printed) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{printed}");
+    assert!(printed.contains("there is no libclang"), "{printed}");
 }
 
 #[test]
@@ -156,11 +156,11 @@ fn a_wrong_libclang_path_is_named() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
-    let (code, told) = machine.run("system", &[("LIBCLANG_PATH", "/nowhere")]);
+    let (code, printed) = machine.run("system", &[("LIBCLANG_PATH", "/nowhere")]);
     assert_eq!(code, 2);
     let expected = "actcheck needs libclang. LIBCLANG_PATH is wrong: there is no libclang at /nowhere. Unset LIBCLANG_PATH, or set \
                     it to the folder that has it\n";
-    assert_eq!(told, expected);
+    assert_eq!(printed, expected);
     assert_eq!(machine.installed(), "", "installing packages would not help");
     // It is accepted as a folder and as a file, wherever else libclang is installed.
     let named = machine.path("root/usr/lib/llvm-14/lib");
@@ -176,24 +176,24 @@ fn without_a_compiler_one_is_installed() {
     machine.lacks("cc");
     machine.lacks("c++");
     machine.lacks("clang++");
-    let (code, told) = machine.run("system", &[]);
-    assert_eq!(code, 2, "{told}");
+    let (code, printed) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{printed}");
     assert!(
         machine.installed().contains("install -y -qq --no-install-recommends g++ clang\n"),
         "{}",
         machine.installed()
     );
-    assert!(told.contains("actcheck needs g++ clang: 'g++ clang' is installed, but"), "{told}");
+    assert!(printed.contains("actcheck needs g++ clang: 'g++ clang' is installed, but"), "{printed}");
 }
 
 #[test]
 fn without_apt_the_packages_are_named() {
     let machine = Machine::new();
     machine.lacks("apt-get");
-    let (code, told) = machine.run("system", &[]);
+    let (code, printed) = machine.run("system", &[]);
     assert_eq!(code, 2);
     let expected = "actcheck needs clang: install them with this system's package manager (the names are Debian's), then run this again\n";
-    assert_eq!(told, expected);
+    assert_eq!(printed, expected);
 }
 
 #[test]
@@ -203,9 +203,9 @@ fn optional_packages_may_be_missing() {
     machine.library("libclang.so.1", &real);
     machine.lacks("clang++");
     machine.command("apt-get", "echo 'E: Unable to locate package' >&2; exit 100");
-    let (code, told) = machine.run("system", &[]);
-    assert_eq!(code, 0, "{told}");
-    assert!(told.contains("missing, but optional: clang (apt-get could not install it)"), "{told}");
+    let (code, printed) = machine.run("system", &[]);
+    assert_eq!(code, 0, "{printed}");
+    assert!(printed.contains("missing, but optional: clang (apt-get could not install it)"), "{printed}");
 }
 
 #[test]
@@ -213,52 +213,56 @@ fn rust_is_checked_before_anything_else() {
     let machine = Machine::new();
     machine.command("rustc", "echo 'rustc 1.70.0 (90c541806 2023-05-31)'");
     let wanted = env!("CARGO_PKG_RUST_VERSION");
-    let (code, told) = machine.run("system", &[]);
+    let (code, printed) = machine.run("system", &[]);
     let expected = format!("actcheck needs Rust {wanted} or later, but this is 1.70.0: run 'rustup update stable'\n");
-    assert_eq!((code, told), (2, expected));
+    assert_eq!((code, printed), (2, expected));
     machine.lacks("cargo");
-    let (code, told) = machine.run("system", &[]);
+    let (code, printed) = machine.run("system", &[]);
     assert_eq!(code, 2);
-    assert!(told.starts_with(&format!("actcheck needs the Rust toolchain, version {wanted} or later")), "{told}");
+    assert!(printed.starts_with(&format!("actcheck needs the Rust toolchain, version {wanted} or later")), "{printed}");
 }
 
 #[test]
 fn a_target_folder_that_cannot_be_written_is_named() {
     let machine = Machine::new();
-    let (code, told) = machine.run("build", &[("CARGO_TARGET_DIR", "/dev/null/target")]);
+    let (code, printed) = machine.run("build", &[("CARGO_TARGET_DIR", "/dev/null/target")]);
     assert_eq!(code, 2);
-    assert!(told.contains("actcheck was not built: /dev/null/target can't be written; set CARGO_TARGET_DIR"), "{told}");
+    assert!(
+        printed.contains("actcheck was not built: /dev/null/target can't be written; set CARGO_TARGET_DIR"),
+        "{printed}"
+    );
 }
 
 #[test]
 fn a_full_disk_is_named_before_and_after() {
     let machine = Machine::new();
     machine.command("df", "echo head; echo 'disk 1 1 204800 1 /'");
-    let (code, told) = machine.run("build", &[]);
+    let (code, printed) = machine.run("build", &[]);
     assert_eq!(code, 2);
-    assert!(told.contains("actcheck was not built: it needs 3000 MB in "), "{told}");
+    assert!(printed.contains("actcheck was not built: it needs 3000 MB in "), "{printed}");
     assert!(
-        told.contains("but only 200 MB are free; free some space, or set CARGO_TARGET_DIR to a folder on another disk"),
-        "{told}"
+        printed
+            .contains("but only 200 MB are free; free some space, or set CARGO_TARGET_DIR to a folder on another disk"),
+        "{printed}"
     );
     // The disk fills up while crates compile.
     machine.command("df", "[ -e \"$MACHINE/full\" ] && free=0 || free=9000000; echo head; echo \"disk 1 1 $free 1 /\"");
     machine.command("cargo", "[ \"$1\" = fetch ] || { touch \"$MACHINE/full\"; exit 101; }");
-    let (code, told) = machine.run("build", &[]);
+    let (code, printed) = machine.run("build", &[]);
     assert_eq!(code, 2);
-    assert!(told.contains("actcheck was not built: no space is left in "), "{told}");
+    assert!(printed.contains("actcheck was not built: no space is left in "), "{printed}");
 }
 
 #[test]
 fn a_missing_network_is_named() {
     let machine = Machine::new();
     machine.command("cargo", "[ \"$1\" != fetch ] || { echo 'error: failed to download' >&2; exit 101; }");
-    let (code, told) = machine.run("build", &[]);
+    let (code, printed) = machine.run("build", &[]);
     assert_eq!(code, 2);
-    assert!(told.contains("error: failed to download"), "{told}");
+    assert!(printed.contains("error: failed to download"), "{printed}");
     assert!(
-        told.contains("actcheck was not built: its crates can't be downloaded: see cargo's message above"),
-        "{told}"
+        printed.contains("actcheck was not built: its crates can't be downloaded: see cargo's message above"),
+        "{printed}"
     );
 }
 
@@ -267,7 +271,7 @@ fn a_missing_network_is_named() {
 fn a_failed_build_keeps_its_exit_code() {
     let machine = Machine::new();
     machine.command("cargo", "[ \"$1\" = fetch ] || exit 101");
-    let (code, told) = machine.run("build", &[]);
-    assert_eq!(code, 101, "{told}");
-    assert!(told.contains("The first build compiles RocksDB"), "{told}");
+    let (code, printed) = machine.run("build", &[]);
+    assert_eq!(code, 101, "{printed}");
+    assert!(printed.contains("The first build compiles RocksDB"), "{printed}");
 }

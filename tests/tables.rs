@@ -124,7 +124,7 @@ fn findings_are_reported(here: &Path) {
     assert!(cells.starts_with("action,property,by,down,across,runs,failed,rate,low,high\n"), "{cells}");
     let patterns = stdout(&actcheck(here, &["analyse", "--format", "csv"]));
     assert!(patterns.starts_with("action,property,conditions,sentence,runs,failed,"), "{patterns}");
-    for (arguments, told) in [
+    for (arguments, printed) in [
         (vec!["analyse", "--property", "MovdObject"], "did you mean `MovedObject`?"),
         (vec!["analyse", "--by", "friction"], "scenes have no parameter `friction`"),
         (vec!["analyse", "--campaign", "nope"], "H014"),
@@ -133,7 +133,7 @@ fn findings_are_reported(here: &Path) {
     ] {
         let output = actcheck(here, &arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(stderr(&output).contains(told), "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(printed), "{arguments:?}: {}", stderr(&output));
     }
 }
 
@@ -157,8 +157,8 @@ fn named_queries_answer(here: &Path) {
         "the first campaign's runs are judged by the new rule now"
     );
     let failures = json(here, &["query", "--named", "first-failure-after-rule-change", "--format", "json"]);
-    let told: Vec<&str> = failures.as_array().unwrap().iter().map(|row| row["property"].as_str().unwrap()).collect();
-    assert_eq!(told, ["http://actions#MovedObject"], "{failures}");
+    let printed: Vec<&str> = failures.as_array().unwrap().iter().map(|row| row["property"].as_str().unwrap()).collect();
+    assert_eq!(printed, ["http://actions#MovedObject"], "{failures}");
     let unknown = actcheck(here, &["query", "--named", "first-failure"]);
     assert_eq!(unknown.status.code(), Some(2));
     assert!(stderr(&unknown).contains("did you mean `first-failures`?"), "{}", stderr(&unknown));

@@ -35,16 +35,16 @@ fn with_odd_properties() -> tempfile::TempDir {
 fn a_campaign_warns_of_uninformative_outcomes() {
     let project = with_odd_properties();
     let run = ["run", "configs/pick.toml", "--runs", "6", "--history", "h", "--format"];
-    let told = json(&actcheck(project.path(), &[&run[..], &["json"]].concat()));
+    let printed = json(&actcheck(project.path(), &[&run[..], &["json"]].concat()));
     let remark = |oddity: &str| {
-        let remarks = told["remarks"].as_array().unwrap();
+        let remarks = printed["remarks"].as_array().unwrap();
         remarks.iter().find(|remark| remark["oddity"] == oddity).unwrap_or_else(|| panic!("no {oddity} in {remarks:?}"))
     };
     let held = remark("held before");
     assert_eq!(held["properties"], serde_json::json!(["http://actions#Exists"]));
     assert_eq!((&held["count"], &held["of"], &held["severity"]), (&6.into(), &6.into(), &"warning".into()));
     // An unviolated prohibition is not reported: it also held before the action.
-    let properties = told["properties"].as_array().unwrap();
+    let properties = printed["properties"].as_array().unwrap();
     for property in properties {
         let odd = property["property"] == "http://actions#Exists";
         assert_eq!(property["held_before"], if odd { 6 } else { 0 }, "{property}");
@@ -68,7 +68,7 @@ fn a_campaign_warns_of_uninformative_outcomes() {
     let kept = stdout(&kept);
     assert_eq!(kept.lines().count(), 2, "{kept}");
     assert!(kept.contains("Exists") && kept.contains(",6"), "{kept}");
-    let run = told["runs"][0]["run"].as_str().unwrap();
+    let run = printed["runs"][0]["run"].as_str().unwrap();
     let shown = stdout(&actcheck(project.path(), &["show", run, "--history", "h"]));
     assert!(shown.contains("passed, held before"), "{shown}");
 }

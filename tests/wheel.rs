@@ -126,8 +126,8 @@ fn a_wheel_needs_no_checkout_and_no_rust() {
     std::fs::copy(&example, folder.join("my_pick.py")).unwrap();
     config(folder, "skill.toml", "my_pick.py");
     let ran = installed.actcheck(folder, &["run", "skill.toml", "--format", "json", "--history", "skill"]);
-    let told: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap_or_else(|_| panic!("{}", stderr(&ran)));
-    for run in told["runs"].as_array().unwrap() {
+    let printed: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap_or_else(|_| panic!("{}", stderr(&ran)));
+    for run in printed["runs"].as_array().unwrap() {
         assert_eq!(run["status"], "completed", "{run:#}");
     }
 
