@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn every_way_not_to_fit_is_named() {
+    fn every_kind_of_mismatch_is_named() {
         let recorded = [real("a", 1.0, 0.5), real("b", 1.0, 0.9), real("b", 1.0, 0.1), real("c", 1.0, 0.2)];
         let made = [real("a", 2.0, 0.5), real("b", 0.8, 0.8), real("d", 1.0, 0.0), real("c", 1.0, 0.2)];
         let told: Vec<String> = misfits(&recorded, &made).iter().map(Misfit::to_string).collect();

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_become_files() {
+    fn property_names_become_file_names() {
         assert_eq!(snake_case("StaysUpright"), "stays_upright");
         let template = property_template("StaysUpright", "Pick", "pickObject", "../rules/");
         assert_eq!(template.rule_file, "stays_upright.rls");

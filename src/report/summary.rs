@@ -329,7 +329,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_broken_run_is_no_failure_and_no_pass() {
+    fn a_broken_run_is_neither_passed_nor_failed() {
         use Outcome::{Broken, Failed, Inapplicable, Passed};
         let broken = run(0, RunStatus::Broken, &[Broken, Broken]);
         assert!(!broken.passed() && !broken.failed());

@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn angles_and_distances_are_as_on_paper() {
+    fn angles_and_distances_match_a_calculation_by_hand() {
         assert_eq!(angle(1.5 * PI), -0.5 * PI);
         assert_eq!(angle(PI), -PI);
         assert_eq!(angle(-0.0), 0.0);
