@@ -212,7 +212,7 @@ impl SceneRuns {
     }
 
     /// Returns the share of some of the runs, given by their indices, with an interval that accounts for runs of the
-    /// same scene.
+    /// same scene. Returns `None` if there are no runs.
     pub fn share(&self, runs: impl IntoIterator<Item = usize>) -> Option<Interval> {
         let mut scenes: Vec<[u64; 2]> = self.sizes.iter().map(|size| [0, *size]).collect();
         runs.into_iter().for_each(|run| scenes[self.scene_of[run]][0] += 1);

@@ -87,7 +87,7 @@ impl Tally {
         }
     }
 
-    /// Counts a run. Returns the budget that it has spent, if any.
+    /// Counts a run. Returns the budget that it has spent, or `None` if the campaign may continue.
     pub(super) fn count(&mut self, told: &Told) -> Option<Spent> {
         self.failures += u64::from(told.outcomes.iter().any(|one| one.outcome == Outcome::Failed));
         for one in &told.outcomes {

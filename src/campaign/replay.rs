@@ -96,6 +96,9 @@ pub struct OutcomeChange {
 /// Replays stored runs on several workers and calls `on_done` after each. `campaigns` has their campaigns by id.
 ///
 /// The results are in the order of `runs`. They depend neither on the number of workers nor on the clock.
+///
+/// # Errors
+/// `X010` if the workers can't be started. Each result has the faults of its own replay.
 pub fn replay_all(
     history: &History,
     campaigns: &BTreeMap<String, Recalled>,

@@ -60,7 +60,7 @@ impl Planned {
         }
     }
 
-    /// The repetition for the run's record.
+    /// The repetition for the run's record. Returns `None` if every scene is run once.
     pub fn repetition(&self) -> Option<Repetition> {
         self.repetition.map(|number| Repetition { scene: self.scene, number })
     }

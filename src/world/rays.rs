@@ -99,7 +99,7 @@ impl<'a> Solids<'a> {
         [self.slopes[0][column], self.slopes[1][row]]
     }
 
-    /// Returns the first hit of a pixel's ray within `most` of its lengths.
+    /// Returns the first hit of a pixel's ray within `most` of its lengths. Returns `None` if the ray hits no solid.
     pub(super) fn first(&self, column: usize, row: usize, most: f64) -> Option<Hit> {
         let slopes = self.slopes(column, row);
         let square = 1.0 + slopes[0] * slopes[0] + slopes[1] * slopes[1];

@@ -45,7 +45,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The largest level surface among points.
+    /// The largest level surface among points. Returns `None` if no level plane is found or the largest surface is too
+    /// small.
     pub fn find(points: &[Point3<f64>]) -> Option<Self> {
         let (plane, inliers) = find(points, &PRIOR, SEED)?;
         let inliers: Vec<Point3<f64>> = inliers.into_iter().map(|idx| points[idx]).collect();

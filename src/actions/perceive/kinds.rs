@@ -23,7 +23,8 @@ pub struct Fit<'a> {
     pub miss: f64,
 }
 
-/// The best match, if any. Unit: metres. The first two sides are horizontal and in any order.
+/// The best match. Returns `None` if no kind is similar enough. Unit: metres. The first two sides are horizontal and in
+/// any order.
 pub fn recognise(size_m: [f64; 3], kinds: &[KnownKind]) -> Option<Fit<'_>> {
     let fits = kinds.iter().flat_map(|kind| {
         [false, true].map(|crosswise| {

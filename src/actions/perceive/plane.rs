@@ -69,7 +69,8 @@ impl Plane {
     }
 }
 
-/// The plane with the most inliers, and their indices. The same seed makes the same guesses.
+/// The plane with the most inliers, and their indices. Returns `None` if there are too few points or inliers, or the
+/// plane is tilted too far. The same seed makes the same guesses.
 pub fn find(points: &[Point3<f64>], prior: &Prior, seed: u64) -> Option<(Plane, Vec<usize>)> {
     let (low, high) = prior.heights_m;
     let within: Vec<usize> = (0..points.len()).filter(|idx| (low..=high).contains(&points[*idx].z)).collect();

@@ -107,7 +107,7 @@ pub fn heightened(things: &[Sighting], held: &Held) -> Vec<Sighting> {
     things.iter().map(higher).collect()
 }
 
-/// The spot nearest to this position of the hand.
+/// The spot nearest to this position of the hand. Returns `None` if there are no spots.
 pub fn nearest(spots: &[Point3<f64>], to: &Point2<f64>) -> Option<Point3<f64>> {
     let far = |spot: &Point3<f64>| length(spot.x - to.x, spot.y - to.y);
     spots.iter().min_by(|a, b| far(a).total_cmp(&far(b))).copied()
