@@ -100,7 +100,7 @@ fn a_case_survives_edits_of_rules_comments_and_ontology() {
     let project = project();
     let run = failing(project.path());
     export(project.path(), &run, "case.toml");
-    edit(&project.path().join("case.toml"), "[case.choices]", "# Somebody's remark.\n[case.choices]");
+    edit(&project.path().join("case.toml"), "[case.choices]", "# A remark.\n[case.choices]");
     let rule = project.path().join("rules/no_grasp_collisions.rls");
     let kept = std::fs::read_to_string(&rule).unwrap();
     std::fs::write(&rule, "violation(?x) :- during(?x, <http://nothing.of/that#sort>, ?x) .\n").unwrap();

@@ -1,4 +1,4 @@
-//! Simulation against closed-form answers, and what happens when it breaks.
+//! Simulation against closed-form answers, and its reaction to faults.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -74,7 +74,7 @@ fn nothing_is_left(folder: &Path) {
     assert_eq!(alive(), [""; 0], "these are left");
 }
 
-/// Traces of runs by their index, and what the actions reported.
+/// Trace hash of each run, by index, with the message that its action reported.
 fn courses(folder: &Path, json: &Value) -> Vec<(String, String)> {
     let shown = runs(json).iter().map(|run| shown(folder, of(run, "run")));
     shown.map(|run| (of(&run, "trace_hash").to_owned(), of(&run["actions"][0], "message").to_owned())).collect()

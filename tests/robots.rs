@@ -51,7 +51,7 @@ fn check_xacro(path: &Path, body: &str) -> (Option<i32>, String) {
     (output.status.code(), format!("{}{}", stdout(&output), stderr(&output)))
 }
 
-/// A stand-in for the program: the test covers the use of its output and the report of its errors.
+/// A replacement for the program: the test covers the use of its output and the report of its errors.
 #[cfg(unix)]
 #[test]
 fn xacro_files_are_expanded_with_xacro_or_refused_with_help() {

@@ -55,12 +55,12 @@ fn shipped_worlds_have_free_space() {
             scene.objects.iter().filter(|o| !walls(o)).map(|o| (o.id.clone(), Solid::new(&o.model, &o.pose))).collect();
         for (idx, (id, solid)) in solids.iter().enumerate() {
             for (other_id, other) in &solids[idx + 1..] {
-                assert!(!solid.is_in_the_way_of(other), "{name}: {id} stands in {other_id}");
+                assert!(!solid.is_in_the_way_of(other), "{name}: {id} overlaps {other_id}");
             }
             for wall in scene.objects.iter().filter(walls) {
                 assert!(
                     !solid.is_in_the_way_of(&Solid::new(&wall.model, &wall.pose)),
-                    "{name}: {id} stands in {}",
+                    "{name}: {id} overlaps {}",
                     wall.id
                 );
             }
@@ -167,7 +167,7 @@ fn the_goal_surface_can_be_cluttered() {
             for object in &standing {
                 let local = platform.pose.to_isometry().inverse() * nalgebra::Point3::from(object.pose.position);
                 assert!(local.x.abs() < surface.size_m[0] / 2.0 && local.y.abs() < surface.size_m[1] / 2.0);
-                assert!((local.z - surface.height_m).abs() < 1e-9, "{} stands on {place}", object.id);
+                assert!((local.z - surface.height_m).abs() < 1e-9, "{} is not on {place}", object.id);
                 assert!(!scene.designators["surfaceObjects"].contains(&object.id));
                 assert_eq!(scene.objects.iter().filter(|other| other.id == object.id).count(), 1);
             }

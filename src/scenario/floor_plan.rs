@@ -1,6 +1,6 @@
 //! The robot's map of the floor.
 //!
-//! Never: contains what a scene adds to its world. The robot perceives obstacles and objects with its sensors.
+//! Never: contains objects that a scene adds to its world. The robot perceives obstacles and objects with its sensors.
 
 use nalgebra::Point3;
 
