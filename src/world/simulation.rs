@@ -279,7 +279,7 @@ impl World {
     }
 
     /// Returns the wall time of the engine's steps since [`World::watch`]; 0 without it. Unit: seconds.
-    pub fn watched_secs(&self) -> f64 {
+    pub fn engine_secs(&self) -> f64 {
         self.watch.as_ref().map_or(0.0, |watch| watch.spent_secs)
     }
 
