@@ -38,7 +38,7 @@ impl fmt::Display for Fault {
 
 /// A realistic external disturbance of an object, for tests of its detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Mishap {
+pub enum Disturbance {
     /// The object jumps to this pose, at rest.
     Pose(Pose),
     /// Its friction coefficient changes.

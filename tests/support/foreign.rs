@@ -20,7 +20,7 @@ pub fn python() -> Option<&'static Path> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     PYTHON
         .get_or_init(|| {
-            environment("python", "requirements.txt").map_err(|why| left_out("what needs Python's packages", &why)).ok()
+            environment("python", "requirements.txt").map_err(|why| left_out("tests of Python's packages", &why)).ok()
         })
         .as_deref()
 }
