@@ -99,18 +99,26 @@ pub fn edit(file: &Path, from: &str, to: &str) {
 /// Physics at a third of the price, where a test is not about physics: what the hand holds stays in it.
 pub const COARSE: &str = "[physics]\nsteps_per_second = 120\niterations = 2\n";
 
-/// A history of four runs that simulation made, for tests that only read it.
-pub fn made_history() -> &'static Path {
+/// A copy of a history of four runs, for one test: one process at a time can have a history open.
+pub fn made_history() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy_made_history(folder.path());
+    folder
+}
+
+/// Copies the history of four runs into a folder. The runs are made once.
+pub fn copy_made_history(to: &Path) {
     static MADE: OnceLock<PathBuf> = OnceLock::new();
-    MADE.get_or_init(|| {
-        // Statics are never dropped: a folder of the system for passing files would stay.
+    let made = MADE.get_or_init(|| {
+        // Statics are never dropped: a temporary folder would stay.
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made-history");
         let _ = std::fs::remove_dir_all(&folder);
         let name = folder.display().to_string();
         let output = actcheck(root(), &["run", "configs/quick.toml", "--runs", "4", "--jobs", "2", "--history", &name]);
         assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
         folder
-    })
+    });
+    copy(made, to);
 }
 
 /// A shipped campaign that was run as a whole.
