@@ -56,6 +56,8 @@ impl Chromium {
                 "--hide-scrollbars",
             ])
             .args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run", "about:blank"])
+            // Software draws the pages more quickly than software that imitates a graphics card, which WebGL alone needs.
+            .arg("--disable-gpu-compositing")
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
