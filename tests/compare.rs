@@ -294,6 +294,30 @@ fn impossible_comparisons_are_refused_with_the_reason() {
     fails(&["a"], &["<B>"]);
 }
 
+/// Regression: if a campaign began in the same second as its regressions, the last id in the alphabet counted as the newest
+/// campaign.
+#[test]
+fn a_campaign_is_newer_than_its_regressions() {
+    let project = looking();
+    let folder = project.path();
+    let ran = |history: &str| {
+        let run = ["run", "configs/look.toml", "--runs", "1", "--history", history, "--format", "json"];
+        let output = actcheck(folder, &run);
+        let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+        json["campaign"].clone()
+    };
+    let run = format!("{}-1", ran("old").as_str().unwrap());
+    let exported = actcheck(folder, &["export", &run, "--regression", "--history", "old"]);
+    assert!(exported.status.success(), "{}", stderr(&exported));
+    for history in ["a", "b", "c", "d"] {
+        // Another text gives the campaign another id.
+        edit(&folder.join("configs/look.toml"), "\ntests =", &format!("\n# {history}\ntests ="));
+        let campaign = ran(history);
+        let (_, json) = compared(folder, &["old", history]);
+        assert_eq!(json["b"]["campaign"], campaign, "{json:#}");
+    }
+}
+
 #[test]
 fn a_campaign_compared_with_itself_shows_no_difference() {
     let runs = flipped(&mut Choices::random(31, 0), 20, &[0.5, 0.5]);

@@ -251,7 +251,7 @@ fn a_hundred_runs_with_random_faults_all_end_and_are_kept() {
     assert_eq!([listed("completed"), listed("broken"), listed("timeout")], [completed, broken, timeout]);
     nothing_is_left(folder.path());
     // A program's behaviour depends on its given seed, so the number of workers changes nothing.
-    let (_, again, _) = run(folder.path(), &["--jobs", "2", "--runs", "20"]);
+    let (_, again, _) = run(folder.path(), &["--jobs", "4", "--runs", "20"]);
     let statuses = |json: &Value| runs(json).iter().map(|run| of(run, "status").to_owned()).collect::<Vec<_>>();
     assert_eq!(statuses(&again), statuses(&json)[..20]);
 }

@@ -48,11 +48,16 @@ pub fn stderr(output: &Output) -> String {
 
 /// A copy of the shipped project with coarse physics in its configurations, for tests that are about campaigns.
 pub fn project() -> tempfile::TempDir {
+    project_with(COARSE)
+}
+
+/// A copy of the shipped project with other physics in its configurations, such as [`COARSEST`].
+pub fn project_with(physics: &str) -> tempfile::TempDir {
     let folder = shipped_project();
     for entry in std::fs::read_dir(folder.path().join("configs")).unwrap() {
         let file = entry.unwrap().path();
         let text = std::fs::read_to_string(&file).unwrap();
-        std::fs::write(&file, text.replace("[physics]\n", COARSE)).unwrap();
+        std::fs::write(&file, text.replace("[physics]\n", physics)).unwrap();
     }
     folder
 }
@@ -99,10 +104,20 @@ pub fn edit(file: &Path, from: &str, to: &str) {
 /// Physics at a third of the cost, for tests that are not about physics: objects still stay in the hand.
 pub const COARSE: &str = "[physics]\nsteps_per_second = 120\niterations = 2\n";
 
-/// A history of four simulated runs, for tests that only read it.
-pub fn made_history() -> &'static Path {
+/// The coarsest physics, for tests that do not need the robot to succeed: a held object slips out of the hand.
+pub const COARSEST: &str = "[physics]\nsteps_per_second = 60\niterations = 1\n";
+
+/// A private copy of a history of four runs: only one process at a time may open a history.
+pub fn made_history() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy_made_history(folder.path());
+    folder
+}
+
+/// Copies a history of four simulated runs into a folder. The runs are made once.
+pub fn copy_made_history(to: &Path) {
     static MADE: OnceLock<PathBuf> = OnceLock::new();
-    MADE.get_or_init(|| {
+    let made = MADE.get_or_init(|| {
         // Statics are never dropped: a temporary folder would not be removed.
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made-history");
         let _ = std::fs::remove_dir_all(&folder);
@@ -110,7 +125,8 @@ pub fn made_history() -> &'static Path {
         let output = actcheck(root(), &["run", "configs/quick.toml", "--runs", "4", "--jobs", "2", "--history", &name]);
         assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
         folder
-    })
+    });
+    copy(made, to);
 }
 
 /// A shipped campaign that was run completely.
