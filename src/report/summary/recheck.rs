@@ -115,3 +115,13 @@ fn why(before: Option<&Judgement>, now: &Judgement) -> Why {
         Some(_) => Why::SameRule,
     }
 }
+
+/// Describes the reason, with digests shortened to `letters` characters.
+pub(crate) fn reason_text(why: &Why, letters: usize) -> String {
+    let short = |digest: &str| digest.get(..letters).unwrap_or(digest).to_owned();
+    match why {
+        Why::NewProperty => "property is new".to_owned(),
+        Why::RuleChanged(before, now) => format!("rule changed {} → {}", short(before), short(now)),
+        Why::SameRule => "same rule, different ontology or program".to_owned(),
+    }
+}

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use crate::findings_summary::{FindingsSummary, PropertyReport, percent};
-use crate::table::ruled;
-use crate::{Share, scene_rule};
+use crate::summary::percent;
+use crate::text::{ruled, scene_rule};
+use crate::{FindingsSummary, PropertyReport, Share};
 use actcheck_analysis::{Judged, Pattern, TwoWay, TwoWayCell};
 use actcheck_base::{Outcome, names};
 use actcheck_verdict::Counts;

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use comfy_table::{Attribute, Cell, Color};
 
-use crate::repeated_text::repeated_text;
-use crate::table::ruled;
-use crate::weighted::weighted_text;
-use crate::{CampaignSummary, PropertyLine, RunSummary, Share, by_action, regressions_text};
+use crate::text::repeated::repeated_text;
+use crate::text::weighted::weighted_text;
+use crate::text::{by_action, regressions_text, ruled};
+use crate::{CampaignSummary, PropertyLine, RunSummary, Share};
 use actcheck_base::{Outcome, names};
 use actcheck_history::SkillRecord;
 
@@ -206,7 +206,7 @@ fn failures(out: &mut String, summary: &CampaignSummary) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::summary::tests::{campaign, run};
+    use crate::summary::campaign_samples::{campaign, run};
     use actcheck_history::RunStatus;
 
     #[test]

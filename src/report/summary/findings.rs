@@ -1,6 +1,5 @@
 //! Findings of the analysis, with the names needed to print them.
 
-use crate::Table;
 use actcheck_analysis::{
     Cascade, Condition, FailureMode, FlakyScene, Parameter, Pattern, PropertyFindings, Trend, TwoWay,
 };
@@ -93,7 +92,7 @@ impl PropertyReport {
 }
 
 /// Formats a proportion, such as `71 %`; values below 10 % have one decimal.
-pub(super) fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     let share = share * 100.0;
     if share > 0.0 && share < 9.95 { format!("{share:.1} %") } else { format!("{share:.0} %") }
 }
@@ -116,82 +115,4 @@ fn told(condition: &Condition, parameter: &Parameter) -> String {
         Condition::Range { high: Some(high), .. } => format!("{name} < {high}{unit}"),
         Condition::Range { .. } => format!("any {name}"),
     }
-}
-
-/// Returns one row for each pattern.
-pub fn findings_table(summary: &FindingsSummary) -> Table {
-    let mut table = Table::new([
-        "action",
-        "property",
-        "conditions",
-        "sentence",
-        "runs",
-        "failed",
-        "rate",
-        "low",
-        "high",
-        "elsewhere",
-        "lift",
-        "wracc",
-        "p",
-        "q",
-        "held_out_runs",
-        "held_out_failed",
-        "p_held_out",
-        "confirmed",
-        "run_ids",
-    ]);
-    for report in &summary.properties {
-        for pattern in &report.findings.patterns.patterns {
-            let held_out = pattern.held_out;
-            table.rows.push(vec![
-                report.findings.action.clone().into(),
-                report.findings.property.clone().into(),
-                report.conditions(pattern).into(),
-                report.sentence(pattern).into(),
-                (pattern.all.failed_in + pattern.all.passed_in).into(),
-                pattern.all.failed_in.into(),
-                pattern.rate.rate.into(),
-                pattern.rate.low.into(),
-                pattern.rate.high.into(),
-                pattern.elsewhere.map(|elsewhere| elsewhere.rate).into(),
-                pattern.lift.into(),
-                pattern.wracc.into(),
-                pattern.p.into(),
-                pattern.q.into(),
-                (held_out.failed_in + held_out.passed_in).into(),
-                held_out.failed_in.into(),
-                pattern.p_held_out.into(),
-                pattern.confirmed.into(),
-                report.runs(pattern).join(" ").into(),
-            ]);
-        }
-    }
-    table
-}
-
-/// Returns one row for each cell of the heat maps.
-pub fn maps_table(summary: &FindingsSummary) -> Table {
-    let mut table = Table::new(["action", "property", "by", "down", "across", "runs", "failed", "rate", "low", "high"]);
-    for report in &summary.properties {
-        for map in &report.maps {
-            for (down, cells) in map.down.iter().zip(&map.cells) {
-                for (across, cell) in map.across.iter().zip(cells) {
-                    table.rows.push(vec![
-                        report.findings.action.clone().into(),
-                        report.findings.property.clone().into(),
-                        map.by.join(" ").into(),
-                        down.clone().into(),
-                        across.clone().into(),
-                        cell.runs.into(),
-                        cell.failed.into(),
-                        cell.failing.map(|failing| failing.rate).into(),
-                        cell.failing.map(|failing| failing.low).into(),
-                        cell.failing.map(|failing| failing.high).into(),
-                    ]);
-                }
-            }
-        }
-    }
-    table
 }

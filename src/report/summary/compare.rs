@@ -62,10 +62,18 @@ impl CompareSummary {
 }
 
 /// The subject of a comparison line, in words.
-pub(super) fn compared_name(of: &Compared) -> String {
+pub(crate) fn compared_name(of: &Compared) -> String {
     match of {
         Compared::WholeRun => "whole run".to_owned(),
         Compared::Property { action, property } => format!("{} {}", names::local(action), names::local(property)),
+    }
+}
+
+/// Action and property; `(None, None)` for whole runs.
+pub(crate) fn compared_parts(of: &Compared) -> (Option<String>, Option<String>) {
+    match of {
+        Compared::WholeRun => (None, None),
+        Compared::Property { action, property } => (Some(action.clone()), Some(property.clone())),
     }
 }
 

@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use crate::repeated_text::repeated_json;
-use crate::weighted::weighted_json;
-use crate::{CampaignSummary, RunSummary, Share, case_json};
+use crate::json::repeated::repeated_json;
+use crate::json::weighted::weighted_json;
+use crate::{CampaignSummary, Remark, RunSummary, Share, case_json};
 use actcheck_analysis::FailureMode;
 use actcheck_base::Judgement;
 
@@ -42,7 +42,7 @@ pub fn campaign_json(summary: &CampaignSummary) -> Value {
         "search": weighted_json(summary),
         "repetitions": repeated_json(summary),
         "failure_modes": summary.failure_modes.iter().map(failure_mode).collect::<Vec<_>>(),
-        "remarks": summary.remarks_json(),
+        "remarks": summary.remarks().iter().map(|one| remark(summary, one)).collect::<Vec<_>>(),
         "runs": summary.runs.iter().map(run).collect::<Vec<_>>(),
     })
 }
@@ -51,6 +51,15 @@ fn failure_mode(mode: &FailureMode) -> Value {
     json!({
         "failed": mode.failed, "runs": mode.runs,
         "share": mode.share.rate, "low": mode.share.low, "high": mode.share.high,
+    })
+}
+
+fn remark(summary: &CampaignSummary, remark: &Remark) -> Value {
+    let properties: Vec<&str> = remark.properties.iter().map(|(iri, _)| iri.as_str()).collect();
+    json!({
+        "severity": if remark.warning { "warning" } else { "note" }, "oddity": remark.oddity.word(),
+        "properties": properties, "count": remark.count, "of": remark.of, "run": remark.run,
+        "text": summary.remark_text(remark),
     })
 }
 

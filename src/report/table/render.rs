@@ -1,7 +1,8 @@
-//! Tables that are printed as text, CSV or JSON.
+//! Flat tables that are printed as text, CSV or JSON.
 
-use comfy_table::{ContentArrangement, TableComponent, presets};
 use serde_json::{Map, Value};
+
+use crate::text::ruled;
 
 /// Output format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -64,21 +65,13 @@ impl Table {
     }
 
     /// Returns a JSON array with one object per row.
-    pub(super) fn objects(&self) -> Value {
+    pub(crate) fn objects(&self) -> Value {
         let object = |row: &Vec<Value>| {
             let pairs = self.columns.iter().cloned().zip(row.iter().cloned());
             Value::Object(pairs.collect::<Map<String, Value>>())
         };
         Value::Array(self.rows.iter().map(object).collect())
     }
-}
-
-/// Creates a terminal table with a rule below the header.
-pub(super) fn ruled() -> comfy_table::Table {
-    let mut table = comfy_table::Table::new();
-    table.load_preset(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
-    table.set_style(TableComponent::HeaderLines, '─').set_style(TableComponent::MiddleHeaderIntersections, '─');
-    table
 }
 
 /// Formats a cell as text: strings without quotes, `null` as an empty string.

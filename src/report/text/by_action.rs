@@ -3,7 +3,7 @@
 
 use comfy_table::{Attribute, Cell, Color};
 
-use crate::table::ruled;
+use crate::text::ruled;
 use crate::{ActionSummary, CampaignSummary, PropertyLine, RunSummary};
 use actcheck_base::Outcome;
 use actcheck_verdict::{Counts, mean};
@@ -105,7 +105,7 @@ pub(super) fn properties_table(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::summary::tests::{campaign, run};
+    use crate::summary::campaign_samples::{campaign, run};
     use actcheck_history::RunStatus;
 
     /// A run with two actions, each with both properties.

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::findings_summary::{FindingsSummary, PropertyReport};
+use crate::{FindingsSummary, PropertyReport};
 use actcheck_analysis::{Cascade, Condition, Judged, Parameter, Pattern, TwoByTwo, TwoWay};
 
 /// Returns all findings as JSON.

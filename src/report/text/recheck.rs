@@ -1,12 +1,10 @@
-//! The changes that a recheck made, as text, table and JSON.
+//! The changes that a recheck made for the terminal.
 
 use std::fmt::Write as _;
 
-use serde_json::{Value, json};
-
-use crate::recheck_summary::{Change, Why};
-use crate::table::ruled;
-use crate::{RecheckSummary, Table};
+use crate::summary::reason_text;
+use crate::text::ruled;
+use crate::{Change, RecheckSummary};
 use actcheck_base::{Outcome, names};
 use actcheck_verdict::Counts;
 
@@ -61,7 +59,7 @@ fn changes(out: &mut String, summary: &RecheckSummary) {
             names::local(&change.action),
             names::local(&change.now.property),
             change.now.outcome,
-            why_text(&change.why, 8),
+            reason_text(&change.why, 8),
             margins(change),
             change.now.witness
         );
@@ -81,16 +79,6 @@ fn margins(change: &Change) -> String {
     }
 }
 
-/// Describes the reason, with digests shortened to `letters` characters.
-fn why_text(why: &Why, letters: usize) -> String {
-    let short = |digest: &str| digest.get(..letters).unwrap_or(digest).to_owned();
-    match why {
-        Why::NewProperty => "property is new".to_owned(),
-        Why::RuleChanged(before, now) => format!("rule changed {} → {}", short(before), short(now)),
-        Why::SameRule => "same rule, different ontology or program".to_owned(),
-    }
-}
-
 /// Lists the outcomes that occurred, with their counts.
 fn counted(counts: Counts) -> String {
     let words: Vec<String> = Outcome::ALL
@@ -99,54 +87,4 @@ fn counted(counts: Counts) -> String {
         .map(|outcome| format!("{} {outcome}", counts.get(outcome)))
         .collect();
     if words.is_empty() { "none".to_owned() } else { words.join(", ") }
-}
-
-/// Returns one row for each outcome that changed or is new.
-pub fn recheck_table(summary: &RecheckSummary) -> Table {
-    let mut table = Table::new([
-        "run",
-        "step",
-        "action",
-        "property",
-        "before",
-        "now",
-        "margin_before",
-        "margin_now",
-        "why",
-        "witness",
-    ]);
-    for change in &summary.changes {
-        table.rows.push(vec![
-            change.run.clone().into(),
-            change.step.into(),
-            change.action.clone().into(),
-            change.now.property.clone().into(),
-            change.before.map(|(outcome, _)| outcome.word()).into(),
-            change.now.outcome.word().into(),
-            change.before.and_then(|(_, margin)| margin).into(),
-            change.now.margin.into(),
-            why_text(&change.why, usize::MAX).into(),
-            change.now.witness.clone().into(),
-        ]);
-    }
-    table
-}
-
-/// Returns the changes and the counts of each property as JSON.
-pub fn recheck_json(summary: &RecheckSummary) -> Value {
-    let properties: Vec<Value> = summary
-        .properties
-        .iter()
-        .map(|(iri, line)| {
-            json!({
-                "property": iri,
-                "before": line.before,
-                "now": line.now,
-                "changed": line.changed,
-                "new": line.new,
-                "restated": line.restated,
-            })
-        })
-        .collect();
-    json!({ "runs": summary.runs, "properties": properties, "changes": recheck_table(summary).objects() })
 }

@@ -1,15 +1,14 @@
-//! Consistency of repeated scenes as text and JSON.
+//! Consistency of repeated scenes for the terminal.
 
 use std::fmt::Write as _;
 
-use serde_json::{Value, json};
-
-use crate::table::ruled;
+use crate::text::ruled;
 use crate::{CampaignSummary, RepeatedProperty};
 use actcheck_analysis::{Flaky, PassPower, Variance};
 
 /// Maximum number of pass^k columns; the JSON has all.
 const POWERS_SHOWN: usize = 5;
+
 /// Maximum number of flaky scenes listed for each property; the JSON has all.
 const SCENES_NAMED: usize = 6;
 
@@ -72,39 +71,4 @@ fn flaky(out: &mut String, summary: &CampaignSummary, property: &RepeatedPropert
     let rest = scenes.len().saturating_sub(SCENES_NAMED);
     let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
     let _ = writeln!(out, "  {}: flaky in scene {}{more}", property.label, named.join(", "));
-}
-
-/// Returns the consistency of repeated scenes as JSON, or `null` if every scene was run once.
-pub(super) fn repeated_json(summary: &CampaignSummary) -> Value {
-    let repeated = summary.repeated();
-    if repeated.is_empty() {
-        return Value::Null;
-    }
-    let property = |RepeatedProperty { property, label, found }: &RepeatedProperty| {
-        let flaky = |Flaky { scene, passed, of }: &Flaky| {
-            let runs: Vec<&str> = summary.runs_of_scene(*scene).map(|run| run.id.as_str()).collect();
-            json!({ "scene": scene, "passed": passed, "of": of, "runs": runs })
-        };
-        let power = |power: &PassPower| {
-            json!({
-                "k": power.k, "scenes": power.scenes, "probability": power.probability.rate,
-                "low": power.probability.low, "high": power.probability.high,
-            })
-        };
-        json!({
-            "property": property, "label": label,
-            "always_passed": found.always_passed, "always_failed": found.always_failed,
-            "flaky": found.flaky.iter().map(flaky).collect::<Vec<_>>(),
-            "pass_powers": found.pass_powers.iter().map(power).collect::<Vec<_>>(),
-            "outcome_variance": variance_json(found.outcome), "margin_variance": variance_json(found.margin),
-        })
-    };
-    Value::Array(repeated.iter().map(property).collect())
-}
-
-fn variance_json(variance: Option<Variance>) -> Value {
-    variance.map_or(
-        Value::Null,
-        |variance| json!({ "noise": variance.noise, "scene": variance.scene, "noise_share": variance.noise_share() }),
-    )
 }

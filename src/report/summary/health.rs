@@ -1,11 +1,5 @@
-//! A campaign's health report as text, table and JSON.
+//! A campaign's health, with the names needed to print it.
 
-use std::fmt::Write as _;
-
-use serde_json::{Value, json};
-
-use crate::Table;
-use crate::table::ruled;
 use actcheck_analysis::{Ailment, Health, ParameterCoverage};
 use actcheck_base::{Diagnostic, Diagnostics, names};
 
@@ -37,7 +31,7 @@ impl HealthSummary {
         found
     }
 
-    fn warning(&self, ailment: &Ailment) -> Diagnostic {
+    pub(crate) fn warning(&self, ailment: &Ailment) -> Diagnostic {
         match ailment {
             Ailment::Discards(discards, drawn, run, reason) => Diagnostic::warning(
                 "S032",
@@ -88,7 +82,7 @@ impl HealthSummary {
     }
 
     /// Pairs of bins over all pairs of parameters: number tried, number expected, total.
-    fn pairs(&self) -> (usize, f64, usize) {
+    pub(crate) fn pairs(&self) -> (usize, f64, usize) {
         let pairs = &self.health.pairs;
         (
             pairs.iter().map(|pair| pair.hits).sum(),
@@ -120,110 +114,6 @@ fn ordinal(number: usize) -> String {
         _ => "th",
     };
     format!("{number}{ending}")
-}
-
-/// One line for each warning, for the end of a campaign's summary. Empty if the campaign is healthy.
-pub fn health_lines(summary: &HealthSummary) -> String {
-    let mut out = String::new();
-    for warning in summary.warnings().iter() {
-        let help = warning.help.as_deref().unwrap_or_default();
-        let _ = writeln!(out, "warning {}: {} ({help})", warning.code, warning.message);
-    }
-    if !out.is_empty() {
-        out.insert(0, '\n');
-        let _ = writeln!(out, "  more: {} health {} --history {}", summary.program, summary.campaign, summary.history);
-    }
-    out
-}
-
-/// Returns one row for each parameter: how often its bins were tried.
-pub fn health_table(summary: &HealthSummary) -> Table {
-    let mut table = Table::new(["parameter", "draws", "bins", "hit", "expected_hit", "least", "most"]);
-    for parameter in &summary.health.parameters {
-        table.rows.push(vec![
-            parameter.name.clone().into(),
-            parameter.draws.into(),
-            parameter.counts.len().into(),
-            parameter.hits().into(),
-            ((parameter.expected_hits * 100.0).round() / 100.0).into(),
-            parameter.counts.iter().min().copied().into(),
-            parameter.counts.iter().max().copied().into(),
-        ]);
-    }
-    table
-}
-
-/// Formats coverage, then the other measurements.
-pub fn health_text(summary: &HealthSummary) -> String {
-    let health = &summary.health;
-    let mut out = String::new();
-    if !health.parameters.is_empty() {
-        let mut table = ruled();
-        table.force_no_tty();
-        table.set_header(["parameter", "draws", "bins hit (expected)", "draws in each bin"]);
-        for parameter in &health.parameters {
-            let counts: Vec<String> = parameter.counts.iter().map(u64::to_string).collect();
-            table.add_row([
-                parameter.name.clone(),
-                parameter.draws.to_string(),
-                format!("{} of {} ({:.1})", parameter.hits(), parameter.counts.len(), parameter.expected_hits),
-                counts.join(" "),
-            ]);
-        }
-        let _ = writeln!(out, "{table}\n");
-    }
-    let (hits, expected, cells) = summary.pairs();
-    if cells > 0 {
-        let _ = writeln!(out, "pairs of bins of two parameters: {hits} of {cells} tried (expected {expected:.0})");
-    }
-    let drawn = health.runs + health.discards;
-    let _ = writeln!(out, "scenes discarded: {} of {drawn}", health.discards);
-    if let (Some(median), Some((secs, run))) = (health.median_secs, &health.slowest) {
-        let _ = writeln!(out, "wall time of a run: median {median:.2} s, longest {secs:.2} s ({run})");
-    }
-    if let Some((depth, run)) = &health.deepest {
-        let _ = writeln!(out, "deepest penetration: {:.2} mm ({run})", depth * 1e3);
-    }
-    if let Some((energy, run)) = &health.energy {
-        let _ = writeln!(out, "unexplained energy gain: at most {:.4} J in a run ({run})", energy);
-    }
-    let _ = match health.ailments.len() {
-        0 => writeln!(out, "campaign {} in {} is healthy", summary.campaign, summary.history),
-        1 => writeln!(out, "campaign {} in {}: 1 warning", summary.campaign, summary.history),
-        many => writeln!(out, "campaign {} in {}: {many} warnings", summary.campaign, summary.history),
-    };
-    out
-}
-
-/// Returns the health report as JSON.
-pub fn health_json(summary: &HealthSummary) -> Value {
-    let health = &summary.health;
-    let parameters = health.parameters.iter().map(|parameter| {
-        json!({
-            "parameter": parameter.name, "draws": parameter.draws, "counts": parameter.counts,
-            "hit": parameter.hits(), "expected_hit": parameter.expected_hits,
-        })
-    });
-    let pairs = health.pairs.iter().map(|pair| {
-        json!({
-            "parameters": pair.names, "draws": pair.draws, "cells": pair.cells, "hit": pair.hits,
-            "expected_hit": pair.expected_hits,
-        })
-    });
-    let worst =
-        |worst: &Option<(f64, String)>| worst.as_ref().map(|(value, run)| json!({ "value": value, "run": run }));
-    let warnings = health.ailments.iter().map(|ailment| {
-        let warning = summary.warning(ailment);
-        json!({ "code": warning.code, "text": warning.message, "help": warning.help })
-    });
-    json!({
-        "campaign": summary.campaign, "runs": health.runs, "discarded_scenes": health.discards,
-        "wall_median_secs": health.median_secs, "wall_longest_secs": worst(&health.slowest),
-        "deepest_penetration_m": worst(&health.deepest), "energy_gain_j": worst(&health.energy),
-        "parameters": parameters.collect::<Vec<_>>(),
-        "pairs": pairs.collect::<Vec<_>>(),
-        "warnings": warnings.collect::<Vec<_>>(),
-    })
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::compare_summary::compared_name;
-use crate::table::ruled;
+use crate::summary::compared_name;
+use crate::text::ruled;
 use crate::{CompareSummary, ComparedSide};
 use actcheck_analysis::{ComparedLine, PairedTable};
 use actcheck_base::Outcome;

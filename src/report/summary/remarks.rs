@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Value, json};
-
 use crate::CampaignSummary;
 use actcheck_analysis::wilson;
 use actcheck_base::Outcome;
@@ -125,25 +123,12 @@ impl CampaignSummary {
             }
         }
     }
-
-    /// Returns the remarks as JSON.
-    pub(super) fn remarks_json(&self) -> Value {
-        let remark = |remark: &Remark| {
-            let properties: Vec<&str> = remark.properties.iter().map(|(iri, _)| iri.as_str()).collect();
-            json!({
-                "severity": if remark.warning { "warning" } else { "note" }, "oddity": remark.oddity.word(),
-                "properties": properties, "count": remark.count, "of": remark.of, "run": remark.run,
-                "text": self.remark_text(remark),
-            })
-        };
-        self.remarks().iter().map(remark).collect()
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::summary::tests::{campaign, run};
+    use crate::summary::campaign_samples::{campaign, run};
     use actcheck_history::RunStatus;
 
     fn told(runs: u64, outcomes: [Outcome; 2], held_before: Option<bool>) -> Vec<(Oddity, u64, u64, bool)> {

@@ -1,44 +1,7 @@
-//! Results of re-running cases: whether each scene still fails as recorded.
+//! Results of re-running cases for the terminal.
 
-use serde_json::{Value, json};
-
+use crate::CaseSummary;
 use actcheck_verdict::Recurrence;
-
-/// Summary of one case.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CaseSummary {
-    /// The case file's path as displayed.
-    pub file: String,
-    /// Id of the new run.
-    pub run: String,
-    /// Names of the properties that failed when the case was recorded.
-    pub expected: Vec<String>,
-    /// How the new result compares with the recorded one.
-    pub recurrence: Recurrence,
-    /// Whether the trace is bit-for-bit the same. `None` if the case has no trace hash.
-    pub same_trace: Option<bool>,
-    /// Why the run did not complete, if it did not.
-    pub reason: Option<String>,
-}
-
-impl CaseSummary {
-    /// Whether any property fails.
-    pub fn fails(&self) -> bool {
-        match self.recurrence {
-            Recurrence::AsBefore => !self.expected.is_empty(),
-            Recurrence::Otherwise(_) => true,
-            Recurrence::NoLonger | Recurrence::Undecided(_) => false,
-        }
-    }
-
-    /// 0: nothing fails. 1: a property fails. 2: the case could not be decided.
-    pub fn exit_code(&self) -> u8 {
-        match self.recurrence {
-            Recurrence::Undecided(_) => 2,
-            _ => u8::from(self.fails()),
-        }
-    }
-}
 
 /// Describes the result of one case in words.
 pub fn case_text(case: &CaseSummary) -> String {
@@ -97,21 +60,6 @@ pub fn regressions_text(cases: &[CaseSummary]) -> String {
 
 fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
     names.into_iter().map(String::as_str).collect::<Vec<_>>().join(" + ")
-}
-
-/// Returns the result of one case as JSON.
-pub fn case_json(case: &CaseSummary) -> Value {
-    let (failed, undecided) = match &case.recurrence {
-        Recurrence::AsBefore => (case.expected.iter().collect::<Vec<_>>(), Vec::new()),
-        Recurrence::NoLonger => (Vec::new(), Vec::new()),
-        Recurrence::Otherwise(now) => (now.iter().collect(), Vec::new()),
-        Recurrence::Undecided(what) => (Vec::new(), what.iter().collect()),
-    };
-    json!({
-        "file": case.file, "run": case.run, "expected": case.expected, "recurrence": case.recurrence.word(),
-        "failed": failed, "undecided": undecided, "same_trace": case.same_trace, "reason": case.reason,
-        "exit_code": case.exit_code(),
-    })
 }
 
 #[cfg(test)]
