@@ -1,8 +1,8 @@
 //! Patterns: what is planted is found, and where nothing is planted nothing is.
 
-use actcheck::analysis::{Condition, Pattern, PatternOptions, Patterns, Subject, mine};
+use actcheck::analysis::{Condition, Pattern, PatternInput, PatternOptions, Patterns, mine};
 
-use crate::support::planted::{kind, plantings, range, shuffled, subject};
+use crate::support::planted::{input, kind, plantings, range, shuffled};
 
 /// A seventh of a bound's range is one step of the cuts; the bound itself has to lie much nearer.
 const NEAR: f64 = 0.02;
@@ -34,7 +34,7 @@ fn told(found: &Patterns) -> Vec<&Vec<Condition>> {
 fn what_is_planted_in_ten_thousand_runs_is_found_and_nothing_else() {
     for (name, planted) in plantings() {
         for seed in 1..=3 {
-            let found = mine(&subject(10_000, seed, &planted), &PatternOptions::default());
+            let found = mine(&input(10_000, seed, &planted), &PatternOptions::default());
             for wanted in &planted {
                 let confirmed = found.confirmed().any(|pattern| is(pattern, wanted));
                 assert!(confirmed, "{name}, seed {seed}: {wanted:?} is not in {:#?}", told(&found));
@@ -47,13 +47,13 @@ fn what_is_planted_in_ten_thousand_runs_is_found_and_nothing_else() {
 #[test]
 fn what_is_told_of_a_pattern_is_what_the_runs_say() {
     let planted = vec![vec![kind(0, "Bottle"), range(4, None, Some(0.35))]];
-    let subject = subject(10_000, 5, &planted);
-    let found = mine(&subject, &PatternOptions::default());
+    let input = input(10_000, 5, &planted);
+    let found = mine(&input, &PatternOptions::default());
     let pattern = &found.patterns[0];
-    let holds: Vec<Vec<bool>> = pattern.conditions.iter().map(|condition| condition.holds(&subject)).collect();
-    let runs: Vec<usize> = (0..subject.len()).filter(|run| holds.iter().all(|holds| holds[*run])).collect();
+    let holds: Vec<Vec<bool>> = pattern.conditions.iter().map(|condition| condition.holds(&input)).collect();
+    let runs: Vec<usize> = (0..input.len()).filter(|run| holds.iter().all(|holds| holds[*run])).collect();
     assert_eq!(pattern.runs, runs);
-    let failed = runs.iter().filter(|run| subject.failed[**run]).count() as u64;
+    let failed = runs.iter().filter(|run| input.failed[**run]).count() as u64;
     assert_eq!((pattern.all.failed_in, pattern.all.passed_in), (failed, runs.len() as u64 - failed));
     assert_eq!(pattern.all.failed_in + pattern.all.failed_out, found.failed);
     let overall = found.failed as f64 / 10_000.0;
@@ -63,7 +63,7 @@ fn what_is_told_of_a_pattern_is_what_the_runs_say() {
     let searched = pattern.searched;
     let looked_at = searched.failed_in + searched.passed_in + searched.failed_out + searched.passed_out;
     assert_eq!(looked_at, 10_000 - found.held_out, "the first pattern is looked for in all that are not kept aside");
-    let kept = (0..subject.len()).filter(|run| subject.held_out[*run] && pattern.runs.contains(run));
+    let kept = (0..input.len()).filter(|run| input.held_out[*run] && pattern.runs.contains(run));
     assert_eq!(pattern.held_out.failed_in + pattern.held_out.passed_in, kept.count() as u64);
     assert!((3_200..3_500).contains(&found.held_out), "{}", found.held_out);
 }
@@ -72,9 +72,9 @@ fn what_is_told_of_a_pattern_is_what_the_runs_say() {
 fn drawn_by_lot_nothing_is_a_pattern() {
     let planted = plantings().pop().unwrap().1;
     for runs in [300, 1_000, 4_000] {
-        let subject = subject(runs, 9, &planted);
+        let input = input(runs, 9, &planted);
         let alarms = (0..100)
-            .filter(|seed| !mine(&shuffled(&subject, *seed), &PatternOptions::default()).patterns.is_empty())
+            .filter(|seed| !mine(&shuffled(&input, *seed), &PatternOptions::default()).patterns.is_empty())
             .count();
         assert!(alarms <= 5, "{alarms} of 100 with {runs} runs");
     }
@@ -82,15 +82,15 @@ fn drawn_by_lot_nothing_is_a_pattern() {
 
 #[test]
 fn too_little_to_learn_from_is_no_fault() {
-    let empty = mine(&Subject::default(), &PatternOptions::default());
+    let empty = mine(&PatternInput::default(), &PatternOptions::default());
     assert_eq!((empty.runs, empty.patterns.len(), empty.tried), (0, 0, 0));
     for runs in [1, 2, 7, 30] {
-        let mut subject = subject(runs, 1, &[]);
+        let mut input = input(runs, 1, &[]);
         for failed in [true, false] {
-            subject.failed.fill(failed);
-            assert!(mine(&subject, &PatternOptions::default()).patterns.is_empty());
+            input.failed.fill(failed);
+            assert!(mine(&input, &PatternOptions::default()).patterns.is_empty());
         }
-        subject.parameters.clear();
-        assert!(mine(&subject, &PatternOptions::default()).patterns.is_empty());
+        input.parameters.clear();
+        assert!(mine(&input, &PatternOptions::default()).patterns.is_empty());
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use crate::{Env, Told};
+use crate::{Env, RunResult};
 use actcheck_base::Outcome;
 use actcheck_config::{Limits, Overrides};
 use actcheck_verdict::{trials_for_width, wilson_share};
@@ -17,7 +17,7 @@ const WIDTH_RESERVE: u64 = 4;
 
 /// The budget that ended a campaign.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Spent {
+pub enum ExhaustedBudget {
     /// The time limit. Unit: seconds.
     Time(f64),
     /// The maximum interval width, which all properties have reached.
@@ -26,7 +26,7 @@ pub enum Spent {
     Failures(u64),
 }
 
-impl Spent {
+impl ExhaustedBudget {
     /// Its name in the history.
     pub fn word(self) -> &'static str {
         match self {
@@ -37,7 +37,7 @@ impl Spent {
     }
 }
 
-impl fmt::Display for Spent {
+impl fmt::Display for ExhaustedBudget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Time(secs) => write!(f, "its time of {secs} s is up (--time)"),
@@ -52,7 +52,7 @@ impl fmt::Display for Spent {
 
 /// Returns the runs of each test if the command line sets a budget but no number of runs, and `None` if the
 /// configuration decides.
-pub(super) fn ceiling(overrides: &Overrides) -> Option<u32> {
+pub(super) fn runs_per_test(overrides: &Overrides) -> Option<u32> {
     match (overrides.runs, overrides.until_width, overrides.time_secs) {
         (None, Some(width), _) => {
             let enough = trials_for_width(width).saturating_mul(WIDTH_RESERVE);
@@ -88,9 +88,9 @@ impl Tally {
     }
 
     /// Counts a run. Returns the budget that it has spent, if any.
-    pub(super) fn count(&mut self, told: &Told) -> Option<Spent> {
-        self.failures += u64::from(told.outcomes.iter().any(|one| one.outcome == Outcome::Failed));
-        for one in &told.outcomes {
+    pub(super) fn count(&mut self, result: &RunResult) -> Option<ExhaustedBudget> {
+        self.failures += u64::from(result.outcomes.iter().any(|one| one.outcome == Outcome::Failed));
+        for one in &result.outcomes {
             if let Some([passed, decided]) = self.decided.get_mut(&one.property) {
                 *passed += u64::from(one.outcome == Outcome::Passed);
                 *decided += u64::from(matches!(one.outcome, Outcome::Passed | Outcome::Failed));
@@ -99,9 +99,9 @@ impl Tally {
         if let Some(most) = self.limits.max_failures
             && self.failures >= most
         {
-            return Some(Spent::Failures(most));
+            return Some(ExhaustedBudget::Failures(most));
         }
-        self.limits.until_width.filter(|width| self.is_narrow(*width)).map(Spent::Width)
+        self.limits.until_width.filter(|width| self.is_narrow(*width)).map(ExhaustedBudget::Width)
     }
 
     /// Whether the interval of every property is at most this wide. The runs of one scene count as one trial, because
@@ -119,15 +119,15 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ToldOutcome;
+    use crate::PropertyOutcome;
 
-    fn told(outcomes: [Outcome; 2]) -> Told {
-        let outcomes = ["a", "b"].into_iter().zip(outcomes).map(|(property, outcome)| ToldOutcome {
+    fn result(outcomes: [Outcome; 2]) -> RunResult {
+        let outcomes = ["a", "b"].into_iter().zip(outcomes).map(|(property, outcome)| PropertyOutcome {
             property: property.to_owned(),
             outcome,
             margin: None,
         });
-        Told { index: 0, discards: 0, outcomes: outcomes.collect() }
+        RunResult { index: 0, discards: 0, outcomes: outcomes.collect() }
     }
 
     fn tally(limits: Limits) -> Tally {
@@ -138,9 +138,9 @@ mod tests {
     fn failed_runs_count_and_not_failed_properties() {
         use Outcome::{Broken, Failed, Passed};
         let mut tally = tally(Limits { max_failures: Some(2), ..Limits::default() });
-        assert_eq!(tally.count(&told([Failed, Failed])), None);
-        assert_eq!(tally.count(&told([Passed, Broken])), None);
-        assert_eq!(tally.count(&told([Passed, Failed])), Some(Spent::Failures(2)));
+        assert_eq!(tally.count(&result([Failed, Failed])), None);
+        assert_eq!(tally.count(&result([Passed, Broken])), None);
+        assert_eq!(tally.count(&result([Passed, Failed])), Some(ExhaustedBudget::Failures(2)));
     }
 
     #[test]
@@ -149,13 +149,13 @@ mod tests {
         let limits = Limits { until_width: Some(0.3), ..Limits::default() };
         // The interval of n passes out of n has the width z² / (n + z²): 0.3 from n = 9 on.
         let mut sure = tally(limits);
-        let stops: Vec<bool> = (0..9).map(|_| sure.count(&told([Passed, Passed])).is_some()).collect();
+        let stops: Vec<bool> = (0..9).map(|_| sure.count(&result([Passed, Passed])).is_some()).collect();
         assert_eq!(stops, [false, false, false, false, false, false, false, false, true]);
         let mut idle = tally(limits);
-        assert!((0..100).all(|_| idle.count(&told([Passed, Inapplicable])).is_none()));
+        assert!((0..100).all(|_| idle.count(&result([Passed, Inapplicable])).is_none()));
         let mut unsure = tally(limits);
         let mut runs = 0;
-        while unsure.count(&told([Passed, if runs % 2 == 0 { Passed } else { Failed }])).is_none() {
+        while unsure.count(&result([Passed, if runs % 2 == 0 { Passed } else { Failed }])).is_none() {
             runs += 1;
         }
         let most = trials_for_width(0.3);
@@ -164,8 +164,9 @@ mod tests {
 
     #[test]
     fn a_budget_without_a_number_of_runs_has_a_ceiling() {
-        let asked =
-            |runs, until_width, time_secs| ceiling(&Overrides { runs, until_width, time_secs, ..Overrides::default() });
+        let asked = |runs, until_width, time_secs| {
+            runs_per_test(&Overrides { runs, until_width, time_secs, ..Overrides::default() })
+        };
         assert_eq!(asked(None, None, None), None);
         assert_eq!(asked(Some(3), Some(0.1), Some(1.0)), None);
         assert_eq!(asked(None, None, Some(60.0)), Some(MOST_RUNS));

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::make_run::cut_of;
-use crate::replay::again;
-use crate::{Env, Manner};
+use crate::replay::rerun;
+use crate::{Env, RunContext};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, nearest};
 use actcheck_config::{Campaign, Case};
 use actcheck_data::{Choice, ChoiceKind, Choices, Scene};
@@ -56,7 +56,7 @@ pub fn run_cases(
     cases: &[(String, Env)],
     history: &History,
     jobs: usize,
-    manner: &Manner,
+    context: &RunContext,
     on_case: &mut dyn FnMut(usize, CaseRun),
 ) -> Result<(), Diagnostics> {
     let jobs = jobs.clamp(1, cases.len().max(1));
@@ -67,10 +67,10 @@ pub fn run_cases(
     let mut faults = Diagnostics::new();
     // At most one trace for each worker is in memory.
     for (number, some) in cases.chunks(jobs).enumerate() {
-        let made: Vec<_> = pool.install(|| some.par_iter().map(|(_, env)| make(env, manner)).collect());
+        let made: Vec<_> = pool.install(|| some.par_iter().map(|(_, env)| make(env, context)).collect());
         for (at, ((name, env), made)) in some.iter().zip(made).enumerate() {
             match made {
-                Ok(record) => on_case(number * jobs + at, keep(env, history, name, record, manner)?),
+                Ok(record) => on_case(number * jobs + at, keep(env, history, name, record, context)?),
                 Err(found) => faults.extend(found),
             }
         }
@@ -78,10 +78,10 @@ pub fn run_cases(
     faults.or(())
 }
 
-fn make(env: &Env, manner: &Manner) -> Result<RunRecord, Diagnostics> {
+fn make(env: &Env, context: &RunContext) -> Result<RunRecord, Diagnostics> {
     let none = BTreeMap::new();
     let choices = env.campaign.case.as_ref().map_or(&none, |case| &case.choices);
-    again(env, "case", (0, &|| Choices::named(choices)), manner, cut_of(env, manner)).map_err(|why| {
+    rerun(env, "case", (0, &|| Choices::named(choices)), context, cut_of(env, context)).map_err(|why| {
         env.campaign
             .fault("S064", "case", format!("the scene of this case can't be built: {why}"))
             .help("models, robot or program may have changed, or a value was edited: move the objects in the way")
@@ -94,18 +94,18 @@ fn keep(
     history: &History,
     name: &str,
     mut record: RunRecord,
-    manner: &Manner,
+    context: &RunContext,
 ) -> Result<CaseRun, Diagnostics> {
     let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
     record.id = format!("{id}-1");
     record.campaign.clone_from(&id);
     // The record of a crash has no start time.
-    let started = if record.started.is_empty() { (manner.clock.now)() } else { record.started.clone() };
+    let started = if record.started.is_empty() { (context.clock.now)() } else { record.started.clone() };
     let mut campaign = env.record(id.clone(), name.to_owned(), started);
     campaign.planned_runs = 1;
     history.begin_campaign(&campaign)?;
     history.commit(&record)?;
-    history.finish_campaign(&id, &end_of(&record, (manner.clock.now)()))?;
+    history.finish_campaign(&id, &end_of(&record, (context.clock.now)()))?;
     let case = env.campaign.case.clone().unwrap_or_default();
     let recurrence = Recurrence::of(&case.expect.into_iter().collect(), record.judgements.iter().flatten());
     let same_trace = case.trace.map(|trace| trace == record.trace.hash);

@@ -27,18 +27,18 @@ mod searching;
 pub mod shrink;
 mod solids;
 
-pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Recalled, Replay, replay_all};
+pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Replay, StoredCampaign, replay_all};
 
-pub use budget::Spent;
+pub use budget::ExhaustedBudget;
 pub use case::{CaseRun, run_cases};
-pub use changes::{Change, ChangeKind, changes};
-pub use difference::{Difference, first_difference};
+pub use changes::{ChangeKind, InputChange, changes};
+pub use difference::{TraceDifference, first_difference};
 pub use environment::Env;
 pub use export::{export, regressions_folder};
-pub use line::{Clock, Disturbance, Failure, Manner, run_line, run_sabotaged};
-pub use outcome::{CampaignEnd, Ending, WeightedRate};
+pub use line::{Clock, Disturbance, Failure, RunContext, run_line, run_sabotaged};
+pub use outcome::{CampaignResult, Ending, WeightedRate};
 pub use recheck::{RecheckEnd, RecheckOptions, recheck};
-pub use resume::{Kept, unfinished};
+pub use resume::{StoredRuns, unfinished};
 pub use rule_set::RuleSet;
-pub use run_all::{Options, resume_all, run_all};
-pub use schedule::{Planned, Schedule, Steering, Told, ToldOutcome, schedule_of};
+pub use run_all::{CampaignOptions, resume_all, run_all};
+pub use schedule::{Planned, PropertyOutcome, RunResult, Schedule, Steering, schedule_of};

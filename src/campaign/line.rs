@@ -28,7 +28,7 @@ pub type Disturbance = fn(u64, &mut World);
 
 /// How runs are made, apart from their choices.
 #[derive(Debug, Clone, Copy)]
-pub struct Manner {
+pub struct RunContext {
     /// The caller's clock.
     pub clock: Clock,
     /// A fault to inject into worlds.
@@ -58,9 +58,9 @@ pub fn run_line(
     campaign: &str,
     index: u64,
     choices: Choices,
-    manner: &Manner,
+    context: &RunContext,
 ) -> Result<RunRecord, Failure> {
-    run_line_with(env, campaign, (index, choices), manner, Interference::default())
+    run_line_with(env, campaign, (index, choices), context, Interference::default())
 }
 
 /// As [`run_line`], but the run ends at `cut`.
@@ -71,10 +71,10 @@ pub(super) fn run_line_until(
     env: &Env,
     campaign: &str,
     run: (u64, Choices),
-    manner: &Manner,
+    context: &RunContext,
     cut: Cut,
 ) -> Result<RunRecord, Failure> {
-    run_line_with(env, campaign, run, manner, Interference { cut, ..Interference::default() })
+    run_line_with(env, campaign, run, context, Interference { cut, ..Interference::default() })
 }
 
 /// As [`run_line`], with a fault injected on purpose.
@@ -87,25 +87,25 @@ pub fn run_sabotaged(
     env: &Env,
     campaign: &str,
     run: (u64, Choices),
-    manner: &Manner,
+    context: &RunContext,
     saboteur: &mut Saboteur,
 ) -> Result<RunRecord, Failure> {
-    run_line_with(env, campaign, run, manner, Interference { saboteur: Some(saboteur), ..Interference::default() })
+    run_line_with(env, campaign, run, context, Interference { saboteur: Some(saboteur), ..Interference::default() })
 }
 
 fn run_line_with(
     env: &Env,
     campaign: &str,
     (index, mut choices): (u64, Choices),
-    manner: &Manner,
+    context: &RunContext,
     interference: Interference<'_>,
 ) -> Result<RunRecord, Failure> {
-    let (started, start_secs) = ((manner.clock.now)(), (manner.clock.secs)());
+    let (started, start_secs) = ((context.clock.now)(), (context.clock.secs)());
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices)
         .map_err(|discard| Failure::Discard(discard.to_string()))?;
     let test = test_to_perform(env, index, &mut choices);
     let disturb = |world: &mut World| {
-        if let Some(disturb) = manner.disturb {
+        if let Some(disturb) = context.disturb {
             disturb(index, world);
         }
     };
@@ -113,7 +113,7 @@ fn run_line_with(
     let mut program = env.programs.as_ref().map(|programs| {
         let seed = choices.index(SKILL_SEED, SEEDS) as u64;
         let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
-        Performance::new(programs, run, manner.clock.secs)
+        Performance::new(programs, run, context.clock.secs)
     });
     let outside = program.as_mut().map(|program| program as &mut dyn Outside);
     let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, outside };
@@ -124,7 +124,7 @@ fn run_line_with(
     record.quality = quality;
     record.program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
     record.started = started;
-    record.wall_secs = (manner.clock.secs)() - start_secs;
+    record.wall_secs = (context.clock.secs)() - start_secs;
     Ok(record)
 }
 

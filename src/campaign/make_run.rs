@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::line::{crashed, run_line_until};
-use crate::{Env, Failure, Manner, Planned, Told};
+use crate::{Env, Failure, Planned, RunContext, RunResult};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::RunRecord;
@@ -18,7 +18,7 @@ pub(super) enum Making {
     /// The run, with its discards.
     Run(Box<RunRecord>),
     /// The run is in the history already: the campaign was resumed.
-    Stored(Told),
+    Stored(RunResult),
     /// The campaign was interrupted.
     Interrupted,
     /// The run can't be made, with the reason.
@@ -26,13 +26,13 @@ pub(super) enum Making {
 }
 
 /// Makes a planned run. Draws scenes until one can be built.
-pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, manner: &Manner) -> Making {
+pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, context: &RunContext) -> Making {
     let mut discards = Vec::new();
     for attempt in 0..SCENES_PER_RUN {
         let index = planned.index;
         let choices = || planned.choices(env.campaign.seed, attempt);
-        let cut = cut_of(env, manner);
-        let made = catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, choices()), manner, cut)));
+        let cut = cut_of(env, context);
+        let made = catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, choices()), context, cut)));
         let record = match made {
             Ok(Ok(record)) => Ok(record),
             Ok(Err(Failure::Interrupted)) => return Making::Interrupted,
@@ -63,8 +63,8 @@ fn kept(planned: &Planned, record: RunRecord, discards: Vec<String>) -> RunRecor
 }
 
 /// The time limit of a run that starts now.
-pub(super) fn cut_of(env: &Env, manner: &Manner) -> Cut {
-    let secs = manner.clock.secs;
+pub(super) fn cut_of(env: &Env, context: &RunContext) -> Cut {
+    let secs = context.clock.secs;
     env.campaign.limits.run_secs.map_or(Cut::Never, |limit| Cut::Clock { secs, at_secs: secs() + limit })
 }
 

@@ -88,7 +88,7 @@ pub fn recheck<'a>(
             on_batch(taken, &batch);
         }
         judged = fresh.map(|batch| {
-            let (rechecks, faults) = parted(batch);
+            let (rechecks, faults) = split_results(batch);
             taken = rechecks.len() as u64;
             end.faults.extend(faults);
             rechecks.into_iter().flatten().collect()
@@ -107,7 +107,7 @@ fn workers(jobs: usize) -> Result<rayon::ThreadPool, Diagnostics> {
     pool.map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")).into())
 }
 
-fn parted(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
+fn split_results(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
     let mut faults = Diagnostics::new();
     let mut rechecks = Vec::with_capacity(batch.len());
     for run in batch {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::line::{crashed, run_line_until};
 use crate::make_run::panic_text;
-use crate::{Change, Difference, Env, Failure, Manner, changes, first_difference};
+use crate::{Env, Failure, InputChange, RunContext, TraceDifference, changes, first_difference};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ActionEnd, Choice, Choices, Trace};
@@ -17,7 +17,7 @@ use actcheck_history::{CampaignRecord, History, RunDetail, RunRecord};
 const MOST_NAMED: usize = 8;
 
 /// A run's campaign as prepared today, and its record.
-pub type Recalled = (Env, CampaignRecord);
+pub type StoredCampaign = (Env, CampaignRecord);
 
 /// How exactly the recorded choices must fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,13 +44,13 @@ pub struct Replay {
     /// Reasons why it did not complete, then and now.
     pub reasons: [Option<String>; 2],
     /// The first difference of the traces; `None` if they are identical or differ by less than the stored precision.
-    pub difference: Option<Difference>,
+    pub difference: Option<TraceDifference>,
     /// Recorded choices that did not fit.
     pub misfits: Vec<Misfit>,
     /// Outcomes that differ under the present rules.
     pub outcomes: Vec<OutcomeChange>,
     /// Inputs that changed since.
-    pub changes: Vec<Change>,
+    pub changes: Vec<InputChange>,
 }
 
 /// A recorded choice that did not fit.
@@ -98,10 +98,10 @@ pub struct OutcomeChange {
 /// The results are in the order of `runs`. They depend neither on the number of workers nor on the clock.
 pub fn replay_all(
     history: &History,
-    campaigns: &BTreeMap<String, Recalled>,
+    campaigns: &BTreeMap<String, StoredCampaign>,
     runs: &[RunDetail],
     (fit, jobs): (Fit, usize),
-    manner: &Manner,
+    context: &RunContext,
     on_done: impl Fn() + Sync,
 ) -> Result<Vec<Result<Replay, Diagnostics>>, Diagnostics> {
     let pool = rayon::ThreadPoolBuilder::new()
@@ -110,7 +110,7 @@ pub fn replay_all(
         .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
     let one = |detail: &RunDetail| {
         let replayed = match campaigns.get(&detail.row.campaign) {
-            Some(recalled) => replay(history, recalled, detail, fit, manner),
+            Some(stored) => replay(history, stored, detail, fit, context),
             None => Err(refused(detail, "its campaign is not known").into()),
         };
         on_done();
@@ -126,10 +126,10 @@ pub fn replay_all(
 /// fit exactly and do not; or the stored trace can't be read.
 fn replay(
     history: &History,
-    (env, record): &Recalled,
+    (env, record): &StoredCampaign,
     detail: &RunDetail,
     fit: Fit,
-    manner: &Manner,
+    context: &RunContext,
 ) -> Result<Replay, Diagnostics> {
     let run = &detail.row.run;
     let (choices, was) = (history.choices(run)?, history.trace(run)?);
@@ -137,7 +137,7 @@ fn replay(
     // The wall clock is not part of a run's choices: the replay is cut off at the same simulated time.
     let cut_secs = cut_secs(&was);
     let cut = cut_secs.map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
-    let is = again(env, &record.id, (index, &|| Choices::recorded(&choices)), manner, cut).map_err(|why| {
+    let is = rerun(env, &record.id, (index, &|| Choices::recorded(&choices)), context, cut).map_err(|why| {
         refused(detail, &why).help("a model, the configuration or the program changed: see the digests in the history")
     })?;
     let misfits = misfits(&choices, &is.choices);
@@ -171,14 +171,14 @@ fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
 }
 
 /// Makes the run again. A simulation crash counts as a run too.
-pub(super) fn again(
+pub(super) fn rerun(
     env: &Env,
     campaign: &str,
     (index, recorded): (u64, &dyn Fn() -> Choices),
-    manner: &Manner,
+    context: &RunContext,
     cut: Cut,
 ) -> Result<RunRecord, String> {
-    match catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, recorded()), manner, cut))) {
+    match catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, recorded()), context, cut))) {
         Ok(Ok(record)) => Ok(record),
         Ok(Err(Failure::Interrupted)) => Err(Failure::Interrupted.to_string()),
         Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can no longer be built: {reason}")),

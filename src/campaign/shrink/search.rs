@@ -17,7 +17,7 @@ pub struct Tried {
 }
 
 /// Limits of a search.
-pub struct Limits<'a> {
+pub struct TrialLimits<'a> {
     /// Maximum number of simulations; the last try may exceed it.
     pub simulations: u64,
     /// Workers; the result does not depend on their number.
@@ -31,18 +31,18 @@ type Key = Vec<(String, u64)>;
 
 /// Tries lists and caches the results. Results that a single worker would not have computed count only once they are
 /// used.
-pub struct Search<'a> {
+pub struct TrialSearch<'a> {
     test: &'a (dyn Fn(&[Choice]) -> Tried + Sync),
-    limits: Limits<'a>,
+    limits: TrialLimits<'a>,
     workers: Option<ThreadPool>,
     known: BTreeMap<Key, Tried>,
     counted: BTreeSet<Key>,
     simulations: u64,
 }
 
-impl<'a> Search<'a> {
+impl<'a> TrialSearch<'a> {
     /// Creates a search with an empty cache.
-    pub fn new(test: &'a (dyn Fn(&[Choice]) -> Tried + Sync), limits: Limits<'a>) -> Self {
+    pub fn new(test: &'a (dyn Fn(&[Choice]) -> Tried + Sync), limits: TrialLimits<'a>) -> Self {
         let several = limits.jobs > 1;
         // Without a thread pool, this thread does the work: slower, but with the same result.
         let workers = several.then(|| rayon::ThreadPoolBuilder::new().num_threads(limits.jobs).build().ok()).flatten();

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::json::repeated::repeated_json;
 use crate::json::weighted::weighted_json;
-use crate::{CampaignSummary, Remark, RunSummary, Share, case_json};
+use crate::{CampaignSummary, Proportion, Remark, RunSummary, case_json};
 use actcheck_analysis::FailureMode;
 use actcheck_base::Judgement;
 
@@ -88,7 +88,7 @@ fn judgement(judgement: &Judgement) -> Value {
     })
 }
 
-fn share(share: &Share) -> Value {
+fn share(share: &Proportion) -> Value {
     json!({
         "count": share.count, "of": share.of,
         "rate": share.interval.rate, "low": share.interval.low, "high": share.interval.high,

@@ -65,7 +65,7 @@ fn property(report: &PropertyReport) -> Value {
         "patterns": {
             "runs": patterns.runs, "failed": patterns.failed, "held_out": patterns.held_out, "tried": patterns.tried,
             "parameters": patterns.parameters, "depth": patterns.depth, "combined": patterns.combined,
-            "twins": found.twins, "repeated": found.repeated, "steered": found.steered,
+            "twins": found.twins, "repeated": found.repeated, "steered": found.weighted_runs,
             "found": patterns.patterns.iter().map(|one| pattern(report, one)).collect::<Vec<Value>>(),
         },
         "trend": { "campaigns": points.collect::<Vec<Value>>(), "changes": changes.collect::<Vec<Value>>() },
@@ -75,7 +75,7 @@ fn property(report: &PropertyReport) -> Value {
 }
 
 fn pattern(report: &PropertyReport, pattern: &Pattern) -> Value {
-    let parameters = &report.findings.subject.parameters;
+    let parameters = &report.findings.input.parameters;
     let conditions: Vec<Value> =
         pattern.conditions.iter().map(|one| condition(one, &parameters[one.parameter()])).collect();
     json!({

@@ -21,8 +21,8 @@ pub fn health_json(summary: &HealthSummary) -> Value {
     });
     let worst =
         |worst: &Option<(f64, String)>| worst.as_ref().map(|(value, run)| json!({ "value": value, "run": run }));
-    let warnings = health.ailments.iter().map(|ailment| {
-        let warning = summary.warning(ailment);
+    let warnings = health.problems.iter().map(|problem| {
+        let warning = summary.warning(problem);
         json!({ "code": warning.code, "text": warning.message, "help": warning.help })
     });
     json!({

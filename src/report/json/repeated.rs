@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::{CampaignSummary, RepeatedProperty};
-use actcheck_analysis::{Flaky, PassPower, Variance};
+use actcheck_analysis::{PassPower, SceneCounts, Variance};
 
 /// Returns the consistency of repeated scenes as JSON, or `null` if every scene was run once.
 pub(super) fn repeated_json(summary: &CampaignSummary) -> Value {
@@ -12,7 +12,7 @@ pub(super) fn repeated_json(summary: &CampaignSummary) -> Value {
         return Value::Null;
     }
     let property = |RepeatedProperty { property, label, found }: &RepeatedProperty| {
-        let flaky = |Flaky { scene, passed, of }: &Flaky| {
+        let flaky = |SceneCounts { scene, passed, of }: &SceneCounts| {
             let runs: Vec<&str> = summary.runs_of_scene(*scene).map(|run| run.id.as_str()).collect();
             json!({ "scene": scene, "passed": passed, "of": of, "runs": runs })
         };

@@ -45,7 +45,7 @@ pub struct EndedBy {
     /// `time`, `width` or `failures`.
     pub budget: &'static str,
     /// The reason in words.
-    pub told: String,
+    pub description: String,
 }
 
 /// Summary of a run.
@@ -84,7 +84,7 @@ pub struct ActionSummary {
 
 /// A proportion with its 95 % confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Share {
+pub struct Proportion {
     /// Numerator.
     pub count: u64,
     /// Denominator.
@@ -93,9 +93,9 @@ pub struct Share {
     pub interval: Interval,
 }
 
-impl Share {
+impl Proportion {
     /// Replaces the interval if one is given.
-    fn knowing(self, interval: Option<Interval>) -> Self {
+    fn with_interval(self, interval: Option<Interval>) -> Self {
         Self { interval: interval.unwrap_or(self.interval), ..self }
     }
 
@@ -115,12 +115,12 @@ pub struct PropertyLine {
     /// Counts of all six outcomes.
     pub counts: Counts,
     /// Proportion of passed among decided outcomes, with its 95 % interval. `None` if none was decided.
-    pub rate: Option<Share>,
+    pub rate: Option<Proportion>,
     /// Number of passed outcomes whose property already held before the action.
     pub held_before: u64,
 }
 
-impl std::fmt::Display for Share {
+impl std::fmt::Display for Proportion {
     /// Writes, for example, `80 % [55–93] (12 of 15)`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let interval = &self.interval;
@@ -158,7 +158,7 @@ impl RunSummary {
     }
 
     /// Summarises a run read from the history; equals the summary of its record.
-    pub fn again(run: &RunDetail) -> Self {
+    pub fn from_history(run: &RunDetail) -> Self {
         let actions = run.actions.iter().map(|action| ActionSummary {
             name: names::local(&action.action).to_owned(),
             score: action.score,
@@ -212,10 +212,10 @@ impl CampaignSummary {
     }
 
     /// Proportion of runs in which everything passed, among the runs that are not broken.
-    pub fn pass_rate(&self) -> Option<Share> {
+    pub fn pass_rate(&self) -> Option<Proportion> {
         let judged = self.runs.iter().filter(|run| run.status != RunStatus::Broken).count() as u64;
         let passed = self.runs.iter().filter(|run| run.passed()).count() as u64;
-        Share::new(passed, judged).map(|rate| rate.knowing(self.interval_of_repeated(None)))
+        Proportion::new(passed, judged).map(|rate| rate.with_interval(self.interval_of_repeated(None)))
     }
 
     /// Outcome counts over all properties.
@@ -251,8 +251,8 @@ impl CampaignSummary {
             let judgements = actions.iter().flat_map(|action| &action.judgements);
             let own: Vec<&Judgement> = judgements.filter(|judgement| judgement.property == *iri).collect();
             let counts = Counts::of(own.iter().map(|judgement| judgement.outcome));
-            let rate = Share::new(counts.passed, counts.decided());
-            let rate = rate.map(|rate| rate.knowing(self.interval_of_repeated(Some(iri))));
+            let rate = Proportion::new(counts.passed, counts.decided());
+            let rate = rate.map(|rate| rate.with_interval(self.interval_of_repeated(Some(iri))));
             let held_before = own.iter().filter(|judgement| judgement.held_before == Some(true)).count() as u64;
             PropertyLine { property: iri.clone(), label: label.clone(), counts, rate, held_before }
         };

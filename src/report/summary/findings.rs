@@ -74,10 +74,13 @@ impl PropertyReport {
 
     /// Describes the conditions of a pattern in words.
     pub fn conditions(&self, pattern: &Pattern) -> String {
-        let parameters = &self.findings.subject.parameters;
-        let told: Vec<String> =
-            pattern.conditions.iter().map(|condition| told(condition, &parameters[condition.parameter()])).collect();
-        match told.as_slice() {
+        let parameters = &self.findings.input.parameters;
+        let conditions: Vec<String> = pattern
+            .conditions
+            .iter()
+            .map(|condition| condition_text(condition, &parameters[condition.parameter()]))
+            .collect();
+        match conditions.as_slice() {
             [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
             all => all.join(""),
         }
@@ -85,7 +88,7 @@ impl PropertyReport {
 
     /// Ids of the runs of a pattern, failed runs first.
     pub fn runs(&self, pattern: &Pattern) -> Vec<&str> {
-        let failed = &self.findings.subject.failed;
+        let failed = &self.findings.input.failed;
         let of = |wanted: bool| pattern.runs.iter().filter(move |run| failed[**run] == wanted);
         of(true).chain(of(false)).map(|run| self.findings.examples[*run].run.as_str()).collect()
     }
@@ -98,7 +101,7 @@ pub(crate) fn percent(share: f64) -> String {
 }
 
 /// Describes a condition, such as `target friction < 0.35`.
-fn told(condition: &Condition, parameter: &Parameter) -> String {
+fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
     let unit = parameter.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
     let bare = match &parameter.unit {
         Some(unit) => parameter.name.strip_suffix(&format!("_{unit}")).unwrap_or(&parameter.name),

@@ -1,6 +1,6 @@
 //! A campaign's health, with the names needed to print it.
 
-use actcheck_analysis::{Ailment, Health, ParameterCoverage};
+use actcheck_analysis::{Health, HealthProblem, ParameterCoverage};
 use actcheck_base::{Diagnostic, Diagnostics, names};
 
 /// A campaign's health, with the names that messages refer to.
@@ -19,21 +19,21 @@ pub struct HealthSummary {
 impl HealthSummary {
     /// 0: the campaign is healthy. 1: there are warnings.
     pub fn exit_code(&self) -> u8 {
-        u8::from(!self.health.ailments.is_empty())
+        u8::from(!self.health.problems.is_empty())
     }
 
     /// The problems found, as warnings with help.
     pub fn warnings(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
-        for ailment in &self.health.ailments {
-            found.push(self.warning(ailment));
+        for problem in &self.health.problems {
+            found.push(self.warning(problem));
         }
         found
     }
 
-    pub(crate) fn warning(&self, ailment: &Ailment) -> Diagnostic {
-        match ailment {
-            Ailment::Discards(discards, drawn, run, reason) => Diagnostic::warning(
+    pub(crate) fn warning(&self, problem: &HealthProblem) -> Diagnostic {
+        match problem {
+            HealthProblem::Discards(discards, drawn, run, reason) => Diagnostic::warning(
                 "S032",
                 format!("{discards} of {drawn} scenes were discarded; the first, for run {run}: {reason}"),
             )
@@ -41,13 +41,13 @@ impl HealthSummary {
                 "use fewer or smaller objects, a larger surface, or ranges closer to `[scene] require`: fewer discards waste \
                  less time and bias the sample less",
             ),
-            Ailment::Inapplicable(property, not, of) => Diagnostic::warning(
+            HealthProblem::Inapplicable(property, not, of) => Diagnostic::warning(
                 "Q001",
                 format!("{} was inapplicable in {not} of {of} judgements", names::local(property)),
             )
             .help("generate scenes to which it applies, or widen the `applicable` condition of its rule"),
-            Ailment::Neglected(parameter) => neglected(parameter),
-            Ailment::PairNeglected(pair) => Diagnostic::warning(
+            HealthProblem::Neglected(parameter) => neglected(parameter),
+            HealthProblem::PairNeglected(pair) => Diagnostic::warning(
                 "Q003",
                 format!(
                     "of {} pairs of values of `{}` and `{}` {} were tried; {} random draws would try about {:.0}",
@@ -55,21 +55,21 @@ impl HealthSummary {
                 ),
             )
             .help("the two parameters vary together, so failures can't be attributed to one of them: check whether discards or a case tie them"),
-            Ailment::Duplicates(times, run, of) => {
+            HealthProblem::Duplicates(times, run, of) => {
                 Diagnostic::warning("Q004", format!("{times} runs make the same decisions as another run: {run} repeats {of}"))
                     .help("widen the ranges of `[physics]`, `[sensing]` or the models, or ask for fewer runs")
             }
-            Ailment::Slow(run, secs, median) => Diagnostic::warning(
+            HealthProblem::Slow(run, secs, median) => Diagnostic::warning(
                 "Q005",
                 format!("run {run} took {secs:.1} s, {:.0} times the median of {median:.1} s", secs / median.max(1e-9)),
             )
             .help(format!("`{}` shows the run; `[budget]` limits the time of a run", self.show(run))),
-            Ailment::Penetration(run, depth) => Diagnostic::warning(
+            HealthProblem::Penetration(run, depth) => Diagnostic::warning(
                 "Q006",
                 format!("in run {run}, bodies penetrated each other by {:.1} mm: contacts were simulated inaccurately", depth * 1e3),
             )
             .help("raise `[physics] steps_per_second` or `iterations`, or make heavy objects lighter"),
-            Ailment::Energy(run, energy) => Diagnostic::warning(
+            HealthProblem::Energy(run, energy) => Diagnostic::warning(
                 "Q007",
                 format!("in run {run}, objects gained {energy:.2} J without a cause: the simulation was unstable"),
             )
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn places_are_counted_as_people_do() {
-        let told: Vec<String> = [1, 2, 3, 4, 11, 12, 13, 21, 102].into_iter().map(ordinal).collect();
-        assert_eq!(told, ["1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "102nd"]);
+        let ordinals: Vec<String> = [1, 2, 3, 4, 11, 12, 13, 21, 102].into_iter().map(ordinal).collect();
+        assert_eq!(ordinals, ["1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "102nd"]);
     }
 }

@@ -16,7 +16,7 @@ mod weighted;
 
 #[cfg(test)]
 pub(crate) use campaign::tests as campaign_samples;
-pub use campaign::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, RunSummary, Share};
+pub use campaign::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RunSummary};
 pub use case::CaseSummary;
 pub use compare::{CompareSummary, ComparedSide, SideChange};
 pub(crate) use compare::{compared_name, compared_parts};
@@ -26,7 +26,7 @@ pub use health::HealthSummary;
 pub use oracles::OracleSummary;
 pub(crate) use oracles::notice_word;
 pub(crate) use recheck::reason_text;
-pub use recheck::{Change, RecheckLine, RecheckSummary, Why};
+pub use recheck::{RecheckChange, RecheckLine, RecheckSummary, Why};
 pub use remarks::{Oddity, Remark};
 pub use repeated::RepeatedProperty;
 pub use shrunk::{ShrunkChoice, ShrunkSummary};

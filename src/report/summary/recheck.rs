@@ -19,7 +19,7 @@ pub enum Why {
 
 /// An outcome that changed or is new.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct RecheckChange {
     /// Id of the run.
     pub run: String,
     /// Position of the action in the test, from 1.
@@ -57,7 +57,7 @@ pub struct RecheckSummary {
     /// Counts by property IRI.
     pub properties: BTreeMap<String, RecheckLine>,
     /// Changes ordered by run, then by step, then by the order of the action's properties.
-    pub changes: Vec<Change>,
+    pub changes: Vec<RecheckChange>,
 }
 
 impl RecheckSummary {
@@ -77,7 +77,7 @@ impl RecheckSummary {
                 return;
             }
         }
-        self.changes.push(Change {
+        self.changes.push(RecheckChange {
             run: recheck.run.clone(),
             step: recheck.step,
             action: recheck.action.clone(),

@@ -131,7 +131,7 @@ mod tests {
     use crate::summary::campaign_samples::{campaign, run};
     use actcheck_history::RunStatus;
 
-    fn told(runs: u64, outcomes: [Outcome; 2], held_before: Option<bool>) -> Vec<(Oddity, u64, u64, bool)> {
+    fn kinds(runs: u64, outcomes: [Outcome; 2], held_before: Option<bool>) -> Vec<(Oddity, u64, u64, bool)> {
         let runs = (0..runs).map(|index| {
             let mut run = run(index, RunStatus::Completed, &outcomes);
             // Set in every third run.
@@ -148,12 +148,12 @@ mod tests {
     fn what_says_less_than_it_seems_to_is_told() {
         use Outcome::{Broken, Failed, Passed};
         let never = |of, warning| vec![(Oddity::NeverPassed, of, of, true), (Oddity::NeverFailed, of, of, warning)];
-        assert_eq!(told(15, [Passed, Failed], None), never(15, false));
-        assert_eq!(told(30, [Passed, Failed], Some(false)), never(30, true));
-        assert_eq!(told(4, [Passed, Failed], None), []);
-        assert_eq!(told(40, [Broken, Broken], None), []);
-        assert_eq!(told(4, [Passed, Passed], Some(true)), [(Oddity::HeldBefore, 2, 4, true)]);
+        assert_eq!(kinds(15, [Passed, Failed], None), never(15, false));
+        assert_eq!(kinds(30, [Passed, Failed], Some(false)), never(30, true));
+        assert_eq!(kinds(4, [Passed, Failed], None), []);
+        assert_eq!(kinds(40, [Broken, Broken], None), []);
+        assert_eq!(kinds(4, [Passed, Passed], Some(true)), [(Oddity::HeldBefore, 2, 4, true)]);
         // Two properties with the same counts make one remark.
-        assert_eq!(told(6, [Passed, Passed], None), [(Oddity::NeverFailed, 6, 6, false)]);
+        assert_eq!(kinds(6, [Passed, Passed], None), [(Oddity::NeverFailed, 6, 6, false)]);
     }
 }

@@ -1,6 +1,6 @@
 //! Weighted failure rates of a guided search. Raw counts of its runs are not failure rates.
 
-use crate::{CampaignSummary, Share};
+use crate::{CampaignSummary, Proportion};
 use actcheck_analysis::Interval;
 
 /// A guided search that chose a campaign's scenes; counts of its runs are not failure rates.
@@ -26,14 +26,14 @@ pub struct WeightedLine {
     /// Number of scenes that the estimate uses: those of complete generations.
     pub scenes: u64,
     /// Failed runs of all runs of the test. Not a rate, because the search prefers failures.
-    pub raw: Option<Share>,
+    pub raw: Option<Proportion>,
 }
 
 impl CampaignSummary {
     /// Failed runs of all runs of a test, for one property. Returns `None` if the test has no runs.
-    pub fn raw_failures(&self, test: &str, property: &str) -> Option<Share> {
+    pub fn raw_failures(&self, test: &str, property: &str) -> Option<Proportion> {
         let own: Vec<_> = self.runs.iter().filter(|run| run.test == test).collect();
         let failed = own.iter().filter(|run| run.failed_property(property)).count() as u64;
-        Share::new(failed, own.len() as u64)
+        Proportion::new(failed, own.len() as u64)
     }
 }

@@ -7,14 +7,14 @@ use comfy_table::{Attribute, Cell, Color};
 use crate::text::repeated::repeated_text;
 use crate::text::weighted::weighted_text;
 use crate::text::{by_action, regressions_text, ruled};
-use crate::{CampaignSummary, PropertyLine, RunSummary, Share};
+use crate::{CampaignSummary, PropertyLine, Proportion, RunSummary};
 use actcheck_base::{Outcome, names};
 use actcheck_history::SkillRecord;
 
 /// Maximum number of rows in the table of runs. The text names the command that lists the rest.
 const RUNS_SHOWN: usize = 40;
 /// Maximum number of failed runs that are described in words.
-const FAILURES_TOLD: usize = 20;
+const FAILURES_SHOWN: usize = 20;
 
 /// Formats the table of runs × properties, the scores, and the witness of each failed property.
 pub fn campaign_text(summary: &CampaignSummary, colour: bool) -> String {
@@ -117,7 +117,7 @@ fn properties_table(out: &mut String, summary: &CampaignSummary) {
 }
 
 fn pass_rate(line: &PropertyLine) -> String {
-    line.rate.as_ref().map_or_else(|| "none decided".to_owned(), Share::to_string)
+    line.rate.as_ref().map_or_else(|| "none decided".to_owned(), Proportion::to_string)
 }
 
 fn scores(out: &mut String, summary: &CampaignSummary) {
@@ -136,7 +136,13 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
         let _ = writeln!(out, "runs in which everything passed: {}", rate);
     }
     if let Some(ended) = &summary.ended_by {
-        let _ = writeln!(out, "ended after {} of at most {} runs: {}", summary.runs.len(), summary.planned, ended.told);
+        let _ = writeln!(
+            out,
+            "ended after {} of at most {} runs: {}",
+            summary.runs.len(),
+            summary.planned,
+            ended.description
+        );
     }
     if summary.interrupted {
         let _ = writeln!(
@@ -177,8 +183,8 @@ fn remarks(out: &mut String, summary: &CampaignSummary) {
 }
 
 fn failures(out: &mut String, summary: &CampaignSummary) {
-    let told: Vec<&RunSummary> = summary.runs.iter().filter(|run| run.failed() || run.reason.is_some()).collect();
-    for run in told.iter().take(FAILURES_TOLD) {
+    let shown: Vec<&RunSummary> = summary.runs.iter().filter(|run| run.failed() || run.reason.is_some()).collect();
+    for run in shown.iter().take(FAILURES_SHOWN) {
         let _ = writeln!(out, "\n{} ({})", run.id, run.test);
         if let Some(reason) = &run.reason {
             let _ = writeln!(out, "  {}: {reason}", run.status.word());
@@ -192,11 +198,11 @@ fn failures(out: &mut String, summary: &CampaignSummary) {
         }
         let _ = writeln!(out, "  more: {} show {} --history {}", summary.program, run.id, summary.history);
     }
-    if told.len() > FAILURES_TOLD {
+    if shown.len() > FAILURES_SHOWN {
         let _ = writeln!(
             out,
             "\n{} more runs did not pass: {} list --history {}",
-            told.len() - FAILURES_TOLD,
+            shown.len() - FAILURES_SHOWN,
             summary.program,
             summary.history
         );

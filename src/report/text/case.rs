@@ -6,7 +6,7 @@ use actcheck_verdict::Recurrence;
 /// Describes the result of one case in words.
 pub fn case_text(case: &CaseSummary) -> String {
     let was = listed(&case.expected);
-    let told = match &case.recurrence {
+    let result = match &case.recurrence {
         Recurrence::AsBefore if case.expected.is_empty() => "still passes as recorded".to_owned(),
         Recurrence::AsBefore => format!("still fails as recorded: {was}"),
         Recurrence::NoLonger => format!("no longer fails: {was}"),
@@ -21,7 +21,7 @@ pub fn case_text(case: &CaseSummary) -> String {
         None => "",
     };
     let reason = case.reason.as_ref().map_or_else(String::new, |reason| format!(" ({reason})"));
-    format!("{told}{reason}{trace}\n")
+    format!("{result}{reason}{trace}\n")
 }
 
 /// Summarises a corpus in one line: the number of cases and the ones that need attention. Empty if there are no cases.
@@ -29,33 +29,33 @@ pub fn regressions_text(cases: &[CaseSummary]) -> String {
     if cases.is_empty() {
         return String::new();
     }
-    let mut told = Vec::new();
-    let mut tell = |verb: [&str; 2], which: &dyn Fn(&CaseSummary) -> Option<String>| {
+    let mut groups = Vec::new();
+    let mut list_group = |verb: [&str; 2], which: &dyn Fn(&CaseSummary) -> Option<String>| {
         let those: Vec<String> = cases.iter().filter_map(which).collect();
         if !those.is_empty() {
             let verb = verb[usize::from(those.len() != 1)];
-            told.push(format!("{} {verb}: {}", those.len(), those.join(", ")));
+            groups.push(format!("{} {verb}: {}", those.len(), those.join(", ")));
         }
     };
     let with = |case: &CaseSummary, what: &str| Some(format!("{} ({what})", case.file));
-    tell(["fails again", "fail again"], &|case| match case.recurrence {
+    list_group(["fails again", "fail again"], &|case| match case.recurrence {
         Recurrence::AsBefore if case.fails() => with(case, &listed(&case.expected)),
         _ => None,
     });
-    tell(["fails differently", "fail differently"], &|case| match &case.recurrence {
+    list_group(["fails differently", "fail differently"], &|case| match &case.recurrence {
         Recurrence::Otherwise(now) => with(case, &listed(now)),
         _ => None,
     });
-    tell(["could not be decided", "could not be decided"], &|case| match &case.recurrence {
+    list_group(["could not be decided", "could not be decided"], &|case| match &case.recurrence {
         Recurrence::Undecided(what) => with(case, &listed(what)),
         _ => None,
     });
-    tell(["no longer fails", "no longer fail"], &|case| match case.recurrence {
+    list_group(["no longer fails", "no longer fail"], &|case| match case.recurrence {
         Recurrence::NoLonger => with(case, &listed(&case.expected)),
         _ => None,
     });
-    let told = if told.is_empty() { String::new() } else { format!(", {}", told.join("; ")) };
-    format!("regressions: {} ran{told}\n", cases.len())
+    let groups = if groups.is_empty() { String::new() } else { format!(", {}", groups.join("; ")) };
+    format!("regressions: {} ran{groups}\n", cases.len())
 }
 
 fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> String {

@@ -10,7 +10,7 @@ use actcheck_base::Outcome;
 use actcheck_verdict::Counts;
 
 /// Maximum number of runs, settings or names in a line or list; `--format json` has all.
-const TOLD: usize = 10;
+const MAX_LISTED: usize = 10;
 
 /// Formats both sides, their differences, rates and tests of each property, the scenes that flipped, and the verdict.
 pub fn compare_text(summary: &CompareSummary) -> String {
@@ -64,14 +64,14 @@ fn changes(out: &mut String, summary: &CompareSummary) {
         Some(digest) => shortened(digest),
         None => "absent".to_owned(),
     };
-    for change in summary.changes.iter().take(TOLD) {
+    for change in summary.changes.iter().take(MAX_LISTED) {
         let _ =
             writeln!(out, "  {} {}: {} → {}", change.kind, change.name, short(&change.first), short(&change.second));
     }
     more(out, summary.changes.len());
     let [first, second] = summary.config_lines();
     for (sign, lines) in [("-", &first), ("+", &second)] {
-        for line in lines.iter().take(TOLD) {
+        for line in lines.iter().take(MAX_LISTED) {
             let _ = writeln!(out, "    {sign} {line}");
         }
         more(out, lines.len());
@@ -190,16 +190,16 @@ fn verdict(out: &mut String, summary: &CompareSummary) {
 }
 
 fn list(names: &[String]) -> String {
-    let mut text = names.iter().take(TOLD).cloned().collect::<Vec<_>>().join(", ");
-    if names.len() > TOLD {
-        let _ = write!(text, " and {} more", names.len() - TOLD);
+    let mut text = names.iter().take(MAX_LISTED).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > MAX_LISTED {
+        let _ = write!(text, " and {} more", names.len() - MAX_LISTED);
     }
     text
 }
 
 fn more(out: &mut String, all: usize) {
-    if all > TOLD {
-        let _ = writeln!(out, "    and {} more: --format json has all", all - TOLD);
+    if all > MAX_LISTED {
+        let _ = writeln!(out, "    and {} more: --format json has all", all - MAX_LISTED);
     }
 }
 

@@ -4,15 +4,15 @@ use std::fmt::Write as _;
 
 use crate::summary::percent;
 use crate::text::{ruled, scene_rule};
-use crate::{FindingsSummary, PropertyReport, Share};
+use crate::{FindingsSummary, PropertyReport, Proportion};
 use actcheck_analysis::{Judged, Pattern, TwoWay, TwoWayCell};
 use actcheck_base::{Outcome, names};
 use actcheck_verdict::Counts;
 
 /// Maximum number of runs or scenes listed in one line; `--format json` has all.
-const TOLD: usize = 8;
+const MAX_LISTED: usize = 8;
 /// Maximum number of failure modes and of cascades listed.
-const TOLD_LINES: usize = 10;
+const MAX_LINES: usize = 10;
 /// Shades of heat map cells, by failure rate in steps of 20 %.
 const SHADES: [char; 5] = ['·', '░', '▒', '▓', '█'];
 
@@ -37,10 +37,10 @@ fn counts(counts: Counts) -> String {
 }
 
 fn list<'a>(ids: impl ExactSizeIterator<Item = &'a str>) -> String {
-    let more = ids.len().saturating_sub(TOLD);
-    let told: Vec<&str> = ids.take(TOLD).collect();
+    let more = ids.len().saturating_sub(MAX_LISTED);
+    let shown: Vec<&str> = ids.take(MAX_LISTED).collect();
     let rest = if more > 0 { format!(", … ({more} more)") } else { String::new() };
-    format!("{}{rest}", told.join(", "))
+    format!("{}{rest}", shown.join(", "))
 }
 
 fn modes(out: &mut String, summary: &FindingsSummary) {
@@ -50,7 +50,7 @@ fn modes(out: &mut String, summary: &FindingsSummary) {
     out.push_str("\nfailure modes\n");
     let mut table = ruled();
     table.set_header(["share", "runs", "failed properties", "example"]);
-    for mode in summary.modes.iter().take(TOLD_LINES) {
+    for mode in summary.modes.iter().take(MAX_LINES) {
         let failed: Vec<&str> = mode.failed.iter().map(|iri| names::local(iri)).collect();
         let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
         let share =
@@ -62,8 +62,8 @@ fn modes(out: &mut String, summary: &FindingsSummary) {
 }
 
 fn rest(out: &mut String, all: usize) {
-    if all > TOLD_LINES {
-        let _ = writeln!(out, "and {} more (--format json has all)", all - TOLD_LINES);
+    if all > MAX_LINES {
+        let _ = writeln!(out, "and {} more (--format json has all)", all - MAX_LINES);
     }
 }
 
@@ -73,7 +73,7 @@ fn cascades(out: &mut String, summary: &FindingsSummary) {
     }
     out.push_str("\ncascades\n");
     let name = |of: &Judged| format!("{} ({} {})", names::local(&of.property), of.step, names::local(&of.action));
-    for cascade in summary.cascades.iter().take(TOLD_LINES) {
+    for cascade in summary.cascades.iter().take(MAX_LINES) {
         let table = cascade.table;
         let share = |failed: u64, of: u64| if of == 0 { "none".to_owned() } else { percent(failed as f64 / of as f64) };
         let _ = writeln!(
@@ -94,7 +94,7 @@ fn cascades(out: &mut String, summary: &FindingsSummary) {
 fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
     let found = &report.findings;
     let _ = write!(out, "\n{} ({}): ", report.name(), names::local(&found.action));
-    match Share::new(found.counts.failed, found.counts.decided()) {
+    match Proportion::new(found.counts.failed, found.counts.decided()) {
         Some(share) => {
             let _ = writeln!(out, "fails in {share}");
         }
@@ -162,11 +162,11 @@ fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
             found.twins, found.repeated
         );
     }
-    if found.steered > 0 {
+    if found.weighted_runs > 0 {
         let _ = writeln!(
             out,
             "  (a search chose the scenes of {} runs: rates describe these runs, not the configured ranges)",
-            found.steered
+            found.weighted_runs
         );
     }
 }
@@ -189,7 +189,7 @@ fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
 
 /// Writes the command that generates more scenes of a pattern.
 fn more(out: &mut String, report: &PropertyReport, pattern: &Pattern, (number, summary): (usize, &FindingsSummary)) {
-    let parameters = &report.findings.subject.parameters;
+    let parameters = &report.findings.input.parameters;
     if scene_rule(&pattern.conditions, parameters, "").is_ok() {
         let _ = writeln!(
             out,
@@ -227,11 +227,11 @@ fn trend(out: &mut String, report: &PropertyReport) {
     if points.len() < 2 {
         return;
     }
-    let told: Vec<String> = points
+    let shown: Vec<String> = points
         .iter()
         .map(|point| format!("{} {}", point.campaign, percent(point.failed as f64 / point.runs.max(1) as f64)))
         .collect();
-    let _ = writeln!(out, "  over campaigns: {}", list(told.iter().map(String::as_str)));
+    let _ = writeln!(out, "  over campaigns: {}", list(shown.iter().map(String::as_str)));
     for change in &report.trend.changes {
         let _ = writeln!(
             out,

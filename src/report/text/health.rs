@@ -53,7 +53,7 @@ pub fn health_text(summary: &HealthSummary) -> String {
     if let Some((energy, run)) = &health.energy {
         let _ = writeln!(out, "unexplained energy gain: at most {:.4} J in a run ({run})", energy);
     }
-    let _ = match health.ailments.len() {
+    let _ = match health.problems.len() {
         0 => writeln!(out, "campaign {} in {} is healthy", summary.campaign, summary.history),
         1 => writeln!(out, "campaign {} in {}: 1 warning", summary.campaign, summary.history),
         many => writeln!(out, "campaign {} in {}: {many} warnings", summary.campaign, summary.history),

@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 
 use crate::summary::reason_text;
 use crate::text::ruled;
-use crate::{Change, RecheckSummary};
+use crate::{RecheckChange, RecheckSummary};
 use actcheck_base::{Outcome, names};
 use actcheck_verdict::Counts;
 
 /// Maximum number of changes printed at a terminal; `--format csv` has all.
-const TOLD: usize = 20;
+const MAX_LISTED: usize = 20;
 
 /// Formats the counts of each property before and now, and the outcomes that changed.
 pub fn recheck_text(summary: &RecheckSummary) -> String {
@@ -26,12 +26,12 @@ pub fn recheck_text(summary: &RecheckSummary) -> String {
         ]);
     }
     let restated: u64 = summary.properties.values().map(|line| line.restated).sum();
-    let _ = writeln!(out, "{table}\n\n{}", told(summary, restated));
+    let _ = writeln!(out, "{table}\n\n{}", totals(summary, restated));
     changes(&mut out, summary);
     out
 }
 
-fn told(summary: &RecheckSummary, restated: u64) -> String {
+fn totals(summary: &RecheckSummary, restated: u64) -> String {
     let changed: u64 = summary.properties.values().map(|line| line.changed).sum();
     let new: u64 = summary.properties.values().map(|line| line.new).sum();
     let mut text = format!("{} judged again: {changed} outcomes changed, {new} new", runs(summary.runs));
@@ -47,10 +47,10 @@ fn runs(count: u64) -> String {
 
 /// Writes changed outcomes, then new outcomes that failed; other new outcomes are omitted.
 fn changes(out: &mut String, summary: &RecheckSummary) {
-    let (changed, new): (Vec<&Change>, Vec<&Change>) =
+    let (changed, new): (Vec<&RecheckChange>, Vec<&RecheckChange>) =
         summary.changes.iter().partition(|change| change.before.is_some());
-    let failed: Vec<&Change> = new.into_iter().filter(|change| change.now.outcome == Outcome::Failed).collect();
-    for change in changed.iter().chain(&failed).take(TOLD) {
+    let failed: Vec<&RecheckChange> = new.into_iter().filter(|change| change.now.outcome == Outcome::Failed).collect();
+    for change in changed.iter().chain(&failed).take(MAX_LISTED) {
         let before = change.before.map_or("new", |(outcome, _)| outcome.word());
         let _ = writeln!(
             out,
@@ -64,13 +64,13 @@ fn changes(out: &mut String, summary: &RecheckSummary) {
             change.now.witness
         );
     }
-    let left_out = (changed.len() + failed.len()).saturating_sub(TOLD);
+    let left_out = (changed.len() + failed.len()).saturating_sub(MAX_LISTED);
     if left_out > 0 {
         let _ = writeln!(out, "  {left_out} more: --format csv lists every one");
     }
 }
 
-fn margins(change: &Change) -> String {
+fn margins(change: &RecheckChange) -> String {
     let number = |margin: Option<f64>| margin.map_or("none".to_owned(), |margin| format!("{margin:.4}"));
     match (change.before, change.now.margin) {
         (Some((_, None)) | None, None) => String::new(),

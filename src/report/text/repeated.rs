@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::text::ruled;
 use crate::{CampaignSummary, RepeatedProperty};
-use actcheck_analysis::{Flaky, PassPower, Variance};
+use actcheck_analysis::{PassPower, SceneCounts, Variance};
 
 /// Maximum number of pass^k columns; the JSON has all.
 const POWERS_SHOWN: usize = 5;
@@ -29,7 +29,7 @@ pub(super) fn repeated_text(out: &mut String, summary: &CampaignSummary) {
         let scenes = found.always_passed + found.always_failed + found.flaky.len() as u64;
         let of = |count: u64| format!("{count} of {scenes}");
         let head = [label.clone(), of(found.always_passed), of(found.always_failed), of(found.flaky.len() as u64)];
-        let power = |k: &u64| found.pass_powers.iter().find(|power| power.k == *k).map_or_else(String::new, told);
+        let power = |k: &u64| found.pass_powers.iter().find(|power| power.k == *k).map_or_else(String::new, power_text);
         table.add_row(head.into_iter().chain(powers.iter().map(power)).chain([noise_share(found.outcome)]));
     }
     let _ = writeln!(out, "{table}");
@@ -47,7 +47,7 @@ fn shown_powers(most: usize) -> Vec<u64> {
     (1..=most as u64).filter(|k| *k < POWERS_SHOWN as u64 || *k == most as u64).collect()
 }
 
-fn told(power: &PassPower) -> String {
+fn power_text(power: &PassPower) -> String {
     let interval = &power.probability;
     format!("{:.0} % [{:.0}–{:.0}]", interval.rate * 100.0, interval.low * 100.0, interval.high * 100.0)
 }
@@ -63,7 +63,7 @@ fn flaky(out: &mut String, summary: &CampaignSummary, property: &RepeatedPropert
     if scenes.is_empty() {
         return;
     }
-    let named = scenes.iter().take(SCENES_NAMED).map(|Flaky { scene, passed, of }| {
+    let named = scenes.iter().take(SCENES_NAMED).map(|SceneCounts { scene, passed, of }| {
         let run = summary.runs_of_scene(*scene).next().map_or("", |run| run.id.as_str());
         format!("{} ({passed} of {of} passed, from {run})", scene + 1)
     });

@@ -26,16 +26,16 @@ const PERCEIVED: &str = "perceived";
 /// # Errors
 /// The rerun library rejects a component.
 pub(super) fn record(recording: &mut Recording<'_>, run: &RunDetail, trace: &Trace) -> Result<(), RecordingFault> {
-    recording.still(place([SCENE]), &[&ViewCoordinates::RIGHT_HAND_Z_UP()])?;
+    recording.log_static(place([SCENE]), &[&ViewCoordinates::RIGHT_HAND_Z_UP()])?;
     let known = Known::of(run, trace);
     for (slot, name) in trace.frames.names.iter().enumerate() {
         // A link without geometry is invisible.
         let Some(solids) = known.solids(name) else { continue };
-        recording.still(path(name), &references(&solids))?;
+        recording.log_static(path(name), &references(&solids))?;
         let (positions, turns) = track(&trace.frames.rows, slot);
         let poses = Transform3D::update_fields().with_many_translation(positions).with_many_quaternion(turns);
         let secs = (0..trace.frames.rows.len()).map(|frame| frame as f64 * trace.frames.period_secs);
-        recording.course(path(name), secs, poses.columns_of_unit_batches()?)?;
+        recording.log_series(path(name), secs, poses.columns_of_unit_batches()?)?;
     }
     let moves = |body: &&&BodyState| trace.frames.names.contains(&body.id);
     for body in known.bodies.values().filter(|body| !moves(body)) {
@@ -43,7 +43,7 @@ pub(super) fn record(recording: &mut Recording<'_>, run: &RunDetail, trace: &Tra
         let pose = transform(&body.pose);
         let mut all = references(&solids);
         all.push(&pose);
-        recording.still(path(&body.id), &all)?;
+        recording.log_static(path(&body.id), &all)?;
     }
     perceived(recording, trace)
 }
@@ -94,8 +94,8 @@ impl<'a> Known<'a> {
 fn track(rows: &[Vec<f32>], slot: usize) -> (Vec<[f32; 3]>, Vec<Quaternion>) {
     let mut last = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
     let poses = rows.iter().map(|row| {
-        let told = row.get(7 * slot..7 * slot + 7).and_then(|pose| <[f32; 7]>::try_from(pose).ok());
-        if let Some(pose) = told.filter(|pose| pose.iter().all(|value| value.is_finite())) {
+        let pose = row.get(7 * slot..7 * slot + 7).and_then(|pose| <[f32; 7]>::try_from(pose).ok());
+        if let Some(pose) = pose.filter(|pose| pose.iter().all(|value| value.is_finite())) {
             last = pose;
         }
         let [x, y, z, i, j, k, w] = last;
@@ -127,7 +127,7 @@ fn perceived(recording: &mut Recording<'_>, trace: &Trace) -> Result<(), Recordi
         }
         let boxes =
             boxes.boxes(Look::PERCEIVED).with_labels(seen.iter().map(|(name, ..)| *name)).with_show_labels(false);
-        recording.from(place([SCENE, PERCEIVED]), end.time_secs - begin, &boxes)?;
+        recording.log_at(place([SCENE, PERCEIVED]), end.time_secs - begin, &boxes)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 /// Decided runs with their parameters. Every list has one entry for each run.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Subject {
+pub struct PatternInput {
     /// Whether the run failed.
     pub failed: Vec<bool>,
     /// Whether the run is held out of the search, to confirm patterns.
@@ -38,7 +38,7 @@ pub enum Values {
     },
 }
 
-impl Subject {
+impl PatternInput {
     /// Number of decided runs.
     pub fn len(&self) -> usize {
         self.failed.len()

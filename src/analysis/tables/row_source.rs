@@ -12,7 +12,7 @@ pub type Hierarchy = BTreeMap<String, Vec<String>>;
 
 /// The source data of one row.
 #[derive(Debug, Clone)]
-pub(super) struct Place<'a> {
+pub(super) struct RowSource<'a> {
     pub run: &'a RunDetail,
     pub action: &'a ActionDetail,
     pub judgement: &'a Judgement,

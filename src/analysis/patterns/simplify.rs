@@ -5,18 +5,18 @@ use crate::patterns::Condition;
 use crate::patterns::cells::Axis;
 use crate::patterns::condition::all_hold;
 use crate::patterns::confirm::count;
-use crate::patterns::refine::Field;
+use crate::patterns::refine::OpenRuns;
 
 /// Removes, one by one, conditions and ends of ranges that are not significant: those whose excluded runs do not fail
 /// significantly less, corrected for the number of alternative conditions. The result is one of the boxes tried.
-pub(super) fn fold(conditions: &mut Vec<Condition>, field: &Field<'_>, level: f64) {
+pub(super) fn simplify(conditions: &mut Vec<Condition>, open_runs: &OpenRuns<'_>, level: f64) {
     // Any of these conditions could have been chosen.
-    let rivals = field.axes.iter().map(Axis::len).sum::<usize>().max(1) as f64;
+    let rivals = open_runs.axes.iter().map(Axis::len).sum::<usize>().max(1) as f64;
     loop {
-        let within = all_hold(conditions, field.subject);
+        let within = all_hold(conditions, open_runs.input);
         let mut least: Option<(f64, Vec<Condition>)> = None;
         for simpler in simpler(conditions) {
-            let p = shut_out(&within, &all_hold(&simpler, field.subject), field).fisher().greater;
+            let p = excluded_by(&within, &all_hold(&simpler, open_runs.input), open_runs).fisher().greater;
             if p * rivals > level && least.as_ref().is_none_or(|(known, _)| p > *known) {
                 least = Some((p, simpler));
             }
@@ -44,6 +44,6 @@ fn simpler(conditions: &[Condition]) -> Vec<Vec<Condition>> {
 }
 
 /// Compares the runs within the pattern with those that only the simpler pattern contains.
-fn shut_out(within: &[bool], simpler: &[bool], field: &Field<'_>) -> TwoByTwo {
-    count(field.subject, within, |run| field.open[run] && simpler[run])
+fn excluded_by(within: &[bool], simpler: &[bool], open_runs: &OpenRuns<'_>) -> TwoByTwo {
+    count(open_runs.input, within, |run| open_runs.open[run] && simpler[run])
 }
