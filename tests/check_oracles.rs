@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use actcheck::actions::{Sabotage, Saboteur};
 use actcheck::analysis::{Notice, OracleGap, OracleMatrix, OracleTrial, oracle_matrix};
 use actcheck::campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
-use actcheck::campaign::{Clock, Env, RunContext, run_line, run_sabotaged};
+use actcheck::campaign::{Clock, Env, RunContext, RunInput, run_line, run_sabotaged};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use serde_json::Value;
@@ -212,7 +212,8 @@ fn who_only_lies_changes_no_physics() {
     let choices = || Choices::random(env.campaign.seed, 0);
     let sound = run_line(&env, "k", 0, choices(), &CONTEXT).unwrap();
     let mut saboteur = Saboteur::new(Sabotage { action: None, robot: None, world: None, report: Some(false) });
-    let lied = run_sabotaged(&env, "k", (0, choices()), &CONTEXT, &mut saboteur).unwrap();
+    let lied =
+        run_sabotaged(&env, RunInput { campaign: "k", index: 0, choices: choices() }, &CONTEXT, &mut saboteur).unwrap();
     assert_eq!(lied.trace.hash, sound.trace.hash);
     assert_eq!(lied.choices, sound.choices);
     let reported = |record: &actcheck::history::RunRecord| record.trace.actions[0].report.clone().unwrap().succeeded;

@@ -6,10 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 
-use crate::budget::Tally;
 use crate::make_run::{Making, make_run};
+use crate::tally::Tally;
+use crate::workers::workers;
 use crate::{
-    CampaignResult, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule, StoredRuns, schedule_of,
+    CampaignResult, Clock, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule, StoredRuns,
+    schedule_of,
 };
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config::Launcher;
@@ -36,6 +38,12 @@ struct Order {
     planned: Planned,
 }
 
+/// The channels to and from the workers.
+struct Channels {
+    orders: Sender<Order>,
+    made: Receiver<Made>,
+}
+
 /// The result of an order.
 struct Made {
     position: u64,
@@ -56,47 +64,48 @@ pub fn run_all(
     stop: &AtomicBool,
     on_run: impl FnMut(&RunRecord),
 ) -> CampaignResult {
-    resume_all(env, (history, StoredRuns::default()), campaign, options, stop, on_run)
+    resume_all(env, history, campaign, StoredRuns::default(), options, stop, on_run)
 }
 
 /// As [`run_all`], for a campaign with runs in the history: these count, but are neither made nor passed to `on_run`
 /// again.
 pub fn resume_all(
     env: &Env,
-    (history, mut kept): (&History, StoredRuns),
+    history: &History,
     campaign: &str,
+    stored: StoredRuns,
     options: &CampaignOptions,
     stop: &AtomicBool,
     mut on_run: impl FnMut(&RunRecord),
 ) -> CampaignResult {
     let jobs = options.jobs.max(1);
     let halt = AtomicBool::new(false);
-    let secs = options.context.clock.secs;
-    let began_secs = secs() - kept.elapsed_secs;
-    let mut writer = RunWriter::new(env, history, (options.context, began_secs), &mut on_run);
-    writer.end.discards = std::mem::take(&mut kept.discards);
+    let clock = options.context.clock;
+    let began_secs = (clock.secs)() - stored.elapsed_secs;
+    let mut writer = RunWriter::new(env, history, campaign, clock, began_secs, &mut on_run);
+    writer.end.discards = stored.discards;
     let time_up_at = env.campaign.limits.time_secs.map_or(f64::INFINITY, |limit| began_secs + limit);
-    let pool = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
+    let pool = match workers(jobs) {
         Ok(pool) => pool,
-        Err(error) => {
-            writer.stop(Diagnostic::error("X010", format!("workers can't be started: {error}")).into());
+        Err(fault) => {
+            writer.stop(fault.into());
             return writer.end;
         }
     };
     let mut schedule = schedule_of(env);
     let (orders, taken) = channel();
     let (give, made) = channel();
-    let taken = Mutex::new(taken);
+    let (channels, taken) = (Channels { orders, made }, Mutex::new(taken));
     pool.in_place_scope(|scope| {
         for _ in 0..jobs {
             let (give, taken, halt) = (give.clone(), &taken, &halt);
             scope.spawn(move |_| {
                 work(env, campaign, &options.context, taken, &give, &|| {
-                    stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed) || secs() >= time_up_at
+                    stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed) || (clock.secs)() >= time_up_at
                 });
             });
         }
-        conduct((&mut *schedule, kept.runs), &mut writer, (&orders, &made), jobs * AHEAD);
+        conduct(&mut *schedule, stored.runs, &mut writer, &channels, jobs * AHEAD);
         if let (Ending::Interrupted, Some(limit), false) =
             (&writer.end.ending, env.campaign.limits.time_secs, stop.load(Ordering::Relaxed))
         {
@@ -104,7 +113,7 @@ pub fn resume_all(
         }
         // Runs still being made are no longer needed. Workers end when the channel of orders is closed.
         halt.store(true, Ordering::Relaxed);
-        drop(orders);
+        drop(channels);
     });
     writer.end.rates = schedule.rates();
     writer.finish()
@@ -122,7 +131,7 @@ fn work(
     loop {
         let order = orders.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok(Order { position, planned }) = order else { return };
-        let making = if stopped() { Making::Interrupted } else { make_run(env, campaign, &planned, context) };
+        let making = if stopped() { Making::Interrupted } else { make_run(env, campaign, planned, context) };
         if give.send(Made { position, making }).is_err() {
             return;
         }
@@ -131,9 +140,10 @@ fn work(
 
 /// Sends the planned runs to the workers and stores the results in order. `stored` are the runs in the history already.
 fn conduct(
-    (schedule, mut stored): (&mut dyn Schedule, BTreeMap<u64, RunResult>),
+    schedule: &mut dyn Schedule,
+    mut stored: BTreeMap<u64, RunResult>,
     writer: &mut RunWriter<'_>,
-    (orders, made): (&Sender<Order>, &Receiver<Made>),
+    channels: &Channels,
     ahead: usize,
 ) {
     let mut batch = VecDeque::new();
@@ -152,7 +162,7 @@ fn conduct(
         {
             if let Some(result) = stored.remove(&planned.index) {
                 early.insert(ordered, Making::Stored(result));
-            } else if orders.send(Order { position: ordered, planned }).is_err() {
+            } else if channels.orders.send(Order { position: ordered, planned }).is_err() {
                 return;
             }
             ordered += 1;
@@ -164,7 +174,7 @@ fn conduct(
             kept += 1;
             continue;
         }
-        let Ok(Made { position, making }) = made.recv() else { return };
+        let Ok(Made { position, making }) = channels.made.recv() else { return };
         early.insert(position, making);
     }
 }
@@ -172,8 +182,10 @@ fn conduct(
 /// Writes the runs; nothing else does.
 struct RunWriter<'a> {
     history: &'a History,
-    context: RunContext,
-    /// Start of the campaign on the context's clock, less the time taken before it was interrupted.
+    /// Id of the campaign.
+    campaign: &'a str,
+    clock: Clock,
+    /// Start of the campaign on that clock, less the time taken before it was interrupted.
     began_secs: f64,
     on_run: &'a mut dyn FnMut(&RunRecord),
     end: CampaignResult,
@@ -191,11 +203,13 @@ impl<'a> RunWriter<'a> {
     fn new(
         env: &Env,
         history: &'a History,
-        (context, began_secs): (RunContext, f64),
+        campaign: &'a str,
+        clock: Clock,
+        began_secs: f64,
         on_run: &'a mut dyn FnMut(&RunRecord),
     ) -> Self {
         let end = CampaignResult { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
-        let flushed_at = (context.clock.secs)();
+        let flushed_at = (clock.secs)();
         let most_broken = match &env.campaign.launcher {
             Launcher::Reference => None,
             Launcher::Program(skill) => Some(skill.max_broken),
@@ -203,7 +217,8 @@ impl<'a> RunWriter<'a> {
         let tally = Tally::new(env);
         Self {
             history,
-            context,
+            campaign,
+            clock,
             began_secs,
             on_run,
             end,
@@ -218,8 +233,8 @@ impl<'a> RunWriter<'a> {
     /// Stores the next run of the schedule. Breaks if it is the last one.
     fn keep(&mut self, making: Making) -> ControlFlow<()> {
         match making {
-            Making::Run(mut record) => {
-                record.elapsed_secs = (self.context.clock.secs)() - self.began_secs;
+            Making::Run(made) => {
+                let record = made.into_record(self.campaign, (self.clock.secs)() - self.began_secs);
                 if let Err(faults) = self.commit(&record) {
                     self.stop(faults);
                     return ControlFlow::Break(());
@@ -271,7 +286,7 @@ impl<'a> RunWriter<'a> {
 
     fn commit(&mut self, record: &RunRecord) -> Result<(), Diagnostics> {
         self.history.commit(record)?;
-        let now = (self.context.clock.secs)();
+        let now = (self.clock.secs)();
         if now - self.flushed_at >= FLUSH_SECS {
             self.flushed_at = now;
             self.history.flush()?;

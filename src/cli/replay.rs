@@ -11,7 +11,7 @@ use crate::replay_text::{replay_json, replay_table, replay_text};
 use crate::run::{all_cores, quietly};
 use crate::{clock, history_dir, output};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_campaign::{Env, Fit, Replay, RunContext, StoredCampaign, replay_all};
+use actcheck_campaign::{Env, Fit, Replay, ReplayOptions, RunContext, StoredCampaign, replay_all};
 use actcheck_data::Choices;
 use actcheck_history::{History, RunDetail, RunFilter};
 
@@ -58,8 +58,8 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
     let bar = ProgressBar::with_draw_target(Some(runs.len() as u64), ProgressDrawTarget::stderr());
     let fit = if args.exact { Fit::Exact } else { Fit::Nearest };
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
-    let context = RunContext { clock: clock::system(), disturb: None };
-    let replayed = quietly(|| replay_all(&history, &campaigns, &runs, (fit, jobs), &context, || bar.inc(1)));
+    let options = ReplayOptions { fit, jobs, context: RunContext { clock: clock::system(), disturb: None } };
+    let replayed = quietly(|| replay_all(&history, &campaigns, &runs, &options, || bar.inc(1)));
     bar.finish_and_clear();
     let (mut done, mut faults) = (Vec::new(), Diagnostics::new());
     for one in replayed? {

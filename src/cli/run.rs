@@ -49,7 +49,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
     let end = quietly(|| {
-        resume_all(&env, (&history, StoredRuns::of(&kept)), &id, &options, &stop, |record| {
+        resume_all(&env, &history, &id, StoredRuns::of(&kept), &options, &stop, |record| {
             let summary = RunSummary::of(record);
             progress.run(&summary);
             runs.push(summary);

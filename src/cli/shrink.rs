@@ -134,7 +134,7 @@ fn shrink_one(
 ) -> Result<ShrunkSummary, Diagnostics> {
     let recorded = history.choices(run)?;
     let shrunk = quietly(|| shrink::shrink(env, index, &recorded, options, &mut |_| {}))?;
-    let record = shrink::store(env, history, (run, index), &shrunk, &options.context)?;
+    let record = shrink::store(env, history, run, index, &shrunk, &options.context)?;
     summary(env, history, run, shrunk, &record)
 }
 

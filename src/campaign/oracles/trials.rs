@@ -7,9 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use crate::oracles::Fault;
-use crate::{Env, Planned, RunContext, run_line, run_sabotaged};
+use crate::workers::workers;
+use crate::{Env, Planned, RunContext, RunInput, run_line, run_sabotaged};
 use actcheck_actions::Saboteur;
-use actcheck_base::{Diagnostic, Diagnostics, Judgement, Outcome};
+use actcheck_base::{Diagnostics, Judgement, Outcome};
 use actcheck_data::{Choice, Choices};
 use actcheck_history::{RunRecord, RunStatus};
 
@@ -62,10 +63,7 @@ pub fn try_faults(
     stop: &AtomicBool,
     on_done: impl Fn() + Sync,
 ) -> Result<Vec<Trial>, Diagnostics> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.jobs.max(1))
-        .build()
-        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
+    let pool = workers(options.jobs)?;
     let going = || !stop.load(Ordering::Relaxed);
     let sound = |index: u64| {
         let made = if going() { without_fault(env, index, &options.context) } else { None };
@@ -127,7 +125,7 @@ fn run(
 ) -> Option<RunRecord> {
     let line = || match saboteur {
         None => run_line(env, NO_CAMPAIGN, index, choices, context),
-        Some(saboteur) => run_sabotaged(env, NO_CAMPAIGN, (index, choices), context, saboteur),
+        Some(saboteur) => run_sabotaged(env, RunInput { campaign: NO_CAMPAIGN, index, choices }, context, saboteur),
     };
     catch_unwind(AssertUnwindSafe(line)).ok()?.ok()
 }

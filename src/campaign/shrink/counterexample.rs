@@ -3,11 +3,13 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::case::end_of;
-use crate::line::TEST_LEFT_OUT;
+use crate::finished_run::RunPlace;
+use crate::line::{TEST_LEFT_OUT, simulate};
+use crate::run_cases::end_of;
 use crate::shrink::list::{drop_rejected_tries, has};
 use crate::shrink::{Explained, ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
-use crate::{Env, RunContext, run_line};
+use crate::{Env, RunContext, RunInput, run_line};
+use actcheck_actions::Interference;
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, did_you_mean, names};
 use actcheck_data::{Choice, ChoiceKind, Choices, Role};
 use actcheck_history::{History, RunRecord, RunStatus};
@@ -124,14 +126,15 @@ pub fn shrink(
 pub(crate) const SHRUNK: &str = "shrunk ";
 
 /// Runs the shrunk scene again and stores it in the history, in a campaign of its own. Returns the run, which names the
-/// run it was shrunk from.
+/// `original` run, from which it was shrunk. `index` is the original's position in its campaign.
 ///
 /// # Errors
 /// Writing failed; or `S051` if the scene can't be built, for example because the program changed.
 pub fn store(
     env: &Env,
     history: &History,
-    (original, index): (&str, u64),
+    original: &str,
+    index: u64,
     shrunk: &Shrunk,
     context: &RunContext,
 ) -> Result<RunRecord, Diagnostics> {
@@ -139,9 +142,10 @@ pub fn store(
     let mut campaign = env.record(id.clone(), format!("{SHRUNK}{original}"), (context.clock.now)());
     (campaign.planned_runs, campaign.repeat) = (1, 1);
     campaign.shards.clear();
-    let mut record = run_line(env, &id, index, Choices::recorded(&shrunk.choices), context)
+    let input = RunInput { campaign: &id, index, choices: Choices::recorded(&shrunk.choices) };
+    let run = simulate(env, input, context, context.clock.start(), Interference::default())
         .map_err(|failure| Diagnostic::error("S051", format!("the shrunk scene can't be built again: {failure}")))?;
-    record.shrunk_from = Some(original.to_owned());
+    let record = run.into_record(RunPlace { shrunk_from: Some(original.to_owned()), ..RunPlace::alone(&id) });
     history.begin_campaign(&campaign)?;
     history.commit(&record)?;
     history.finish_campaign(&id, &end_of(&record, (context.clock.now)()))?;

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::ThreadPool;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
+use crate::workers::workers;
 use actcheck_data::Choice;
 
 /// The result of a try.
@@ -34,7 +35,7 @@ type Key = Vec<(String, u64)>;
 pub struct TrialSearch<'a> {
     test: &'a (dyn Fn(&[Choice]) -> Tried + Sync),
     limits: TrialLimits<'a>,
-    workers: Option<ThreadPool>,
+    pool: Option<ThreadPool>,
     known: BTreeMap<Key, Tried>,
     counted: BTreeSet<Key>,
     simulations: u64,
@@ -45,8 +46,8 @@ impl<'a> TrialSearch<'a> {
     pub fn new(test: &'a (dyn Fn(&[Choice]) -> Tried + Sync), limits: TrialLimits<'a>) -> Self {
         let several = limits.jobs > 1;
         // Without a thread pool, this thread does the work: slower, but with the same result.
-        let workers = several.then(|| rayon::ThreadPoolBuilder::new().num_threads(limits.jobs).build().ok()).flatten();
-        Self { test, limits, workers, known: BTreeMap::new(), counted: BTreeSet::new(), simulations: 0 }
+        let pool = several.then(|| workers(limits.jobs).ok()).flatten();
+        Self { test, limits, pool, known: BTreeMap::new(), counted: BTreeSet::new(), simulations: 0 }
     }
 
     /// Number of simulations so far.
@@ -99,8 +100,8 @@ impl<'a> TrialSearch<'a> {
         }
         let unknown: Vec<(Key, &Vec<Choice>)> = unknown.into_iter().collect();
         let test = self.test;
-        let tried: Vec<Tried> = match &self.workers {
-            Some(workers) => workers.install(|| unknown.par_iter().map(|(_, list)| test(list)).collect()),
+        let tried: Vec<Tried> = match &self.pool {
+            Some(pool) => pool.install(|| unknown.par_iter().map(|(_, list)| test(list)).collect()),
             None => unknown.iter().map(|(_, list)| test(list)).collect(),
         };
         self.known.extend(unknown.into_iter().map(|(key, _)| key).zip(tried));

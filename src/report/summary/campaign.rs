@@ -277,7 +277,7 @@ impl CampaignSummary {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
 
     pub fn run(index: u64, status: RunStatus, outcomes: &[Outcome]) -> RunSummary {
