@@ -4,7 +4,7 @@ use crate::finished_run::{FinishedRun, RunPlace};
 use crate::judging::judge_action;
 use crate::{Env, Failure};
 use actcheck_actions as actions;
-use actcheck_actions::{ActionCall, Interference, Outside, Saboteur};
+use actcheck_actions::{ActionCall, ExternalSkill, Interference, Saboteur};
 use actcheck_base::{Judgement, RunFacts};
 use actcheck_data::{ActionEnd, Choices, Quality, Scene, Trace};
 use actcheck_facts as facts;
@@ -125,7 +125,7 @@ pub(super) fn simulate(
         let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
         Performance::new(programs, run, context.clock.secs)
     });
-    let outside = program.as_mut().map(|program| program as &mut dyn Outside);
+    let outside = program.as_mut().map(|program| program as &mut dyn ExternalSkill);
     let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, outside };
     let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
     let program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
