@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use actcheck::base::Outcome;
-use actcheck::campaign::{Env, Planned, Schedule, Told, ToldOutcome, schedule_of};
+use actcheck::campaign::{Env, Planned, PropertyOutcome, RunResult, Schedule, schedule_of};
 use actcheck::config::Overrides;
 use actcheck::data::{Choice, ChoiceKind};
 use actcheck::scenario;
@@ -40,7 +40,7 @@ fn quantile(choice: &Choice) -> f64 {
 
 /// The result of a made-up robot in a planned run: it fails in the most crowded fifth of the scenes with the base in
 /// the nearer quarter. If the base is far to one side, the scene can't be built and is not simulated.
-fn made_up(env: &Env, planned: &Planned) -> Told {
+fn made_up(env: &Env, planned: &Planned) -> RunResult {
     for attempt in 0.. {
         let mut choices = planned.choices(env.campaign.seed, attempt);
         if scenario::draw(&env.space, 0, &mut choices).is_err() {
@@ -52,9 +52,9 @@ fn made_up(env: &Env, planned: &Planned) -> Told {
         }
         let margin = (0.8 - at("other.count")).max(at("robot.gap") - 0.25);
         let outcome = if margin < 0.0 { Outcome::Failed } else { Outcome::Passed };
-        let said = |property: &str| ToldOutcome { property: property.to_owned(), outcome, margin: Some(margin) };
+        let said = |property: &str| PropertyOutcome { property: property.to_owned(), outcome, margin: Some(margin) };
         let outcomes = ["CloseObject", "MovedObject"].map(|name| said(&format!("http://actions#{name}")));
-        return Told { index: planned.index, discards: attempt, outcomes: outcomes.to_vec() };
+        return RunResult { index: planned.index, discards: attempt, outcomes: outcomes.to_vec() };
     }
     unreachable!("some scenes can be built")
 }

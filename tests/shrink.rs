@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use actcheck::campaign::shrink::{Limits, Plan, Search, Tried, explain, reduce};
+use actcheck::campaign::shrink::{ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
 use actcheck::data::{Choice, ChoiceKind, Choices};
 
 /// Objects in the initial list.
@@ -68,8 +68,8 @@ fn shrunk(fails: Fails, jobs: usize, simulations: u64) -> (Vec<Choice>, bool, u6
         Tried { made: fails(&things, noise).then(|| choices.into_made()), simulations: 1 }
     };
     let never = || false;
-    let mut search = Search::new(&test, Limits { simulations, jobs, stop: &never });
-    let plan = Plan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
+    let mut search = TrialSearch::new(&test, TrialLimits { simulations, jobs, stop: &never });
+    let plan = ShrinkPlan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
     let (list, minimal) = reduce(&mut search, failing(fails), &plan, &mut |_| {});
     (list, minimal, search.simulations())
 }
@@ -115,9 +115,9 @@ fn a_limit_ends_shrinking_with_the_best_so_far() {
     let asked = AtomicBool::new(true);
     let stop = || asked.load(Ordering::Relaxed);
     let test = |list: &[Choice]| Tried { made: Some(list.to_vec()), simulations: 1 };
-    let mut search = Search::new(&test, Limits { simulations: 100, jobs: 1, stop: &stop });
+    let mut search = TrialSearch::new(&test, TrialLimits { simulations: 100, jobs: 1, stop: &stop });
     let start = failing(|_, _| true);
-    let plan = Plan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
+    let plan = ShrinkPlan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
     assert_eq!(reduce(&mut search, start.clone(), &plan, &mut |_| {}), (start, false));
     assert_eq!(search.simulations(), 0);
 }
@@ -131,8 +131,8 @@ fn the_range_of_a_failure_and_its_nearest_pass_are_found() {
         Tried { made: fails(&things, noise).then(|| list.to_vec()), simulations: 1 }
     };
     let never = || false;
-    let mut search = Search::new(&test, Limits { simulations: 100, jobs: 2, stop: &never });
-    let plan = Plan { removals: Vec::new(), ends: Vec::new(), group: &group };
+    let mut search = TrialSearch::new(&test, TrialLimits { simulations: 100, jobs: 2, stop: &never });
+    let plan = ShrinkPlan { removals: Vec::new(), ends: Vec::new(), group: &group };
     let explained = explain(&mut search, &list, &plan);
     let [influence] = explained.influences.as_slice() else { panic!("{explained:?}") };
     assert_eq!((influence.id.name.as_str(), influence.matters), ("thing.7.x", Some(true)));

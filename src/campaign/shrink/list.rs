@@ -74,7 +74,7 @@ pub(super) fn spread(kind: &ChoiceKind) -> f64 {
 }
 
 /// Drops the rejected tries of placements: only the last one, which was accepted, stays.
-pub(crate) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
+pub(crate) fn drop_rejected_tries(list: &[Choice]) -> Vec<Choice> {
     // Sensor noise is drawn repeatedly, and every draw counts.
     let placed = |name: &str| !name.starts_with("sense.");
     let kept = list
