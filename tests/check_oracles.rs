@@ -11,7 +11,7 @@ use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use serde_json::Value;
 
-use crate::support::{COARSE, actcheck, edit, project, root, stderr, stdout};
+use crate::support::{COARSE, COARSEST, actcheck, edit, project, root, stderr, stdout};
 
 const MANNER: Manner = Manner { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
 
@@ -129,7 +129,7 @@ fn every_property_of_the_whole_task_notices_a_fault() {
     let mut asked = Vec::new();
     let mut tried = Vec::new();
     // Where nothing is grasped, the coarsest physics does.
-    for (tests, physics) in [(LOOKS, "[physics]\nsteps_per_second = 60\niterations = 1\n"), (GRASPS, COARSE)] {
+    for (tests, physics) in [(LOOKS, COARSEST), (GRASPS, COARSE)] {
         std::fs::write(folder.path().join("task.toml"), format!("tests = {tests}\n{TASK}{physics}")).unwrap();
         let env = Env::prepare(&folder.path().join("task.toml"), &Overrides::default()).unwrap();
         asked.extend(properties(&env));

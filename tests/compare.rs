@@ -292,6 +292,30 @@ fn what_cannot_be_compared_is_said() {
     fails(&["a"], &["<B>"]);
 }
 
+/// A campaign may begin within the second in which its regressions ran. The newest campaign of the history was then the one whose id came
+/// last in the alphabet.
+#[test]
+fn a_campaign_is_newer_than_its_regressions() {
+    let project = looking();
+    let folder = project.path();
+    let ran = |history: &str| {
+        let run = ["run", "configs/look.toml", "--runs", "1", "--history", history, "--format", "json"];
+        let output = actcheck(folder, &run);
+        let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+        json["campaign"].clone()
+    };
+    let run = format!("{}-1", ran("old").as_str().unwrap());
+    let exported = actcheck(folder, &["export", &run, "--regression", "--history", "old"]);
+    assert!(exported.status.success(), "{}", stderr(&exported));
+    for history in ["a", "b", "c", "d"] {
+        // Another text gives the campaign another id.
+        edit(&folder.join("configs/look.toml"), "\ntests =", &format!("\n# {history}\ntests ="));
+        let campaign = ran(history);
+        let (_, json) = compared(folder, &["old", history]);
+        assert_eq!(json["b"]["campaign"], campaign, "{json:#}");
+    }
+}
+
 #[test]
 fn the_same_campaign_twice_is_no_difference() {
     let runs = flipped(&mut Choices::random(31, 0), 20, &[0.5, 0.5]);

@@ -5,12 +5,12 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::support::{actcheck, copy, foreign, made_history, root, stderr, stdout};
+use crate::support::{actcheck, copy_made_history, foreign, root, stderr, stdout};
 
-/// Exports into the folder `data` of one that passes. The history is a copy: others may have the first open.
+/// Exports a history into the folder `data` of a temporary folder.
 fn export(arguments: &[&str]) -> (tempfile::TempDir, Output) {
     let folder = tempfile::tempdir().unwrap();
-    copy(made_history(), &folder.path().join("history"));
+    copy_made_history(&folder.path().join("history"));
     let output =
         actcheck(folder.path(), &[&["export", "--history", "history", "--dataset", "data"], arguments].concat());
     (folder, output)

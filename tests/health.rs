@@ -9,7 +9,7 @@ use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use actcheck::history::{History, RunFilter};
 use actcheck::scenario;
-use actcheck::world::{Mishap, World};
+use actcheck::world::{Perturbation, World};
 use serde_json::Value;
 
 use crate::support::{actcheck, edit, project, root, shipped, stderr, stdout};
@@ -142,7 +142,7 @@ fn bad_simulation_is_told() {
         let solid = |id: &str| ["box_", "can_", "bottle_", "salt_shaker_"].iter().any(|name| id.starts_with(name));
         let solids: Vec<_> = bodies.iter().filter(|body| solid(&body.id)).collect();
         if index == 1 {
-            assert!(world.befall(&solids[1].id, Mishap::Pose(solids[0].pose)));
+            assert!(world.perturb(&solids[1].id, Perturbation::Pose(solids[0].pose)));
         }
     };
     let config = root().join("configs/clutter.toml");

@@ -4,7 +4,7 @@ use actcheck::base::Outcome;
 use actcheck::campaign::{Disturbance, Env};
 use actcheck::data::{Choices, Pose};
 use actcheck::history::RunRecord;
-use actcheck::world::{Mishap, Poison, World};
+use actcheck::world::{Perturbation, Poison, World};
 use serde_json::Value;
 
 use crate::support::line::{env_of, nominal, outcomes, report, run};
@@ -140,7 +140,7 @@ fn with_a_camera_nothing_is_known_by_the_abstract_detector() {
 
 /// The glass has no friction at all.
 fn oil(_: u64, world: &mut World) {
-    assert!(world.befall("glass_1", Mishap::Friction(0.0)));
+    assert!(world.perturb("glass_1", Perturbation::Friction(0.0)));
 }
 
 #[test]

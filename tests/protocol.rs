@@ -251,7 +251,7 @@ fn a_hundred_runs_with_faults_by_chance_end_and_nothing_is_lost() {
     assert_eq!([listed("completed"), listed("broken"), listed("timeout")], [completed, broken, timeout]);
     nothing_is_left(folder.path());
     // What a program does goes by the seed that it is given: who makes the runs changes nothing.
-    let (_, again, _) = run(folder.path(), &["--jobs", "2", "--runs", "20"]);
+    let (_, again, _) = run(folder.path(), &["--jobs", "4", "--runs", "20"]);
     let statuses = |json: &Value| runs(json).iter().map(|run| of(run, "status").to_owned()).collect::<Vec<_>>();
     assert_eq!(statuses(&again), statuses(&json)[..20]);
 }

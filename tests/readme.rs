@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use crate::support::{copy, edit, project, root, script};
+use crate::support::{COARSEST, copy, edit, project_with, root, script};
 
 /// The texts of the fenced blocks in a language.
 fn blocks(text: &str, language: &str) -> Vec<String> {
@@ -13,10 +13,10 @@ fn blocks(text: &str, language: &str) -> Vec<String> {
 #[test]
 fn every_command_of_the_readme_works() {
     let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
-    let project = project();
+    let project = project_with(COARSEST);
     let folder = project.path();
-    // Among six scenes there are failures to look at.
-    edit(&folder.join("configs/pick.toml"), "test_count = 15", "test_count = 6");
+    // Among four scenes there is a failure to look at.
+    edit(&folder.join("configs/pick.toml"), "test_count = 15", "test_count = 4");
     std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
     copy(&root().join("clients"), &folder.join("clients"));
     // The program as the README calls it, with its exit codes written down.
@@ -34,6 +34,7 @@ fn every_command_of_the_readme_works() {
     let path = format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap());
     let blocks = blocks(&readme, "sh");
     assert!(blocks.len() >= 4, "the README shows too little");
+    let mut printed = String::new();
     for block in &blocks {
         let output = Command::new("sh")
             .args(["-c", block])
@@ -44,6 +45,7 @@ fn every_command_of_the_readme_works() {
             .unwrap();
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code().is_some_and(|code| code <= 1), "{block}\n{text}");
+        printed.push_str(&text);
     }
     let codes = std::fs::read_to_string(folder.join("codes")).unwrap();
     let wrong: Vec<&str> = codes
@@ -51,6 +53,6 @@ fn every_command_of_the_readme_works() {
         // 1 is what a campaign with a failed property says, and a recheck that finds one.
         .filter(|line| !(line.starts_with("0 ") || ["1 run", "1 recheck"].contains(line)))
         .collect();
-    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(wrong.is_empty(), "{wrong:#?}\n{printed}");
     assert!(codes.lines().count() >= 6, "{codes}");
 }

@@ -10,7 +10,7 @@ use actcheck::search::Strategy;
 use serde_json::Value as Json;
 use toml::Value;
 
-use crate::support::{actcheck, copy, foreign, made_history, root, stderr, stdout};
+use crate::support::{actcheck, copy_made_history, foreign, root, stderr, stdout};
 
 /// A configuration with every key that there is.
 const EVERY_KEY: &str = r#"
@@ -271,7 +271,7 @@ fn shipped_new_and_exported_configurations_fit_the_schema() {
         std::fs::write(here(&format!("{name}.toml")), campaign_template(&new)).unwrap();
     }
     let history = here("h").display().to_string();
-    copy(made_history(), Path::new(&history));
+    copy_made_history(Path::new(&history));
     let list = stdout(&actcheck(root(), &["list", "--history", &history, "--format", "csv"]));
     let run = list.lines().nth(1).and_then(|line| line.split(',').next()).expect("there is a run");
     let case = here("case.toml").display().to_string();

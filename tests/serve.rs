@@ -8,13 +8,16 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use tempfile::TempDir;
 
-use crate::support::{actcheck, foreign, made_history, signal, stderr, stdout};
+use crate::support::{actcheck, copy_made_history, foreign, made_history, signal, stderr, stdout};
 
 /// A server that ends with the test.
 struct Server {
     process: Child,
     port: u16,
+    /// Its history, unless others use it too.
+    _history: Option<TempDir>,
 }
 
 impl Server {
@@ -30,7 +33,15 @@ impl Server {
         let mut line = String::new();
         BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
         let port = line.split("127.0.0.1:").nth(1).and_then(|rest| rest.split('/').next()).unwrap().parse().unwrap();
-        Self { process, port }
+        Self { process, port, _history: None }
+    }
+
+    /// A server with a history of its own.
+    fn alone(options: &[&str]) -> Self {
+        let history = made_history();
+        let mut server = Self::start(history.path(), options);
+        server._history = Some(history);
+        server
     }
 
     fn connect(&self) -> TcpStream {
@@ -108,7 +119,7 @@ impl Reply {
 
 /// A server with narrow limits.
 fn limited() -> Server {
-    Server::start(made_history(), &["--max-time", "3s", "--max-rows", "1000", "--max-queries", "64"])
+    Server::alone(&["--max-time", "3s", "--max-rows", "1000", "--max-queries", "64"])
 }
 
 const RUNS: &str = "SELECT ?run ?index { ?run a act:Run ; act:index ?index } ORDER BY ?index";
@@ -261,7 +272,7 @@ fn huge_answers_are_refused() {
     let reply = server.ask("CONSTRUCT { ?a ?b ?f } WHERE { ?a ?b ?c . ?d ?e ?f }", "*/*");
     assert_eq!(reply.status, 403, "{}", reply.body);
     // Few rows, each of them large.
-    let small = Server::start(made_history(), &["--max-mb", "1"]);
+    let small = Server::alone(&["--max-mb", "1"]);
     let doubled = "SELECT ?t { BIND(\"0123456789abcdef\" AS ?a) BIND(CONCAT(?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a,?a) AS ?b) \
                    BIND(CONCAT(?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b,?b) AS ?c) BIND(CONCAT(?c,?c,?c,?c,?c,?c,?c,?c) AS ?d) \
                    BIND(CONCAT(?d,?d,?d,?d,?d,?d,?d,?d) AS ?e) BIND(CONCAT(?e,?e,?e,?e,?e,?e,?e,?e) AS ?t) }";
@@ -383,7 +394,7 @@ fn the_page_and_the_report_are_there() {
 fn a_second_process_has_the_history_beside_the_server() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("history");
-    crate::support::copy(made_history(), &history);
+    copy_made_history(&history);
     let server = Server::start(&history, &[]);
     let runs = |server: &Server| server.ask(RUNS, "text/csv").body.lines().count() - 1;
     let before = runs(&server);
@@ -417,7 +428,7 @@ fn a_second_process_has_the_history_beside_the_server() {
 
 #[test]
 fn ctrl_c_ends_it_in_order() {
-    let mut server = Server::start(made_history(), &[]);
+    let mut server = Server::alone(&[]);
     signal(server.process.id(), "INT");
     assert_eq!(server.process.wait().unwrap().code(), Some(0));
     assert!(TcpStream::connect(("127.0.0.1", server.port)).is_err());
@@ -427,7 +438,8 @@ fn ctrl_c_ends_it_in_order() {
 fn what_can_not_be_served_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let server = limited();
-    let history = made_history().display().to_string();
+    let own = made_history();
+    let history = own.path().display().to_string();
     for (arguments, fault) in [
         (vec!["serve", "--history", "nowhere"], "H003"),
         (vec!["serve", "--history", &history, "--port", &server.port.to_string()], "X053"),

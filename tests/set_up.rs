@@ -71,10 +71,12 @@ impl Machine {
         symlink(file, self.path("root/usr/lib/llvm-14/lib").join(name)).unwrap();
     }
 
-    /// Runs a script of `.ci`: its exit code and what it printed to the error stream.
+    /// Runs a script of `.ci`, with arguments after its name: its exit code and what it printed to the error stream.
     fn run(&self, script: &str, variables: &[(&str, &str)]) -> (i32, String) {
+        let mut words = script.split(' ');
         let output = Command::new("/bin/sh")
-            .arg(root().join(".ci").join(script))
+            .arg(root().join(".ci").join(words.next().unwrap()))
+            .args(words)
             .env_clear()
             .env("PATH", self.path("bin"))
             .env("HOME", self.path("home"))
@@ -170,6 +172,28 @@ fn a_libclang_path_that_leads_nowhere_is_named() {
     }
 }
 
+/// As for bindgen: its extra arguments count, and so do the folders of the program clang.
+#[test]
+fn headers_are_looked_for_where_bindgen_looks() {
+    let Some(real) = libclang() else { return };
+    let machine = Machine::new();
+    machine.library("libclang.so.1", &real);
+    let without_own = ("BINDGEN_EXTRA_CLANG_ARGS", "-nostdinc -Wall");
+    let (code, told) = machine.run("system", &[without_own]);
+    assert_eq!(code, 2, "{told}");
+    assert!(told.contains("lacks clang's own headers, such as stddef.h"), "{told}");
+
+    let headers = machine.path("headers");
+    std::fs::create_dir(&headers).unwrap();
+    for name in ["stdarg.h", "stdbool.h", "stddef.h", "stdint.h"] {
+        std::fs::write(headers.join(name), "").unwrap();
+    }
+    let list =
+        "echo '#include <...> search starts here:' >&2; echo \" $MACHINE/headers\" >&2; echo 'End of search list.' >&2";
+    machine.command("clang-14", &format!("[ \"$6\" = -nostdinc ] || exit 1; {list}"));
+    assert_eq!(machine.run("system", &[without_own]), (0, String::new()));
+}
+
 #[test]
 fn without_a_compiler_one_is_installed() {
     let machine = Machine::new();
@@ -206,6 +230,28 @@ fn packages_that_are_not_necessary_may_be_missing() {
     let (code, told) = machine.run("system", &[]);
     assert_eq!(code, 0, "{told}");
     assert!(told.contains("missing, but optional: clang (apt-get could not install it)"), "{told}");
+}
+
+#[test]
+fn only_a_wheel_needs_python() {
+    let Some(real) = libclang() else { return };
+    let machine = Machine::new();
+    machine.library("libclang.so.1", &real);
+    assert_eq!(machine.run("system", &[]), (0, String::new()));
+    // Missing, and without its module venv.
+    for python in [None, Some("exit 1")] {
+        python.iter().for_each(|script| machine.command("python3", script));
+        let (code, told) = machine.run("system wheel", &[]);
+        let asked = machine.installed();
+        assert!(asked.ends_with("install -y -qq --no-install-recommends python3 python3-venv\n"), "{asked}");
+        let expected = "installing from the system: python3 python3-venv\nactcheck needs python3 python3-venv: 'python3 python3-venv' is \
+                        installed, and still python3 can't make environments with venv\n";
+        assert_eq!((code, told.as_str()), (2, expected));
+    }
+    machine.command("python3", "exit 0");
+    assert_eq!(machine.run("system wheel", &[]), (0, String::new()));
+    let makefile = std::fs::read_to_string(root().join("Makefile")).unwrap();
+    assert!(makefile.contains("\nwheel:\n\t@sh .ci/system wheel\n"), "{makefile}");
 }
 
 #[test]

@@ -42,7 +42,7 @@ pub enum RuleFault {
     /// An invalid value, for example a margin that is not a number.
     #[error("{0}")]
     Value(String),
-    /// The caller requested a stop ([`Budget::stop`]).
+    /// The caller requested a stop (the `stop` flag of its budget).
     #[error("interrupted")]
     Interrupted,
 }

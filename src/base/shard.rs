@@ -48,19 +48,19 @@ impl fmt::Display for Shard {
 /// The error of parsing an invalid shard.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected a shard such as 1/4: its number, from 1, and the number of shards")]
-pub struct NoShard;
+pub struct ParseShardError;
 
 impl FromStr for Shard {
-    type Err = NoShard;
+    type Err = ParseShardError;
 
-    fn from_str(text: &str) -> Result<Self, NoShard> {
+    fn from_str(text: &str) -> Result<Self, ParseShardError> {
         // Accept only digits: `u64::from_str` also accepts a `+` sign.
         let number = |text: &str| match text.bytes().all(|byte| byte.is_ascii_digit()) {
-            true => text.parse::<u64>().map_err(|_| NoShard),
-            false => Err(NoShard),
+            true => text.parse::<u64>().map_err(|_| ParseShardError),
+            false => Err(ParseShardError),
         };
-        let (part, of) = text.split_once('/').ok_or(NoShard)?;
-        Self::new(number(part)?, number(of)?).ok_or(NoShard)
+        let (part, of) = text.split_once('/').ok_or(ParseShardError)?;
+        Self::new(number(part)?, number(of)?).ok_or(ParseShardError)
     }
 }
 
@@ -103,7 +103,7 @@ mod tests {
             "a/b",
             "1/99999999999999999999",
         ] {
-            assert_eq!(wrong.parse::<Shard>(), Err(NoShard), "{wrong}");
+            assert_eq!(wrong.parse::<Shard>(), Err(ParseShardError), "{wrong}");
         }
     }
 }

@@ -85,7 +85,7 @@ fn not_resumable(id: &str) -> Diagnostics {
 
 /// The path of a campaign's configuration.
 pub(super) fn config_of(history: &History, record: &CampaignRecord) -> PathBuf {
-    config::beside(history.dir(), &record.config_path)
+    config::resolve_path(history.dir(), &record.config_path)
 }
 
 pub(super) fn is_same_file(one: &Path, other: &Path) -> bool {

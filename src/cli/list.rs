@@ -77,8 +77,7 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
 }
 
 fn outcome(word: &str) -> Result<Outcome, String> {
-    let known = Outcome::ALL.into_iter().find(|outcome| outcome.word() == word);
-    known.ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)))
+    Outcome::from_word(word).ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)))
 }
 
 /// The outcomes by which runs are chosen.

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use actcheck_base::{Diagnostic, Diagnostics, write_whole};
+use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
 
 /// Writes a file. If that fails, for instance on a full disk, the previous content is kept.
 ///
@@ -15,7 +15,7 @@ pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnost
     let written = match fs::metadata(&target) {
         // Pipes and terminals are written directly; directories are rejected by the OS.
         Ok(found) if !found.is_file() => fs::write(&target, bytes),
-        _ => write_whole(&target, bytes.as_ref()),
+        _ => write_atomic(&target, bytes.as_ref()),
     };
     written.map_err(|error| unwritten(file, &error).into())
 }

@@ -134,14 +134,14 @@ impl Table {
         self.text_of(key, "a string", value)
     }
 
-    /// Takes a list of non-empty strings. The list may be empty: see [`Table::some_strings`].
+    /// Takes a list of non-empty strings. The list may be empty: see [`Table::non_empty_strings`].
     pub fn strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let list = self.list(key, "a list of strings")?;
         Some(list.into_iter().filter_map(|value| self.text_of(key, "a list of strings", value)).collect())
     }
 
     /// Takes a list of at least one string.
-    pub fn some_strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
+    pub fn non_empty_strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let span = self.entries.get(key).map(|entry| entry.value.span.clone());
         let before = self.found.len();
         let list = self.strings(key)?;
@@ -420,7 +420,7 @@ mod tests {
             table.number("mass", (Bound::Excluded(0.0), Bound::Unbounded));
             table.range("range", ..);
             table.integer("big", 0..=10);
-            table.some_strings("list");
+            table.non_empty_strings("list");
         });
         assert_eq!(
             found,

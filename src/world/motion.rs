@@ -84,7 +84,7 @@ mod tests {
         let (first, last) = (moments[0], moments[10]);
         assert_eq!((first.time_secs, last.time_secs), (0.0, 1.0));
         assert!((f64::from(last.opening_m) - observed.gripper_opening_m).abs() < 1e-4);
-        assert!((last.told_opening_m - 0.1).abs() < 1e-6);
+        assert!((last.commanded_opening_m - 0.1).abs() < 1e-6);
         let joint = last.joints().nth(lift).expect("it has as many joints as the robot");
         assert!((joint.target - 0.2).abs() < 1e-6);
         assert!((f64::from(joint.position) - observed.positions[lift]).abs() < 1e-4);

@@ -111,7 +111,7 @@ impl<'a> Solids<'a> {
             if solid.nearest >= limit {
                 break;
             }
-            if !solid.ball.is_passed_by(slopes, square) {
+            if !solid.ball.may_hit(slopes, square) {
                 continue;
             }
             if let Some(along) = solid.met_at(slopes, limit) {
@@ -154,7 +154,7 @@ struct Around {
 
 impl Around {
     /// Whether a ray may hit the shape. `square` is the squared length of its direction.
-    fn is_passed_by(&self, [left, up]: [f64; 2], square: f64) -> bool {
+    fn may_hit(&self, [left, up]: [f64; 2], square: f64) -> bool {
         let dot = self.middle.x + self.middle.y * left + self.middle.z * up;
         self.off <= 0.0 || (dot > 0.0 && dot * dot >= self.off * square)
     }

@@ -48,11 +48,16 @@ pub fn stderr(output: &Output) -> String {
 
 /// A copy of the shipped project, with coarse physics in its configurations: most tests are about campaigns, whatever they test.
 pub fn project() -> tempfile::TempDir {
+    project_with(COARSE)
+}
+
+/// A copy of the shipped project with other physics in its configurations, such as [`COARSEST`].
+pub fn project_with(physics: &str) -> tempfile::TempDir {
     let folder = shipped_project();
     for entry in std::fs::read_dir(folder.path().join("configs")).unwrap() {
         let file = entry.unwrap().path();
         let text = std::fs::read_to_string(&file).unwrap();
-        std::fs::write(&file, text.replace("[physics]\n", COARSE)).unwrap();
+        std::fs::write(&file, text.replace("[physics]\n", physics)).unwrap();
     }
     folder
 }
@@ -99,18 +104,29 @@ pub fn edit(file: &Path, from: &str, to: &str) {
 /// Physics at a third of the price, where a test is not about physics: what the hand holds stays in it.
 pub const COARSE: &str = "[physics]\nsteps_per_second = 120\niterations = 2\n";
 
-/// A history of four runs that simulation made, for tests that only read it.
-pub fn made_history() -> &'static Path {
+/// The coarsest physics, where it makes no difference whether the robot succeeds: a held object slips out of the hand.
+pub const COARSEST: &str = "[physics]\nsteps_per_second = 60\niterations = 1\n";
+
+/// A copy of a history of four runs, for one test: one process at a time can have a history open.
+pub fn made_history() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy_made_history(folder.path());
+    folder
+}
+
+/// Copies the history of four runs into a folder. The runs are made once.
+pub fn copy_made_history(to: &Path) {
     static MADE: OnceLock<PathBuf> = OnceLock::new();
-    MADE.get_or_init(|| {
-        // Statics are never dropped: a folder of the system for passing files would stay.
+    let made = MADE.get_or_init(|| {
+        // Statics are never dropped: a temporary folder would stay.
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made-history");
         let _ = std::fs::remove_dir_all(&folder);
         let name = folder.display().to_string();
         let output = actcheck(root(), &["run", "configs/quick.toml", "--runs", "4", "--jobs", "2", "--history", &name]);
         assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
         folder
-    })
+    });
+    copy(made, to);
 }
 
 /// A shipped campaign that was run as a whole.

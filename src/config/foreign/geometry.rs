@@ -34,7 +34,7 @@ impl Shapes<'_> {
     }
 
     fn sdf_mesh(&mut self, mesh: Node, reader: &mut Reader) -> Option<Shape> {
-        reader.leaves_out(mesh, &["uri", "scale", "submesh", "convex_decomposition"]);
+        reader.warn_about_unknown_children(mesh, &["uri", "scale", "submesh", "convex_decomposition"]);
         if let Some(submesh) = xml::child(mesh, "submesh") {
             let message = "`<submesh>` is not supported".to_owned();
             reader.error("W035", submesh, message, "export that part of the mesh to its own file");

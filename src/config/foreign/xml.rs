@@ -160,7 +160,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Warns about every child element that is not in `known` (W036).
-    pub(crate) fn leaves_out(&mut self, node: Node, known: &[&str]) {
+    pub(crate) fn warn_about_unknown_children(&mut self, node: Node, known: &[&str]) {
         for other in node.children().filter(|child| child.is_element()) {
             let name = other.tag_name().name();
             // Elements with a namespace are extensions of other programs.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::foreign::{self, Lookup};
-use crate::load::beside;
+use crate::paths::resolve_path;
 use crate::{Furniture, Located, Table, WorldMap, model, robot, world_map};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, did_you_mean};
 use actcheck_data::{ObjectModel, Range, RobotProfile};
@@ -16,7 +16,7 @@ const SHIPPED_MODELS: &str = "models";
 const DEFAULT_ROBOT: &str = "mobile_manipulator";
 
 /// The models that a configuration can name.
-pub(crate) struct Shelf {
+pub(crate) struct ModelLibrary {
     files: Files,
     folder: PathBuf,
     /// Objects by name.
@@ -24,7 +24,7 @@ pub(crate) struct Shelf {
     /// Names of object files, including invalid ones, so that an invalid model is not also reported as missing.
     names: Vec<String>,
     /// Faults of SDF and URDF models, reported in full only if the configuration names the model.
-    said: BTreeMap<String, Diagnostics>,
+    diagnostics: BTreeMap<String, Diagnostics>,
     /// Models without a category.
     pub(crate) uncategorised: BTreeSet<String>,
     /// The worlds that the configuration names.
@@ -39,29 +39,29 @@ pub(crate) struct Shelf {
 const FLOOR_ALONE: &str = "empty";
 
 /// Reads all models of `model_dir`, or of the shipped folder. Faults of TOML models are reported at once; those of SDF
-/// and URDF models by [`Shelf::report`].
-pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Shelf {
+/// and URDF models by [`ModelLibrary::report`].
+pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> ModelLibrary {
     let written = table.string("model_dir");
     let (files, dir) = match &written {
-        Some(written) => (Files::Disk, beside(folder, &written.value)),
+        Some(written) => (Files::Disk, resolve_path(folder, &written.value)),
         None => (Files::Shipped, PathBuf::from(SHIPPED_MODELS)),
     };
-    let mut shelf = Shelf {
+    let mut library = ModelLibrary {
         files,
         folder: dir,
         models: BTreeMap::new(),
         names: Vec::new(),
-        said: BTreeMap::new(),
+        diagnostics: BTreeMap::new(),
         uncategorised: BTreeSet::new(),
         worlds: BTreeMap::new(),
         start: None,
         warnings: Diagnostics::new(),
     };
-    for path in shelf.toml_files("objects") {
-        shelf.names.push(stem(&path));
-        match shelf.files.read(&path) {
+    for path in library.toml_files("objects") {
+        library.names.push(stem(&path));
+        match library.files.read(&path) {
             Ok(source) => match model::read(&source) {
-                Ok(model) => _ = shelf.models.insert(model.name.clone(), Arc::new(model)),
+                Ok(model) => _ = library.models.insert(model.name.clone(), Arc::new(model)),
                 Err(faults) => found.extend(faults),
             },
             Err(reason) => {
@@ -70,18 +70,18 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
             }
         }
     }
-    shelf.read_foreign();
-    if let (Some(written), true) = (written, shelf.names.is_empty()) {
-        let message = format!("the model folder {} contains no models", shelf.folder.display());
+    library.read_foreign();
+    if let (Some(written), true) = (written, library.names.is_empty()) {
+        let message = format!("the model folder {} contains no models", library.folder.display());
         let help = "it needs a folder `objects` with one TOML file for each model, or a folder with `model.config` and \
             `model.sdf` for each; without `model_dir`, the shipped models are used";
         table.fault("C010", written.span, message, help);
     }
-    shelf.read_categories(table, found);
-    shelf
+    library.read_categories(table, found);
+    library
 }
 
-impl Shelf {
+impl ModelLibrary {
     /// Reads the SDF and URDF models.
     fn read_foreign(&mut self) {
         let folders = [self.folder.clone(), self.folder.join("objects")];
@@ -90,16 +90,16 @@ impl Shelf {
             if self.names.contains(&model.name) {
                 let message = format!("there are two models `{0}`: {1} is ignored", model.name, model.path.display());
                 let fault = Diagnostic::warning("W036", message).help("give one of them another name");
-                self.said.entry(model.name).or_default().push(fault);
+                self.diagnostics.entry(model.name).or_default().push(fault);
                 continue;
             }
             match foreign::read(&model, &lookup) {
                 Ok((read, warnings)) => {
                     self.models.insert(model.name.clone(), Arc::new(read));
                     self.uncategorised.insert(model.name.clone());
-                    self.said.insert(model.name.clone(), warnings);
+                    self.diagnostics.insert(model.name.clone(), warnings);
                 }
-                Err(faults) => _ = self.said.insert(model.name.clone(), faults),
+                Err(faults) => _ = self.diagnostics.insert(model.name.clone(), faults),
             }
             self.names.push(model.name);
         }
@@ -132,11 +132,11 @@ impl Shelf {
     /// errors, as warnings, for the others.
     pub(crate) fn report(&self, named: &BTreeSet<&str>) -> Diagnostics {
         let mut report = self.warnings.clone();
-        for (name, said) in &self.said {
+        for (name, diagnostics) in &self.diagnostics {
             if named.contains(name.as_str()) {
-                report.extend(said.clone());
-            } else if said.has_errors() {
-                let errors = said.iter().filter(|fault| fault.severity == Severity::Error);
+                report.extend(diagnostics.clone());
+            } else if diagnostics.has_errors() {
+                let errors = diagnostics.iter().filter(|fault| fault.severity == Severity::Error);
                 errors.for_each(|fault| {
                     report.push(Diagnostic { severity: Severity::Warning, ..fault.clone() });
                 });
@@ -157,7 +157,7 @@ impl Shelf {
     /// Reads a world by name from the model folder, or else from the shipped one.
     pub(crate) fn read_world(&mut self, table: &mut Table, name: &Located<String>, found: &mut Diagnostics) {
         if name.value == FLOOR_ALONE {
-            self.worlds.insert(name.value.clone(), Arc::new(WorldMap::nothing(FLOOR_ALONE)));
+            self.worlds.insert(name.value.clone(), Arc::new(WorldMap::floor_only(FLOOR_ALONE)));
             return;
         }
         let Some((files, path)) = self.world_files().into_iter().find(|(_, path)| stem(path) == name.value) else {
@@ -184,7 +184,7 @@ impl Shelf {
         };
         let model = |name: &str| self.models.get(name).map(|model| &**model);
         let known: Vec<String> = self.models.keys().cloned().collect();
-        let (world, said) = if is_toml(&path) {
+        let (world, diagnostics) = if is_toml(&path) {
             match world_map::read(&name.value, &source, model, &known) {
                 Ok(world) => (Some(world), Diagnostics::new()),
                 Err(faults) => (None, faults),
@@ -193,7 +193,7 @@ impl Shelf {
             foreign::world::read(&name.value, &source, model, &known)
         };
         let (errors, warnings): (Vec<Diagnostic>, Vec<Diagnostic>) =
-            said.into_iter().partition(|fault| fault.severity == Severity::Error);
+            diagnostics.into_iter().partition(|fault| fault.severity == Severity::Error);
         found.extend(errors.into_iter().collect());
         self.warnings.extend(warnings.into_iter().collect());
         if let Some(world) = world {
@@ -269,7 +269,7 @@ impl Shelf {
         let name = written.as_ref().map_or(DEFAULT_ROBOT, |written| &written.value);
         let place = match &written {
             Some(path) if path.value.ends_with(".toml") => {
-                let place = beside(folder, &path.value);
+                let place = resolve_path(folder, &path.value);
                 Files::Disk.read(&place).map(|_| (Files::Disk, place.clone())).map_err(|reason| {
                     let help = "the path is relative to the configuration";
                     (format!("cannot read the robot profile {}: {reason}", place.display()), help.to_owned())
@@ -287,7 +287,7 @@ impl Shelf {
         if let Some(mut table) = table {
             let written = table.strings("package_dirs").unwrap_or_default();
             self.start = read_start(&mut table);
-            packages = written.iter().map(|written| beside(folder, &written.value)).collect();
+            packages = written.iter().map(|written| resolve_path(folder, &written.value)).collect();
             table.finish(found);
         }
         let (files, path) = place.ok()?;

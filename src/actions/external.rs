@@ -6,12 +6,12 @@ use actcheck_data::ActionReport;
 use actcheck_world::World;
 
 /// Performs actions with a skill that is not part of actcheck.
-pub trait Outside {
+pub trait ExternalSkill {
     /// Begins a run in this world. The external skill learns no more about the world than a robot knows about itself.
     ///
     /// # Errors
     /// Returns an error if the run can't be performed; its first action then ends for this reason.
-    fn begin_run(&mut self, world: &World) -> Result<(), OutsideFault>;
+    fn begin_run(&mut self, world: &World) -> Result<(), ExternalFault>;
 
     /// Whether it performs the action. Valid once a run has begun.
     fn performs(&self, action: &str) -> bool;
@@ -26,7 +26,7 @@ pub trait Outside {
 /// A fault of an external skill.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}")]
-pub struct OutsideFault {
+pub struct ExternalFault {
     /// Whether it failed to answer in time; otherwise it did something wrong.
     pub late: bool,
     /// The reason, for people.

@@ -8,7 +8,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// Returns an error if the file can't be written. An existing file is then unchanged.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".tmp");
     let temporary = path.with_file_name(name);

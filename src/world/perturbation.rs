@@ -3,20 +3,20 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::convert::{to_pose, to_real, to_vector};
-use crate::{Mishap, World};
+use crate::{Perturbation, World};
 use actcheck_data::Pose;
 
 /// Gap below an object that is laid down, so that it drops into contact instead of being pushed out. Unit: metres.
 const DROP_M: f64 = 2e-3;
 
 impl World {
-    /// Applies a disturbance to an object. Returns `false` if there is no such object.
-    pub fn befall(&mut self, id: &str, mishap: Mishap) -> bool {
+    /// Applies a perturbation to an object. Returns `false` if there is no such object.
+    pub fn perturb(&mut self, id: &str, perturbation: Perturbation) -> bool {
         let Some(object) = self.objects.iter().find(|object| object.id == id) else { return false };
-        let pose = match mishap {
-            Mishap::Pose(pose) => pose.to_isometry(),
-            Mishap::Fall => lying(&self.pose_of(object), object.model.size_m),
-            Mishap::Friction(friction) => {
+        let pose = match perturbation {
+            Perturbation::Pose(pose) => pose.to_isometry(),
+            Perturbation::Fall => lying(&self.pose_of(object), object.model.size_m),
+            Perturbation::Friction(friction) => {
                 let colliders = self.engine.bodies.get(object.body).map(rapier3d::prelude::RigidBody::colliders);
                 for handle in colliders.unwrap_or_default() {
                     if let Some(collider) = self.engine.colliders.get_mut(*handle) {
@@ -37,7 +37,7 @@ impl World {
 impl World {
     /// Moves the robot to another pose (x, y, heading) without changing its pose estimate. Returns `false` if its base
     /// is fixed.
-    pub fn carry_off(&mut self, to: [f64; 3]) -> bool {
+    pub fn kidnap(&mut self, to: [f64; 3]) -> bool {
         if self.robot.layout.base.is_none() {
             return false;
         }
