@@ -231,7 +231,7 @@ fn a_surface_that_is_too_full_is_a_discard_that_says_what_found_no_place() {
     assert_eq!((discard.model.as_str(), discard.tries), ("plate", 50));
     assert_eq!(discard.to_string(), format!("found no free place for `plate` ({}) in 50 tries", discard.name));
     // Every try is on record.
-    let tries = choices.made().iter().filter(|choice| choice.name == format!("{}.x", discard.name)).count();
+    let tries = choices.made().iter().filter(|choice| choice.name.to_string() == format!("{}.x", discard.name)).count();
     assert_eq!(tries, 50);
 }
 

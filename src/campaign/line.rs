@@ -5,7 +5,7 @@ use crate::judging::judge_action;
 use actcheck_actions as actions;
 use actcheck_actions::{ActionCall, Cut, Interference, Outside, Saboteur};
 use actcheck_base::{Judgement, RunFacts};
-use actcheck_data::{ActionEnd, Choices, Quality, Scene, Trace};
+use actcheck_data::{ActionEnd, ChoiceName, Choices, Quality, Scene, Trace};
 use actcheck_facts as facts;
 use actcheck_history::{RunRecord, RunStatus};
 use actcheck_protocol::{Performance, RunName};
@@ -111,7 +111,7 @@ fn run_line_with(
     };
     choices.begin_noise();
     let mut program = env.programs.as_ref().map(|programs| {
-        let seed = choices.index(SKILL_SEED, SEEDS) as u64;
+        let seed = choices.index(ChoiceName::SkillSeed, SEEDS) as u64;
         let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
         Performance::new(programs, run, manner.clock.secs)
     });
@@ -128,17 +128,13 @@ fn run_line_with(
     Ok(record)
 }
 
-/// The choice that seeds all randomness of a program, and the number of seeds: every language can represent them.
-const SKILL_SEED: &str = "skill.seed";
+/// Number of seeds of a program: every language can represent them.
 const SEEDS: usize = 1 << 32;
-
-/// The choice of how many of the last actions are left out.
-pub(super) const TEST_LEFT_OUT: &str = "test.left_out";
 
 /// The actions of a run. Only shrunk runs leave the last ones out.
 fn test_to_perform<'a>(env: &'a Env, index: u64, choices: &mut Choices) -> &'a [String] {
     let test = &env.campaign.tests[env.test_of(index)];
-    let left_out = choices.exception(TEST_LEFT_OUT, test.len());
+    let left_out = choices.exception(ChoiceName::ActionsLeftOut, test.len());
     &test[..test.len() - left_out]
 }
 

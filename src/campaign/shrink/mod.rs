@@ -16,6 +16,6 @@ pub(super) use counterexample::SHRUNK;
 pub use counterexample::{Repeat, ShrinkOptions, Shrunk, keep, shrink};
 pub use explain::{Explained, Influence, Neighbour, explain};
 pub(super) use list::accepted_places;
-pub use list::{Id, ids, unit_of};
+pub use list::{Id, ids};
 pub use reduce::{Plan, reduce};
 pub use search::{Limits, Search, Tried};

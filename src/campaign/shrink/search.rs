@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::ThreadPool;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
-use actcheck_data::Choice;
+use actcheck_data::{Choice, ChoiceName};
 
 /// The result of a try.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Limits<'a> {
 }
 
 /// Names and value bits of a list.
-type Key = Vec<(String, u64)>;
+type Key = Vec<(ChoiceName, u64)>;
 
 /// Tries lists and caches the results. Results that a single worker would not have computed count only once they are
 /// used.
