@@ -5,6 +5,7 @@ mod broken;
 mod browser;
 mod budgets;
 mod campaign;
+mod case_candidates;
 mod cases;
 mod check_oracles;
 mod commands;

@@ -10,7 +10,7 @@ use serde_json::Value;
 use actcheck::base::Outcome;
 use actcheck::campaign::{Env, Planned, PropertyOutcome, RunResult, Schedule, schedule_of};
 use actcheck::config::Overrides;
-use actcheck::data::{Choice, ChoiceKind};
+use actcheck::data::{Choice, ChoiceKind, ChoiceName, StartAxis};
 use actcheck::scenario;
 use actcheck::search::{GENERATION, Strategy};
 
@@ -31,8 +31,9 @@ fn pick(runs: u32, seed: u64, repeat: u32, strategy: Strategy) -> Env {
 
 /// The quantile of a recorded choice in its range.
 fn quantile(choice: &Choice) -> f64 {
-    match choice.kind {
-        ChoiceKind::Index { of } => (choice.value + 0.5) / of as f64,
+    match &choice.kind {
+        ChoiceKind::Index { of } => (choice.value + 0.5) / *of as f64,
+        ChoiceKind::Candidate { names } => (choice.value + 0.5) / names.len() as f64,
         ChoiceKind::Real { low, high, .. } => (choice.value - low) / (high - low),
         ChoiceKind::Normal { sigma } => choice.value / sigma,
     }
@@ -46,11 +47,11 @@ fn made_up(env: &Env, planned: &Planned) -> RunResult {
         if scenario::draw(&env.space, 0, &mut choices).is_err() {
             continue;
         }
-        let at = |name: &str| quantile(choices.made().iter().find(|choice| choice.name == name).unwrap());
-        if at("robot.side") > 0.7 {
+        let at = |name: ChoiceName| quantile(choices.made().iter().find(|choice| choice.name == name).unwrap());
+        if at(ChoiceName::Robot(StartAxis::Side)) > 0.7 {
             continue;
         }
-        let margin = (0.8 - at("other.count")).max(at("robot.gap") - 0.25);
+        let margin = (0.8 - at(ChoiceName::OtherCount)).max(at(ChoiceName::Robot(StartAxis::Gap)) - 0.25);
         let outcome = if margin < 0.0 { Outcome::Failed } else { Outcome::Passed };
         let said = |property: &str| PropertyOutcome { property: property.to_owned(), outcome, margin: Some(margin) };
         let outcomes = ["CloseObject", "MovedObject"].map(|name| said(&format!("http://actions#{name}")));
@@ -143,7 +144,7 @@ fn repetitions_of_a_searched_scene_share_it_and_differ_in_noise() {
     for scene in planned.chunks(3) {
         let steering = scene[0].steering.as_ref().unwrap();
         assert!(scene.iter().all(|run| run.steering.as_ref().unwrap() == steering));
-        assert!(steering.quantiles.keys().all(|name| !name.starts_with("sense.")), "{steering:?}");
+        assert!(steering.quantiles.keys().all(|name| !name.is_noise()), "{steering:?}");
         assert_eq!(scene.iter().map(|run| run.repetition).collect::<Vec<_>>(), [Some(0), Some(1), Some(2)]);
     }
     // Counts scenes, not runs.

@@ -168,7 +168,7 @@ impl HealthMeter {
 fn digest(run: &RunVitals) -> String {
     let mut digest = Digest::new();
     for choice in &run.choices {
-        digest.update(choice.name.as_bytes());
+        digest.update(choice.name.to_string().as_bytes());
         digest.update(&[0]);
         digest.update(&choice.value.to_bits().to_le_bytes());
     }
@@ -224,7 +224,7 @@ mod tests {
 
     fn run(index: u64) -> RunVitals {
         let mut choices = Choices::random(7, index);
-        choices.real("x", 0.0, 1.0, 0.0);
+        choices.real("x".into(), 0.0, 1.0, 0.0);
         RunVitals {
             run: format!("k-{}", index + 1),
             index,

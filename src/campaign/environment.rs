@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use crate::budget::runs_per_test;
 use crate::case::check_case;
-use crate::line::TEST_LEFT_OUT;
 use crate::requirement::Requirement;
 use crate::solids;
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
 use actcheck_config as config;
 use actcheck_config::{Campaign, Launcher, Overrides};
-use actcheck_data::Choice;
+use actcheck_data::{Choice, ChoiceName};
 use actcheck_history::{CampaignRecord, History, SkillRecord};
 use actcheck_ontology as ontology;
 use actcheck_ontology::Ontology;
@@ -106,7 +105,8 @@ impl Env {
     /// # Errors
     /// `S040` if the configuration has no such test.
     pub fn index_of(&self, performed: &str, choices: &[Choice]) -> Result<u64, Diagnostics> {
-        let left_out = choices.iter().find(|choice| choice.name == TEST_LEFT_OUT).map_or(0.0, |choice| choice.value);
+        let left_out = choices.iter().find(|choice| choice.name == ChoiceName::ActionsLeftOut);
+        let left_out = left_out.map_or(0.0, |choice| choice.value);
         let fits = |test: &Vec<String>| {
             let done = test.len().checked_sub(left_out as usize);
             done.is_some_and(|done| test[..done].join(" ") == performed)
@@ -144,7 +144,12 @@ impl Env {
         let requirement = requirement.map_err(|found| faults.extend(found)).ok().flatten();
         match (space, rules) {
             (Some(space), Some(rules)) if !faults.has_errors() => {
-                faults.extend(check_case(&campaign, &space));
+                let of_case = check_case(&campaign, &space);
+                if of_case.has_errors() {
+                    faults.extend(of_case);
+                } else {
+                    campaign.warnings.extend(of_case);
+                }
                 let programs = programs(&campaign);
                 faults.or(Self { campaign, ontology, space, rules, rule_budget, requirement, programs })
             }

@@ -6,7 +6,7 @@ use crate::{Env, Failure};
 use actcheck_actions as actions;
 use actcheck_actions::{ActionCall, ExternalSkill, Interference, Saboteur};
 use actcheck_base::{Judgement, RunFacts};
-use actcheck_data::{ActionEnd, Choices, Quality, Scene, Trace};
+use actcheck_data::{ActionEnd, ChoiceName, Choices, Quality, Scene, Trace};
 use actcheck_facts as facts;
 use actcheck_history::{RunRecord, RunStatus};
 use actcheck_protocol::{Performance, RunName};
@@ -121,7 +121,7 @@ pub(super) fn simulate(
     };
     choices.begin_noise();
     let mut program = env.programs.as_ref().map(|programs| {
-        let seed = choices.index(SKILL_SEED, SEEDS) as u64;
+        let seed = choices.index(ChoiceName::SkillSeed, SEEDS) as u64;
         let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
         Performance::new(programs, run, context.clock.secs)
     });
@@ -132,17 +132,13 @@ pub(super) fn simulate(
     finish(env, Simulated { index, scene, trace, quality, choices, program_output }, context, start)
 }
 
-/// The choice that seeds all randomness of a program, and the number of seeds: every language can represent them.
-const SKILL_SEED: &str = "skill.seed";
+/// Number of seeds of a program: every language can represent them.
 const SEEDS: usize = 1 << 32;
-
-/// The choice of how many of the last actions are left out.
-pub(super) const TEST_LEFT_OUT: &str = "test.left_out";
 
 /// The actions of a run. Only shrunk runs leave the last ones out.
 fn test_to_perform<'a>(env: &'a Env, index: u64, choices: &mut Choices) -> &'a [String] {
     let test = &env.campaign.tests[env.test_of(index)];
-    let left_out = choices.exception(TEST_LEFT_OUT, test.len());
+    let left_out = choices.exception(ChoiceName::ActionsLeftOut, test.len());
     &test[..test.len() - left_out]
 }
 

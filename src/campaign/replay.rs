@@ -10,7 +10,7 @@ use crate::workers::workers;
 use crate::{Env, Failure, InputChange, RunContext, TraceDifference, changes, first_difference};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_data::{ActionEnd, Choice, Choices, Trace};
+use actcheck_data::{ActionEnd, Choice, ChoiceKind, Choices, Trace};
 use actcheck_history::{CampaignRecord, History, RunDetail};
 
 /// Maximum number of choices named in a message.
@@ -22,7 +22,7 @@ pub type StoredCampaign = (Env, CampaignRecord);
 /// How exactly the recorded choices must fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fit {
-    /// Every choice must be recorded and of the same kind, and none may be left over.
+    /// Every choice must be recorded and of the same kind, and none may be left over. Candidates may be added.
     Exact,
     /// Values are clamped to their bounds, and missing choices are nominal.
     Nearest,
@@ -80,8 +80,15 @@ pub enum MisfitKind {
     Missing,
     /// It is recorded but not needed.
     LeftOver,
-    /// Its kind changed: other bounds, another number of candidates, or another standard deviation.
+    /// Its kind changed: other bounds, another number of options, or another standard deviation.
     OtherKind,
+    /// Its candidate was removed.
+    Replaced {
+        /// The recorded candidate.
+        was: String,
+        /// The candidate that was used.
+        is: String,
+    },
     /// Its value was changed.
     Moved {
         /// The recorded value.
@@ -194,37 +201,43 @@ pub(super) fn rerun(env: &Env, attempt: &Attempt<'_>, context: &RunContext) -> R
 
 /// Compares the recorded choices with those made from them.
 fn misfits(recorded: &[Choice], made: &[Choice]) -> Vec<Misfit> {
-    let (recorded, made) = (by_name(recorded), by_name(made));
-    let mut names: Vec<&str> = recorded.keys().chain(made.keys()).copied().collect();
-    names.sort_unstable();
-    names.dedup();
+    let mut pairs: BTreeMap<String, [Vec<&Choice>; 2]> = BTreeMap::new();
+    for (side, choices) in [recorded, made].into_iter().enumerate() {
+        for choice in choices {
+            pairs.entry(choice.name.to_string()).or_default()[side].push(choice);
+        }
+    }
     let mut found = Vec::new();
-    for name in names {
-        let none = Vec::new();
-        let (was, is) = (recorded.get(name).unwrap_or(&none), made.get(name).unwrap_or(&none));
+    for (name, [was, is]) in pairs {
         for number in 0..was.len().max(is.len()) {
             let kind = match (was.get(number), is.get(number)) {
-                (None, _) => MisfitKind::Missing,
-                (_, None) => MisfitKind::LeftOver,
-                (Some(was), Some(is)) if was.value.to_bits() != is.value.to_bits() => {
-                    MisfitKind::Moved { was: was.value, is: is.value }
-                }
-                (Some(was), Some(is)) if was.kind != is.kind => MisfitKind::OtherKind,
-                _ => continue,
+                (None, _) => Some(MisfitKind::Missing),
+                (_, None) => Some(MisfitKind::LeftOver),
+                (Some(was), Some(is)) => misfit(was, is),
             };
-            let name = if number == 0 { name.to_owned() } else { format!("{name} ({})", number + 1) };
-            found.push(Misfit { name, kind });
+            let name = if number == 0 { name.clone() } else { format!("{name} ({})", number + 1) };
+            found.extend(kind.map(|kind| Misfit { name, kind }));
         }
     }
     found
 }
 
-fn by_name(choices: &[Choice]) -> BTreeMap<&str, Vec<&Choice>> {
-    let mut names: BTreeMap<&str, Vec<&Choice>> = BTreeMap::new();
-    for choice in choices {
-        names.entry(choice.name.as_str()).or_default().push(choice);
+/// Compares a recorded choice with the one made from it; `None` if they are the same.
+fn misfit(was: &Choice, is: &Choice) -> Option<MisfitKind> {
+    match (was.candidate(), is.candidate()) {
+        (Some(was), Some(is)) => (was != is).then(|| MisfitKind::Replaced { was: was.to_owned(), is: is.to_owned() }),
+        _ if was.value.to_bits() != is.value.to_bits() => Some(MisfitKind::Moved { was: was.value, is: is.value }),
+        _ if is_same_kind(&was.kind, &is.kind) => None,
+        _ => Some(MisfitKind::OtherKind),
     }
-    names
+}
+
+/// Whether two kinds have the same values. Old histories have the number of candidates, without their names.
+fn is_same_kind(was: &ChoiceKind, is: &ChoiceKind) -> bool {
+    match (was, is) {
+        (ChoiceKind::Index { of }, ChoiceKind::Candidate { names }) => names.len() == *of,
+        _ => was == is,
+    }
 }
 
 fn unfit(detail: &RunDetail, misfits: &[Misfit]) -> Diagnostic {
@@ -241,10 +254,11 @@ fn unfit(detail: &RunDetail, misfits: &[Misfit]) -> Diagnostic {
 impl std::fmt::Display for Misfit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let name = &self.name;
-        match self.kind {
+        match &self.kind {
             MisfitKind::Missing => write!(f, "`{name}` is missing"),
             MisfitKind::LeftOver => write!(f, "`{name}` is no longer needed"),
             MisfitKind::OtherKind => write!(f, "`{name}` has another kind or range now"),
+            MisfitKind::Replaced { was, is } => write!(f, "`{name}` was `{was}`, which it can't be now, is `{is}`"),
             MisfitKind::Moved { was, is } => write!(f, "`{name}` was {was}, is {is}"),
         }
     }
@@ -277,7 +291,7 @@ fn outcome_changes(was: &RunDetail, is: &FinishedRun) -> Vec<OutcomeChange> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use actcheck_data::ChoiceKind;
+    use actcheck_data::ChoiceName;
 
     fn real(name: &str, high: f64, value: f64) -> Choice {
         Choice { name: name.into(), kind: ChoiceKind::Real { low: 0.0, high, nominal: 0.0 }, value }
@@ -298,5 +312,22 @@ mod tests {
             ]
         );
         assert!(misfits(&recorded, &recorded).is_empty());
+    }
+
+    fn candidate(names: &[&str], value: f64) -> Choice {
+        let names = names.iter().map(|name| (*name).to_owned()).collect();
+        Choice { name: ChoiceName::SurfaceName, kind: ChoiceKind::Candidate { names }, value }
+    }
+
+    #[test]
+    fn candidates_may_be_added_but_not_removed() {
+        let told = |was: Choice, is: Choice| misfits(&[was], &[is]).first().map(Misfit::to_string);
+        assert_eq!(told(candidate(&["a"], 0.0), candidate(&["b", "a"], 1.0)), None);
+        let gone = told(candidate(&["a"], 0.0), candidate(&["b"], 0.0));
+        assert_eq!(gone.as_deref(), Some("`surface.name` was `a`, which it can't be now, is `b`"));
+        let old = |of| Choice { kind: ChoiceKind::Index { of }, ..candidate(&[], 0.0) };
+        assert_eq!(told(old(1), candidate(&["a"], 0.0)), None);
+        let grown = told(old(1), candidate(&["b", "a"], 0.0));
+        assert_eq!(grown.as_deref(), Some("`surface.name` has another kind or range now"));
     }
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::searching::Searching;
 use crate::{Env, WeightedRate};
 use actcheck_base::{Judgement, Outcome, Shard};
-use actcheck_data::Choices;
+use actcheck_data::{ChoiceName, Choices};
 use actcheck_history::{Repetition, RunDetail, RunRecord};
 use actcheck_search::Strategy;
 
@@ -37,7 +37,7 @@ pub struct Planned {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steering {
     /// Quantiles of choices by name.
-    pub quantiles: BTreeMap<String, f64>,
+    pub quantiles: BTreeMap<ChoiceName, f64>,
     /// Importance weight of the scene, if scenes are not drawn from the configuration's distribution.
     pub weight: Option<f64>,
 }
@@ -221,9 +221,9 @@ mod tests {
     fn repetitions_differ_only_in_noise() {
         let drawn = |scene, repetition| {
             let mut choices = Planned { index: 0, scene, repetition, steering: None }.choices(7, 0);
-            let yaw = choices.real("yaw", 0.0, 1.0, 0.0).to_bits();
+            let yaw = choices.real("yaw".into(), 0.0, 1.0, 0.0).to_bits();
             choices.begin_noise();
-            (yaw, choices.normal("sense.x", 1.0).to_bits())
+            (yaw, choices.normal("sense.x".into(), 1.0).to_bits())
         };
         assert_eq!(drawn(1, Some(0)).0, drawn(1, Some(1)).0);
         assert_eq!(drawn(1, Some(0)).0, drawn(1, None).0);
@@ -254,7 +254,7 @@ mod tests {
         let first = |index, attempt| {
             Planned { index, scene: index, repetition: None, steering: None }
                 .choices(7, attempt)
-                .real("x", 0.0, 1.0, 0.0)
+                .real("x".into(), 0.0, 1.0, 0.0)
                 .to_bits()
         };
         assert_eq!(first(1, 0), first(1, 0));

@@ -111,7 +111,7 @@ fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnost
 fn sample(mut runs: Vec<String>, size: usize, seed: u64) -> Vec<String> {
     let mut choices = Choices::random(seed, 0);
     while runs.len() > size {
-        runs.remove(choices.index("sample", runs.len()));
+        runs.remove(choices.index("sample".into(), runs.len()));
     }
     runs
 }

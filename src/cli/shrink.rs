@@ -10,7 +10,7 @@ use crate::picture::Picture;
 use crate::work::{all_cores, quietly};
 use crate::{clock, history_dir, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk, unit_of};
+use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk};
 use actcheck_campaign::{Env, RunContext};
 use actcheck_data::Choice;
 use actcheck_history::{History, RunRecord};
@@ -138,7 +138,7 @@ fn summary(
 ) -> Result<ShrunkSummary, Diagnostics> {
     let influences = shrunk.explained.influences.iter();
     let shown = |id: &Id| match influences.clone().filter(|other| other.id.name == id.name).count() {
-        0 | 1 => id.name.clone(),
+        0 | 1 => id.name.to_string(),
         _ => format!("{} ({})", id.name, id.nth + 1),
     };
     let choices = influences.clone().map(|influence| shrunk_choice(shown(&influence.id), influence));
@@ -188,7 +188,7 @@ fn shrunk_choice(name: String, influence: &shrink::Influence) -> ShrunkChoice {
         name,
         value: *value,
         nominal: kind.nominal(),
-        unit: unit_of(full),
+        unit: full.unit(),
         matters: influence.matters,
         fails: influence.fails,
         passes: influence.passes,

@@ -4,18 +4,17 @@ use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::finished_run::RunPlace;
-use crate::line::{TEST_LEFT_OUT, simulate};
+use crate::line::simulate;
 use crate::run_cases::end_of;
 use crate::shrink::list::{drop_rejected_tries, has};
 use crate::shrink::{Explained, ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
 use crate::{Env, RunContext, RunInput, run_line};
 use actcheck_actions::Interference;
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, did_you_mean, names};
-use actcheck_data::{Choice, ChoiceKind, Choices, Role};
+use actcheck_data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices, ObjectAxis, PlacedObject, Role};
 use actcheck_history::{History, RunRecord, RunStatus};
+use actcheck_scenario as scenario;
 
-/// Prefix of the choices of sensor noise.
-const NOISE: &str = "sense.";
 /// Repetitions of the shrunk scene with fresh noise, to estimate how often it fails.
 const FRESH: u32 = 5;
 /// Smaller movements come from settling and rounding. Unit: metres.
@@ -78,7 +77,8 @@ pub struct Shrunk {
 /// smaller scene.
 ///
 /// # Errors
-/// `S050` if nothing fails when the run is repeated, or not the requested property; `S051` if its scene can't be built.
+/// `S050` if nothing fails when the run is repeated, or not the requested property; `S051` if its scene can't be built,
+/// for example because one of its candidates was removed.
 pub fn shrink(
     env: &Env,
     index: u64,
@@ -86,6 +86,7 @@ pub fn shrink(
     options: &ShrinkOptions<'_>,
     on_better: &mut dyn FnMut(&[Choice]),
 ) -> Result<Shrunk, Diagnostics> {
+    check_candidates(env, index, recorded)?;
     let recorded = drop_rejected_tries(recorded);
     let first = remake(env, index, &recorded, options)?;
     let subject = Subject { env, index, failed: signature(&first), options };
@@ -97,13 +98,13 @@ pub fn shrink(
     let start = drop_rejected_tries(&first.choices);
     let fresh_noise = |list: &[Choice]| subject.with_fresh_noise(list);
     let as_recorded = |list: &[Choice]| subject.as_recorded(list);
-    let noisy = start.iter().any(|choice| is_noise(&choice.name) && choice.value != 0.0);
+    let noisy = start.iter().any(|choice| choice.name.is_noise() && choice.value != 0.0);
     let repeated = options.repeat.is_some() && noisy && fresh_noise(&start).made.is_some();
     let test: &(dyn Fn(&[Choice]) -> Tried + Sync) = if repeated { &fresh_noise } else { &as_recorded };
     let limits = TrialLimits { simulations: options.trials, jobs: options.jobs, stop: options.stop };
     let mut search = TrialSearch::new(test, limits);
     let special_before = special(&start);
-    let start = if repeated { start.into_iter().filter(|choice| !is_noise(&choice.name)).collect() } else { start };
+    let start = if repeated { start.into_iter().filter(|choice| !choice.name.is_noise()).collect() } else { start };
     let (choices, minimal) = reduce(&mut search, start, &plan, on_better);
     let simulations = search.simulations();
     let explained = explain(&mut search, &choices, &plan);
@@ -201,7 +202,7 @@ impl Subject<'_> {
 
     /// Runs the scene of a list with the noise of a repetition. The noise does not depend on the scene.
     fn repetition(&self, list: &[Choice], number: u32) -> Option<RunRecord> {
-        let scene: Vec<Choice> = list.iter().filter(|choice| !is_noise(&choice.name)).cloned().collect();
+        let scene: Vec<Choice> = list.iter().filter(|choice| !choice.name.is_noise()).cloned().collect();
         // The campaign uses the streams from 0 up; these count down from the maximum.
         self.run(Choices::partly_recorded(&scene, self.env.campaign.seed, u64::MAX - u64::from(number)))
     }
@@ -222,7 +223,7 @@ impl Subject<'_> {
             }
         }
         let scene = |made: Vec<Choice>| {
-            drop_rejected_tries(&made).into_iter().filter(|choice| !is_noise(&choice.name)).collect::<Vec<_>>()
+            drop_rejected_tries(&made).into_iter().filter(|choice| !choice.name.is_noise()).collect::<Vec<_>>()
         };
         Tried { made: made.filter(|_| failures >= least).map(scene), simulations }
     }
@@ -239,6 +240,25 @@ impl Subject<'_> {
         let failing = (0..of).find_map(|number| self.repetition(list, number));
         failing.map_or_else(|| list.to_vec(), |record| drop_rejected_tries(&record.choices))
     }
+}
+
+/// Checks that the run's candidates still exist.
+fn check_candidates(env: &Env, index: u64, recorded: &[Choice]) -> Result<(), Diagnostics> {
+    let mut choices = Choices::recorded(recorded);
+    // Whether the scene can be built is checked by making the run again.
+    let _ = scenario::draw(&env.space, env.test_of(index), &mut choices);
+    let mut faults = Diagnostics::new();
+    for made in choices.made() {
+        let was = recorded.iter().find(|choice| choice.name == made.name).and_then(Choice::candidate);
+        if let (Some(was), ChoiceKind::Candidate { names }) = (was, &made.kind)
+            && made.candidate() != Some(was)
+        {
+            let message = format!("the run's scene can no longer be built: `{}` can't be `{was}` now", made.name);
+            let help = format!("add it to the configuration again; candidates there: {}", names.join(", "));
+            faults.push(Diagnostic::error("S051", message).help(help));
+        }
+    }
+    faults.or(())
 }
 
 /// Makes the run again.
@@ -259,32 +279,24 @@ fn is_named(iri: &str, name: &str) -> bool {
     iri == name || names::local(iri) == name
 }
 
-fn is_noise(name: &str) -> bool {
-    name.starts_with(NOISE)
-}
-
 /// Number of choices that are not nominal, without those that only set the number of objects.
 fn special(list: &[Choice]) -> usize {
     list.iter().filter(|choice| choice.value != choice.kind.nominal() && group(list, &choice.name).is_some()).count()
 }
 
-/// The numbered object of a choice, such as `other.3`.
-fn thing_of(name: &str) -> Option<&str> {
-    let (thing, _) = name.rsplit_once('.')?;
-    let (kind, number) = thing.split_once('.')?;
-    (kind != "sense" && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(thing)
-}
-
-fn left_out(thing: &str) -> Choice {
-    Choice { name: format!("{thing}.left_out"), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
+fn left_out(object: PlacedObject) -> Choice {
+    let name = ChoiceName::Object(object, ObjectAxis::LeftOut);
+    Choice { name, kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
 }
 
 /// Removals of each object except target and platform: first the objects that moved, farthest first, then those nearest
 /// to the target.
 fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
-    let things = recorded.iter().filter(|choice| choice.name.ends_with(".model"));
-    let things = things.filter_map(|choice| thing_of(&choice.name));
-    let left = things.map(left_out).filter(|removal| !has(recorded, removal));
+    let models = recorded.iter().filter(|choice| matches!(choice.name, ChoiceName::Object(_, ObjectAxis::Model)));
+    let left = models
+        .filter_map(|choice| choice.name.numbered_object())
+        .map(left_out)
+        .filter(|removal| !has(recorded, removal));
     let objects = &record.scene.objects;
     let target = objects.iter().find(|object| object.role == Role::Target).map(|object| object.pose.position);
     let others = objects.iter().filter(|object| object.role.is_bystander());
@@ -307,27 +319,16 @@ fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
 fn ends(env: &Env, index: u64) -> Vec<Choice> {
     let of = env.campaign.tests[env.test_of(index)].len();
     let end = |left_out: usize| Choice {
-        name: TEST_LEFT_OUT.to_owned(),
+        name: ChoiceName::ActionsLeftOut,
         kind: ChoiceKind::Index { of },
         value: left_out as f64,
     };
     (1..of).rev().map(end).collect()
 }
 
-/// Group of choices that become nominal together: noise, physics, the robot's start, positions of other objects, the
-/// target's position, and models. Returns `None` for numbers of objects.
-fn group(list: &[Choice], name: &str) -> Option<u8> {
-    let behind = name.rsplit('.').next().unwrap_or(name);
-    let thing = thing_of(name);
-    let gone = thing.is_some_and(|thing| has(list, &left_out(thing)));
-    match (name, behind) {
-        (_, "count" | "left_out") => None,
-        _ if gone => None,
-        _ if is_noise(name) => Some(0),
-        (_, "mass_scale" | "friction_scale" | "restitution") => Some(1),
-        _ if name.starts_with("robot.") => Some(2),
-        (_, "x" | "y" | "yaw") if thing.is_some() => Some(3),
-        (_, "x" | "y" | "yaw") => Some(4),
-        _ => Some(5),
-    }
+/// Group of choices that become nominal together. Returns `None` for numbers of objects, and for the choices of objects
+/// that are left out.
+fn group(list: &[Choice], name: &ChoiceName) -> Option<ChoiceGroup> {
+    let gone = name.numbered_object().is_some_and(|object| has(list, &left_out(object)));
+    if gone { None } else { name.group() }
 }

@@ -115,13 +115,13 @@ fn brackets(influences: &[Influence]) -> Vec<Bracket> {
                     -FARTHEST_SIGMAS * sigma
                 }
             }
-            ChoiceKind::Index { .. } => return None,
+            ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. } => return None,
         };
         (end != value).then_some((of, end))
     });
     let bracket = |(of, end): (usize, f64)| {
         let choice = &influences[of].choice;
-        let continuous = !matches!(choice.kind, ChoiceKind::Index { .. });
+        let continuous = !matches!(choice.kind, ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. });
         Bracket { of, fails: choice.value, passes: None, end, continuous, open: true }
     };
     towards.chain(away).map(bracket).collect()

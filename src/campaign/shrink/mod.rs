@@ -16,6 +16,6 @@ pub(super) use counterexample::SHRUNK;
 pub use counterexample::{Repeat, ShrinkOptions, Shrunk, shrink, store};
 pub use explain::{Explained, Influence, Neighbour, explain};
 pub(super) use list::drop_rejected_tries;
-pub use list::{Id, ids, unit_of};
+pub use list::{Id, ids};
 pub use reduce::{ShrinkPlan, reduce};
 pub use search::{TrialLimits, TrialSearch, Tried};

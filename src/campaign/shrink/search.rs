@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
 use crate::workers::workers;
-use actcheck_data::Choice;
+use actcheck_data::{Choice, ChoiceName};
 
 /// The result of a try.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +28,7 @@ pub struct TrialLimits<'a> {
 }
 
 /// Names and value bits of a list.
-type Key = Vec<(String, u64)>;
+type Key = Vec<(ChoiceName, u64)>;
 
 /// Tries lists and caches the results. Results that a single worker would not have computed count only once they are
 /// used.
