@@ -8,8 +8,12 @@ mod numeric;
 mod table;
 mod text;
 mod types;
+mod value;
 
 pub(crate) use geometry::GEO3D;
 pub(crate) use numeric::{compare, equal};
-pub(crate) use table::{Builtin, Value, builtin, builtin_in_words, builtin_names};
+#[cfg(feature = "sparql")]
+pub(crate) use table::builtin_by_exact_name;
+pub(crate) use table::{Builtin, builtin, builtin_names};
 pub(crate) use text::compile_pattern;
+pub(crate) use value::Value;

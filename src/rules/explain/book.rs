@@ -1,15 +1,15 @@
 //! Explanations of properties.
 
-use crate::book::{JudgeRules, RuleBook, fault};
-use crate::evaluate::{Layers, Planned, Rounds, Tables, evaluate_noting};
+use crate::book::judge::{JudgeRules, RuleBook};
+use crate::engine::budget::Budget;
+use crate::engine::evaluate::{Layers, Planned, Rounds, Tables, evaluate_recording_rounds, fault};
+use crate::engine::meter::Meter;
+use crate::engine::reading::{Verdict, findings};
 use crate::explain::model::Explanation;
 use crate::explain::proof::Prover;
-use crate::explain::search::Ground;
-use crate::findings::Budget;
-use crate::meter::Meter;
-use crate::program::Rule;
-use crate::reading::{Verdict, findings};
-use crate::universe::Universe;
+use crate::explain::search::ProofContext;
+use crate::model::program::Rule;
+use crate::model::universe::Universe;
 use actcheck_base::{ActionFacts, Findings, RuleFault};
 
 /// Maximum number of proofs shown.
@@ -27,6 +27,7 @@ impl RuleBook {
             JudgeRules::Datalog { planned, verdict } => {
                 self.explain_datalog(facts, &judge.label, planned, verdict, budget)
             }
+            #[cfg(feature = "sparql")]
             JudgeRules::Sparql(_) => {
                 let results = self.judge(facts, &[property.to_owned()], budget).remove(property);
                 let findings =
@@ -50,7 +51,7 @@ impl RuleBook {
         let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let mut enriched = Layers { own, below: vec![&self.fixed] };
         let (predicates, indexes) = (&self.predicates, &self.indexes);
-        evaluate_noting(
+        evaluate_recording_rounds(
             &self.libraries,
             predicates,
             indexes,
@@ -61,45 +62,53 @@ impl RuleBook {
         )
         .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
         let mut layers = Layers { own: Tables::default(), below: vec![&enriched.own, &self.fixed] };
-        evaluate_noting(planned, predicates, indexes, &mut layers, &mut universe, &mut meter, Some(&mut rounds))
-            .map_err(|stopped| fault(&meter, stopped, planned))?;
+        evaluate_recording_rounds(
+            planned,
+            predicates,
+            indexes,
+            &mut layers,
+            &mut universe,
+            &mut meter,
+            Some(&mut rounds),
+        )
+        .map_err(|stopped| fault(&meter, stopped, planned))?;
         let findings = findings(verdict, &layers, &universe)?;
         let rules: Vec<&Rule> =
             planned.rules.iter().chain(&self.libraries.rules).chain(&self.fixed_rules.rules).collect();
-        let stated = stated(&[planned, &self.libraries, &self.fixed_rules], self);
-        let ground = Ground {
+        let given_facts = given_facts(&[planned, &self.libraries, &self.fixed_rules], self);
+        let context = ProofContext {
             predicates,
             rules,
             layers: vec![&layers.own, &enriched.own, &self.fixed],
-            facts: vec![&given, &self.fixed_facts, &stated],
+            facts: vec![&given, &self.fixed_facts, &given_facts],
             rounds: &rounds,
             universe: &universe,
         };
-        Ok(explained(label, findings, verdict, &ground))
+        Ok(explained(label, findings, verdict, &context))
     }
 }
 
 /// Returns the facts written in the rule texts.
-fn stated(programs: &[&Planned], book: &RuleBook) -> Tables {
+fn given_facts(programs: &[&Planned], book: &RuleBook) -> Tables {
     let mut tables = Tables::default();
     for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
         let width = book.predicates.get(*predicate).width;
-        let table = crate::relation::finished(width, rows.clone(), book.indexes.of(*predicate).clone());
+        let table = crate::engine::relation::finished(width, rows.clone(), book.indexes.of(*predicate).clone());
         tables.set(*predicate, table);
     }
     tables
 }
 
-fn explained(label: &str, findings: Findings, verdict: &Verdict, ground: &Ground<'_>) -> Explanation {
+fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &ProofContext<'_>) -> Explanation {
     let mut explanation =
         Explanation { title: label.to_owned(), findings: None, proofs: Vec::new(), miss: None, notes: Vec::new() };
     if let Some(decisive) = &verdict.decisive {
-        let mut prover = Prover::new(ground);
-        let mut rows: Vec<&[u32]> = ground.rows(decisive.predicate).collect();
+        let mut prover = Prover::new(context);
+        let mut rows: Vec<&[u32]> = context.rows(decisive.predicate).collect();
         rows.truncate(PROOFS_SHOWN);
         explanation.proofs = rows.into_iter().map(|row| prover.prove(decisive.predicate, row, 0)).collect();
         if explanation.proofs.is_empty() {
-            explanation.miss = ground.miss(decisive.predicate, &vec![None; decisive.arity], 0);
+            explanation.miss = context.miss(decisive.predicate, &vec![None; decisive.arity], 0);
         }
         let shown = explanation.proofs.len();
         if findings.witness_count > shown {
@@ -114,6 +123,7 @@ fn explained(label: &str, findings: Findings, verdict: &Verdict, ground: &Ground
 }
 
 /// Explains a query by its rows: it has no proof tree.
+#[cfg(feature = "sparql")]
 fn of_query(label: &str, findings: Findings) -> Explanation {
     let notes = findings
         .witness

@@ -1,17 +1,16 @@
 //! Explanations of the tuples of a standalone program.
 
-use crate::book::fault;
-use crate::evaluate::{Layers, Rounds, Tables, evaluate_noting};
+use crate::engine::budget::Budget;
+use crate::engine::evaluate::{Layers, Rounds, Tables, evaluate_recording_rounds, fault};
+use crate::engine::meter::Meter;
+use crate::engine::relation::finished;
 use crate::explain::book::PROOFS_SHOWN;
 use crate::explain::model::Explanation;
 use crate::explain::proof::Prover;
-use crate::explain::search::Ground;
-use crate::findings::Budget;
-use crate::meter::Meter;
-use crate::program::PredicateId;
-use crate::relation::finished;
+use crate::explain::search::ProofContext;
+use crate::model::program::PredicateId;
+use crate::model::universe::Universe;
 use crate::standalone::Program;
-use crate::universe::Universe;
 use actcheck_base::{RuleFault, Term};
 
 impl Program {
@@ -25,7 +24,7 @@ impl Program {
         let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
         let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
         let planned = &self.planned;
-        evaluate_noting(
+        evaluate_recording_rounds(
             planned,
             &self.predicates,
             &self.indexes,
@@ -36,7 +35,7 @@ impl Program {
         )
         .map_err(|stopped| fault(&meter, stopped, planned))?;
         let facts = self.stated();
-        let ground = Ground {
+        let context = ProofContext {
             predicates: &self.predicates,
             rules: planned.rules.iter().collect(),
             layers: vec![&layers.own],
@@ -47,7 +46,7 @@ impl Program {
         let Some(predicate) = self.predicates.find(0, &name, None) else {
             return Err(RuleFault::Value(format!("the program has no predicate `{name}`")));
         };
-        Ok(explained(statement, predicate, &pattern, &ground))
+        Ok(explained(statement, predicate, &pattern, &context))
     }
 
     /// Returns the program's facts without derived tuples.
@@ -61,20 +60,25 @@ impl Program {
     }
 }
 
-fn explained(statement: &str, predicate: PredicateId, pattern: &[Option<Term>], ground: &Ground<'_>) -> Explanation {
+fn explained(
+    statement: &str,
+    predicate: PredicateId,
+    pattern: &[Option<Term>],
+    context: &ProofContext<'_>,
+) -> Explanation {
     // A term without an id occurs in no tuple, so the pattern can't match.
     let known: Option<Vec<Option<u32>>> = pattern
         .iter()
-        .map(|term| term.as_ref().map_or(Some(None), |term| ground.universe.id(term).map(Some)))
+        .map(|term| term.as_ref().map_or(Some(None), |term| context.universe.id(term).map(Some)))
         .collect();
     let fits = |row: &&[u32]| {
         known.as_ref().is_some_and(|known| known.iter().zip(*row).all(|(k, v)| k.is_none_or(|k| k == *v)))
     };
-    let mut prover = Prover::new(ground);
+    let mut prover = Prover::new(context);
     let proofs: Vec<_> =
-        ground.rows(predicate).filter(fits).take(PROOFS_SHOWN).map(|row| prover.prove(predicate, row, 0)).collect();
+        context.rows(predicate).filter(fits).take(PROOFS_SHOWN).map(|row| prover.prove(predicate, row, 0)).collect();
     let miss = match &known {
-        Some(known) if proofs.is_empty() => ground.miss(predicate, known, 0),
+        Some(known) if proofs.is_empty() => context.miss(predicate, known, 0),
         _ => None,
     };
     let notes = if proofs.is_empty() && miss.is_none() {

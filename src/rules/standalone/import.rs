@@ -7,14 +7,14 @@ use std::sync::atomic::AtomicBool;
 use oxrdf::GraphName;
 use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 
-use crate::check::{Checking, Role, counted};
-use crate::dataset::from_rdf;
-use crate::options::{OptionValue, options};
-use crate::program::{Predicates, Program};
+use crate::check::checking::{Checking, Role, counted};
+use crate::check::options::{OptionValue, options};
+use crate::model::program::{Predicates, Program};
+use crate::model::rdf::from_rdf;
+use crate::model::values::lexical;
 use crate::standalone::stoppable::Stoppable;
 use crate::standalone::table::{ColumnKind, LeftOut, delimiter_of, read_table};
 use crate::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
-use crate::values::lexical;
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, TermId, Terms, did_you_mean};
 
 /// Formats of imports.
@@ -213,12 +213,22 @@ fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
 fn open(path: &Path) -> Result<Box<dyn Read>, String> {
     let file = std::fs::File::open(path).map_err(|error| error.to_string().to_lowercase())?;
     let file = std::io::BufReader::new(file);
-    let packed = path.extension().is_some_and(|extension| extension == "gz");
-    Ok(if packed {
-        Box::new(flate2::read::MultiGzDecoder::new(file).take(SIZE_LIMIT))
-    } else {
-        Box::new(file.take(SIZE_LIMIT))
-    })
+    if path.extension().is_some_and(|extension| extension == "gz") {
+        return unpacked(file);
+    }
+    Ok(Box::new(file.take(SIZE_LIMIT)))
+}
+
+/// Decompresses a file.
+#[cfg(feature = "gzip")]
+fn unpacked(file: impl Read + 'static) -> Result<Box<dyn Read>, String> {
+    Ok(Box::new(flate2::read::MultiGzDecoder::new(file).take(SIZE_LIMIT)))
+}
+
+/// Reports that compressed files need the feature `gzip`.
+#[cfg(not(feature = "gzip"))]
+fn unpacked(_file: impl Read) -> Result<Box<dyn Read>, String> {
+    Err("this build can't decompress it; unpack it, or build `actcheck-rules` with the feature `gzip`".to_owned())
 }
 
 /// Second pass: adds the rows of a file to the program's facts.

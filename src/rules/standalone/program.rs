@@ -4,19 +4,17 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use crate::book::fault;
-use crate::check::{Checking, Role, unique};
-use crate::evaluate::{Layers, Planned, Tables, evaluate};
-use crate::findings::Budget;
-use crate::meter::Meter;
-use crate::naive;
-use crate::parse::parse;
-use crate::plan::Indexes;
-use crate::program::{PredicateId, Predicates};
+use crate::check::checking::{Checking, Role, unique};
+use crate::check::stratify::stratify;
+use crate::engine::budget::Budget;
+use crate::engine::evaluate::{Layers, Planned, Tables, evaluate, fault};
+use crate::engine::meter::Meter;
+use crate::engine::naive;
+use crate::engine::plan::Indexes;
+use crate::model::program::{PredicateId, Predicates};
+use crate::model::universe::Universe;
 use crate::standalone::import::{define_imports, import};
-use crate::stratify::stratify;
-use crate::syntax::{ExpressionKind, Statement, Syntax};
-use crate::universe::Universe;
+use crate::syntax::{ExpressionKind, Statement, Syntax, parse};
 use actcheck_base::{Diagnostics, RuleFault, Source, Term, TermId, Terms};
 
 /// The evaluator of a program.
@@ -165,8 +163,8 @@ impl Program {
                 tables.insert(predicate.name.clone(), (predicate.arity, rows));
             }
         }
-        let made = universe.into_made();
-        let terms = (0..self.terms.len()).map(|id| self.terms.term(id as TermId).clone()).chain(made).collect();
+        let created = universe.into_created();
+        let terms = (0..self.terms.len()).map(|id| self.terms.term(id as TermId).clone()).chain(created).collect();
         Ok(Closure { terms, tables })
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::findings::{Budget, interrupted};
+use crate::engine::budget::{Budget, interrupted};
 use crate::standalone::export::{exports, write};
 use crate::standalone::program::{Engine, Program};
 use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault};
