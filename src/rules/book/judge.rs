@@ -8,13 +8,40 @@ use crate::engine::load::Given;
 use crate::engine::meter::Meter;
 use crate::engine::plan::Indexes;
 use crate::engine::reading::{Verdict, findings};
-use crate::model::program::Predicates;
+use crate::model::program::{Predicates, Scope};
 use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query, snapshot::snapshot};
 use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Terms};
 
 /// Every property's rules with the libraries, parsed, checked and planned. Shared between threads.
+///
+/// The libraries are evaluated once for an action, then each property. For the rules of one property,
+/// [`Rules`](crate::Rules) is simpler.
+///
+/// ```
+/// use actcheck_base::Source;
+/// use actcheck_ontology::{Ontology, Property, RuleFile};
+/// use actcheck_rules::{Budget, Facts, RuleBook};
+///
+/// let mut ontology = Ontology::default();
+/// for (iri, text) in [
+///     ("http://example.org/onTable", "success(?x) :- after(?x, <http://example.org/on>, <http://example.org/table>) ."),
+///     ("http://example.org/allDry", "violation(?x) :- after(?x, <http://example.org/wet>, true) ."),
+/// ] {
+///     let rule = RuleFile::new(Source::new(format!("{iri}.rls"), text));
+///     ontology.properties.insert(iri.to_owned(), Property::new(iri, rule));
+/// }
+/// let book = RuleBook::prepare(&ontology)?;
+///
+/// let facts = Facts::from_turtle("@prefix : <http://example.org/> . :cup :on :table ; :wet true .")?;
+/// let properties: Vec<String> = ontology.properties.keys().cloned().collect();
+/// let findings = book.judge(&facts.as_action(), &properties, &Budget::default());
+/// let holds = |iri: &str| findings[iri].as_ref().map(|found| found.holds);
+/// assert_eq!(holds("http://example.org/onTable"), Ok(true));
+/// assert_eq!(holds("http://example.org/allDry"), Ok(false));
+/// # Ok::<(), actcheck_base::Diagnostics>(())
+/// ```
 pub struct RuleBook {
     pub(crate) terms: Terms,
     pub(crate) predicates: Predicates,
@@ -51,6 +78,10 @@ pub(crate) enum JudgeRules {
     Datalog {
         planned: Box<Planned>,
         verdict: Verdict,
+        /// Scope of the file's predicates.
+        scope: Scope,
+        /// Prefixes that the file declares.
+        prefixes: Vec<(String, String)>,
     },
     #[cfg(feature = "sparql")]
     Sparql(Box<Query>),
@@ -78,7 +109,7 @@ impl RuleBook {
         for iri in properties {
             let result = match self.properties.get(iri) {
                 None => Err(RuleFault::Value(format!("unknown property {iri}"))),
-                Some(Judge { rules: JudgeRules::Datalog { planned, verdict }, .. }) => {
+                Some(Judge { rules: JudgeRules::Datalog { planned, verdict, .. }, .. }) => {
                     self.datalog(planned, verdict, &derived, &mut universe, budget)
                 }
                 #[cfg(feature = "sparql")]

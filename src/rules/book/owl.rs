@@ -4,16 +4,28 @@ use std::path::Path;
 
 use crate::engine::budget::Budget;
 use crate::standalone::{Engine, Program};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Term, names};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Term, names};
 
-/// The rule file, embedded in the program.
-const RULES: &str = "rules/lib/owl-rl.rls";
+/// Name and text of the rule file.
+const RULES: (&str, &str) = ("built-in:rules/lib/owl-rl.rls", include_str!("../shipped/owl-rl.rls"));
 /// Maximum number of contradictions reported; each has its proof.
 const CONTRADICTIONS_SHOWN: usize = 5;
 
 /// Returns all statements that follow from the given ones under OWL 2 RL, including these, sorted.
 ///
 /// Leaves out statements true of any term (`?x owl:sameAs ?x`) and those not allowed in RDF (a literal as subject).
+///
+/// ```
+/// use actcheck_base::{Term, names};
+///
+/// let ex = |local: &str| Term::iri(format!("http://example.org/{local}"));
+/// let kind = Term::iri(format!("{}type", names::RDF));
+/// let below = Term::iri(format!("{}subClassOf", names::RDFS));
+/// let stated = [[ex("mug"), kind.clone(), ex("Mug")], [ex("Mug"), below, ex("Dish")]];
+/// let closure = actcheck_rules::owl_closure(&stated)?;
+/// assert!(closure.contains(&[ex("mug"), kind, ex("Dish")]));
+/// # Ok::<(), actcheck_base::Diagnostics>(())
+/// ```
 ///
 /// # Errors
 /// `R080` for each contradiction, with the rule of the W3C profile that finds it and its proof.
@@ -24,8 +36,7 @@ pub fn owl_closure(triples: &[[Term; 3]]) -> Result<Vec<[Term; 3]>, Diagnostics>
 /// Like [`owl_closure`], with a budget.
 pub(crate) fn owl_closure_within(triples: &[[Term; 3]], budget: &Budget) -> Result<Vec<[Term; 3]>, Diagnostics> {
     let unusable = |reason: String| Diagnostics::from(Diagnostic::error("R090", reason));
-    let source = Files::Shipped.read(Path::new(RULES)).map_err(|reason| unusable(format!("{RULES}: {reason}")))?;
-    let mut program = Program::load(&source, Path::new(""))?;
+    let mut program = Program::load(&Source::new(RULES.0, RULES.1), Path::new(""))?;
     program.add_facts("triple", triples.iter().map(|triple| triple.as_slice())).map_err(unusable)?;
     let closure = program.close(Engine::Fast, budget).map_err(|fault| unusable(fault.to_string()))?;
     let contradictions = closure.tuples("contradiction");

@@ -61,7 +61,8 @@ impl Preparing {
     pub(crate) fn run(mut self, ontology: &Ontology) -> Result<RuleBook, Diagnostics> {
         let phases = Phases::intern(&mut self.terms);
         let (libraries, properties) = self.parse(ontology);
-        let mut checking = Checking::new(&mut self.terms, Some(&ontology.vocabulary));
+        let vocabulary = Some(&ontology.vocabulary).filter(|vocabulary| !vocabulary.terms.is_empty());
+        let mut checking = Checking::new(&mut self.terms, vocabulary);
         for syntax in &libraries {
             checking.define(syntax, Role::Library);
         }
@@ -136,11 +137,11 @@ impl Preparing {
         let fixed = self.plan(fixed, &predicates, &mut indexes);
         let libraries = self.plan(moving, &predicates, &mut indexes);
         let mut properties = self.queries(ontology);
-        for (scope, property, _) in syntaxes {
+        for (scope, property, syntax) in syntaxes {
             let program = programs.remove(scope).unwrap_or_default();
             let verdict = Verdict::new(&program, &predicates, *scope);
             let planned = Box::new(self.plan(program, &predicates, &mut indexes));
-            let rules = JudgeRules::Datalog { planned, verdict };
+            let rules = JudgeRules::Datalog { planned, verdict, scope: *scope, prefixes: syntax.prefixes.clone() };
             properties.insert(property.iri.clone(), judge(ontology, property, rules));
         }
         self.diagnostics = unique(self.diagnostics);
@@ -197,6 +198,10 @@ impl Preparing {
 
     /// Returns the ontology's statements with their OWL 2 RL closure.
     fn closed(&mut self, ontology: &Ontology) -> Vec<[TermId; 3]> {
+        // Without statements, only the axioms of OWL itself follow.
+        if ontology.triples.is_empty() {
+            return Vec::new();
+        }
         let closed = owl_closure_within(&ontology.triples, &self.budget).unwrap_or_else(|found| {
             self.diagnostics.extend(found);
             Vec::new()

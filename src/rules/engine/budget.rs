@@ -1,4 +1,4 @@
-//! The result of evaluating the rules of one property for one action.
+//! Limits on one evaluation.
 
 use actcheck_base::{Diagnostic, RuleFault};
 use std::sync::Arc;
@@ -9,7 +9,14 @@ pub(crate) fn interrupted() -> Diagnostic {
     Diagnostic::error("R091", RuleFault::Interrupted.to_string())
 }
 
-/// Limits on one evaluation.
+/// Limits on one evaluation. Change single limits of the default, so that new ones keep their default:
+///
+/// ```
+/// use actcheck_rules::Budget;
+///
+/// let budget = Budget { secs: 0.5, ..Budget::default() };
+/// assert!(budget.tuples > 1_000_000);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Budget {
     /// Maximum number of derived tuples.

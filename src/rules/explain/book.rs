@@ -1,19 +1,16 @@
 //! Explanations of properties.
 
-use crate::book::judge::{JudgeRules, RuleBook};
+use crate::book::judge::{Judge, JudgeRules, RuleBook};
 use crate::engine::budget::Budget;
 use crate::engine::evaluate::{Layers, Planned, Rounds, Tables, evaluate_recording_rounds, fault};
 use crate::engine::meter::Meter;
 use crate::engine::reading::{Verdict, findings};
+use crate::explain::goal::{Goal, PROOFS_SHOWN, goal_explained};
 use crate::explain::model::Explanation;
 use crate::explain::proof::Prover;
 use crate::explain::search::ProofContext;
-use crate::model::program::Rule;
 use crate::model::universe::Universe;
 use actcheck_base::{ActionFacts, Findings, RuleFault};
-
-/// Maximum number of proofs shown.
-pub(super) const PROOFS_SHOWN: usize = 3;
 
 impl RuleBook {
     /// Explains why a property (by IRI) holds in an action, or why not.
@@ -21,11 +18,11 @@ impl RuleBook {
     /// # Errors
     /// The property is unknown, a value is invalid, or the budget was exceeded.
     pub fn explain(&self, facts: &ActionFacts<'_>, property: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
-        let judge =
-            self.properties.get(property).ok_or_else(|| RuleFault::Value(format!("unknown property {property}")))?;
+        let judge = self.property(property)?;
         match &judge.rules {
-            JudgeRules::Datalog { planned, verdict } => {
-                self.explain_datalog(facts, &judge.label, planned, verdict, budget)
+            JudgeRules::Datalog { planned, verdict, .. } => {
+                let evaluated = self.evaluate_for_proofs(facts, planned, verdict, budget)?;
+                Ok(explained(&judge.label, evaluated.findings.clone()?, verdict, &evaluated.context(self, planned)))
             }
             #[cfg(feature = "sparql")]
             JudgeRules::Sparql(_) => {
@@ -37,54 +34,91 @@ impl RuleBook {
         }
     }
 
-    fn explain_datalog(
+    /// Explains why the rules of a property (by IRI) derive a statement such as `near(obj:cup_1, _)` in an action, or
+    /// why not. `_` matches any value. The statement may use the prefixes of the property's rule file.
+    ///
+    /// # Errors
+    /// The property is unknown or a SPARQL query, the statement is invalid, or the budget was exceeded.
+    pub fn explain_statement(
         &self,
         facts: &ActionFacts<'_>,
-        label: &str,
+        property: &str,
+        statement: &str,
+        budget: &Budget,
+    ) -> Result<Explanation, RuleFault> {
+        match &self.property(property)?.rules {
+            JudgeRules::Datalog { planned, verdict, scope, prefixes } => {
+                let goal = Goal::parse(statement, prefixes)?;
+                let predicate = goal.predicate(&self.predicates, &[*scope, 0])?;
+                let mut evaluated = self.evaluate_for_proofs(facts, planned, verdict, budget)?;
+                let known = goal.known(&mut evaluated.universe);
+                Ok(goal_explained(statement, predicate, &known, &evaluated.context(self, planned)))
+            }
+            #[cfg(feature = "sparql")]
+            JudgeRules::Sparql(_) => {
+                Err(RuleFault::Value("a SPARQL query derives no statements; explain the property instead".into()))
+            }
+        }
+    }
+
+    fn property(&self, iri: &str) -> Result<&Judge, RuleFault> {
+        self.properties.get(iri).ok_or_else(|| RuleFault::Value(format!("unknown property {iri}")))
+    }
+
+    /// Evaluates the rules of a property over an action, and keeps the tuples of every stage.
+    fn evaluate_for_proofs<'a>(
+        &'a self,
+        facts: &ActionFacts<'a>,
         planned: &Planned,
         verdict: &Verdict,
         budget: &Budget,
-    ) -> Result<Explanation, RuleFault> {
+    ) -> Result<Evaluated<'a>, RuleFault> {
         let mut universe = Universe::new(&self.terms, Some(facts.terms));
         let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
         let given = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let mut enriched = Layers { own, below: vec![&self.fixed] };
-        let (predicates, indexes) = (&self.predicates, &self.indexes);
-        evaluate_recording_rounds(
-            &self.libraries,
-            predicates,
-            indexes,
-            &mut enriched,
-            &mut universe,
-            &mut meter,
-            Some(&mut rounds),
-        )
-        .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
-        let mut layers = Layers { own: Tables::default(), below: vec![&enriched.own, &self.fixed] };
-        evaluate_recording_rounds(
-            planned,
-            predicates,
-            indexes,
-            &mut layers,
-            &mut universe,
-            &mut meter,
-            Some(&mut rounds),
-        )
-        .map_err(|stopped| fault(&meter, stopped, planned))?;
-        let findings = findings(verdict, &layers, &universe)?;
-        let rules: Vec<&Rule> =
-            planned.rules.iter().chain(&self.libraries.rules).chain(&self.fixed_rules.rules).collect();
-        let given_facts = given_facts(&[planned, &self.libraries, &self.fixed_rules], self);
-        let context = ProofContext {
-            predicates,
-            rules,
-            layers: vec![&layers.own, &enriched.own, &self.fixed],
-            facts: vec![&given, &self.fixed_facts, &given_facts],
-            rounds: &rounds,
-            universe: &universe,
+        let mut evaluate = |planned: &Planned, layers: &mut Layers<'_>| {
+            let (predicates, indexes) = (&self.predicates, &self.indexes);
+            let rounds = Some(&mut rounds);
+            evaluate_recording_rounds(planned, predicates, indexes, layers, &mut universe, &mut meter, rounds)
+                .map_err(|stopped| fault(&meter, stopped, planned))
         };
-        Ok(explained(label, findings, verdict, &context))
+        evaluate(&self.libraries, &mut enriched)?;
+        let mut layers = Layers { own: Tables::default(), below: vec![&enriched.own, &self.fixed] };
+        evaluate(planned, &mut layers)?;
+        let findings = findings(verdict, &layers, &universe);
+        let own = layers.own;
+        let stated = given_facts(&[planned, &self.libraries, &self.fixed_rules], self);
+        Ok(Evaluated { universe, rounds, given, stated, enriched: enriched.own, own, findings })
+    }
+}
+
+/// The tuples of one action and one property by stage, from which proofs are built.
+struct Evaluated<'a> {
+    universe: Universe<'a>,
+    rounds: Rounds,
+    /// The facts of the action.
+    given: Tables,
+    /// The facts written in the rule texts.
+    stated: Tables,
+    /// The facts of the action with the tuples of the libraries.
+    enriched: Tables,
+    /// The tuples of the property's rules.
+    own: Tables,
+    findings: Result<Findings, RuleFault>,
+}
+
+impl Evaluated<'_> {
+    fn context<'c>(&'c self, book: &'c RuleBook, planned: &'c Planned) -> ProofContext<'c> {
+        ProofContext {
+            predicates: &book.predicates,
+            rules: planned.rules.iter().chain(&book.libraries.rules).chain(&book.fixed_rules.rules).collect(),
+            layers: vec![&self.own, &self.enriched, &book.fixed],
+            facts: vec![&self.given, &book.fixed_facts, &self.stated],
+            rounds: &self.rounds,
+            universe: &self.universe,
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod book;
 mod dot;
+mod goal;
 #[cfg(feature = "json")]
 mod json;
 mod miss;

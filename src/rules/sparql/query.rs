@@ -34,7 +34,9 @@ impl Query {
         derived: &BTreeSet<String>,
     ) -> Result<Self, Diagnostics> {
         let mut diagnostics = Diagnostics::new();
-        check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
+        if !ontology.vocabulary.terms.is_empty() {
+            check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
+        }
         if let Err(error) = evaluator().parse_query(source.text.as_ref()) {
             diagnostics.push(syntax_fault(source, &error.to_string()));
             return Err(diagnostics);

@@ -9,6 +9,7 @@ use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault};
 
 /// Results of running a program.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Summary {
     /// Name and number of tuples of each predicate.
     pub tuples: Vec<(String, usize)>,

@@ -14,6 +14,16 @@ const DIRECTIVES: [&str; 7] = ["base", "declare", "export", "import", "output", 
 pub(crate) struct ErrorReported;
 
 /// Parses a rule text. Never fails: statements with errors are left out and reported in the diagnostics.
+///
+/// ```
+/// use actcheck_base::Source;
+/// use actcheck_rules::syntax::Statement;
+///
+/// let (syntax, diagnostics) = actcheck_rules::parse(&Source::new("a.rls", "p(?x) :- q(?x), ?x > 1 .\n p(1 .\n r(2) ."));
+/// assert_eq!(syntax.statements.len(), 2);
+/// assert!(matches!(&syntax.statements[0], Statement::Rule(rule) if rule.body.len() == 2));
+/// assert_eq!(diagnostics.iter().next().and_then(|found| found.place()).as_deref(), Some("a.rls:2:6"));
+/// ```
 pub fn parse(source: &Source) -> (Syntax, Diagnostics) {
     let mut diagnostics = Diagnostics::new();
     let mut syntax =

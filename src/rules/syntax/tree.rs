@@ -4,6 +4,7 @@ use actcheck_base::{Source, Span};
 
 /// A parsed rule text.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Syntax {
     /// The text.
     pub source: Source,
@@ -19,6 +20,7 @@ pub struct Syntax {
 
 /// One statement. The parser resolves `@prefix` and `@base`, so they do not appear here.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Statement {
     /// A rule, or a fact (a rule without body).
     Rule(RuleSyntax),
@@ -51,6 +53,7 @@ pub enum Statement {
 
 /// `@import p :- csv{resource="f"}, … .`, or the corresponding `@export`.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Transfer {
     /// Whether this is an import; otherwise it is an export.
     pub import: bool,
@@ -68,6 +71,7 @@ pub struct Transfer {
 
 /// A rule as written.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RuleSyntax {
     /// `#[name("…")]`.
     pub name: Option<String>,
@@ -83,6 +87,7 @@ pub struct RuleSyntax {
 
 /// `p(…)`.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct AtomSyntax {
     /// Predicate: a bare name or an absolute IRI.
     pub predicate: String,
@@ -96,6 +101,7 @@ pub struct AtomSyntax {
 
 /// One condition of a body.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum LiteralSyntax {
     /// An atom, or a call of a built-in, which has the same syntax.
     Atom(AtomSyntax),
@@ -147,6 +153,7 @@ impl Comparison {
 
 /// A term or a computation.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Expression {
     /// Its kind, with its operands.
     pub kind: ExpressionKind,
@@ -156,6 +163,7 @@ pub struct Expression {
 
 /// Kinds of expressions.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum ExpressionKind {
     /// A constant.
     Constant(actcheck_base::Term),
