@@ -6,7 +6,7 @@ use actcheck_ontology::triples_of;
 /// The snapshot of an action that a fact belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Phase {
+pub enum When {
     /// The state before the action: `before(s, p, o)` in rules.
     Before,
     /// Events during the action: `during(s, p, o)`.
@@ -17,16 +17,16 @@ pub enum Phase {
 
 /// The facts that rules judge: triples before, during and after an action, and the values of its parameters.
 ///
-/// Triples come from Turtle text or from terms. Facts about a single state belong to [`Phase::After`].
+/// Triples come from Turtle text or from terms. Facts about a single state belong to [`When::After`].
 ///
 /// ```
 /// use actcheck_base::Term;
-/// use actcheck_rules::{Facts, Phase};
+/// use actcheck_rules::{Facts, When};
 ///
 /// let mut facts = Facts::from_turtle("@prefix ex: <http://example.org/> . ex:cup ex:on ex:table .")?;
 /// let ex = |local: &str| Term::iri(format!("http://example.org/{local}"));
-/// facts.add(Phase::Before, [ex("cup"), ex("on"), ex("shelf")]);
-/// facts.add(Phase::After, [ex("cup"), ex("height"), Term::Double(0.12)]);
+/// facts.add(When::Before, [ex("cup"), ex("on"), ex("shelf")]);
+/// facts.add(When::After, [ex("cup"), ex("height"), Term::Double(0.12)]);
 /// assert_eq!(facts.len(), 3);
 /// # Ok::<(), actcheck_base::Diagnostics>(())
 /// ```
@@ -53,17 +53,17 @@ impl Facts {
     /// `O002` for each syntax error, at most five.
     pub fn from_turtle(text: &str) -> Result<Self, Diagnostics> {
         let mut facts = Self::new();
-        facts.add_turtle(Phase::After, text)?;
+        facts.add_turtle(When::After, text)?;
         Ok(facts)
     }
 
     /// Adds a triple: subject, predicate and object.
-    pub fn add(&mut self, phase: Phase, triple: [Term; 3]) -> &mut Self {
+    pub fn add(&mut self, when: When, triple: [Term; 3]) -> &mut Self {
         let triple = triple.map(|term| self.terms.intern(term));
-        match phase {
-            Phase::Before => self.before.push(triple),
-            Phase::During => self.during.push(triple),
-            Phase::After => self.after.push(triple),
+        match when {
+            When::Before => self.before.push(triple),
+            When::During => self.during.push(triple),
+            When::After => self.after.push(triple),
         }
         self
     }
@@ -74,11 +74,11 @@ impl Facts {
     ///
     /// # Errors
     /// `O002` for each syntax error, at most five; then no triple is added.
-    pub fn add_turtle(&mut self, phase: Phase, text: &str) -> Result<&mut Self, Diagnostics> {
+    pub fn add_turtle(&mut self, when: When, text: &str) -> Result<&mut Self, Diagnostics> {
         let triples = triples_of(&Source::new("facts.ttl", text), self.documents)?;
         self.documents += 1;
         for triple in triples {
-            self.add(phase, triple);
+            self.add(when, triple);
         }
         Ok(self)
     }
@@ -122,7 +122,7 @@ mod tests {
     fn blank_nodes_of_two_texts_differ() {
         let mut facts = Facts::new();
         for _ in 0..2 {
-            facts.add_turtle(Phase::After, "_:a <http://x/p> 1 .").expect("the text is valid");
+            facts.add_turtle(When::After, "_:a <http://x/p> 1 .").expect("the text is valid");
         }
         assert_ne!(facts.after[0], facts.after[1]);
     }
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn a_syntax_error_is_reported_with_its_place() {
         let mut facts = Facts::new();
-        let found = facts.add_turtle(Phase::Before, "<http://x/a> <http://x/p>").expect_err("the object is missing");
+        let found = facts.add_turtle(When::Before, "<http://x/a> <http://x/p>").expect_err("the object is missing");
         assert!(found.to_string().contains("facts.ttl:1:"), "{found}");
         assert!(facts.is_empty());
     }

@@ -24,9 +24,9 @@
 //!     "@prefix ex: <http://example.org/> .
 //!      ex:cup a ex:Cup ; ex:x 0.25e0 . ex:plate ex:x 0.3e0 . ex:spoon ex:x 0.9e0 .",
 //! )?;
-//! let judged = rules.judge(&facts);
-//! assert_eq!(judged.outcome, Outcome::Passed);
-//! assert!(judged.margin().is_some_and(|margin| (margin - 0.05).abs() < 1e-9));
+//! let decision = rules.judge(&facts);
+//! assert_eq!(decision.outcome, Outcome::Passed);
+//! assert!(decision.margin().is_some_and(|margin| (margin - 0.05).abs() < 1e-9));
 //!
 //! // Why? The proof, down to the facts.
 //! let why = rules.why(&facts)?.to_text();
@@ -43,8 +43,8 @@
 //! | type | purpose |
 //! | --- | --- |
 //! | [`Rules`] | the rules of one property; [`RulesBuilder`] adds libraries, background knowledge and a [`Budget`] |
-//! | [`Facts`] | triples by [`Phase`], from Turtle text or from terms |
-//! | [`Judged`] | the outcome with witness and margin |
+//! | [`Facts`] | triples by [`When`], from Turtle text or from terms |
+//! | [`Decision`] | the outcome with witness and margin |
 //! | [`explain::Explanation`] | proofs, or the closest attempt: a tree, text, Graphviz, JSON |
 //! | [`RuleBook`] | the rules of all properties of an ontology, evaluated together |
 //! | [`standalone::Program`] | a Datalog program with predicates of its own, without actions |
@@ -80,6 +80,11 @@ pub mod syntax;
 
 pub use book::{RuleBook, owl_closure};
 pub use engine::budget::Budget;
-pub use facts::{Facts, Phase};
-pub use rules::{Judged, Rules, RulesBuilder};
+pub use facts::{Facts, When};
+pub use rules::{Decision, Rules, RulesBuilder};
 pub use syntax::parse;
+
+/// Compiles and runs the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("README.md")]
+struct Readme;

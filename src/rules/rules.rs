@@ -29,9 +29,9 @@ const PROPERTY: &str = "https://w3id.org/actcheck/property/rules";
 ///      violation(?object) :- after(?object, ex:on, ex:floor) .",
 /// )?;
 /// let facts = Facts::from_turtle("@prefix ex: <http://example.org/> . ex:cup ex:on ex:floor .")?;
-/// let judged = rules.judge(&facts);
-/// assert_eq!(judged.outcome, Outcome::Failed);
-/// assert_eq!(judged.witness()[0].to_string(), "violation(object = <http://example.org/cup>)");
+/// let decision = rules.judge(&facts);
+/// assert_eq!(decision.outcome, Outcome::Failed);
+/// assert_eq!(decision.witness()[0].to_string(), "violation(object = <http://example.org/cup>)");
 /// # Ok::<(), actcheck_base::Diagnostics>(())
 /// ```
 #[derive(Debug)]
@@ -55,11 +55,11 @@ impl Rules {
     }
 
     /// Applies the rules to facts.
-    pub fn judge(&self, facts: &Facts) -> Judged {
+    pub fn judge(&self, facts: &Facts) -> Decision {
         let property = PROPERTY.to_owned();
         let mut results = self.book.judge(&facts.as_action(), std::slice::from_ref(&property), &self.budget);
         let result = results.remove(PROPERTY);
-        Judged::new(result.unwrap_or_else(|| Err(RuleFault::Value("the property was not judged".to_owned()))))
+        Decision::new(result.unwrap_or_else(|| Err(RuleFault::Value("the property was not judged".to_owned()))))
     }
 
     /// Explains the outcome: the proofs of `success` or `violation`, or the rule that came closest.
@@ -180,20 +180,20 @@ impl RulesBuilder {
 ///      margin(?m) :- after(_, ex:height, ?h), ?m = ?h - 0.5 .",
 /// )?;
 /// let facts = Facts::from_turtle("<http://example.org/cup> <http://example.org/height> 0.75e0 .")?;
-/// let judged = rules.judge(&facts);
-/// assert_eq!((judged.outcome, judged.margin()), (Outcome::Passed, Some(0.25)));
+/// let decision = rules.judge(&facts);
+/// assert_eq!((decision.outcome, decision.margin()), (Outcome::Passed, Some(0.25)));
 /// # Ok::<(), actcheck_base::Diagnostics>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Judged {
+pub struct Decision {
     /// The outcome.
     pub outcome: Outcome,
     /// The findings, or the fault because of which the property could not be decided.
     pub result: Result<Findings, RuleFault>,
 }
 
-impl Judged {
+impl Decision {
     fn new(result: Result<Findings, RuleFault>) -> Self {
         let outcome = result.as_ref().map_or_else(RuleFault::outcome, Findings::outcome);
         Self { outcome, result }

@@ -23,8 +23,8 @@ ex:tray ex:on ex:table .
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rules = Rules::parse(RULES)?;
     let facts = Facts::from_turtle(FACTS)?;
-    let judged = rules.judge(&facts);
-    println!("{}: {}", judged.outcome, judged.witness()[0]);
+    let decision = rules.judge(&facts);
+    println!("{}: {}", decision.outcome, decision.witness()[0]);
     println!("{}", rules.why(&facts)?);
     println!("{}", rules.why_not(&facts, "above(ex:glass2, ex:table)")?);
     Ok(())
