@@ -4,6 +4,7 @@
 
 pub(crate) mod judge;
 mod owl;
+mod parts;
 mod prepare;
 
 pub use judge::RuleBook;

@@ -5,6 +5,7 @@
 pub(crate) mod checking;
 mod expressions;
 pub(crate) mod options;
+mod predicates;
 pub(crate) mod ranges;
 mod safety;
 pub(crate) mod stratify;
