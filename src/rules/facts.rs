@@ -1,6 +1,6 @@
 //! Facts of an action for users of the library.
 
-use actcheck_base::{ActionFacts, Diagnostics, Source, Term, TermId, Terms, Triple, names};
+use actcheck_base::{ActionFacts, Diagnostics, Source, Term, TermId, Terms, Triple};
 use actcheck_ontology::triples_of;
 
 /// The snapshot of an action that a fact belongs to.
@@ -27,6 +27,7 @@ pub enum When {
 /// let ex = |local: &str| Term::iri(format!("http://example.org/{local}"));
 /// facts.add(When::Before, [ex("cup"), ex("on"), ex("shelf")]);
 /// facts.add(When::After, [ex("cup"), ex("height"), Term::Double(0.12)]);
+/// facts.set_parameter(ex("target"), ex("cup"));
 /// assert_eq!(facts.len(), 3);
 /// # Ok::<(), actcheck_base::Diagnostics>(())
 /// ```
@@ -83,10 +84,9 @@ impl Facts {
         Ok(self)
     }
 
-    /// Sets a parameter of the action, which rules read as `parameter(act:name, ?value)`.
-    pub fn set_parameter(&mut self, name: &str, value: Term) -> &mut Self {
-        let name = self.terms.intern(Term::iri(names::act(name)));
-        let value = self.terms.intern(value);
+    /// Sets a parameter of the action. Rules read it as `parameter(ex:target, ?value)` if its name is `ex:target`.
+    pub fn set_parameter(&mut self, name: Term, value: Term) -> &mut Self {
+        let (name, value) = (self.terms.intern(name), self.terms.intern(value));
         self.parameters.retain(|[known, _]| *known != name);
         self.parameters.push([name, value]);
         self
@@ -138,7 +138,8 @@ mod tests {
     #[test]
     fn a_parameter_has_one_value() {
         let mut facts = Facts::new();
-        facts.set_parameter("pickObject", Term::Integer(1)).set_parameter("pickObject", Term::Integer(2));
+        let name = Term::iri("http://example.org/target");
+        facts.set_parameter(name.clone(), Term::Integer(1)).set_parameter(name, Term::Integer(2));
         assert_eq!(facts.as_action().parameters.len(), 1);
     }
 }

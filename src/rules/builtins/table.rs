@@ -136,7 +136,7 @@ pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> + Clone {
     BUILTINS.iter().map(|b| b.name)
 }
 
-/// Finds a built-in by the exact name that [`builtin_names`] returns.
+/// Finds a built-in by the exact name that [`builtin_names`] returns. Returns `None` if it is unknown.
 #[cfg(feature = "sparql")]
 pub(crate) fn builtin_by_exact_name(name: &str) -> Option<&'static Builtin> {
     BUILTINS.iter().find(|b| b.name == name)

@@ -69,7 +69,7 @@ impl Ranges {
         }
     }
 
-    /// Returns the constant property of an atom.
+    /// Returns the constant property of an atom, or `None` if its property is a variable.
     fn property<'t>(&self, atom: &Atom, predicates: &Predicates, terms: &'t Terms) -> Option<&'t str> {
         let property: TermId = predicates.get(atom.predicate).property?;
         terms.term(property).as_iri()

@@ -50,7 +50,7 @@ fn bind(binding: &mut [TermId], variables: &[Variable], values: &[TermId]) {
     }
 }
 
-/// Computes the aggregates of a group and the variables that depend on them.
+/// Computes the aggregates of a group and the variables that depend on them. Returns `None` if one has no value.
 fn fill(
     aggregation: &Aggregation,
     rows: &[&[TermId]],
@@ -98,7 +98,8 @@ fn extreme<'a>(inputs: impl Iterator<Item = &'a Term>, better: fn(std::cmp::Orde
 }
 
 /// Sums numbers: the result is an integer if all are integers, otherwise a double. Doubles are added in sorted order,
-/// so that the sum does not depend on the order of the tuples.
+/// so that the sum does not depend on the order of the tuples. Returns `None` if there are no numbers or the sum
+/// overflows.
 fn sum<'a>(inputs: impl Iterator<Item = &'a Term>) -> Option<Term> {
     let (mut whole, mut parts, mut any) = (0i64, Vec::new(), false);
     for term in inputs {

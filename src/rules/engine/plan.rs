@@ -175,7 +175,7 @@ fn tests(literal: &Literal, bound: &[bool]) -> bool {
     !matches!(literal, Literal::Positive(_)) && literal.needs().iter().all(|v| bound[*v])
 }
 
-/// Returns the atom with the fewest expected matches; the first one of equals.
+/// Returns the atom with the fewest expected matches, the first one of equals. Returns `None` if no atom is left.
 fn best_atom(rule: &Rule, left: &[usize], bound: &[bool], sizes: Sizes<'_>) -> Option<usize> {
     let expected = |atom: &Atom| {
         // Unknown sizes count as 1000 tuples. A constant or bound variable is assumed to keep one tuple of ten.

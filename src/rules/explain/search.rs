@@ -157,7 +157,7 @@ pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
 }
 
 /// Returns a fully bound atom, which is only a test; otherwise the first atom that shares a bound variable, to keep the
-/// textual order, which is easier to follow; otherwise the first atom.
+/// textual order, which is easier to follow; otherwise the first atom. Returns `None` if no atom is left.
 fn next_atom(rule: &Rule, left: &[usize], bound: &[bool]) -> Option<usize> {
     let mut best: Option<(usize, usize)> = None;
     for idx in left.iter().copied() {

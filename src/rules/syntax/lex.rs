@@ -235,7 +235,8 @@ impl Lexer<'_> {
         name
     }
 
-    /// Reads an IRI if the matching `>` comes before any white space; otherwise `<` is the operator.
+    /// Reads an IRI if the matching `>` comes before any white space; otherwise `<` is the operator. Returns
+    /// `None` if neither fits.
     fn iri_or_less(&mut self) -> Option<Token> {
         let inside = &self.rest()[1..];
         let length = inside.find(|c: char| c == '>' || c.is_whitespace() || "<\"{}|^`".contains(c));

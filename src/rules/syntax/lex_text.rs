@@ -65,7 +65,7 @@ impl Lexer<'_> {
         }
     }
 
-    /// Reads `f"…{code}…"`; `{{` and `}}` are escaped braces.
+    /// Reads `f"…{code}…"`; `{{` and `}}` are escaped braces. Returns `None` if an error was reported.
     pub(crate) fn format(&mut self) -> Option<Token> {
         let start = self.at;
         let triple = self.rest().starts_with("f\"\"\"");
@@ -103,7 +103,7 @@ impl Lexer<'_> {
         Some(Token::Format(pieces))
     }
 
-    /// Returns the tokens between `{` and its `}`.
+    /// Returns the tokens between `{` and its `}`, or `None` if an error was reported.
     fn format_code(&mut self) -> Option<Vec<Spanned>> {
         let start = self.at;
         self.at += 1;
