@@ -98,7 +98,7 @@ pub(crate) enum Literal {
 }
 
 impl Literal {
-    /// Returns the atom of a positive or negative literal, and `None` for other literals.
+    /// Returns the atom of a positive or negative literal. Returns `None` for other literals.
     pub(crate) fn atom(&self) -> Option<&Atom> {
         match self {
             Self::Positive(atom) | Self::Negative(atom) => Some(atom),
