@@ -50,6 +50,7 @@ mod replay;
 mod resume;
 mod robots;
 mod rules;
+mod rules_library;
 mod scenario;
 mod schema;
 mod search;

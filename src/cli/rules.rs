@@ -12,7 +12,7 @@ use crate::{history_dir, output};
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_history::RunFilter;
 use actcheck_ontology as ontology;
-use actcheck_ontology::{Action, Ontology, Property, RuleLanguage};
+use actcheck_ontology::{Action, Ontology, Property};
 use actcheck_report::{Proportion, Table};
 use actcheck_verdict::Counts;
 
@@ -86,10 +86,7 @@ fn for_programs(property: &Property, ontology: &Ontology, counts: Counts) -> Vec
 
 /// Name, label, language and file.
 fn described(property: &Property) -> [Value; 4] {
-    let language = match property.rule.language {
-        RuleLanguage::Datalog => "Datalog",
-        RuleLanguage::Sparql => "SPARQL",
-    };
+    let language = property.rule.language.word();
     let file = &*property.rule.source.name;
     [property.name.as_str(), property.label.as_str(), language, file].map(Value::from)
 }
