@@ -3,6 +3,7 @@
 //! Never: reads a file, steps the simulation, or decides anything.
 
 mod choices;
+mod hull;
 mod mesh;
 mod model;
 mod motion;
@@ -20,6 +21,7 @@ mod stream;
 mod trace;
 
 pub use choices::{Choice, ChoiceKind, Choices};
+pub use hull::convex_hull;
 pub use mesh::{Mesh, Top};
 pub use model::{Inertia, ObjectModel, Surface};
 pub use motion::{JointMoment, Motion, MotionRow};
