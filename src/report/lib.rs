@@ -34,6 +34,7 @@ mod shrunk_text;
 mod summary;
 mod table;
 mod weighted;
+mod xml;
 
 pub use answer::answer_table;
 pub use campaign_json::campaign_json;
