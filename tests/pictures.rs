@@ -1,4 +1,4 @@
-//! Pictures of real runs, with the built program: pixels that are there, lines that are well formed, endings that are not.
+//! Pictures of real runs, with the built program: PNG pixels, well-formed SVG, and refusal of other file extensions.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn draw(folder: &Path, run: &str, file: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_pick_is_drawn_as_pixels_and_as_lines() {
+fn a_pick_is_drawn_as_png_and_svg() {
     let project = project();
     let run = first_run(project.path(), "configs/pick.toml");
     let picture = Pixmap::decode_png(&draw(project.path(), &run, "pick.PNG")).unwrap();
@@ -28,7 +28,7 @@ fn a_pick_is_drawn_as_pixels_and_as_lines() {
     let count = |is: &dyn Fn([u8; 3]) -> bool| {
         picture.pixels().iter().filter(|pixel| is([pixel.red(), pixel.green(), pixel.blue()])).count()
     };
-    // Words; what was perceived; the way of the hand.
+    // Text, percepts, and the path of the hand.
     assert!(count(&|rgb| rgb == [0x1c, 0x24, 0x30]) > 1000);
     assert!(count(&|rgb| rgb == [0xa0, 0x2c, 0x9a]) > 1000);
     assert!(count(&|[red, green, blue]| red > 200 && green < 120 && blue < 60) > 1000);
@@ -40,7 +40,7 @@ fn a_pick_is_drawn_as_pixels_and_as_lines() {
         assert!(words.contains(&word), "{word}: {words:?}");
     }
     assert!(words.iter().any(|word| word.starts_with(&format!("{run} · Pick"))), "{words:?}");
-    // The same run, the same picture.
+    // The same run gives the same picture.
     assert_eq!(draw(project.path(), &run, "again.svg"), lines.as_bytes());
 }
 
@@ -66,7 +66,7 @@ fn a_world_is_drawn_with_its_rooms_places_and_walls() {
 }
 
 #[test]
-fn other_endings_are_refused_before_anything_is_done() {
+fn other_file_extensions_are_refused_before_any_work() {
     let folder = tempfile::tempdir().unwrap();
     for file in ["run.jpg", "run", "run.png.gz"] {
         let output = actcheck(folder.path(), &["show", "abcd-1", "--history", "h", "--picture", file]);

@@ -87,7 +87,7 @@ impl Tally {
         }
     }
 
-    /// Counts a run. Returns the budget that it has spent, if any.
+    /// Counts a run. Returns the budget that it has spent, or `None` if the campaign may continue.
     pub(super) fn count(&mut self, told: &Told) -> Option<Spent> {
         self.failures += u64::from(told.outcomes.iter().any(|one| one.outcome == Outcome::Failed));
         for one in &told.outcomes {
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_runs_count_and_not_failed_properties() {
+    fn failed_runs_are_counted_not_failed_properties() {
         use Outcome::{Broken, Failed, Passed};
         let mut tally = tally(Limits { max_failures: Some(2), ..Limits::default() });
         assert_eq!(tally.count(&told([Failed, Failed])), None);
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn the_widest_interval_decides_and_what_is_undecided_has_none() {
+    fn the_widest_interval_decides_and_undecided_properties_have_none() {
         use Outcome::{Failed, Inapplicable, Passed};
         let limits = Limits { until_width: Some(0.3), ..Limits::default() };
         // The interval of n passes out of n has the width z² / (n + z²): 0.3 from n = 9 on.
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_budget_without_a_number_of_runs_has_a_ceiling() {
+    fn a_budget_without_a_run_count_has_a_maximum() {
         let asked =
             |runs, until_width, time_secs| ceiling(&Overrides { runs, until_width, time_secs, ..Overrides::default() });
         assert_eq!(asked(None, None, None), None);

@@ -75,7 +75,7 @@ impl Env {
         let loaded = match config {
             Some(config) => config::load(config, &overrides),
             None => {
-                let path = config::beside(history.dir(), &record.config_path);
+                let path = config::resolve_path(history.dir(), &record.config_path);
                 let source = Source::new(path.display().to_string(), record.config_text.as_str());
                 config::load_text(source, path.parent().unwrap_or(Path::new("")), &overrides).map_err(|mut faults| {
                     let message = format!("this is the configuration of campaign {campaign} as stored in the history");

@@ -76,7 +76,7 @@ fn skill_seen_from(folder: &Path, env: &Env) -> Option<(Option<String>, String)>
 /// The configuration is not valid TOML.
 pub fn regressions_folder(source: &Source) -> Result<PathBuf, Diagnostics> {
     let own = Path::new(&*source.name).parent().unwrap_or(Path::new(""));
-    let (beside, above) = (own.join(REGRESSIONS), config::beside(own, &format!("../{REGRESSIONS}")));
+    let (beside, above) = (own.join(REGRESSIONS), config::resolve_path(own, &format!("../{REGRESSIONS}")));
     if beside.is_dir() {
         return Ok(beside);
     }

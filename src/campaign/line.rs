@@ -3,7 +3,7 @@
 use crate::Env;
 use crate::judging::judge_action;
 use actcheck_actions as actions;
-use actcheck_actions::{ActionCall, Cut, Interference, Outside, Saboteur};
+use actcheck_actions::{ActionCall, Cut, ExternalSkill, Interference, Saboteur};
 use actcheck_base::{Judgement, RunFacts};
 use actcheck_data::{ActionEnd, Choices, Quality, Scene, Trace};
 use actcheck_facts as facts;
@@ -115,7 +115,7 @@ fn run_line_with(
         let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
         Performance::new(programs, run, manner.clock.secs)
     });
-    let outside = program.as_mut().map(|program| program as &mut dyn Outside);
+    let outside = program.as_mut().map(|program| program as &mut dyn ExternalSkill);
     let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, outside };
     let (mut trace, quality) = perform((env, interference), test, &scene, &mut choices, disturb)?;
     trace.map = scene.map.clone();

@@ -74,7 +74,7 @@ fn finished_already(id: &str) -> Diagnostics {
 
 /// The path of a campaign's configuration.
 fn config_of(history: &History, record: &CampaignRecord) -> PathBuf {
-    config::beside(history.dir(), &record.config_path)
+    config::resolve_path(history.dir(), &record.config_path)
 }
 
 fn is_same_file(one: &Path, other: &Path) -> bool {

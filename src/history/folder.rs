@@ -9,7 +9,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::fault;
-use actcheck_base::{Diagnostics, write_whole};
+use actcheck_base::{Diagnostics, write_atomic};
 
 /// Format of the folder that this program writes, and the newest that it reads.
 pub(super) const FORMAT: u64 = 1;
@@ -41,7 +41,7 @@ impl Folder {
         }
         let folder = Self { dir: dir.to_path_buf(), _lock: lock(dir, File::try_lock)? };
         if !known {
-            write_whole(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
+            write_atomic(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
                 .map_err(|error| fault::io(dir, "writing its version", &error))?;
         }
         fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;

@@ -46,7 +46,7 @@ pub struct Recheck {
 impl Recheck {
     /// Whether it differs from the newest judgement in the history.
     pub fn is_news(&self) -> bool {
-        !self.before.as_ref().is_some_and(|before| before.judgement.says_the_same(&self.now))
+        !self.before.as_ref().is_some_and(|before| before.judgement.same_as(&self.now))
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{
     RunVitals, detail, fault, query, trace_file, vitals,
 };
 use crate::{lists, read_campaign};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, RunFacts, Source, nearest, write_whole};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, RunFacts, Source, nearest, write_atomic};
 use actcheck_data::{Choice, Trace};
 use actcheck_facts::extract;
 
@@ -144,7 +144,7 @@ impl History {
         let bytes = trace_file::encode(&record.choices, &record.trace)
             .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         let file = self.folder.trace(&record.id);
-        write_whole(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
+        write_atomic(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
         self.store()?.extend(write_run::quads(record)).map_err(|error| {
             // A trace without a run is harmless; if it can't be removed now, the next campaign removes it.
             let _ = std::fs::remove_file(&file);

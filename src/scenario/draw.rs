@@ -38,7 +38,7 @@ pub struct Discard {
 /// # Errors
 /// No free place was found for an object or the robot.
 pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
-    let mut hand = Hand {
+    let mut hand = SceneBuilder {
         space,
         choices,
         objects: Vec::new(),
@@ -100,7 +100,7 @@ pub(super) fn platform(id: String, model: Arc<ObjectModel>, pose: Pose) -> Scene
 }
 
 /// A scene under construction.
-pub(super) struct Hand<'a> {
+pub(super) struct SceneBuilder<'a> {
     pub(super) space: &'a Space,
     pub(super) choices: &'a mut Choices,
     pub(super) objects: Vec<SceneObject>,
@@ -115,7 +115,7 @@ pub(super) struct Hand<'a> {
     pub(super) front: Option<Location>,
 }
 
-impl<'a> Hand<'a> {
+impl<'a> SceneBuilder<'a> {
     /// Chooses values of designators that are names. Nominal: the first candidate.
     fn choose_names(&mut self) {
         for (designator, values) in &self.space.names {
@@ -232,7 +232,7 @@ impl<'a> Hand<'a> {
     fn set_others(&mut self, surface: &Surface) -> Result<(), Discard> {
         let counts = self.space.other_counts.beside_target;
         if !self.space.others.is_empty() && counts.1 > 0 {
-            let ids = self.strew("other", Role::Other, counts, surface)?;
+            let ids = self.place_others("other", Role::Other, counts, surface)?;
             self.designators.insert("surfaceObjects".to_owned(), ids);
         }
         Ok(())
@@ -250,14 +250,14 @@ impl<'a> Hand<'a> {
             return Ok(());
         }
         let platform = self.platform.replace(pose);
-        let strewn = self.strew("place_other", Role::PlaceOther, counts, &surface);
+        let strewn = self.place_others("place_other", Role::PlaceOther, counts, &surface);
         self.platform = platform;
         strewn.map(|_| ())
     }
 
     /// Places other objects anywhere on a surface and returns their ids. Nominal: the fewest, on a ring around the
     /// centre, the first at the far side.
-    fn strew(
+    fn place_others(
         &mut self,
         kind: &str,
         role: Role,
@@ -285,7 +285,7 @@ impl<'a> Hand<'a> {
         Ok(ids)
     }
 
-    /// Chooses one of the models. Nominal: the first.
+    /// Chooses one of the models. Nominal: the first. Returns `None` if there are no models.
     pub(super) fn choose(&mut self, name: &str, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
         if models.is_empty() {
             return None;

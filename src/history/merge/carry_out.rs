@@ -14,7 +14,7 @@ use crate::statements::{Statements, iri, time};
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::run_node;
 use crate::{History, fault};
-use actcheck_base::{Diagnostic, Diagnostics, write_whole};
+use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
 
 /// The result of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -116,7 +116,7 @@ impl Writer<'_> {
     fn run(&mut self, place: usize, run: &str, new: &str) -> Result<(), Diagnostics> {
         let doing = format!("writing run {new}");
         match std::fs::read(self.sources[place].trace_path(run)) {
-            Ok(bytes) => write_whole(&self.into.trace_path(new), &bytes)
+            Ok(bytes) => write_atomic(&self.into.trace_path(new), &bytes)
                 .map_err(|error| fault::io(self.into.dir(), &doing, &error))?,
             Err(_) => self.merged.without_trace.push(new.to_owned()),
         }

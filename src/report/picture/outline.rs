@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_reach_as_far_as_the_shape() {
+    fn corners_span_the_extent_of_the_shape() {
         let reach = |shape: &Shape| corners(shape).iter().map(|point| point.coords.abs().max()).fold(0.0, f64::max);
         let expected = [
             (Shape::Box { size: [0.2, 0.4, 0.6] }, 0.3),
