@@ -1,8 +1,7 @@
 //! Wrong configurations, ontologies and scene spaces, each with all its diagnostics.
 //!
 //! A case is a file below `tests/diagnostics/`; its diagnostics are beside it, in a file of the same name with
-//! `.expected` appended. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write missing files, and review
-//! them.
+//! `.expected` appended. A new case needs no Rust: run with `UPDATE_EXPECT=1` to write the files, and review them.
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +9,8 @@ use actcheck::base::{Diagnostics, Files};
 use actcheck::config::{self, Overrides};
 use actcheck::ontology;
 use actcheck::scenario::Space;
+
+use crate::support::expected::assert_diagnostics;
 
 fn cases(kind: &str) -> Vec<PathBuf> {
     let folder = Path::new("tests/diagnostics").join(kind);
@@ -20,26 +21,11 @@ fn cases(kind: &str) -> Vec<PathBuf> {
 }
 
 fn check(kind: &str, least: usize, load: impl Fn(&Path) -> Result<(), Diagnostics>) {
-    let bless = std::env::var_os("ACTCHECK_BLESS").is_some();
-    let cases = cases(kind);
-    assert!(cases.len() >= least, "only {} cases of {kind}", cases.len());
-    let mut wrong = Vec::new();
-    for case in cases {
-        let said = load(&case).err().map_or_else(String::new, |found| found.to_string());
-        let expected_path = case.with_added_extension("expected");
-        if bless {
-            std::fs::write(&expected_path, &said).unwrap();
-        }
-        let expected = std::fs::read_to_string(&expected_path).unwrap_or_default();
-        if said.is_empty() || said != expected {
-            wrong.push(format!("== {}\n-- expected\n{expected}-- said\n{said}", case.display()));
-        }
-        for line in said.lines().filter(|line| !line.starts_with("  help: ")) {
-            assert!(line.contains(':') && !line.ends_with('.'), "{line}");
-        }
-        assert_eq!(said.matches("  help: ").count(), said.lines().count() / 2, "each fault has its help:\n{said}");
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let report = |case: PathBuf| {
+        let diagnostics = load(&case).err().map_or_else(String::new, |found| found.to_string());
+        (case.with_added_extension("expected"), diagnostics)
+    };
+    assert_diagnostics(least, cases(kind).into_iter().map(report));
 }
 
 #[test]

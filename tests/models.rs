@@ -1,7 +1,7 @@
 //! External models: a folder in Gazebo's layout works unchanged, and faults of a model are reported with their place.
 //!
 //! A wrong model is a folder below `tests/diagnostics/models/` that holds the model `thing`, with its diagnostics in
-//! `expected`. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write missing files, and review them.
+//! `expected`. A new case needs no Rust: run with `UPDATE_EXPECT=1` to write the files, and review them.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use actcheck::config::{self, Campaign, Overrides};
 use actcheck::data::Shape;
 use actcheck::rules::Budget;
 
-use crate::support::wrong::all_are_reported;
+use crate::support::expected::assert_diagnostics;
 use crate::support::{actcheck, copy, root, stderr, stdout};
 
 const WRONG: &str = "tests/diagnostics/models";
@@ -35,10 +35,13 @@ const USED: &str = "[objectSurface]\nobject_surfaces = [\"cafe_table\"]\n[pickOb
 
 #[test]
 fn every_wrong_model_is_reported_with_its_place() {
-    all_are_reported(WRONG, 40, |name| {
-        campaign(Path::new(WRONG), &format!("model_dir = \"{name}\"\n[pickObject]\nmodel_list = [\"thing\"]\n"))
-            .map_or_else(|found| found.to_string(), |_| String::new())
-    });
+    let report = |case: PathBuf| {
+        let name = case.file_name().unwrap().display();
+        let text = format!("model_dir = \"{name}\"\n[pickObject]\nmodel_list = [\"thing\"]\n");
+        let diagnostics = campaign(Path::new(WRONG), &text).err().map_or_else(String::new, |found| found.to_string());
+        (case.join("expected"), diagnostics)
+    };
+    assert_diagnostics(40, Files::Disk.folders(Path::new(WRONG)).into_iter().map(report));
 }
 
 /// Sizes, masses and centres as computed from the files by hand.

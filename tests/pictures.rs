@@ -1,59 +1,10 @@
 //! Pictures of real runs, with the built program: PNG pixels, well-formed SVG, and refusal of other file extensions.
 
-use std::io::Read;
 use std::path::Path;
 
+use tiny_skia::Pixmap;
+
 use crate::support::{actcheck, edit, project, stderr, stdout};
-
-/// A decoded PNG. Shape of the pixels: height × width × red, green, blue.
-struct Pixels {
-    width: usize,
-    height: usize,
-    pixels: Vec<u8>,
-}
-
-/// Decodes our own PNGs: eight bits a channel, one filter, one chunk. Verifies every checksum.
-fn decode(file: &[u8]) -> Pixels {
-    let mut rest = file.strip_prefix(b"\x89PNG\r\n\x1a\n").expect("it begins as PNG does");
-    let (mut sides, mut data) = ([0; 2], Vec::new());
-    while !rest.is_empty() {
-        let length = u32::from_be_bytes(rest[..4].try_into().unwrap()) as usize;
-        let (body, sum) = (&rest[4..8 + length], &rest[8 + length..12 + length]);
-        let mut crc = flate2::Crc::new();
-        crc.update(body);
-        assert_eq!(crc.sum().to_be_bytes(), sum);
-        match &body[..4] {
-            b"IHDR" => {
-                sides = [4, 8].map(|at| u32::from_be_bytes(body[at..at + 4].try_into().unwrap()) as usize);
-                assert_eq!(body[12..], [8, 2, 0, 0, 0]);
-            }
-            b"IDAT" => data = body[4..].to_vec(),
-            kind => assert_eq!(kind, b"IEND"),
-        }
-        rest = &rest[12 + length..];
-    }
-    let [width, height] = sides;
-    let mut rows = Vec::new();
-    flate2::read::ZlibDecoder::new(data.as_slice()).read_to_end(&mut rows).unwrap();
-    let mut pixels = Vec::new();
-    for row in rows.chunks(width * 3 + 1) {
-        assert_eq!(row[0], 1);
-        let begin = pixels.len();
-        for (idx, byte) in row[1..].iter().enumerate() {
-            let left = if idx < 3 { 0 } else { pixels[begin + idx - 3] };
-            pixels.push(byte.wrapping_add(left));
-        }
-    }
-    assert_eq!(pixels.len(), width * height * 3);
-    Pixels { width, height, pixels }
-}
-
-impl Pixels {
-    /// Pixels of exactly a colour.
-    fn count(&self, rgb: [u8; 3]) -> usize {
-        self.pixels.chunks(3).filter(|pixel| *pixel == rgb).count()
-    }
-}
 
 /// The id of the first run of a new campaign.
 fn first_run(folder: &Path, config: &str) -> String {
@@ -72,12 +23,15 @@ fn draw(folder: &Path, run: &str, file: &str) -> Vec<u8> {
 fn a_pick_is_drawn_as_png_and_svg() {
     let project = project();
     let run = first_run(project.path(), "configs/pick.toml");
-    let picture = decode(&draw(project.path(), &run, "pick.PNG"));
-    assert!(picture.width == 2400 && picture.height > 1200, "{} × {}", picture.width, picture.height);
+    let picture = Pixmap::decode_png(&draw(project.path(), &run, "pick.PNG")).unwrap();
+    assert!(picture.width() == 2400 && picture.height() > 1200, "{} × {}", picture.width(), picture.height());
+    let count = |is: &dyn Fn([u8; 3]) -> bool| {
+        picture.pixels().iter().filter(|pixel| is([pixel.red(), pixel.green(), pixel.blue()])).count()
+    };
     // Text, percepts, and the path of the hand.
-    assert!(picture.count([0x1c, 0x24, 0x30]) > 1000);
-    assert!(picture.count([0xa0, 0x2c, 0x9a]) > 1000);
-    assert!(picture.pixels.chunks(3).filter(|p| p[0] > 200 && p[1] < 120 && p[2] < 60).count() > 1000);
+    assert!(count(&|rgb| rgb == [0x1c, 0x24, 0x30]) > 1000);
+    assert!(count(&|rgb| rgb == [0xa0, 0x2c, 0x9a]) > 1000);
+    assert!(count(&|[red, green, blue]| red > 200 && green < 120 && blue < 60) > 1000);
 
     let lines = String::from_utf8(draw(project.path(), &run, "pick.svg")).unwrap();
     let tree = roxmltree::Document::parse(&lines).unwrap();

@@ -1,17 +1,17 @@
 //! Robots: the shipped ones perform their tasks, and faults of a robot are reported with their place.
 //!
 //! A wrong robot is a folder below `tests/diagnostics/robots/` that holds `robot.toml` and the files it names, with
-//! its diagnostics in `expected`. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write missing files, and
+//! its diagnostics in `expected`. A new case needs no Rust: run with `UPDATE_EXPECT=1` to write the files, and
 //! review them. All are variants of `tests/models/crane` with a fault.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use actcheck::base::Source;
+use actcheck::base::{Files, Source};
 use actcheck::config::{self, Overrides};
 use serde_json::Value;
 
-use crate::support::wrong::all_are_reported;
+use crate::support::expected::assert_diagnostics;
 use crate::support::{actcheck, copy, project, root, stderr, stdout};
 
 const WRONG: &str = "tests/diagnostics/robots";
@@ -26,7 +26,11 @@ fn said_of(folder: &Path, profile: &str) -> String {
 #[test]
 fn every_wrong_robot_is_reported_with_its_place() {
     assert_eq!(said_of(Path::new("tests/models"), "crane/robot.toml"), "");
-    all_are_reported(WRONG, 30, |name| said_of(Path::new(WRONG), &format!("{name}/robot.toml")));
+    let report = |case: PathBuf| {
+        let profile = format!("{}/robot.toml", case.file_name().unwrap().display());
+        (case.join("expected"), said_of(Path::new(WRONG), &profile))
+    };
+    assert_diagnostics(30, Files::Disk.folders(Path::new(WRONG)).into_iter().map(report));
     let said = said_of(Path::new(WRONG), "fixed_amr");
     assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
 }

@@ -12,6 +12,8 @@ use actcheck::base::{ActionFacts, Files, Findings, RuleFault, RunFacts, Source, 
 use actcheck::ontology::{self, Ontology, Property, RuleFile};
 use actcheck::rules::{Budget, RuleBook, explain::Support, owl_closure, standalone::Program};
 
+use crate::support::expected::assert_expected;
+
 pub const TESTED: &str = "http://actions#Tested";
 
 fn root() -> PathBuf {
@@ -157,39 +159,29 @@ fn outcome(case: &Path) -> String {
     }
 }
 
-/// Compares the text with a file of the case, or rewrites the file. Returns the difference, or `None`.
-fn differs(file: &Path, got: &str) -> Option<String> {
-    if std::env::var_os("UPDATE_EXPECT").is_some() {
-        std::fs::write(file, got).unwrap();
-    }
-    let expected = std::fs::read_to_string(file).unwrap_or_default();
-    (got != expected).then(|| format!("== {}\n-- expected\n{expected}-- got\n{got}", file.display()))
-}
-
 pub fn cases() -> Vec<PathBuf> {
     list(&root()).into_iter().filter(|path| path.is_dir()).collect()
 }
 
 #[test]
 fn every_case_gives_its_expected_findings() {
-    let wrong: Vec<String> =
-        cases().iter().filter_map(|case| differs(&case.join("expected"), &outcome(case))).collect();
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert_expected(cases().iter().map(|case| (case.join("expected"), outcome(case))));
 }
 
 /// Each shipped property, and each case that has a file `explained`.
 #[test]
 fn every_explanation_is_as_expected() {
-    let mut wrong = Vec::new();
-    for case in cases().iter().filter(|case| case.join("shipped").is_file() || case.join("explained").is_file()) {
+    let mut cases = cases();
+    cases.retain(|case| case.join("shipped").is_file() || case.join("explained").is_file());
+    assert_expected(cases.iter().map(|case| {
         let book = RuleBook::prepare(&ontology_of(case)).unwrap();
         let facts = facts_of(case);
         let explanation = book.explain(&facts.action(0).unwrap(), TESTED, &Budget::default()).unwrap();
-        wrong.extend(differs(&case.join("explained"), &explanation.to_text()));
+        let text = explanation.to_text();
         assert!(explanation.to_dot().ends_with("}\n"));
         assert_eq!(explanation.to_json()["holds"], explanation.findings.unwrap().holds);
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+        (case.join("explained"), text)
+    }));
 }
 
 /// Statements of one line, parsed as Turtle; a final statement with a literal as subject is parsed separately.

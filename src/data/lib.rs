@@ -5,6 +5,7 @@
 mod choice_name;
 mod choice_parts;
 mod choices;
+mod hull;
 mod mesh;
 mod model;
 mod motion;
@@ -24,6 +25,7 @@ mod trace;
 pub use choice_name::{ChoiceGroup, ChoiceName, OBSTACLE_LIST};
 pub use choice_parts::{ObjectAxis, PlacedObject, PlanarAxis, SightingAxis, StartAxis, WheelAxis};
 pub use choices::{Choice, ChoiceKind, ChoiceValue, Choices};
+pub use hull::convex_hull;
 pub use mesh::{Mesh, Top};
 pub use model::{Inertia, ObjectModel, Surface};
 pub use motion::{JointMoment, Motion, MotionRow};

@@ -13,6 +13,7 @@ mod recording;
 mod summary;
 mod table;
 mod text;
+mod xml;
 
 pub use formats::{
     Attachment, EarlReport, JunitReport, MarkdownReport, RESULTS_COMMON_FILES, Repetitions, allure_common,

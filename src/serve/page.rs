@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use quick_xml::escape::escape;
+
 use actcheck_base::names;
 
 /// The stylesheet.
@@ -39,7 +41,7 @@ pub(super) fn page(history: &str, examples: &[ExampleQuery]) -> String {
     let prefixes: String = names::PREFIXES
         .iter()
         .map(|(prefix, namespace)| {
-            let (prefix, namespace) = (escape(prefix), escape(namespace));
+            let (prefix, namespace) = (escape(*prefix), escape(*namespace));
             format!(
                 "<li data-prefix=\"{prefix}\" data-namespace=\"{namespace}\"><code>{prefix}: {namespace}</code></li>"
             )
@@ -60,11 +62,6 @@ pub(super) fn page(history: &str, examples: &[ExampleQuery]) -> String {
          <div id=\"said\" role=\"status\"></div><div class=\"row\" id=\"downloads\"></div><div class=\"wide\" id=\"answer\"></div>\
          <details><summary>Prefixes</summary><ul id=\"prefixes\">{prefixes}</ul></details></body></html>\n"
     )
-}
-
-/// Escapes text for HTML elements and attributes.
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
 }
 
 #[cfg(test)]

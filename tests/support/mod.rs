@@ -1,13 +1,13 @@
 //! Shared helpers: the built program, and temporary folders.
 
 pub mod chromium;
+pub mod expected;
 pub mod foreign;
 pub mod line;
 pub mod look;
 pub mod made_up;
 pub mod paged;
 pub mod planted;
-pub mod wrong;
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt as _;

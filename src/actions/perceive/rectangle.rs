@@ -2,6 +2,8 @@
 
 use nalgebra::{Point2, Vector2};
 
+use actcheck_data::convex_hull;
+
 /// A rotated rectangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rectangle {
@@ -29,7 +31,8 @@ impl Rectangle {
 /// The rectangle of the smallest area: one of its sides lies along a side of the convex hull. Returns `None` without
 /// points.
 pub fn smallest_around(points: &[Point2<f64>]) -> Option<Rectangle> {
-    let hull = hull(points);
+    let hull: Vec<Point2<f64>> =
+        convex_hull(points.iter().map(|point| [point.x, point.y])).into_iter().map(Point2::from).collect();
     let ends = hull.iter().zip(hull.iter().cycle().skip(1));
     let headings = ends.map(|(a, b)| libm::atan2(b.y - a.y, b.x - a.x));
     let rectangles = headings.map(|heading| around(&hull, quarter(heading)));
@@ -56,33 +59,6 @@ pub fn quarter(heading: f64) -> f64 {
 fn turned(v: Vector2<f64>, by: f64) -> Vector2<f64> {
     let (sin, cos) = (libm::sin(by), libm::cos(by));
     Vector2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y)
-}
-
-/// Corners of the convex hull, counterclockwise. Source: Andrew's monotone chain (1979).
-fn hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
-    let mut sorted = points.to_vec();
-    sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    sorted.dedup();
-    let half = |points: &mut dyn Iterator<Item = &Point2<f64>>| {
-        let mut chain: Vec<Point2<f64>> = Vec::new();
-        for point in points {
-            while let [.., a, b] = chain.as_slice()
-                && (b - a).perp(&(point - b)) <= 0.0
-            {
-                chain.pop();
-            }
-            chain.push(*point);
-        }
-        chain
-    };
-    let (mut lower, mut upper) = (half(&mut sorted.iter()), half(&mut sorted.iter().rev()));
-    if sorted.len() > 1 {
-        // Each chain ends where the other begins.
-        lower.pop();
-        upper.pop();
-        lower.append(&mut upper);
-    }
-    lower
 }
 
 #[cfg(test)]

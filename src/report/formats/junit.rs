@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::xml::{attribute, text};
 use actcheck_base::{Judgement, Outcome, names};
 use actcheck_history::{ActionDetail, RunDetail};
 use actcheck_verdict::Counts;
@@ -139,37 +140,4 @@ fn body(run: &RunDetail, action: &ActionDetail, judgement: &Judgement) -> String
     }
     let _ = write!(out, "more: actcheck show {}", run.row.run);
     out
-}
-
-/// Escapes the text of an element. XML 1.0 can't represent most control characters; they become U+FFFD.
-fn text(raw: &str) -> String {
-    raw.chars().fold(String::with_capacity(raw.len()), |mut out, letter| {
-        match letter {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '\t' | '\n' => out.push(letter),
-            '\r' => out.push_str("&#13;"),
-            '\u{0}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
-            _ => out.push(letter),
-        }
-        out
-    })
-}
-
-/// Escapes an attribute's value. Line ends are written as character references, because parsers normalise them
-/// otherwise.
-fn attribute(raw: &str) -> String {
-    text(raw).replace('"', "&quot;").replace('\t', "&#9;").replace('\n', "&#10;")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn texts_of_models_are_escaped() {
-        assert_eq!(text("a<b>&\u{1}\r\n"), "a&lt;b&gt;&amp;\u{fffd}&#13;\n");
-        assert_eq!(attribute("\"'\n]]>"), "&quot;'&#10;]]&gt;");
-    }
 }

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use quick_xml::escape::partial_escape;
+
 use actcheck_base::{Judgement, Outcome, names};
 use actcheck_history::{CampaignRow, RunDetail, RunStatus, SkillRecord};
 use actcheck_verdict::{Counts, wilson};
@@ -165,11 +167,8 @@ fn word<'a>(count: u64, one: &'a str, several: &'a str) -> &'a str {
 /// Escapes text as a single line without markup, also inside tables.
 pub fn plain(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    for letter in text.chars() {
+    for letter in partial_escape(text).chars() {
         match letter {
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '&' => out.push_str("&amp;"),
             // Otherwise, the forge would notify the user named after it.
             '@' => out.push_str("&#64;"),
             '\\' | '`' | '*' | '_' | '[' | ']' | '|' | '#' | '~' | '!' => {

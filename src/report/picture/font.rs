@@ -4,8 +4,8 @@
 
 use std::sync::OnceLock;
 
+use tiny_skia::{Path, PathBuilder, Point};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
-use zeno::{Command, PathBuilder, Vector};
 
 const REGULAR: &[u8] = include_bytes!("font/DejaVuSans.ttf");
 const BOLD: &[u8] = include_bytes!("font/DejaVuSans-Bold.ttf");
@@ -36,18 +36,18 @@ pub(super) fn width(text: &str, size: f64, bold: bool) -> f64 {
     face(bold).map_or(0.0, |face| f64::from(glyphs(face, text).1) * size / f64::from(face.units_per_em()))
 }
 
-/// Outline of a text whose baseline starts at a point. Unit: pixels, y down.
-pub(super) fn outline(text: &str, at: [f64; 2], size: f64, bold: bool) -> Vec<Command> {
-    let Some(face) = face(bold) else { return Vec::new() };
+/// Outline of a text whose baseline starts at a point. Returns `None` if there is nothing to draw. Unit: pixels, y down.
+pub(super) fn outline(text: &str, at: [f64; 2], size: f64, bold: bool) -> Option<Path> {
+    let face = face(bold)?;
     #[expect(clippy::cast_possible_truncation, reason = "pixels")]
     let (size, [x, y]) = (size as f32, at.map(|value| value as f32));
     let scale = size / f32::from(face.units_per_em());
-    let mut pen = Pen { x, y, scale, path: Vec::new() };
+    let mut pen = Pen { x, y, scale, path: PathBuilder::new() };
     for (glyph, along) in glyphs(face, text).0 {
         pen.x = x + along * scale;
         face.outline_glyph(glyph, &mut pen);
     }
-    pen.path
+    pen.path.finish()
 }
 
 /// Splits a text into lines of at most the width `most`, between words if possible.
@@ -84,34 +84,34 @@ struct Pen {
     x: f32,
     y: f32,
     scale: f32,
-    path: Vec<Command>,
+    path: PathBuilder,
 }
 
 impl Pen {
-    fn at(&self, x: f32, y: f32) -> Vector {
-        Vector::new(self.x + x * self.scale, self.y - y * self.scale)
+    fn at(&self, x: f32, y: f32) -> Point {
+        Point::from_xy(self.x + x * self.scale, self.y - y * self.scale)
     }
 }
 
 impl OutlineBuilder for Pen {
     fn move_to(&mut self, x: f32, y: f32) {
         let to = self.at(x, y);
-        self.path.move_to(to);
+        self.path.move_to(to.x, to.y);
     }
 
     fn line_to(&mut self, x: f32, y: f32) {
         let to = self.at(x, y);
-        self.path.line_to(to);
+        self.path.line_to(to.x, to.y);
     }
 
     fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
         let (control, to) = (self.at(x1, y1), self.at(x, y));
-        self.path.quad_to(control, to);
+        self.path.quad_to(control.x, control.y, to.x, to.y);
     }
 
     fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
         let (first, second, to) = (self.at(x1, y1), self.at(x2, y2), self.at(x, y));
-        self.path.curve_to(first, second, to);
+        self.path.cubic_to(first.x, first.y, second.x, second.y, to.x, to.y);
     }
 
     fn close(&mut self) {
@@ -129,7 +129,7 @@ mod tests {
             assert!(face(bold).is_some());
             // The widest letter, relative to the size: 0.97 regular and 1.04 bold.
             assert!((0.9..1.1).contains(&(width("mm", 12.0, bold) / 24.0)));
-            assert!(outline("Ä→✗", [0.0, 0.0], 12.0, bold).len() > 20);
+            assert!(outline("Ä→✗", [0.0, 0.0], 12.0, bold).is_some_and(|path| path.len() > 20));
         }
         assert_eq!(width("\u{4e00}", 12.0, false), width("\u{fffd}", 12.0, false));
     }

@@ -24,7 +24,5 @@ mod window;
 
 pub use drawing::Drawing;
 pub use header::Caption;
-#[cfg(feature = "rerun")]
-pub(super) use outline::hull as flat_hull;
 pub use patterns::patterns_picture;
 pub use run::run_picture;

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Isometry3, Point3};
 
 use crate::picture::window::Window;
-use actcheck_data::{Part, Shape};
+use actcheck_data::{Part, Shape, convex_hull};
 
 /// Number of corners that approximate a circle.
 const AROUND: u32 = 28;
@@ -14,7 +14,7 @@ const AROUND: u32 = 28;
 pub(super) fn silhouette(parts: &[Part], pose: &Isometry3<f64>, window: &Window) -> Vec<Vec<[f64; 2]>> {
     let seen = parts.iter().map(|part| {
         let placed = pose * part.pose.to_isometry();
-        hull(corners(&part.shape).iter().map(|corner| window.pixel((placed * corner).coords.into())).collect())
+        convex_hull(corners(&part.shape).iter().map(|corner| window.pixel((placed * corner).coords.into())))
     });
     seen.filter(|polygon| polygon.len() > 2).collect()
 }
@@ -57,47 +57,9 @@ fn rings(circles: impl IntoIterator<Item = (f64, f64)>) -> Vec<Point3<f64>> {
     circles.into_iter().flat_map(ring).collect()
 }
 
-/// Convex hull of points in a plane, counter-clockwise if y is to the left of x (Andrew's monotone chain algorithm).
-pub(crate) fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    points.retain(|point| point.iter().all(|value| value.is_finite()));
-    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    points.dedup();
-    if points.len() < 3 {
-        return points;
-    }
-    let mut chain = half(points.iter().copied());
-    let upper = half(points.iter().rev().copied());
-    chain.pop();
-    chain.extend(upper);
-    chain.pop();
-    chain
-}
-
-/// One chain: the points from one end to the other that all turn in the same direction.
-fn half(points: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
-    let mut chain: Vec<[f64; 2]> = Vec::new();
-    for point in points {
-        while let [.., before, last] = chain[..]
-            && (last[0] - before[0]) * (point[1] - before[1]) <= (last[1] - before[1]) * (point[0] - before[0])
-        {
-            chain.pop();
-        }
-        chain.push(point);
-    }
-    chain
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_hull_omits_points_inside_and_on_edges() {
-        let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
-        let inside = [[1.0, 1.0], [1.0, 0.0], [0.5, 1.5], [2.0, 2.0]];
-        assert_eq!(hull(square.into_iter().chain(inside).collect()), square);
-        assert_eq!(hull(vec![[f64::NAN, 0.0], [1.0, 1.0]]), [[1.0, 1.0]]);
-    }
 
     #[test]
     fn corners_span_the_extent_of_the_shape() {

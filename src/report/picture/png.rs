@@ -1,65 +1,62 @@
 //! Rasterises a drawing and encodes it as PNG.
 
-use std::io::Write as _;
-
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
-use zeno::{Command, Fill, Join, Mask, PathBuilder, Stroke, Style as Brush};
+use tiny_skia::{FillRule, LineJoin, Mask, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform};
 
 use crate::picture::drawing::{Drawing, Line, Mark, Paint, Rect};
 use crate::picture::font;
 
 /// Pixels of the file per pixel of the drawing, so that small text stays sharp when zoomed in.
-const DENSITY: u8 = 2;
+const DENSITY: f64 = 2.0;
 
 impl Drawing {
     /// Encodes the drawing as a PNG file, with twice its width and height in pixels.
     ///
     /// # Errors
-    /// The compressor fails; it writes to memory, so it can only run out of memory.
+    /// The drawing is too large for memory.
     pub fn to_png(&self) -> std::io::Result<Vec<u8>> {
-        let mut canvas = Canvas::white(self.width, self.height);
+        let mut canvas = Canvas::white(self.width, self.height).ok_or(std::io::ErrorKind::OutOfMemory)?;
         for (clip, mark) in &self.marks {
+            canvas.clip(*clip);
             match mark {
                 Mark::Shape { lines, closed, style } => {
-                    let path = path_of(lines, *closed);
+                    let Some(path) = path_of(lines, *closed) else { continue };
                     if let Some(paint) = style.fill {
-                        canvas.draw(&path, Fill::NonZero.into(), paint, clip.as_ref());
+                        canvas.fill(&path, paint);
                     }
                     if let Some(line) = style.line {
-                        canvas.stroke(&path, &line, clip.as_ref());
+                        canvas.stroke(&path, &line);
                     }
                 }
                 Mark::Words(words) => {
-                    let at = words.at.map(|value| value * f64::from(DENSITY));
-                    let path = font::outline(&words.text, at, words.size * f64::from(DENSITY), words.bold);
+                    let Some(path) = font::outline(&words.text, words.at, words.size, words.bold) else { continue };
                     if words.rim {
-                        canvas.stroke(&path, &Line::new(Paint::solid(0xff_ffff), 3.0), clip.as_ref());
+                        canvas.stroke(&path, &Line::new(Paint::solid(0xff_ffff), 3.0));
                     }
-                    canvas.draw(&path, Fill::NonZero.into(), words.paint, clip.as_ref());
+                    canvas.fill(&path, words.paint);
                 }
             }
         }
-        canvas.to_png()
+        Ok(canvas.pixels.encode_png()?)
     }
 }
 
-fn path_of(lines: &[Vec<[f64; 2]>], closed: bool) -> Vec<Command> {
-    let mut path = Vec::new();
+/// Returns `None` if there is nothing to draw.
+fn path_of(lines: &[Vec<[f64; 2]>], closed: bool) -> Option<Path> {
+    let mut path = PathBuilder::new();
     for line in lines {
         for (idx, point) in line.iter().enumerate() {
-            let to = point.map(|value| single(value * f64::from(DENSITY)));
+            let [x, y] = point.map(single);
             if idx == 0 {
-                path.move_to(to);
+                path.move_to(x, y);
             } else {
-                path.line_to(to);
+                path.line_to(x, y);
             }
         }
         if closed {
             path.close();
         }
     }
-    path
+    path.finish()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "pixels")]
@@ -67,109 +64,55 @@ fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// Pixels, row by row from the upper left. Shape: height × width × red, green, blue.
+fn scale() -> Transform {
+    Transform::from_scale(single(DENSITY), single(DENSITY))
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 255")]
+fn brush(Paint { rgb, opacity }: Paint) -> tiny_skia::Paint<'static> {
+    let [_, red, green, blue] = rgb.to_be_bytes();
+    let mut brush = tiny_skia::Paint::default();
+    brush.set_color_rgba8(red, green, blue, (opacity * 255.0).round() as u8);
+    brush
+}
+
+/// The pixels of a picture, with the clipping rectangle of the current mark.
 struct Canvas {
-    width: usize,
-    height: usize,
-    pixels: Vec<u8>,
+    pixels: Pixmap,
+    clip: Option<(Rect, Mask)>,
 }
 
 impl Canvas {
-    fn white(width: f64, height: f64) -> Self {
+    fn white(width: f64, height: f64) -> Option<Self> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few thousand pixels")]
-        let [width, height] = [width, height].map(|size| (size * f64::from(DENSITY)).ceil().max(1.0) as usize);
-        Self { width, height, pixels: vec![0xff; width * height * 3] }
+        let [width, height] = [width, height].map(|size| (size * DENSITY).ceil().max(1.0) as u32);
+        let mut pixels = Pixmap::new(width, height)?;
+        pixels.fill(tiny_skia::Color::WHITE);
+        Some(Self { pixels, clip: None })
     }
 
-    fn stroke(&mut self, path: &[Command], line: &Line, clip: Option<&Rect>) {
-        let dashes = line.dash.unwrap_or_default().map(|length| single(length * f64::from(DENSITY)));
-        let mut stroke = Stroke::new(single(line.width * f64::from(DENSITY)));
-        stroke.join(Join::Round);
-        if line.dash.is_some() {
-            stroke.dash(&dashes, 0.0);
-        }
-        self.draw(path, stroke.into(), line.paint, clip);
-    }
-
-    /// Fills or strokes a path.
-    fn draw(&mut self, path: &[Command], brush: Brush<'_>, paint: Paint, clip: Option<&Rect>) {
-        let (cover, placed) = Mask::new(path).style(brush).render();
-        let (columns, rows) = self.seen(clip);
-        let (width, height) = (placed.width as usize, placed.height as usize);
-        for row in 0..height {
-            let Some(y) = usize::try_from(placed.top + row as i32).ok().filter(|y| rows.contains(y)) else { continue };
-            for column in 0..width {
-                let Some(x) = usize::try_from(placed.left + column as i32).ok().filter(|x| columns.contains(x)) else {
-                    continue;
-                };
-                let share = f64::from(cover[row * width + column]) / 255.0 * paint.opacity;
-                if share > 0.0 {
-                    self.mix([x, y], paint.rgb, share);
-                }
-            }
+    /// Limits later marks to a rectangle. Its edges are rounded to pixels.
+    fn clip(&mut self, within: Option<Rect>) {
+        if self.clip.as_ref().map(|(rect, _)| *rect) != within {
+            self.clip = within.and_then(|rect| Some((rect, self.mask(&rect)?)));
         }
     }
 
-    /// Columns and rows inside a clipping rectangle.
-    fn seen(&self, clip: Option<&Rect>) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
-        let whole = Rect { left: 0.0, top: 0.0, width: f64::INFINITY, height: f64::INFINITY };
-        let Rect { left, top, width, height } = *clip.unwrap_or(&whole);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the canvas")]
-        let range = |from: f64, length: f64, most: usize| {
-            let pixel = |at: f64| (at * f64::from(DENSITY)).round().clamp(0.0, most as f64) as usize;
-            pixel(from)..pixel(from + length)
-        };
-        (range(left, width, self.width), range(top, height, self.height))
+    fn mask(&self, rect: &Rect) -> Option<Mask> {
+        let mut mask = Mask::new(self.pixels.width(), self.pixels.height())?;
+        mask.fill_path(&path_of(&[rect.corners()], true)?, FillRule::Winding, false, scale());
+        Some(mask)
     }
 
-    fn mix(&mut self, [x, y]: [usize; 2], rgb: u32, share: f64) {
-        let at = (y * self.width + x) * 3;
-        for (idx, channel) in self.pixels[at..at + 3].iter_mut().enumerate() {
-            let [_, colour @ ..] = rgb.to_be_bytes();
-            let mixed = f64::from(*channel) * (1.0 - share) + f64::from(colour[idx]) * share;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two bytes")]
-            let mixed = mixed.round() as u8;
-            *channel = mixed;
-        }
+    fn fill(&mut self, path: &Path, paint: Paint) {
+        let mask = self.clip.as_ref().map(|(_, mask)| mask);
+        self.pixels.fill_path(path, &brush(paint), FillRule::Winding, scale(), mask);
     }
 
-    /// Encodes the file: a header, the compressed pixels and an end chunk (PNG, third edition, §5 and §11.2).
-    fn to_png(&self) -> std::io::Result<Vec<u8>> {
-        let mut rows = Vec::with_capacity(self.height * (self.width * 3 + 1));
-        for row in self.pixels.chunks(self.width * 3) {
-            rows.extend(filtered(row));
-        }
-        let mut compressor = ZlibEncoder::new(Vec::new(), Compression::default());
-        compressor.write_all(&rows)?;
-        let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX).to_be_bytes();
-        // Eight bits per channel, RGB, no interlacing.
-        let header = [side(self.width).as_slice(), &side(self.height), &[8, 2, 0, 0, 0]].concat();
-        let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
-        for (kind, data) in [(b"IHDR", header), (b"IDAT", compressor.finish()?), (b"IEND", Vec::new())] {
-            chunk(&mut file, kind, &data);
-        }
-        Ok(file)
+    fn stroke(&mut self, path: &Path, line: &Line) {
+        let dash = line.dash.and_then(|lengths| StrokeDash::new(lengths.map(single).to_vec(), 0.0));
+        let stroke = Stroke { width: single(line.width), line_join: LineJoin::Round, dash, ..Stroke::default() };
+        let mask = self.clip.as_ref().map(|(_, mask)| mask);
+        self.pixels.stroke_path(path, &brush(line.paint), &stroke, scale(), mask);
     }
-}
-
-/// Filters a row with the `Sub` filter: the filter type, then the difference of each byte from the pixel to its left.
-fn filtered(row: &[u8]) -> Vec<u8> {
-    const LEFT: u8 = 1;
-    let mut out = Vec::with_capacity(row.len() + 1);
-    out.push(LEFT);
-    out.extend(row.iter().enumerate().map(|(idx, byte)| match idx.checked_sub(3) {
-        Some(left) => byte.wrapping_sub(row[left]),
-        None => *byte,
-    }));
-    out
-}
-
-fn chunk(file: &mut Vec<u8>, kind: &[u8; 4], data: &[u8]) {
-    let mut sum = flate2::Crc::new();
-    sum.update(kind);
-    sum.update(data);
-    file.extend(u32::try_from(data.len()).unwrap_or(u32::MAX).to_be_bytes());
-    file.extend(kind);
-    file.extend(data);
-    file.extend(sum.sum().to_be_bytes());
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::picture::drawing::{Drawing, Line, Mark, Paint, Rect, Style, Words};
+use crate::xml;
 
 impl Drawing {
     /// Formats the drawing as SVG.
@@ -77,11 +78,6 @@ fn text(out: &mut String, words: &Words) {
         "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{}\"{weight}{}{rim}>{}</text>",
         words.size,
         paints("fill", words.paint),
-        escaped(&words.text)
+        xml::text(&words.text)
     );
-}
-
-/// Escapes text, so that it can't inject markup.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

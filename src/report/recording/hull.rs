@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::picture::flat_hull;
+use actcheck_data::convex_hull;
 
 /// Points closer than this to a plane are considered on it. Unit: metres.
 const FLAT_M: f64 = 1e-6;
@@ -61,7 +61,7 @@ fn around(points: &[Point3<f64>], normal: &Vector3<f64>) -> Vec<Point3<f64>> {
     let Some(u) = points.iter().find_map(|point| (point - first).try_normalize(FLAT_M)) else { return Vec::new() };
     let v = normal.cross(&u);
     let flat = points.iter().map(|point| [(point - first).dot(&u), (point - first).dot(&v)]);
-    flat_hull(flat.collect()).into_iter().map(|[x, y]| first + u * x + v * y).collect()
+    convex_hull(flat).into_iter().map(|[x, y]| first + u * x + v * y).collect()
 }
 
 #[cfg(test)]
