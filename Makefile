@@ -22,7 +22,7 @@ bench:
 	@. .ci/env && cargo bench --locked
 
 wheel:
-	@sh .ci/system
+	@sh .ci/system wheel
 	@sh clients/wheel/build
 
 RUNS ?= 200

@@ -5,7 +5,8 @@
    A folder as the argument replaces the root folder of the search (for tests).
 
    The order of the search is that of clang-sys 1.9 (its build/common.rs and build/dynamic.rs): only LIBCLANG_PATH, if it is set; otherwise
-   the folder from llvm-config, LD_LIBRARY_PATH, LIBRARY_PATH and the usual folders; the file with the highest version wins. */
+   the folder from llvm-config, LD_LIBRARY_PATH, LIBRARY_PATH and the usual folders; the file with the highest version wins.
+   The folders with headers are those of bindgen 0.73: libclang's own, those of the program clang, and BINDGEN_EXTRA_CLANG_ARGS. */
 
 #include <dlfcn.h>
 #include <glob.h>
@@ -122,6 +123,43 @@ static void look_everywhere(const char *root) {
     }
 }
 
+/* Arguments for libclang besides the header, the same as bindgen's. */
+#define MOST_WORDS 256
+static const char *words[MOST_WORDS] = {"-x", "c"};
+static int n_words = 2;
+
+static void give(const char *word) {
+    if (n_words < MOST_WORDS) words[n_words++] = strdup(word);
+}
+
+static void give_extra(void) {
+    const char *extra = getenv("BINDGEN_EXTRA_CLANG_ARGS");
+    char *copy = extra ? strdup(extra) : NULL;
+    for (char *word = copy ? strtok(copy, " ") : NULL; word; word = strtok(NULL, " ")) give(word);
+    free(copy);
+}
+
+/* Adds the search folders of the program clang, if there is one: CLANG_PATH, or the first one in PATH. */
+static void give_search_paths(void) {
+    static const char ASK[] = "unset found; is() { [ -f \"$1\" ] && [ -x \"$1\" ] && found=$1; }; is \"$CLANG_PATH\" || {"
+        " bin=$(\"${LLVM_CONFIG_PATH:-llvm-config}\" --bindir 2> /dev/null); IFS=:;"
+        " for folder in $bin $PATH; do for file in \"$folder\"/clang \"$folder\"/clang-[0-9]*; do is \"$file\" && break 2; done; done; };"
+        " IFS=' '; [ -z \"$found\" ] || \"$found\" -E -x c - -v $BINDGEN_EXTRA_CLANG_ARGS 2>&1 > /dev/null < /dev/null";
+    char line[PATH_MAX];
+    int is_within = 0;
+    FILE *answer = popen(ASK, "r");
+    while (answer && fgets(line, sizeof line, answer)) {
+        line[strcspn(line, "\n")] = '\0';
+        if (strncmp(line, "End of search list.", 19) == 0) is_within = 0;
+        if (is_within) {
+            give("-isystem");
+            give(line + strspn(line, " "));
+        }
+        if (strncmp(line, "#include <...> search starts here:", 34) == 0) is_within = 1;
+    }
+    if (answer) pclose(answer);
+}
+
 /* Lets a library parse the headers that RocksDB's C interface includes; this fails without clang's own headers. */
 static int reads_headers(const char *path) {
     static const char HEADERS[] = "/tmp/actcheck-libclang-XXXXXX";
@@ -143,15 +181,16 @@ static int reads_headers(const char *path) {
         return printf("%s can't be tried: nothing can be written to /tmp\n", path), 0;
     }
     close(file);
-    static const char *const AS_C[] = {"-x", "c"};
-    void *unit = parse(make_index(0, 0), header, AS_C, 2, NULL, 0, 0);
+    give_extra();
+    give_search_paths();
+    void *unit = parse(make_index(0, 0), header, words, n_words, NULL, 0, 0);
     int works = unit && faults(unit) == 0;
     unlink(header);
     if (!works) printf("%s lacks clang's own headers, such as stddef.h\n", path);
     return works;
 }
 
-int main(int count, char **words) {
+int main(int count, char **arguments) {
     const char *named = getenv("LIBCLANG_PATH");
     if (named) {
         /* A file or a folder. */
@@ -160,7 +199,7 @@ int main(int count, char **words) {
         else look_in(named);
         if (!best[0]) return printf("LIBCLANG_PATH is wrong: there is no libclang at %s\n", named), 1;
     } else {
-        look_everywhere(count > 1 ? words[1] : "");
+        look_everywhere(count > 1 ? arguments[1] : "");
         if (!best[0]) return printf("there is no libclang\n"), 1;
     }
     return reads_headers(best) ? 0 : 1;

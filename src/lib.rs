@@ -15,28 +15,32 @@
 //! Each stage is a function from the products of earlier stages to its own product; nothing flows back. [`campaign`] runs
 //! the stages; [`cli`] handles arguments, the clock, signals and streams.
 //!
-//! | module | purpose | libraries |
+//! Each stage is a crate of its own in the folder of its name (`src/rules` is `actcheck-rules`), so that a part can be used without
+//! the others.
+//!
+//! | crate | purpose | libraries |
 //! | --- | --- | --- |
-//! | [`base`] | sources and diagnostics, terms, poses, recorded choices, shipped files | |
+//! | [`base`] | sources and diagnostics, terms, facts, findings and outcomes, shipped files | |
+//! | [`data`] | poses, recorded choices, models, scenes, traces | nalgebra |
 //! | [`search`] | adaptive sampling of the unit cube, guided by margins; failure rates by importance weighting | statrs |
 //! | [`config`] | TOML text to a fully checked `Campaign`; models in our own and in third-party formats | toml, roxmltree, mesh-loader, shlex |
-//! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxigraph (parsers) |
+//! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxrdf, oxrdfio (parsers) |
 //! | [`scenario`] | recorded choices to one concrete `Scene`; the order of simplicity for shrinking | parry3d (overlaps) |
-//! | [`world`] | a `Scene` to a stepping simulation; the only module that uses the physics engine | rapier3d, parry3d, urdf-rs |
+//! | [`world`] | a `Scene` to a stepping simulation; the only crate that uses the physics engine | rapier3d, parry3d, urdf-rs |
 //! | [`actions`] | the robot's actions through commands and observations; the `Trace` | |
 //! | [`protocol`] | actions performed by an external program, in lockstep over a socket | nix |
 //! | [`facts`] | a `Trace` to RDF facts, interned once | |
-//! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxigraph (evaluator) |
+//! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxrdfio (imports), oxigraph (evaluator, feature `sparql`) |
 //! | [`verdict`] | findings to outcomes with witness and margin; the scores | |
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store) |
-//! | [`campaign`] | runs the stages of a campaign; the only module that calls many stages | rayon |
+//! | [`campaign`] | runs the stages of a campaign; the only crate that calls many stages | rayon |
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, comparison of campaigns, failure conditions | polars, statrs |
 //! | [`report`] | verdicts and tables as text, JSON and HTML, and in the formats of other tools; runs as pictures and in 3D | rerun (feature `rerun`) |
 //! | [`serve`] | a history over HTTP: SPARQL endpoint, query page, report | oxhttp |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap, clap_complete, clap_mangen |
 //!
-//! A module imports only from modules above it in this table ([`campaign`] and [`cli`] from all), and uses a listed
-//! library only if the table names it there. `tests/floors.rs` enforces both.
+//! A crate depends only on crates above it in this table ([`campaign`] on many, [`cli`] on all), and on a listed library only if the
+//! table names it there. `tests/floors.rs` enforces both.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::unwrap_used)]

@@ -14,6 +14,7 @@ mod config;
 mod dataset;
 mod determinism;
 mod diagnostics;
+mod english;
 mod extra;
 mod facts;
 mod findings;

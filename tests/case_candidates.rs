@@ -4,7 +4,7 @@ use std::path::Path;
 
 use actcheck::base::{Diagnostics, Source};
 use actcheck::campaign::shrink::{ShrinkOptions, shrink};
-use actcheck::campaign::{Clock, Env, Manner};
+use actcheck::campaign::{Clock, Env, RunContext};
 use actcheck::config::{self, CaseText, Overrides};
 use actcheck::data::{Choices, Scene};
 use actcheck::scenario;
@@ -221,9 +221,9 @@ fn a_run_whose_candidate_is_removed_is_not_shrunk() {
         let mut choices = Choices::random(3, 1);
         scenario::draw(&env(&named.config()).unwrap().space, 0, &mut choices).unwrap();
         let without = named.config().replace(&format!("[\"{}\"]", named.candidate), &format!("[\"{}\"]", named.other));
-        let manner = Manner { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
+        let context = RunContext { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
         let stop = || false;
-        let options = ShrinkOptions { property: None, trials: 1, jobs: 1, repeat: None, manner, stop: &stop };
+        let options = ShrinkOptions { property: None, trials: 1, jobs: 1, repeat: None, context, stop: &stop };
         let said = shrink(&env(&without).unwrap(), 0, choices.made(), &options, &mut |_| {}).unwrap_err().to_string();
         assert!(said.contains("S051") && said.contains(named.choice) && said.contains(named.candidate), "{said}");
     }

@@ -1,47 +1,50 @@
-//! Holds the `use` lines under `src/` to the architecture: a module imports only from modules above it, and a library of
-//! the field is used only where the module's charter names it.
+//! Checks the crates under `src/` against the architecture in `src/lib.rs`: a crate depends only on crates above it in the table, and a
+//! library of the field is a dependency only of the crates that the table names.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Each module, the modules that it may import, in the order of the line. `cli` may import all.
-const FLOORS: [(&str, &[&str]); 16] = [
+/// Each crate and the crates that it may depend on, in the order of the pipeline. `cli` may depend on all.
+const FLOORS: [(&str, &[&str]); 17] = [
     ("base", &[]),
-    ("search", &["base"]),
-    ("config", &["base", "search"]),
+    ("data", &["base"]),
+    ("search", &[]),
+    ("config", &["base", "data", "search"]),
     ("ontology", &["base"]),
-    ("scenario", &["base", "config", "ontology"]),
-    ("world", &["base", "scenario"]),
-    ("actions", &["base", "scenario", "world"]),
-    ("protocol", &["base", "config", "scenario", "world", "actions"]),
-    ("facts", &["base", "ontology", "actions"]),
-    ("rules", &["base", "ontology", "facts"]),
-    ("verdict", &["base", "ontology", "facts", "rules"]),
-    ("history", &["base", "ontology", "scenario", "facts", "verdict", "actions"]),
+    ("scenario", &["base", "data", "config", "ontology"]),
+    ("world", &["base", "data", "scenario"]),
+    ("actions", &["base", "data", "scenario", "world"]),
+    ("protocol", &["base", "data", "config", "scenario", "world", "actions"]),
+    ("facts", &["base", "data"]),
+    ("rules", &["base", "ontology"]),
+    ("verdict", &["base", "ontology"]),
+    ("history", &["base", "data", "facts", "verdict"]),
     (
         "campaign",
         &[
-            "base", "search", "config", "ontology", "scenario", "world", "actions", "protocol", "facts", "rules",
-            "verdict", "history",
+            "base", "data", "search", "config", "ontology", "scenario", "world", "actions", "protocol", "facts",
+            "rules", "verdict", "history",
         ],
     ),
-    ("analysis", &["base", "history", "verdict"]),
-    ("report", &["base", "verdict", "history", "analysis"]),
+    ("analysis", &["base", "data", "history", "verdict"]),
+    ("report", &["base", "data", "verdict", "history", "analysis"]),
     ("serve", &["base", "history"]),
 ];
 
-/// Libraries of the field and where they may be named.
-const FENCES: [(&str, &[&str]); 22] = [
+/// Libraries of the field and the crates that may depend on them.
+const FENCES: [(&str, &[&str]); 24] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
-    ("mesh_loader", &["config"]),
+    ("mesh-loader", &["config"]),
     ("shlex", &["config"]),
     ("nix", &["protocol"]),
     ("statrs", &["search", "analysis"]),
-    ("oxigraph", &["ontology", "rules", "history"]),
+    ("oxigraph", &["rules", "history"]),
+    ("oxrdf", &["ontology", "rules"]),
+    ("oxrdfio", &["ontology", "rules"]),
     ("rapier3d", &["world"]),
     ("parry3d", &["world", "scenario"]),
-    ("urdf_rs", &["world"]),
+    ("urdf-rs", &["world"]),
     ("datafrog", &["rules"]),
     ("polars", &["analysis"]),
     ("rayon", &["campaign"]),
@@ -56,66 +59,39 @@ const FENCES: [(&str, &[&str]); 22] = [
     ("re_sdk_types", &["report"]),
 ];
 
-fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
-    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    entries.sort();
-    for path in entries {
-        if path.is_dir() {
-            rust_files(&path, found);
-        } else if path.extension().is_some_and(|ending| ending == "rs") {
-            found.push(path);
-        }
-    }
+fn source_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// Code lines of each module: comments and what is behind them left out.
-fn code() -> BTreeMap<String, Vec<(PathBuf, usize, String)>> {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    rust_files(&src, &mut files);
-    let mut modules: BTreeMap<String, Vec<(PathBuf, usize, String)>> = BTreeMap::new();
-    for file in files {
-        let relative = file.strip_prefix(&src).unwrap().to_path_buf();
-        let module = relative.components().next().unwrap().as_os_str().to_string_lossy().into_owned();
-        let text = std::fs::read_to_string(&file).unwrap();
-        // Tests inside a file stand at its end and may reach further.
-        let outside_tests = text.lines().take_while(|line| *line != "#[cfg(test)]");
-        for (idx, line) in outside_tests.enumerate() {
-            let line = line.split("//").next().unwrap().to_owned();
-            modules.entry(module.clone()).or_default().push((relative.clone(), idx + 1, line));
-        }
-    }
-    modules
+/// Names of the folders of `src`.
+fn folders() -> Vec<String> {
+    let entries = std::fs::read_dir(source_folder()).unwrap().map(|entry| entry.unwrap());
+    let folders = entries.filter(|entry| entry.file_type().unwrap().is_dir());
+    let mut names: Vec<String> = folders.map(|entry| entry.file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
 }
 
-/// Names behind every `crate::` in a line, groups included: `crate::{base, world}` and `crate::base::Pose`.
-fn crate_modules(line: &str) -> BTreeSet<String> {
-    let mut found = BTreeSet::new();
-    for behind in line.split("crate::").skip(1) {
-        let names: Vec<&str> = match behind.strip_prefix('{') {
-            Some(group) => group.split('}').next().unwrap_or("").split(',').collect(),
-            None => vec![behind],
-        };
-        for name in names {
-            let name: String = name.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            if !name.is_empty() {
-                found.insert(name);
-            }
-        }
-    }
-    found
+fn manifest(path: &Path) -> toml::Table {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    text.parse().unwrap()
+}
+
+/// Names of a crate's dependencies, without those of its tests.
+fn dependencies(folder: &str) -> BTreeSet<String> {
+    let manifest = manifest(&source_folder().join(folder).join("Cargo.toml"));
+    let found = manifest.get("dependencies").and_then(toml::Value::as_table);
+    found.into_iter().flat_map(|table| table.keys().cloned()).collect()
 }
 
 #[test]
-fn every_import_points_up_the_table() {
+fn every_crate_depends_only_on_crates_above_it() {
     let mut wrong = Vec::new();
-    for (module, lines) in code() {
-        let Some((_, allowed)) = FLOORS.iter().find(|(name, _)| *name == module) else { continue };
-        for (file, number, line) in lines {
-            for imported in crate_modules(&line) {
-                if imported != module && !allowed.contains(&imported.as_str()) {
-                    wrong.push(format!("{}:{number} imports `{imported}`", file.display()));
-                }
+    for (folder, allowed) in FLOORS {
+        for dependency in dependencies(folder) {
+            let Some(ours) = dependency.strip_prefix("actcheck-") else { continue };
+            if !allowed.contains(&ours) {
+                wrong.push(format!("src/{folder} depends on `{ours}`"));
             }
         }
     }
@@ -123,17 +99,22 @@ fn every_import_points_up_the_table() {
 }
 
 #[test]
-fn every_library_stays_behind_its_fence() {
+fn the_table_lists_only_crates_above() {
+    for (idx, (folder, allowed)) in FLOORS.iter().enumerate() {
+        let above: Vec<&str> = FLOORS[..idx].iter().map(|(name, _)| *name).collect();
+        let wrong: Vec<&&str> = allowed.iter().filter(|name| !above.contains(name)).collect();
+        assert!(wrong.is_empty(), "`{folder}` may not depend on {wrong:?}, which come after it");
+    }
+}
+
+#[test]
+fn every_library_is_used_only_in_its_crates() {
     let mut wrong = Vec::new();
-    for (module, lines) in code() {
-        for (file, number, line) in lines {
-            for (library, allowed) in FENCES {
-                let named = line
-                    .match_indices(&format!("{library}::"))
-                    .any(|(at, _)| !line[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':'));
-                if named && !allowed.contains(&module.as_str()) {
-                    wrong.push(format!("{}:{number} uses `{library}`", file.display()));
-                }
+    for folder in folders() {
+        let dependencies = dependencies(&folder);
+        for (library, allowed) in FENCES {
+            if dependencies.contains(library) && !allowed.contains(&folder.as_str()) {
+                wrong.push(format!("src/{folder} depends on `{library}`"));
             }
         }
     }
@@ -141,15 +122,14 @@ fn every_library_stays_behind_its_fence() {
 }
 
 #[test]
-fn every_module_has_a_floor() {
-    let known: BTreeSet<&str> = FLOORS.iter().map(|(name, _)| *name).chain(["cli", "lib.rs", "main.rs"]).collect();
-    let unknown: Vec<String> = code().into_keys().filter(|module| !known.contains(module.as_str())).collect();
-    assert!(unknown.is_empty(), "no floor for {unknown:?}");
-}
-
-#[test]
-fn the_reader_of_imports_sees_groups_and_paths() {
-    let names =
-        crate_modules("use crate::{base::Pose, world}; crate::facts::extract(); pub(crate) use crate::rules::x;");
-    assert_eq!(names.into_iter().collect::<Vec<_>>(), ["base", "facts", "rules", "world"]);
+fn every_folder_is_a_crate_in_the_table() {
+    let workspace = manifest(&Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
+    let members = workspace["workspace"]["members"].as_array().unwrap();
+    let members: BTreeSet<&str> = members.iter().map(|member| member.as_str().unwrap()).collect();
+    for folder in folders() {
+        assert!(folder == "cli" || FLOORS.iter().any(|(name, _)| *name == folder), "no floor for src/{folder}");
+        assert!(members.contains(format!("src/{folder}").as_str()), "src/{folder} is not a member of the workspace");
+        let name = manifest(&source_folder().join(&folder).join("Cargo.toml"))["package"]["name"].clone();
+        assert_eq!(name.as_str(), Some(format!("actcheck-{folder}").as_str()));
+    }
 }

@@ -6,7 +6,7 @@ use crate::controls::Drives;
 use crate::grip::GripWatch;
 use crate::memory::{Held, Memory, Standing};
 use crate::sabotage::IDLE_SECS;
-use crate::{Cut, OutsideFault, Saboteur};
+use crate::{Cut, ExternalFault, Saboteur};
 use actcheck_data::{ActionReport, ChoiceName, Choices, KnownKind, Perceived, Percept, Phase, RobotProfile};
 use actcheck_scenario::FloorPlan;
 use actcheck_world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
@@ -21,7 +21,7 @@ pub enum Interrupt {
     /// The run is cut off.
     Cut,
     /// A fault of the external skill.
-    Outside(OutsideFault),
+    ExternalSkill(ExternalFault),
 }
 
 /// Share of a joint's velocity limit that skills use, so that the controller can catch up.
@@ -167,7 +167,7 @@ impl<'a> Operator<'a> {
         self.world.floor_plan()
     }
 
-    /// The kind of object that a designator's value refers to.
+    /// The kind of object that a designator's value refers to. Returns `None` if the scene has no object with this id.
     pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
         self.world.kind_of(id)
     }
@@ -227,27 +227,28 @@ impl<'a> Operator<'a> {
     }
 
     /// Records a percept.
-    pub fn take_for(&mut self, seen: &Sighting) {
+    pub fn record_percept(&mut self, seen: &Sighting) {
         self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
     }
 
-    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection.
+    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection. Returns
+    /// `None` if the scene has no object with this id.
     pub fn see(&mut self, id: &str) -> Option<Sighting> {
         let mut seen = self.world.perceive(id, self.choices)?;
         if let Some(saboteur) = &mut self.saboteur {
             seen = saboteur.sighting(seen);
         }
-        self.take_for(&seen);
+        self.record_percept(&seen);
         Some(seen)
     }
 
     /// Looks at every object except one.
     pub fn see_others(&mut self, but: &str) -> Vec<Sighting> {
-        self.see_if(|id| id != but)
+        self.see_where(|id| id != but)
     }
 
     /// Looks at every object whose id is accepted.
-    pub fn see_if(&mut self, wanted: impl Fn(&str) -> bool) -> Vec<Sighting> {
+    pub fn see_where(&mut self, wanted: impl Fn(&str) -> bool) -> Vec<Sighting> {
         let ids = self.world.visible();
         ids.iter().filter(|id| wanted(id)).filter_map(|id| self.see(id)).collect()
     }

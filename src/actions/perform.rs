@@ -4,7 +4,7 @@ use crate::cut::{self, Cut};
 use crate::memory::Memory;
 use crate::operator::{Interrupt, Operator};
 use crate::skills::skill;
-use crate::{ActionCall, Outside, OutsideFault, Saboteur};
+use crate::{ActionCall, ExternalFault, ExternalSkill, Saboteur};
 use actcheck_data::{
     ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames, RobotCourse,
     SceneMap, Trace,
@@ -27,7 +27,7 @@ pub struct Interference<'a> {
     /// Injects faults on purpose.
     pub saboteur: Option<&'a mut Saboteur>,
     /// Performs the actions it knows, instead of the reference skills.
-    pub outside: Option<&'a mut dyn Outside>,
+    pub outside: Option<&'a mut dyn ExternalSkill>,
 }
 
 /// Performs the actions as [`perform`] does, with interference from outside.
@@ -123,7 +123,7 @@ fn never_begun(call: &ActionCall, end: ActionEnd) -> ActionTrace {
     ActionTrace { end, ..ActionTrace::not_reached(&call.action, &call.parameters) }
 }
 
-fn ended_outside(fault: OutsideFault) -> ActionEnd {
+fn ended_outside(fault: ExternalFault) -> ActionEnd {
     if fault.late { ActionEnd::Timeout(fault.reason) } else { ActionEnd::Broken(fault.reason) }
 }
 
@@ -136,7 +136,7 @@ fn ended(
         (_, Some(fault)) => (ActionEnd::Broken(fault.to_string()), None),
         (Ok(report), None) => (ActionEnd::Completed, Some(report)),
         (Err(Interrupt::Cut), None) => (ActionEnd::Cut(cut::REASON.to_owned()), None),
-        (Err(Interrupt::Outside(fault)), None) => (ended_outside(fault), None),
+        (Err(Interrupt::ExternalSkill(fault)), None) => (ended_outside(fault), None),
         (Err(_), None) => {
             let reason = format!("the action took longer than its budget of {} s", budget.action_secs);
             (ActionEnd::Timeout(reason), None)

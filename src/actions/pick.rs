@@ -4,7 +4,7 @@ use crate::grip::{EMPTY_M, close, feels};
 use crate::memory::Held;
 use crate::operator::{Interrupt, Operator};
 use crate::perceive::look_again;
-use crate::plan::{self, Plan, Wanted};
+use crate::plan::{self, Plan, PlanRequest};
 use crate::{ActionCall, grasp, memory};
 use actcheck_data::{ActionReport, Pose};
 use actcheck_world::Sighting;
@@ -37,7 +37,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     if grasps.is_empty() {
         return Ok(failed(format!("{target} is too wide for the gripper")));
     }
-    let wanted = Wanted { grasps: &grasps, all: &all, taken: Some(&seen) };
+    let wanted = PlanRequest { grasps: &grasps, all: &all, taken: Some(&seen) };
     let way = match plan::plan(robot, wanted, &others) {
         Ok(way) => way,
         Err(reason) => return Ok(failed(format!("{target}: {reason}"))),
@@ -78,7 +78,7 @@ fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sightin
         let (seen, mut others) = memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
         others.extend(memory::elsewhere(robot.known_furniture(), perceived));
         others.extend(memory::obstacles(&robot.memory().floor));
-        robot.take_for(&seen);
+        robot.record_percept(&seen);
         return Ok((seen, others));
     }
     let seen = robot.see(target).ok_or_else(|| format!("{target} was not seen"))?;
@@ -102,7 +102,7 @@ fn put_right(mut way: Plan, seen: Sighting, robot: &mut Operator<'_>) -> Result<
         posture[x] += dx;
         posture[y] += dy;
     }
-    robot.take_for(&again);
+    robot.record_percept(&again);
     robot.begin("approach");
     let last: Vec<Vec<f64>> = way.near.last().cloned().into_iter().collect();
     robot.follow(&last, 0.0)?;

@@ -51,7 +51,7 @@ pub(super) const NO_WAY: &str = "no reachable, collision-free path to it was fou
 
 /// The planner's task.
 #[derive(Debug, Clone, Copy)]
-pub struct Wanted<'a> {
+pub struct PlanRequest<'a> {
     /// Usual grasps, for a mobile robot.
     pub grasps: &'a [Grasp],
     /// All grasps, for a fixed arm and for cases where none of the usual grasps is free; empty if there are no others.
@@ -68,7 +68,7 @@ pub struct Wanted<'a> {
 ///
 /// # Errors
 /// If there is no plan, the reason as a sentence for the action's report.
-pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]) -> Result<Plan, String> {
+pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sighting]) -> Result<Plan, String> {
     let Some(base) = operator.layout().base else { return standing::plan(operator, wanted, others) };
     if let Some(plan) = best(&Planner::new(operator, base, others), wanted.grasps, &mut Samples::new(0.0, 0)) {
         return Ok(plan);

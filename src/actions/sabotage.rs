@@ -5,7 +5,7 @@
 
 use crate::ActionCall;
 use actcheck_data::{ActionReport, BodyState, Pose, Snapshot};
-use actcheck_world::{Command, Mishap, Observation, Sighting, World};
+use actcheck_world::{Command, Observation, Perturbation, Sighting, World};
 
 /// Designators of the object that the action handles and of the surface it is placed on.
 const OBJECT: &str = "pickObject";
@@ -250,22 +250,22 @@ impl Saboteur {
         match accident {
             Accident::HandOpens => self.opening_m = Some(world.profile().max_opening_m),
             Accident::HandJams => self.opening_m = Some(0.0),
-            Accident::Slippery => return world.befall(object, Mishap::Friction(0.0)),
-            Accident::Falls => return world.befall(object, Mishap::Fall),
+            Accident::Slippery => return world.perturb(object, Perturbation::Friction(0.0)),
+            Accident::Falls => return world.perturb(object, Perturbation::Fall),
             Accident::Teleport => {
                 let there = body(&now, object).map(|is| farther(is, now.robot.base_true));
-                return there.is_some_and(|there| world.befall(object, Mishap::Pose(there)));
+                return there.is_some_and(|there| world.perturb(object, Perturbation::Pose(there)));
             }
             Accident::NeighbourFalls => {
                 let neighbour = others_by_distance(&now, object).first().map(|body| body.id.clone());
-                return neighbour.is_some_and(|id| world.befall(&id, Mishap::Fall));
+                return neighbour.is_some_and(|id| world.perturb(&id, Perturbation::Fall));
             }
             Accident::InTheWay => {
                 let thing = now.bodies.iter().find(|body| !body.fixed && body.id != object);
                 let there = thing.map(|thing| (thing.id.clone(), before(thing, now.robot.base_true)));
-                return there.is_some_and(|(id, there)| world.befall(&id, Mishap::Pose(there)));
+                return there.is_some_and(|(id, there)| world.perturb(&id, Perturbation::Pose(there)));
             }
-            Accident::CarriedOff => return world.carry_off(outside(world, now.robot.base_true)),
+            Accident::CarriedOff => return world.kidnap(outside(world, now.robot.base_true)),
         }
         true
     }
@@ -352,11 +352,11 @@ mod tests {
     }
 
     fn report(succeeded: bool) -> ActionReport {
-        ActionReport { succeeded, message: "so it is".to_owned() }
+        ActionReport { succeeded, message: "done".to_owned() }
     }
 
     #[test]
-    fn only_a_report_that_differs_from_what_the_action_believes_is_a_lie() {
+    fn only_a_report_against_the_actions_belief_is_a_lie() {
         for (told, honest, lied) in
             [(true, false, true), (true, true, false), (false, true, true), (false, false, false)]
         {
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn sabotage_of_which_a_part_is_missing_did_not_come_about() {
+    fn incomplete_sabotage_does_not_count_as_occurred() {
         let mut saboteur = idle(Some((Moment::Carrying, Accident::HandOpens)), Some(true));
         saboteur.armed = true;
         saboteur.report(report(false));

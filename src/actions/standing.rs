@@ -6,7 +6,7 @@ use crate::grasp::{Approach, Grasp};
 use crate::motion::{self, ArmSpace, Room, Samples};
 use crate::operator::Operator;
 use crate::plan::{
-    AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, Wanted, wrapped,
+    AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, PlanRequest, wrapped,
 };
 use crate::route::{Block, Pillar};
 use actcheck_world::{JointKind, Kinematics, Layout, Sighting, ik};
@@ -35,7 +35,7 @@ const RETREATS_M: [f64; 2] = [0.1, 0.05];
 ///
 /// # Errors
 /// If there is no plan, the reason as a sentence for the action's report.
-pub fn plan(operator: &mut Operator<'_>, wanted: Wanted<'_>, others: &[Sighting]) -> Result<Plan, String> {
+pub fn plan(operator: &mut Operator<'_>, wanted: PlanRequest<'_>, others: &[Sighting]) -> Result<Plan, String> {
     let mut samples = match wanted.taken {
         Some(_) => Samples::new(operator.choose_samples(), MOST_SAMPLES),
         None => Samples::new(0.0, 0),

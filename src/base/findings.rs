@@ -1,4 +1,4 @@
-//! What a rule found out about one property in one action.
+//! The findings of a rule about one property in one action.
 
 use crate::Term;
 
@@ -42,7 +42,7 @@ pub enum RuleFault {
     /// An invalid value, for example a margin that is not a number.
     #[error("{0}")]
     Value(String),
-    /// The caller requested a stop ([`Budget::stop`]).
+    /// The caller requested a stop (the `stop` flag of its budget).
     #[error("interrupted")]
     Interrupted,
 }

@@ -85,7 +85,7 @@ pub struct Judgement {
 
 impl Judgement {
     /// Whether two judgements are equal in every field. Unlike `==`, two NaN margins are equal.
-    pub fn says_the_same(&self, other: &Self) -> bool {
+    pub fn same_as(&self, other: &Self) -> bool {
         let margin =
             |of: &Self| of.margin.map(|value| if value.is_nan() { f64::NAN.to_bits() } else { value.to_bits() });
         let texts = |of: &Self| [of.property.clone(), of.witness.clone(), of.rule_digest.clone()];

@@ -48,19 +48,19 @@ impl fmt::Display for Shard {
 /// The error of parsing an invalid shard.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected a shard such as 1/4: its number, from 1, and the number of shards")]
-pub struct NoShard;
+pub struct ParseShardError;
 
 impl FromStr for Shard {
-    type Err = NoShard;
+    type Err = ParseShardError;
 
-    fn from_str(text: &str) -> Result<Self, NoShard> {
+    fn from_str(text: &str) -> Result<Self, ParseShardError> {
         // Accept only digits: `u64::from_str` also accepts a `+` sign.
         let number = |text: &str| match text.bytes().all(|byte| byte.is_ascii_digit()) {
-            true => text.parse::<u64>().map_err(|_| NoShard),
-            false => Err(NoShard),
+            true => text.parse::<u64>().map_err(|_| ParseShardError),
+            false => Err(ParseShardError),
         };
-        let (part, of) = text.split_once('/').ok_or(NoShard)?;
-        Self::new(number(part)?, number(of)?).ok_or(NoShard)
+        let (part, of) = text.split_once('/').ok_or(ParseShardError)?;
+        Self::new(number(part)?, number(of)?).ok_or(ParseShardError)
     }
 }
 
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_run_is_in_one_part() {
+    fn every_run_is_in_exactly_one_shard() {
         for of in 1..9 {
             let shards: Vec<Shard> = (1..=of).filter_map(|number| Shard::new(number, of)).collect();
             assert_eq!(shards.len() as u64, of);
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn only_parts_can_be_read() {
+    fn invalid_shards_are_rejected() {
         assert_eq!("2/4".parse(), Ok(Shard { number: 2, of: 4 }));
         assert_eq!("2/4".parse::<Shard>().map(|shard| shard.to_string()), Ok("2/4".to_owned()));
         for wrong in [
@@ -103,7 +103,7 @@ mod tests {
             "a/b",
             "1/99999999999999999999",
         ] {
-            assert_eq!(wrong.parse::<Shard>(), Err(NoShard), "{wrong}");
+            assert_eq!(wrong.parse::<Shard>(), Err(ParseShardError), "{wrong}");
         }
     }
 }

@@ -1,109 +1,12 @@
-//! Cases: configurations with one fixed scene. Checks that the scene can be built as written, and runs it.
+//! Checks that the scene of a case, a configuration with one fixed scene, can be built as written.
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-
-use crate::make_run::cut_of;
-use crate::replay::again;
-use crate::{Env, Manner};
-use actcheck_base::{Diagnostic, Diagnostics, Outcome, nearest};
+use actcheck_base::{Diagnostic, Diagnostics, nearest};
 use actcheck_config::{Campaign, Case};
 use actcheck_data::{Choice, ChoiceKind, ChoiceName, ChoiceValue, Choices, ObjectAxis, Scene, SightingAxis};
-use actcheck_history::{CampaignEnd, History, RunRecord, RunStatus};
 use actcheck_scenario as scenario;
 use actcheck_scenario::Space;
-use actcheck_verdict::{Counts, Recurrence};
-
-/// The result of a case.
-#[derive(Debug, Clone)]
-pub struct CaseRun {
-    /// The run.
-    pub record: RunRecord,
-    /// Whether it fails as the case expects.
-    pub recurrence: Recurrence,
-    /// Whether all states are bitwise identical; `None` if the case has no trace digest.
-    pub same_trace: Option<bool>,
-}
-
-/// Runs cases on several workers and stores each run as a campaign of its own with the case's name. Calls `on_case` for
-/// each in the order of `cases`, with its position.
-///
-/// # Errors
-/// `S064` if a scene can't be built or does not settle, `X010` if workers can't be started; or writing failed.
-pub fn run_cases(
-    cases: &[(String, Env)],
-    history: &History,
-    jobs: usize,
-    manner: &Manner,
-    on_case: &mut dyn FnMut(usize, CaseRun),
-) -> Result<(), Diagnostics> {
-    let jobs = jobs.clamp(1, cases.len().max(1));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(jobs)
-        .build()
-        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
-    let mut faults = Diagnostics::new();
-    // At most one trace for each worker is in memory.
-    for (number, some) in cases.chunks(jobs).enumerate() {
-        let made: Vec<_> = pool.install(|| some.par_iter().map(|(_, env)| make(env, manner)).collect());
-        for (at, ((name, env), made)) in some.iter().zip(made).enumerate() {
-            match made {
-                Ok(record) => on_case(number * jobs + at, keep(env, history, name, record, manner)?),
-                Err(found) => faults.extend(found),
-            }
-        }
-    }
-    faults.or(())
-}
-
-fn make(env: &Env, manner: &Manner) -> Result<RunRecord, Diagnostics> {
-    let none = BTreeMap::new();
-    let choices = env.campaign.case.as_ref().map_or(&none, |case| &case.choices);
-    again(env, "case", (0, &|| Choices::named(choices)), manner, cut_of(env, manner)).map_err(|why| {
-        env.campaign
-            .fault("S064", "case", format!("the scene of this case can't be built: {why}"))
-            .help("models, robot or program may have changed, or a value was edited: move the objects in the way")
-            .into()
-    })
-}
-
-fn keep(
-    env: &Env,
-    history: &History,
-    name: &str,
-    mut record: RunRecord,
-    manner: &Manner,
-) -> Result<CaseRun, Diagnostics> {
-    let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
-    record.id = format!("{id}-1");
-    record.campaign.clone_from(&id);
-    // The record of a crash has no start time.
-    let started = if record.started.is_empty() { (manner.clock.now)() } else { record.started.clone() };
-    let mut campaign = env.record(id.clone(), name.to_owned(), started);
-    campaign.planned_runs = 1;
-    history.begin_campaign(&campaign)?;
-    history.commit(&record)?;
-    history.finish_campaign(&id, &end_of(&record, (manner.clock.now)()))?;
-    let case = env.campaign.case.clone().unwrap_or_default();
-    let recurrence = Recurrence::of(&case.expect.into_iter().collect(), record.judgements.iter().flatten());
-    let same_trace = case.trace.map(|trace| trace == record.trace.hash);
-    Ok(CaseRun { record, recurrence, same_trace })
-}
-
-/// The end of a campaign of one run.
-pub(super) fn end_of(record: &RunRecord, ended: String) -> CampaignEnd {
-    let counts = Counts::of(record.judgements.iter().flatten().map(|judgement| judgement.outcome));
-    CampaignEnd {
-        ended,
-        score: Some(record.score),
-        score_without_broken: (record.status != RunStatus::Broken).then_some(record.score),
-        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
-        discards: 0,
-        ended_by: None,
-        interrupted: false,
-    }
-}
 
 /// Finds the choices of a case that can't have their written values: S061 the scene has no such choice, S062 the value
 /// is out of bounds, S063 another object is in the way, S060 the scene can't be built at all. Warns of an index that

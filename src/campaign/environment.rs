@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::budget::ceiling;
+use crate::budget::runs_per_test;
 use crate::case::check_case;
 use crate::requirement::Requirement;
 use crate::solids;
@@ -55,7 +55,7 @@ impl Env {
     /// As [`Env::prepare`], or if the budget is spent.
     pub fn prepare_within(config: &Path, overrides: &Overrides, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let mut campaign = config::load(config, overrides)?;
-        campaign.test_count = ceiling(overrides).unwrap_or(campaign.test_count);
+        campaign.test_count = runs_per_test(overrides).unwrap_or(campaign.test_count);
         Self::of(campaign, rule_budget)
     }
 
@@ -64,17 +64,17 @@ impl Env {
     ///
     /// # Errors
     /// `H014` if the history has no such campaign; else as [`Env::prepare`].
-    pub fn recall(
+    pub fn from_history(
         history: &History,
         campaign: &str,
         config: Option<&Path>,
     ) -> Result<(Self, CampaignRecord), Diagnostics> {
         let record = history.campaign(campaign)?;
-        let overrides = asked_for(history, &record);
+        let overrides = recorded_overrides(history, &record);
         let loaded = match config {
             Some(config) => config::load(config, &overrides),
             None => {
-                let path = config::beside(history.dir(), &record.config_path);
+                let path = config::resolve_path(history.dir(), &record.config_path);
                 let source = Source::new(path.display().to_string(), record.config_text.as_str());
                 config::load_text(source, path.parent().unwrap_or(Path::new("")), &overrides).map_err(|mut faults| {
                     let message = format!("this is the configuration of campaign {campaign} as stored in the history");
@@ -132,7 +132,7 @@ impl Env {
         let ontology = ontology::load(files, path)?;
         let mut faults = Diagnostics::new();
         categorise(&mut campaign, &ontology);
-        solids::take_apart(&mut campaign, &mut faults);
+        solids::decompose_meshes(&mut campaign, &mut faults);
         check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
         if let Err(error) = world::check_robot(&campaign.robot) {
@@ -243,7 +243,7 @@ impl Env {
 }
 
 /// The command-line overrides with which a campaign of a history began, except the number of runs.
-pub(super) fn asked_for(history: &History, record: &CampaignRecord) -> Overrides {
+pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> Overrides {
     // A campaign merged from several shards is treated as a whole, so its missing shards belong to it too.
     let shard = match record.shards.as_slice() {
         [only] => Some(*only),

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::shrink::accepted_places;
-use crate::{Env, Recalled};
+use crate::shrink::drop_rejected_tries;
+use crate::{Env, StoredCampaign};
 use actcheck_base::{Diagnostics, Outcome, Source, names};
 use actcheck_config as config;
 use actcheck_config::{CaseText, Launcher, Overrides};
@@ -25,7 +25,7 @@ const REGRESSIONS: &str = "regressions";
 /// The trace can't be read, `S040` the configuration no longer has the test, or it is no longer valid TOML.
 pub fn export(
     history: &History,
-    (env, record): &Recalled,
+    (env, record): &StoredCampaign,
     run: &RunDetail,
     folder: &Path,
 ) -> Result<String, Diagnostics> {
@@ -35,7 +35,7 @@ pub fn export(
     let performed = run.actions.len().min(test.len());
     // Only performed actions are written, so the number of those left out is not needed. Of each placement, only the
     // accepted try is kept.
-    let choices = accepted_places(&with_candidates(env, index, choices));
+    let choices = drop_rejected_tries(&with_candidates(env, index, choices));
     let choices: Vec<Choice> = choices.into_iter().filter(|choice| choice.name != ChoiceName::ActionsLeftOut).collect();
     let failed = failed(run);
     let folder = absolute(folder);
@@ -93,7 +93,7 @@ fn skill_seen_from(folder: &Path, env: &Env) -> Option<(Option<String>, String)>
 /// The configuration is not valid TOML.
 pub fn regressions_folder(source: &Source) -> Result<PathBuf, Diagnostics> {
     let own = Path::new(&*source.name).parent().unwrap_or(Path::new(""));
-    let (beside, above) = (own.join(REGRESSIONS), config::beside(own, &format!("../{REGRESSIONS}")));
+    let (beside, above) = (own.join(REGRESSIONS), config::resolve_path(own, &format!("../{REGRESSIONS}")));
     if beside.is_dir() {
         return Ok(beside);
     }

@@ -1,23 +1,23 @@
 //! Runs a stored run again from its recorded choices, and compares the two.
 
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
 
-use crate::line::{crashed, run_line_until};
-use crate::make_run::panic_text;
-use crate::{Change, Difference, Env, Failure, Manner, changes, first_difference};
+use crate::attempt::{Attempt, AttemptFault};
+use crate::finished_run::FinishedRun;
+use crate::workers::workers;
+use crate::{Env, Failure, InputChange, RunContext, TraceDifference, changes, first_difference};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ActionEnd, Choice, ChoiceKind, Choices, Trace};
-use actcheck_history::{CampaignRecord, History, RunDetail, RunRecord};
+use actcheck_history::{CampaignRecord, History, RunDetail};
 
 /// Maximum number of choices named in a message.
 const MOST_NAMED: usize = 8;
 
 /// A run's campaign as prepared today, and its record.
-pub type Recalled = (Env, CampaignRecord);
+pub type StoredCampaign = (Env, CampaignRecord);
 
 /// How exactly the recorded choices must fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,17 @@ pub enum Fit {
     Exact,
     /// Values are clamped to their bounds, and missing choices are nominal.
     Nearest,
+}
+
+/// Options of [`replay_all`]. Neither the number of workers nor the clock changes the results.
+#[derive(Debug, Clone, Copy)]
+pub struct ReplayOptions {
+    /// How exactly the recorded choices must fit.
+    pub fit: Fit,
+    /// Workers, one simulation each.
+    pub jobs: usize,
+    /// How each run is made.
+    pub context: RunContext,
 }
 
 /// The result of replaying a run.
@@ -44,13 +55,13 @@ pub struct Replay {
     /// Reasons why it did not complete, then and now.
     pub reasons: [Option<String>; 2],
     /// The first difference of the traces; `None` if they are identical or differ by less than the stored precision.
-    pub difference: Option<Difference>,
+    pub difference: Option<TraceDifference>,
     /// Recorded choices that did not fit.
     pub misfits: Vec<Misfit>,
     /// Outcomes that differ under the present rules.
     pub outcomes: Vec<OutcomeChange>,
     /// Inputs that changed since.
-    pub changes: Vec<Change>,
+    pub changes: Vec<InputChange>,
 }
 
 /// A recorded choice that did not fit.
@@ -103,21 +114,20 @@ pub struct OutcomeChange {
 /// Replays stored runs on several workers and calls `on_done` after each. `campaigns` has their campaigns by id.
 ///
 /// The results are in the order of `runs`. They depend neither on the number of workers nor on the clock.
+///
+/// # Errors
+/// `X010` if the workers can't be started. Each result has the faults of its own replay.
 pub fn replay_all(
     history: &History,
-    campaigns: &BTreeMap<String, Recalled>,
+    campaigns: &BTreeMap<String, StoredCampaign>,
     runs: &[RunDetail],
-    (fit, jobs): (Fit, usize),
-    manner: &Manner,
+    options: &ReplayOptions,
     on_done: impl Fn() + Sync,
 ) -> Result<Vec<Result<Replay, Diagnostics>>, Diagnostics> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(jobs.max(1))
-        .build()
-        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
+    let pool = workers(options.jobs)?;
     let one = |detail: &RunDetail| {
         let replayed = match campaigns.get(&detail.row.campaign) {
-            Some(recalled) => replay(history, recalled, detail, fit, manner),
+            Some(stored) => replay(history, stored, detail, options),
             None => Err(refused(detail, "its campaign is not known").into()),
         };
         on_done();
@@ -133,10 +143,9 @@ pub fn replay_all(
 /// fit exactly and do not; or the stored trace can't be read.
 fn replay(
     history: &History,
-    (env, record): &Recalled,
+    (env, record): &StoredCampaign,
     detail: &RunDetail,
-    fit: Fit,
-    manner: &Manner,
+    options: &ReplayOptions,
 ) -> Result<Replay, Diagnostics> {
     let run = &detail.row.run;
     let (choices, was) = (history.choices(run)?, history.trace(run)?);
@@ -144,11 +153,12 @@ fn replay(
     // The wall clock is not part of a run's choices: the replay is cut off at the same simulated time.
     let cut_secs = cut_secs(&was);
     let cut = cut_secs.map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
-    let is = again(env, &record.id, (index, &|| Choices::recorded(&choices)), manner, cut).map_err(|why| {
+    let attempt = Attempt { campaign: &record.id, index, choices: &|| Choices::recorded(&choices), cut };
+    let is = rerun(env, &attempt, &options.context).map_err(|why| {
         refused(detail, &why).help("a model, the configuration or the program changed: see the digests in the history")
     })?;
     let misfits = misfits(&choices, &is.choices);
-    if fit == Fit::Exact && !misfits.is_empty() {
+    if options.fit == Fit::Exact && !misfits.is_empty() {
         return Err(unfit(detail, &misfits).into());
     }
     let (now, difference) =
@@ -177,24 +187,16 @@ fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
     Diagnostic::error("S041", format!("run {} can't be run again: {why}", detail.row.run))
 }
 
-/// Makes the run again. A simulation crash counts as a run too.
-pub(super) fn again(
-    env: &Env,
-    campaign: &str,
-    (index, recorded): (u64, &dyn Fn() -> Choices),
-    manner: &Manner,
-    cut: Cut,
-) -> Result<RunRecord, String> {
-    match catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, recorded()), manner, cut))) {
-        Ok(Ok(record)) => Ok(record),
-        Ok(Err(Failure::Interrupted)) => Err(Failure::Interrupted.to_string()),
-        Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can no longer be built: {reason}")),
-        Err(panic) => {
-            let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
-            let redone = catch_unwind(AssertUnwindSafe(|| crashed(env, campaign, index, recorded(), &reason)));
-            redone.ok().flatten().ok_or(reason)
-        }
-    }
+/// Makes a run again. A simulation crash counts as a run too.
+///
+/// # Errors
+/// The reason why there is no run, in words.
+pub(super) fn rerun(env: &Env, attempt: &Attempt<'_>, context: &RunContext) -> Result<FinishedRun, String> {
+    attempt.make(env, context).map_err(|fault| match fault {
+        AttemptFault::Failure(Failure::Interrupted) => Failure::Interrupted.to_string(),
+        AttemptFault::Failure(Failure::Discard(reason)) => format!("its scene can no longer be built: {reason}"),
+        AttemptFault::Crash(reason) => reason,
+    })
 }
 
 /// Compares the recorded choices with those made from them.
@@ -263,7 +265,7 @@ impl std::fmt::Display for Misfit {
 }
 
 /// Changed outcomes, sorted by action and property.
-fn outcome_changes(was: &RunDetail, is: &RunRecord) -> Vec<OutcomeChange> {
+fn outcome_changes(was: &RunDetail, is: &FinishedRun) -> Vec<OutcomeChange> {
     let mut both: BTreeMap<(usize, &str), [Option<&'static str>; 2]> = BTreeMap::new();
     for (idx, action) in was.actions.iter().enumerate() {
         for judgement in &action.judgements {
@@ -296,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn every_way_not_to_fit_is_named() {
+    fn every_kind_of_mismatch_is_named() {
         let recorded = [real("a", 1.0, 0.5), real("b", 1.0, 0.9), real("b", 1.0, 0.1), real("c", 1.0, 0.2)];
         let made = [real("a", 2.0, 0.5), real("b", 0.8, 0.8), real("d", 1.0, 0.0), real("c", 1.0, 0.2)];
         let told: Vec<String> = misfits(&recorded, &made).iter().map(Misfit::to_string).collect();

@@ -178,7 +178,7 @@ pub enum Command {
     /// 130 interrupted by Ctrl-C (judgements so far are kept).
     #[command(after_help = "Example:\n  actcheck recheck MovedObject    (after `actcheck run configs/pick.toml`)")]
     Recheck(RecheckArgs),
-    /// Explain why a property holds in a run, or how close it came and what was missing
+    /// Explain why a property holds in a run, or how close it came and which facts were missing
     ///
     /// Uses the current rules: those that the ontology links now.
     #[command(after_help = "Example:\n  actcheck why k7f3-3 MovedObject    (a run id from `actcheck list`)")]

@@ -11,7 +11,7 @@ use actcheck_campaign::Env;
 use actcheck_config::Overrides;
 use actcheck_rules::Budget;
 
-/// Prints what a campaign would use, or returns everything that is wrong with it. `stop` interrupts it.
+/// Prints the parts that a campaign would use, or returns all its faults. `stop` interrupts it.
 pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let usual = Path::new("configs/pick.toml");
     let config = match &args.config {

@@ -11,9 +11,8 @@ pub fn system() -> Clock {
 }
 
 fn now() -> String {
-    // Whole seconds are precise enough for readers, and shorter in the history.
-    let now = jiff::Timestamp::now();
-    now.round(jiff::Unit::Second).unwrap_or(now).to_string()
+    // Campaigns are sorted by start time, and a campaign can begin in the same second as its regressions.
+    format!("{:.3}", jiff::Timestamp::now())
 }
 
 fn secs() -> f64 {

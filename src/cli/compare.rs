@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(Name::read("k7f3@rechecked"), name(None, Some("k7f3"), true));
         assert_eq!(Name::read("old/.actcheck#k7f3"), name(Some(Path::new("old/.actcheck")), Some("k7f3"), false));
         assert_eq!(Name::read("a#b#k7f3"), name(Some(Path::new("a#b")), Some("k7f3"), false));
-        assert_eq!(Name::read("src@rechecked"), name(Some(Path::new("src")), None, true));
+        assert_eq!(Name::read("shipped@rechecked"), name(Some(Path::new("shipped")), None, true));
         assert_eq!(Name::read("nowhere#"), name(Some(Path::new("nowhere")), None, false));
         for wrong in ["0", "1", "-0.1", "NaN", "5 %", ""] {
             assert!(level(wrong).is_err(), "{wrong}");

@@ -13,7 +13,9 @@ use crate::{case, clock, health, output, shrink, stop};
 use actcheck_analysis as analysis;
 use actcheck_analysis::{Interval, Mirror};
 use actcheck_base::{Diagnostics, Outcome};
-use actcheck_campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, WeightedRate, resume_all};
+use actcheck_campaign::{
+    CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns, WeightedRate, resume_all,
+};
 use actcheck_history as history;
 use actcheck_history::{History, RunFilter};
 use actcheck_report::{
@@ -43,11 +45,11 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     session.begin((clock.now)())?;
     let Session { env, history, id, kept, regressions, .. } = session;
 
-    let options = Options { jobs, manner: Manner { clock, disturb: None } };
-    let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::again).collect();
+    let options = CampaignOptions { jobs, context: RunContext { clock, disturb: None } };
+    let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
     let end = quietly(|| {
-        resume_all(&env, (&history, Kept::of(&kept)), &id, &options, &stop, |record| {
+        resume_all(&env, &history, &id, StoredRuns::of(&kept), &options, &stop, |record| {
             let summary = RunSummary::of(record);
             progress.run(&summary);
             runs.push(summary);
@@ -180,7 +182,7 @@ pub(super) fn quietly<T>(work: impl FnOnce() -> T) -> T {
 }
 
 /// The budget that ended a campaign.
-fn spent(end: &CampaignEnd) -> Option<Spent> {
+fn spent(end: &CampaignResult) -> Option<ExhaustedBudget> {
     match end.ending {
         Ending::Budget(spent) => Some(spent),
         _ => None,
@@ -188,7 +190,7 @@ fn spent(end: &CampaignEnd) -> Option<Spent> {
 }
 
 /// Whether a campaign ended on its own, without an interrupt or a fault.
-fn is_whole(end: &CampaignEnd) -> bool {
+fn is_whole(end: &CampaignResult) -> bool {
     matches!(end.ending, Ending::Finished | Ending::Budget(_))
 }
 
@@ -197,7 +199,7 @@ fn finish(
     history: &History,
     id: &str,
     runs: &[RunSummary],
-    end: &CampaignEnd,
+    end: &CampaignResult,
     ended: String,
 ) -> Result<(), Diagnostics> {
     let whole = runs.iter().filter(|run| run.status != history::RunStatus::Broken);
@@ -222,7 +224,7 @@ fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureM
     Ok(analysis::failure_modes(&rows, &scenes))
 }
 
-fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
+fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignResult) -> CampaignSummary {
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
     for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
         for iri in &action.success_properties {
@@ -246,7 +248,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
         privileged: env.is_privileged(),
         planned: env.runs_to_make(),
         discards: end.discards.len() as u64,
-        ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), told: spent.to_string() }),
+        ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), description: spent.to_string() }),
         interrupted: !is_whole(end),
     };
     summary.search = guided_search(env, &summary, end);
@@ -254,7 +256,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
 }
 
 /// The failure rates of a guided search. Returns `None` if another strategy chose the scenes.
-fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignEnd) -> Option<GuidedSearch> {
+fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignResult) -> Option<GuidedSearch> {
     let line = |found: &WeightedRate| WeightedLine {
         test: found.test.clone(),
         property: found.property.clone(),

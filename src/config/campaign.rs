@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Case, OtherCounts, Skill, WorldMap, designators};
+use crate::{Case, Launcher, OtherCounts, WorldMap, designators};
 
 /// One campaign: runs every test in `test_count` scenes, `repeat` times in each.
 #[derive(Debug, Clone)]
@@ -121,15 +121,6 @@ pub struct Overrides {
     pub search: Option<Strategy>,
     /// Overrides `[history] dir`; relative to the current directory.
     pub history: Option<PathBuf>,
-}
-
-/// The skills that perform the actions.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Launcher {
-    /// The built-in reference skills, in process.
-    Reference,
-    /// An external program for the actions that it supports; the reference skills for the others.
-    Program(Box<Skill>),
 }
 
 /// Limits on one run and on the whole campaign; `None` means unlimited.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::shelf::Shelf;
+use crate::model_library::ModelLibrary;
 use crate::{Located, OtherCounts, Table};
 use actcheck_base::{Diagnostics, Span};
 
@@ -40,10 +40,10 @@ pub(crate) struct Designators {
 }
 
 /// Reads the tables of designators: those of the paper, and any other with a single list of strings. Only the ontology
-/// can tell whether such a designator exists, so `places` keeps the span for a later check.
+/// defines which designators exist, so `places` keeps the span for a later check.
 pub(crate) fn read(
     root: &mut Table,
-    shelf: &mut Shelf,
+    library: &mut ModelLibrary,
     places: &mut BTreeMap<String, Span>,
     found: &mut Diagnostics,
 ) -> Designators {
@@ -54,13 +54,13 @@ pub(crate) fn read(
     for (name, key, kind) in PAPER_TABLES {
         let Some(mut table) = root.table(name) else { continue };
         table.require(&[key]);
-        let values = table.some_strings(key).unwrap_or_default();
+        let values = table.non_empty_strings(key).unwrap_or_default();
         for value in &values {
             match kind {
-                Kind::World => shelf.read_world(&mut table, value, found),
-                Kind::Location => shelf.check_location(&mut table, value),
-                Kind::Surface => shelf.check_surface(&mut table, value),
-                Kind::Model => shelf.check_name(&mut table, value),
+                Kind::World => library.read_world(&mut table, value, found),
+                Kind::Location => library.check_location(&mut table, value),
+                Kind::Surface => library.check_surface(&mut table, value),
+                Kind::Model => library.check_name(&mut table, value),
             }
         }
         if name == "surfaceObjects" {
@@ -79,7 +79,7 @@ pub(crate) fn read(
     for name in root.untaken_tables() {
         read_own_table(root, &name, &mut candidates, places, found);
     }
-    let (nav_obstacles, nav_obstacle_count) = read_obstacles(root, shelf);
+    let (nav_obstacles, nav_obstacle_count) = read_obstacles(root, library);
     Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count }
 }
 
@@ -118,7 +118,7 @@ fn read_own_table(
 ) {
     let Some(key) = root.only_list_of(name) else { return };
     let Some(mut table) = root.table(name) else { return };
-    let values = table.some_strings(&key).unwrap_or_default();
+    let values = table.non_empty_strings(&key).unwrap_or_default();
     keep(name, table.span(), values, candidates, places);
     table.finish(found);
 }
@@ -152,9 +152,9 @@ fn read_place_count(table: &mut Table, has_others: bool) -> (u32, u32) {
     count
 }
 
-fn read_obstacles(root: &mut Table, shelf: &Shelf) -> (Vec<String>, u32) {
+fn read_obstacles(root: &mut Table, library: &ModelLibrary) -> (Vec<String>, u32) {
     let names = root.strings("nav_obstacle_list").unwrap_or_default();
-    names.iter().for_each(|name| shelf.check_name(root, name));
+    names.iter().for_each(|name| library.check_name(root, name));
     let place = root.key_span("nav_obstacle_count");
     let count = root.integer("nav_obstacle_count", 0..=MOST_OBJECTS).unwrap_or(0);
     if count > 0 && names.is_empty() {

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::designators::{self, Designators};
-use crate::{Campaign, Overrides, Table, case, ranges, shelf, skill};
+use crate::paths::resolve_path;
+use crate::{Campaign, Overrides, Table, case, model_library, ranges, skill};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Source, Span, did_you_mean};
 use actcheck_search::Strategy;
 
@@ -46,8 +47,8 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let seed = table.integer("seed", 0..=i64::MAX).map_or(0, i64::unsigned_abs);
     let ontology = read_ontology_path(&mut table, folder);
     let scene_rule = read_scene_rule(&mut table, folder, &mut found);
-    let mut shelf = shelf::read(&mut table, folder, &mut found);
-    let robot = shelf.read_robot(&mut table, folder, &mut found);
+    let mut library = model_library::read(&mut table, folder, &mut found);
+    let robot = library.read_robot(&mut table, folder, &mut found);
     let physics = ranges::read_physics(&mut table, &mut found);
     let sensing = ranges::read_sensing(&mut table, &mut found);
     let (budget, limits) = ranges::read_budget(&mut table, &mut found);
@@ -55,12 +56,12 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let history = read_history(&mut table, folder, &mut found);
     // Taken before the tables of designators, which may have any name.
     let case = table.table("case");
-    let designators = designators::read(&mut table, &mut shelf, &mut places, &mut found);
+    let designators = designators::read(&mut table, &mut library, &mut places, &mut found);
     let case = case.map(|table| case::read(table, &designators, &mut places, &mut found));
     let Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count } = designators;
     table.finish(&mut found);
     let named = designators::named_models(&candidates, &nav_obstacles);
-    let report = shelf.report(&named);
+    let report = library.report(&named);
     found.extend(report);
     let warnings: Diagnostics = found.iter().filter(|fault| fault.severity == Severity::Warning).cloned().collect();
 
@@ -78,9 +79,9 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         shard: overrides.shard,
         search: overrides.search.or(search).unwrap_or(Strategy::Random),
         ontology,
-        models: shelf.models,
-        uncategorised: shelf.uncategorised,
-        worlds: shelf.worlds,
+        models: library.models,
+        uncategorised: library.uncategorised,
+        worlds: library.worlds,
         robot,
         nav_obstacles,
         nav_obstacle_count,
@@ -88,7 +89,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         other_counts,
         lying,
         scene_rule,
-        start: shelf.start,
+        start: library.start,
         physics,
         sensing,
         budget,
@@ -132,7 +133,7 @@ fn read_tests(table: &mut Table) -> (Vec<Vec<String>>, BTreeMap<String, Span>) {
 
 fn read_ontology_path(table: &mut Table, folder: &Path) -> (Files, PathBuf) {
     let Some(written) = table.string("ontology") else { return (Files::Shipped, PathBuf::from(SHIPPED_ONTOLOGY)) };
-    let path = beside(folder, &written.value);
+    let path = resolve_path(folder, &written.value);
     if let Err(reason) = Files::Disk.read(&path) {
         let message = format!("cannot read the ontology {}: {reason}", path.display());
         table.fault(
@@ -162,7 +163,7 @@ fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
     let mut scene = table.table("scene")?;
     scene.require(&["require"]);
     let read = scene.string("require").and_then(|written| {
-        let path = beside(folder, &written.value);
+        let path = resolve_path(folder, &written.value);
         let is_rules = path.extension().is_some_and(|ending| ending == "rls" || ending == "rq");
         let read =
             if is_rules { Files::Disk.read(&path) } else { Err("it ends neither in `.rls` nor in `.rq`".to_owned()) };
@@ -180,37 +181,9 @@ fn read_history(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Pa
     let mut dir = folder.join(HISTORY_DIR);
     if let Some(mut history) = table.table("history") {
         if let Some(written) = history.string("dir") {
-            dir = beside(folder, &written.value);
+            dir = resolve_path(folder, &written.value);
         }
         history.finish(found);
     }
     dir
-}
-
-/// Resolves a path of a configuration relative to `folder`, without `..` where removing it does not change the target.
-pub fn beside(folder: &Path, written: &str) -> PathBuf {
-    let (mut base, mut rest) = (folder.to_path_buf(), Path::new(written));
-    while let Ok(shorter) = rest.strip_prefix("..") {
-        if base.file_name().is_none() || base.is_symlink() || !base.pop() {
-            break;
-        }
-        rest = shorter;
-    }
-    let path = base.join(rest);
-    // An empty path is the current directory.
-    if path.as_os_str().is_empty() { PathBuf::from(".") } else { path }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn paths_are_relative_to_the_configuration() {
-        assert_eq!(beside(Path::new("no-such"), "../models"), Path::new("models"));
-        assert_eq!(beside(Path::new(""), "../models"), Path::new("../models"));
-        assert_eq!(beside(Path::new("a/b"), "../../../m"), Path::new("../m"));
-        assert_eq!(beside(Path::new("a"), "/m"), Path::new("/m"));
-        assert_eq!(beside(Path::new("a"), ".."), Path::new("."));
-    }
 }

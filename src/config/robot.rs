@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::foreign::{self, Lookup};
-use crate::load::beside;
+use crate::paths::resolve_path;
 use crate::robot_roles::Roles;
 use crate::{Located, Table, xacro};
 
@@ -57,7 +57,7 @@ pub fn read_with(files: &Files, path: &Path, packages: &[PathBuf]) -> Result<Rob
     let mut found = Diagnostics::new();
     let mut folders: Vec<PathBuf> = values(table.strings("package_dirs").unwrap_or_default())
         .into_iter()
-        .map(|written| beside(folder, &written))
+        .map(|written| resolve_path(folder, &written))
         .collect();
     let urdf = read_urdf(files, folder, &mut table);
     let mut roles = Roles::default();
@@ -90,7 +90,7 @@ fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> Ro
 /// Reads the URDF, after expansion if it is xacro. Returns its text and path.
 fn read_urdf(files: &Files, folder: &Path, table: &mut Table) -> Option<(Source, PathBuf)> {
     let written = table.string("urdf")?;
-    let path = beside(folder, &written.value);
+    let path = resolve_path(folder, &written.value);
     match files.read(&path) {
         Ok(_) if xacro::is_xacro(&path) => match xacro::expand(&path) {
             Ok(urdf) => return Some((urdf, path)),
@@ -134,7 +134,7 @@ fn read_table(
 ) -> Option<RobotProfile> {
     let name = table.string("name");
     let base = read_base(table, roles);
-    let arm_joints = table.some_strings("arm_joints");
+    let arm_joints = table.non_empty_strings("arm_joints");
     roles.joints.push(("arm_joints", arm_joints.clone().unwrap_or_default()));
     let finger_joints = names(table, "finger_joints", roles);
     let finger_links = names(table, "finger_links", roles);
@@ -230,8 +230,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_profile_that_is_not_there_or_incomplete_is_refused() {
-        let found = read(&Files::Disk, Path::new("no/such/robot.toml")).expect_err("there is no such file");
+    fn a_missing_or_incomplete_profile_is_refused() {
+        let found = read(&Files::Disk, Path::new("no/such/robot.toml")).expect_err("the file is missing");
         assert_eq!(found.iter().map(|d| d.code).collect::<Vec<_>>(), ["W010"]);
         let source = Source::new(
             "r.toml",

@@ -6,9 +6,18 @@ use std::ops::Bound;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-use crate::load::beside;
-use crate::{Launcher, Located, Table};
+use crate::paths::resolve_path;
+use crate::{Located, Table};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Span};
+
+/// The skills that perform the actions.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Launcher {
+    /// The built-in reference skills, in process.
+    Reference,
+    /// An external program for the actions that it supports; the reference skills for the others.
+    Program(Box<Skill>),
+}
 
 /// A program that performs actions, located and ready to start.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,7 +154,7 @@ fn fill(skill: &mut Skill, options: &mut Table, folder: &Path) {
         options.note(faults);
     }
     if let Some(written) = options.string("dir") {
-        skill.dir = beside(folder, &written.value);
+        skill.dir = resolve_path(folder, &written.value);
         if !skill.dir.is_dir() {
             let message = format!("there is no folder {}", skill.dir.display());
             options.fault("C034", written.span, message, "`dir` is relative to the configuration");
@@ -194,7 +203,7 @@ struct Command {
 fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
     let text = written.value.as_str();
     // A path may contain spaces.
-    let words = if beside(folder, text).is_file() { Some(vec![text.to_owned()]) } else { shlex::split(text) };
+    let words = if resolve_path(folder, text).is_file() { Some(vec![text.to_owned()]) } else { shlex::split(text) };
     let split = words.filter(|words| !text.contains('\0') && !words.is_empty()).ok_or_else(|| Missing {
         code: "C030",
         message: format!("`{text}` is not a command: it is empty or a quotation mark is not closed"),
@@ -202,7 +211,7 @@ fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
     })?;
     let mut words = split.into_iter();
     let (name, args) = (words.next().unwrap_or_default(), words.collect::<Vec<_>>());
-    let path = beside(folder, &name);
+    let path = resolve_path(folder, &name);
     if name.contains('/') || path.is_file() || name.ends_with(".py") || name.ends_with(".launch") {
         return find_file(&name, path, args);
     }

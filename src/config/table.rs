@@ -139,14 +139,14 @@ impl Table {
         self.text_of(key, "a string", value)
     }
 
-    /// Takes a list of non-empty strings. The list may be empty: see [`Table::some_strings`].
+    /// Takes a list of non-empty strings. The list may be empty: see [`Table::non_empty_strings`].
     pub fn strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let list = self.list(key, "a list of strings")?;
         Some(list.into_iter().filter_map(|value| self.text_of(key, "a list of strings", value)).collect())
     }
 
     /// Takes a list of at least one string.
-    pub fn some_strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
+    pub fn non_empty_strings(&mut self, key: &str) -> Option<Vec<Located<String>>> {
         let span = self.entries.get(key).map(|entry| entry.value.span.clone());
         let before = self.found.len();
         let list = self.strings(key)?;
@@ -401,13 +401,13 @@ mod tests {
     }
 
     #[test]
-    fn values_come_with_their_places() {
+    fn values_have_their_spans() {
         let text = "name = \"glass\"\nsize = [1, 2.5, 3]\n[part]\nround = true\n";
         let found = faults(text, |table| {
             table.require(&["name", "size"]);
             assert_eq!(table.string("name").map(|name| (name.value, name.span)), Some(("glass".to_owned(), 7..14)));
             assert_eq!(table.numbers("size", 0.0..), Some([1.0, 2.5, 3.0]));
-            let mut part = table.table("part").expect("it is there");
+            let mut part = table.table("part").expect("the table exists");
             assert_eq!(part.boolean("round"), Some(true));
             let mut none = Diagnostics::new();
             part.finish(&mut none);
@@ -417,7 +417,7 @@ mod tests {
     }
 
     #[test]
-    fn each_fault_is_noted_with_its_place() {
+    fn each_fault_is_reported_with_its_place() {
         let text = "count = -1\nmass = \"x\"\nrange = [3, 1]\nfrction = 1\nbig = 99999999999999999999\nlist = []\n";
         let found = faults(text, |table| {
             table.require(&["friction"]);
@@ -425,7 +425,7 @@ mod tests {
             table.number("mass", (Bound::Excluded(0.0), Bound::Unbounded));
             table.range("range", ..);
             table.integer("big", 0..=10);
-            table.some_strings("list");
+            table.non_empty_strings("list");
         });
         assert_eq!(
             found,
@@ -442,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn text_that_is_not_toml_has_its_places() {
+    fn syntax_errors_have_their_places() {
         let found = faults("a = \nb = [1,\n", |_| {});
         assert!(found.len() >= 2, "{found:?}");
         assert!(found.iter().all(|fault| fault.starts_with("C002 t.toml:")), "{found:?}");

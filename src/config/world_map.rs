@@ -52,7 +52,7 @@ const FARTHEST_M: f64 = 12.0;
 
 impl WorldMap {
     /// Returns a world with only a floor.
-    pub(crate) fn nothing(name: &str) -> Self {
+    pub(crate) fn floor_only(name: &str) -> Self {
         Self {
             name: name.to_owned(),
             walls: Vec::new(),

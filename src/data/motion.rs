@@ -1,4 +1,4 @@
-//! What the robot measured of itself and the commands of its controllers, over time.
+//! The robot's measurements of itself and the commands of its controllers, over time.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,9 +21,9 @@ pub struct MotionRow<'a> {
     /// Force of each finger's motor, left and right; positive closes. Unit: newtons.
     pub finger_efforts_n: [f32; 2],
     /// Commanded gap between the fingers. Unit: metres.
-    pub told_opening_m: f32,
+    pub commanded_opening_m: f32,
     /// Commanded largest force of a finger. Unit: newtons.
-    pub told_force_n: f32,
+    pub commanded_force_n: f32,
     /// True base pose: x, y (metres), heading (radians). Frame: world.
     pub base_true: [f32; 3],
     /// Believed base pose, in the same order.
@@ -49,14 +49,14 @@ impl Motion {
     pub fn moments(&self) -> impl Iterator<Item = MotionRow<'_>> {
         self.rows.iter().filter_map(|row| {
             let (head, joints) = row.split_first_chunk::<12>()?;
-            let [time_secs, opening_m, left, right, told_opening_m, told_force_n, base @ ..] = *head;
+            let [time_secs, opening_m, left, right, commanded_opening_m, commanded_force_n, base @ ..] = *head;
             let [true_x, true_y, true_heading, x, y, heading] = base;
             (joints.len() == 4 * self.joints.len()).then_some(MotionRow {
                 time_secs,
                 opening_m,
                 finger_efforts_n: [left, right],
-                told_opening_m,
-                told_force_n,
+                commanded_opening_m,
+                commanded_force_n,
                 base_true: [true_x, true_y, true_heading],
                 base_believed: [x, y, heading],
                 joints,

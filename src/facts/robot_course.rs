@@ -5,7 +5,7 @@ use actcheck_base::names;
 use actcheck_data::RobotCourse;
 
 /// A joint that used less than this share of its maximum speed counts as unmoved: its speed is not written.
-const STANDS_STILL: f64 = 0.01;
+const MIN_SPEED_SHARE: f64 = 0.01;
 
 /// Writes how close joints came to their limits, self-contacts and held objects. Marks the robot as measured, so that
 /// rules don't take missing facts for a pass.
@@ -18,7 +18,7 @@ pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
         if joint.max_excess.is_finite() {
             writer.number(subject, "maxExcess", joint.max_excess);
         }
-        if joint.max_speed_share >= STANDS_STILL {
+        if joint.max_speed_share >= MIN_SPEED_SHARE {
             writer.number(subject, "maxSpeedShare", joint.max_speed_share);
         }
         if joint.overload_secs > 0.0 {

@@ -9,7 +9,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::fault;
-use actcheck_base::{Diagnostics, write_whole};
+use actcheck_base::{Diagnostics, write_atomic};
 
 /// Format of the folder that this program writes, and the newest that it reads.
 pub(super) const FORMAT: u64 = 1;
@@ -25,7 +25,7 @@ pub(super) struct Folder {
 
 impl Folder {
     /// Locks a folder for writing. Creates it if it is missing and `create` is `true`.
-    pub(super) fn take(dir: &Path, create: bool) -> Result<Self, Diagnostics> {
+    pub(super) fn lock_exclusive(dir: &Path, create: bool) -> Result<Self, Diagnostics> {
         if dir.is_file() {
             return Err(fault::unusable(dir, "a file exists at its path"));
         }
@@ -41,7 +41,7 @@ impl Folder {
         }
         let folder = Self { dir: dir.to_path_buf(), _lock: lock(dir, File::try_lock)? };
         if !known {
-            write_whole(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
+            write_atomic(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
                 .map_err(|error| fault::io(dir, "writing its version", &error))?;
         }
         fs::create_dir_all(folder.traces()).map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;
@@ -49,7 +49,7 @@ impl Folder {
     }
 
     /// Locks an existing folder for reading: other processes may read it at the same time, and none may write.
-    pub(super) fn share(dir: &Path) -> Result<Self, Diagnostics> {
+    pub(super) fn lock_shared(dir: &Path) -> Result<Self, Diagnostics> {
         if !has_version(dir)? {
             return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
         }

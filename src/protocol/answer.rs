@@ -83,7 +83,7 @@ fn cloud(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {
 fn objects(of: Option<&str>, robot: &mut Operator<'_>) -> Vec<WireObject> {
     let seen = match of {
         Some(id) => robot.see(id).into_iter().collect(),
-        None => robot.see_if(|_| true),
+        None => robot.see_where(|_| true),
     };
     let objects = seen.into_iter().map(|thing| WireObject {
         category: robot.kind_of(&thing.id).map(|kind| kind.category),

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 
 use crate::hello::{Joints, Role};
-use actcheck_actions::{Controls, OutsideFault};
+use actcheck_actions::{Controls, ExternalFault};
 
 /// A command as it is on the wire.
 #[derive(Debug, Deserialize)]
@@ -84,7 +84,7 @@ impl WireCommand {
     ///
     /// # Errors
     /// An unknown joint, a joint commanded by the wrong key, duplicate targets for a joint, or zero ticks.
-    pub fn controls(self, joints: &Joints) -> Result<(u32, Controls), OutsideFault> {
+    pub fn controls(self, joints: &Joints) -> Result<(u32, Controls), ExternalFault> {
         if self.ticks == 0 {
             return Err(wrong("its command lasts 0 ticks; `ticks` must be at least 1".to_owned()));
         }
@@ -123,11 +123,11 @@ struct Taken<'a> {
 }
 
 impl Taken<'_> {
-    fn list(&mut self, targets: &Targets) -> Result<Vec<(usize, f64)>, OutsideFault> {
+    fn list(&mut self, targets: &Targets) -> Result<Vec<(usize, f64)>, ExternalFault> {
         targets.0.iter().map(|(name, value)| Ok((self.joint(name)?, *value))).collect()
     }
 
-    fn joint(&mut self, name: &str) -> Result<usize, OutsideFault> {
+    fn joint(&mut self, name: &str) -> Result<usize, ExternalFault> {
         let Some((joint, role)) = self.joints.by_name.get(name) else {
             let help = actcheck_base::did_you_mean(name, self.joints.by_name.keys().map(String::as_str));
             return Err(wrong(format!("the robot has no joint `{name}`: {help}")));
@@ -139,7 +139,7 @@ impl Taken<'_> {
         Ok(*joint)
     }
 
-    fn once(&mut self, joint: usize, name: &str) -> Result<(), OutsideFault> {
+    fn once(&mut self, joint: usize, name: &str) -> Result<(), ExternalFault> {
         if self.seen.contains(&joint) {
             return Err(wrong(format!("its command has two targets for the joint `{name}`")));
         }
@@ -148,7 +148,7 @@ impl Taken<'_> {
     }
 
     /// Checks that a base velocity is not combined with targets for the base's joints.
-    fn base(&self) -> Result<(), OutsideFault> {
+    fn base(&self) -> Result<(), ExternalFault> {
         if !self.joints.drives {
             return Err(wrong("the robot has no mobile base".to_owned()));
         }
@@ -161,6 +161,6 @@ impl Taken<'_> {
     }
 }
 
-fn wrong(reason: String) -> OutsideFault {
-    OutsideFault { late: false, reason }
+fn wrong(reason: String) -> ExternalFault {
+    ExternalFault { late: false, reason }
 }

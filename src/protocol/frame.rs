@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
-use actcheck_actions::OutsideFault;
+use actcheck_actions::ExternalFault;
 
 /// Longest payload sent to a program. Unit: bytes.
 pub const TO_PROGRAM_LIMIT: usize = 64 << 20;
@@ -60,7 +60,7 @@ impl Wire {
         message: &impl serde::Serialize,
         binaries: &[&[u8]],
         limit_secs: f64,
-    ) -> Result<(), OutsideFault> {
+    ) -> Result<(), ExternalFault> {
         self.outgoing.clear();
         self.outgoing.extend_from_slice(&[0; HEADER]);
         serde_json::to_writer(&mut self.outgoing, message)
@@ -92,8 +92,8 @@ impl Wire {
     pub fn receive(
         &mut self,
         limit_secs: f64,
-        watch: &mut dyn FnMut() -> Result<(), OutsideFault>,
-    ) -> Result<Range<usize>, OutsideFault> {
+        watch: &mut dyn FnMut() -> Result<(), ExternalFault>,
+    ) -> Result<Range<usize>, ExternalFault> {
         let mut patience = self.patience(limit_secs);
         let (mut filled, mut needed) = (0, HEADER);
         while filled < needed {
@@ -140,7 +140,7 @@ impl Wire {
 
 impl Patience {
     /// Continues after a read or write that would block or was interrupted.
-    fn bear(&mut self, error: &std::io::Error, what: &str) -> Result<(), OutsideFault> {
+    fn bear(&mut self, error: &std::io::Error, what: &str) -> Result<(), ExternalFault> {
         match error.kind() {
             ErrorKind::Interrupted => Ok(()),
             ErrorKind::WouldBlock | ErrorKind::TimedOut => {
@@ -152,15 +152,15 @@ impl Patience {
         }
     }
 
-    fn check(&self, what: &str) -> Result<(), OutsideFault> {
+    fn check(&self, what: &str) -> Result<(), ExternalFault> {
         if self.idle_secs < self.limit_secs && (self.clock_secs)() < self.until_secs {
             return Ok(());
         }
-        Err(OutsideFault { late: true, reason: format!("it did not {what} within {} s", self.limit_secs) })
+        Err(ExternalFault { late: true, reason: format!("it did not {what} within {} s", self.limit_secs) })
     }
 }
 
-fn header(kind: u8, length: usize) -> Result<[u8; HEADER], OutsideFault> {
+fn header(kind: u8, length: usize) -> Result<[u8; HEADER], ExternalFault> {
     let bytes = u32::try_from(length).ok().filter(|_| length <= TO_PROGRAM_LIMIT);
     let [a, b, c, d] =
         bytes.ok_or_else(|| broke(format!("a message of {length} bytes is too long"))).map(u32::to_le_bytes)?;
@@ -168,7 +168,7 @@ fn header(kind: u8, length: usize) -> Result<[u8; HEADER], OutsideFault> {
 }
 
 /// The payload length announced by a header.
-fn payload_length(incoming: &[u8]) -> Result<usize, OutsideFault> {
+fn payload_length(incoming: &[u8]) -> Result<usize, ExternalFault> {
     let [a, b, c, d, kind, ..] = *incoming else { return Ok(0) };
     if kind != JSON {
         let begun = String::from_utf8_lossy(&incoming[..HEADER]).escape_debug().to_string();
@@ -181,10 +181,10 @@ fn payload_length(incoming: &[u8]) -> Result<usize, OutsideFault> {
     Ok(length)
 }
 
-fn broke(reason: String) -> OutsideFault {
-    OutsideFault { late: false, reason }
+fn broke(reason: String) -> ExternalFault {
+    ExternalFault { late: false, reason }
 }
 
-fn gone() -> OutsideFault {
+fn gone() -> ExternalFault {
     broke("it closed the connection".to_owned())
 }

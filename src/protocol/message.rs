@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::observation::Observed;
-use actcheck_actions::OutsideFault;
+use actcheck_actions::ExternalFault;
 use actcheck_data::Pose;
 
 /// Version of the protocol. Versions are incompatible with each other.
@@ -85,23 +85,29 @@ struct Typed<'a> {
 }
 
 /// The type of a message.
-pub fn kind_of(message: &[u8]) -> Result<String, OutsideFault> {
+///
+/// # Errors
+/// The message is not a JSON object with a `type`.
+pub fn kind_of(message: &[u8]) -> Result<String, ExternalFault> {
     let typed: Typed<'_> = serde_json::from_slice(message).map_err(|error| wrong("a message", &error, message))?;
     Ok(typed.kind.into_owned())
 }
 
 /// Parses a message of a known type.
-pub fn parse<'a, T: Deserialize<'a>>(kind: &str, message: &'a [u8]) -> Result<T, OutsideFault> {
+///
+/// # Errors
+/// The message is not JSON, or has missing, unknown or invalid fields.
+pub fn parse<'a, T: Deserialize<'a>>(kind: &str, message: &'a [u8]) -> Result<T, ExternalFault> {
     serde_json::from_slice(message).map_err(|error| wrong(&format!("a message `{kind}`"), &error, message))
 }
 
 /// Longest quoted part of an invalid message. Unit: characters.
 const QUOTED: usize = 80;
 
-fn wrong(what: &str, error: &serde_json::Error, message: &[u8]) -> OutsideFault {
+fn wrong(what: &str, error: &serde_json::Error, message: &[u8]) -> ExternalFault {
     let text = String::from_utf8_lossy(&message[..message.len().min(4 * QUOTED)]);
     let quoted: String = text.chars().take(QUOTED).flat_map(char::escape_debug).collect();
-    OutsideFault { late: false, reason: format!("it sent {what} that can't be parsed: {error}, in `{quoted}`") }
+    ExternalFault { late: false, reason: format!("it sent {what} that can't be parsed: {error}, in `{quoted}`") }
 }
 
 /// The program's introduction.
@@ -197,11 +203,14 @@ impl WirePose {
     }
 
     /// A pose from the wire, with its quaternion normalised.
-    pub fn pose(&self) -> Result<Pose, OutsideFault> {
+    ///
+    /// # Errors
+    /// The quaternion is not finite, or too short to be a rotation.
+    pub fn pose(&self) -> Result<Pose, ExternalFault> {
         let length = self.quaternion_xyzw.iter().map(|part| part * part).sum::<f64>().sqrt();
         if !length.is_finite() || length < SHORTEST {
             let reason = format!("it sent a pose whose quaternion {:?} is not a rotation", self.quaternion_xyzw);
-            return Err(OutsideFault { late: false, reason });
+            return Err(ExternalFault { late: false, reason });
         }
         Ok(Pose { position: self.position_m, rotation: self.quaternion_xyzw.map(|part| part / length) })
     }

@@ -9,7 +9,7 @@ use crate::observation::Observed;
 use crate::pool::{Lent, Programs};
 use crate::remember::{Grasped, remember};
 use crate::session::Session;
-use actcheck_actions::{ActionCall, Interrupt, Operator, Outside, OutsideFault};
+use actcheck_actions::{ActionCall, ExternalFault, ExternalSkill, Interrupt, Operator};
 use actcheck_data::ActionReport;
 use actcheck_world::World;
 
@@ -47,14 +47,14 @@ impl<'a> Performance<'a> {
         Self { lent: programs.lend(), run, clock_secs, output: None }
     }
 
-    /// The last lines that the program printed, if its own fault ended the run.
+    /// The last lines that the program printed. Returns `None` unless its own fault ended the run.
     pub fn output(&self) -> Option<&[String]> {
         self.output.as_deref()
     }
 
     /// The program. It is started if it is not running, or if it is still busy with an action that a crash of the
     /// simulation ended.
-    fn started(&mut self, world: &World) -> Result<&mut Session, OutsideFault> {
+    fn started(&mut self, world: &World) -> Result<&mut Session, ExternalFault> {
         let worker = &mut self.lent.worker;
         let programs = self.lent.programs;
         let session = match worker.session.take().filter(|session| session.idle) {
@@ -69,7 +69,7 @@ impl<'a> Performance<'a> {
     }
 
     /// Ends the program because of a fault of its own.
-    fn give_up(&mut self, fault: OutsideFault) -> OutsideFault {
+    fn give_up(&mut self, fault: ExternalFault) -> ExternalFault {
         if let Some(mut session) = self.lent.worker.session.take() {
             let fault = session.refuse(fault);
             self.output = Some(session.end());
@@ -78,19 +78,19 @@ impl<'a> Performance<'a> {
         self.named(fault)
     }
 
-    fn named(&self, fault: OutsideFault) -> OutsideFault {
+    fn named(&self, fault: ExternalFault) -> ExternalFault {
         let text = &self.lent.programs.skill.text;
         let last = self.output.iter().flatten().rev().find(|line| !line.trim().is_empty());
         let printed = last.map_or_else(String::new, |line| {
             let line: String = line.trim().chars().take(LONGEST_LINE).collect();
             format!("; its last output: {line}")
         });
-        OutsideFault { reason: format!("the program `{text}`: {}{printed}", fault.reason), ..fault }
+        ExternalFault { reason: format!("the program `{text}`: {}{printed}", fault.reason), ..fault }
     }
 }
 
-impl Outside for Performance<'_> {
-    fn begin_run(&mut self, world: &World) -> Result<(), OutsideFault> {
+impl ExternalSkill for Performance<'_> {
+    fn begin_run(&mut self, world: &World) -> Result<(), ExternalFault> {
         let RunName { run, index, seed } = self.run.clone();
         let begun = self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }));
         begun.map_err(|fault| self.give_up(fault))
@@ -104,7 +104,7 @@ impl Outside for Performance<'_> {
         let privileged = self.lent.programs.skill.privileged;
         let Some(session) = &mut self.lent.worker.session else {
             let reason = format!("no program is running that performs {}", call.action);
-            return Err(Interrupt::Outside(OutsideFault { late: false, reason }));
+            return Err(Interrupt::ExternalSkill(ExternalFault { late: false, reason }));
         };
         session.idle = false;
         robot.begin(&call.action);
@@ -113,11 +113,11 @@ impl Outside for Performance<'_> {
         let outcome = match ended {
             Ok(end) => remember(call, &end, performed.grasped, performed.robot)
                 .map(|()| report(end))
-                .map_err(Interrupt::Outside),
+                .map_err(Interrupt::ExternalSkill),
             Err(interrupt) => Err(performed.stop(interrupt)),
         };
         match outcome {
-            Err(Interrupt::Outside(fault)) => Err(Interrupt::Outside(self.give_up(fault))),
+            Err(Interrupt::ExternalSkill(fault)) => Err(Interrupt::ExternalSkill(self.give_up(fault))),
             other => {
                 if let Some(session) = &mut self.lent.worker.session {
                     session.idle = !session.lost;
@@ -160,48 +160,48 @@ impl Performed<'_, '_> {
             budget_s: self.robot.budget_left_secs(),
             observation: Observed::of(self.robot, &measured, self.privileged),
         };
-        self.session.send(&begin, &[]).map_err(Interrupt::Outside)
+        self.session.send(&begin, &[]).map_err(Interrupt::ExternalSkill)
     }
 
     /// Executes the program's commands and requests until it ends the action.
     fn follow(&mut self) -> Result<End, Interrupt> {
         loop {
-            let message = self.session.receive().map_err(Interrupt::Outside)?;
-            match kind_of(message).map_err(Interrupt::Outside)?.as_str() {
+            let message = self.session.receive().map_err(Interrupt::ExternalSkill)?;
+            match kind_of(message).map_err(Interrupt::ExternalSkill)?.as_str() {
                 "command" => {
-                    let command: WireCommand = parse("command", message).map_err(Interrupt::Outside)?;
+                    let command: WireCommand = parse("command", message).map_err(Interrupt::ExternalSkill)?;
                     self.obey(command)?;
                 }
                 "ask" => {
-                    let ask: Ask = parse("ask", message).map_err(Interrupt::Outside)?;
+                    let ask: Ask = parse("ask", message).map_err(Interrupt::ExternalSkill)?;
                     let (answer, bytes) = answer(&ask, self.robot);
                     let binaries: Vec<&[u8]> = bytes.iter().map(Vec::as_slice).collect();
-                    self.session.send(&answer, &binaries).map_err(Interrupt::Outside)?;
+                    self.session.send(&answer, &binaries).map_err(Interrupt::ExternalSkill)?;
                 }
-                "end" => return parse("end", message).map_err(Interrupt::Outside),
+                "end" => return parse("end", message).map_err(Interrupt::ExternalSkill),
                 other => {
                     let reason = format!("it sent `{other}`, but `command`, `ask` or `end` was expected");
-                    return Err(Interrupt::Outside(OutsideFault { late: false, reason }));
+                    return Err(Interrupt::ExternalSkill(ExternalFault { late: false, reason }));
                 }
             }
         }
     }
 
     fn obey(&mut self, command: WireCommand) -> Result<(), Interrupt> {
-        let (ticks, controls) = command.controls(&self.session.joints).map_err(Interrupt::Outside)?;
+        let (ticks, controls) = command.controls(&self.session.joints).map_err(Interrupt::ExternalSkill)?;
         self.robot.steer(&controls);
         self.robot.step(ticks)?;
         let measured = self.robot.observe();
         self.grasped.feel(self.robot, &measured);
         let observed = Observed::of(self.robot, &measured, self.privileged);
-        self.session.send(&observed.message(), &[]).map_err(Interrupt::Outside)
+        self.session.send(&observed.message(), &[]).map_err(Interrupt::ExternalSkill)
     }
 
     /// Notifies the program that its action is over. If the program does not acknowledge, it is restarted for the next
     /// run; the action still ends for its own reason.
     fn stop(&mut self, interrupt: Interrupt) -> Interrupt {
         let reason = match interrupt {
-            Interrupt::Outside(_) => return interrupt,
+            Interrupt::ExternalSkill(_) => return interrupt,
             Interrupt::Fault => "fault",
             Interrupt::Budget => "budget",
             Interrupt::Cut => "stopped",

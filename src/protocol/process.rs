@@ -15,7 +15,7 @@ use nix::unistd::Pid;
 
 use crate::message::PROTOCOL;
 use crate::output::Output;
-use actcheck_actions::OutsideFault;
+use actcheck_actions::ExternalFault;
 use actcheck_config::Skill;
 
 /// Polling interval while waiting for a process.
@@ -52,7 +52,7 @@ impl Process {
     ///
     /// # Errors
     /// It can't be started.
-    pub fn start(skill: &Skill, worker: usize) -> Result<Self, OutsideFault> {
+    pub fn start(skill: &Skill, worker: usize) -> Result<Self, ExternalFault> {
         let folder = private_folder().map_err(|error| cannot("the folder of its socket can't be created", &error))?;
         let started = Self::start_in(skill, worker, &folder);
         if started.is_err() {
@@ -62,7 +62,7 @@ impl Process {
         started
     }
 
-    fn start_in(skill: &Skill, worker: usize, folder: &Path) -> Result<Self, OutsideFault> {
+    fn start_in(skill: &Skill, worker: usize, folder: &Path) -> Result<Self, ExternalFault> {
         let socket = folder.join("skill.sock");
         let listener = UnixListener::bind(&socket).map_err(|error| cannot("its socket can't be created", &error))?;
         listener.set_nonblocking(true).map_err(|error| cannot("its socket can't be configured", &error))?;
@@ -100,7 +100,7 @@ impl Process {
     ///
     /// # Errors
     /// The program exits first, or does not connect in time.
-    pub fn accept(&mut self, limit_secs: f64, clock_secs: fn() -> f64) -> Result<UnixStream, OutsideFault> {
+    pub fn accept(&mut self, limit_secs: f64, clock_secs: fn() -> f64) -> Result<UnixStream, ExternalFault> {
         let began = clock_secs();
         let mut waited_secs: f64 = 0.0;
         loop {
@@ -114,7 +114,7 @@ impl Process {
             }
             if waited_secs.max(clock_secs() - began) >= limit_secs {
                 let reason = format!("it did not connect to the address in ACTCHECK_ADDRESS within {limit_secs} s");
-                return Err(OutsideFault { late: true, reason });
+                return Err(ExternalFault { late: true, reason });
             }
             std::thread::sleep(POLL);
             waited_secs += POLL.as_secs_f64();
@@ -126,13 +126,13 @@ impl Process {
         self.child.try_wait().ok().flatten().map(how)
     }
 
-    /// Waits briefly for a possible exit and returns how the process ended.
+    /// Waits briefly for a possible exit and returns how the process ended. Returns `None` if it is still running.
     pub fn ends_soon(&mut self) -> Option<String> {
         self.ends_within(GRACE_POLLS / 4)
     }
 
     /// Waits for the exit of a program that has closed its connection, and returns how it ended. On a busy machine, an
-    /// interpreter takes a while to exit.
+    /// interpreter takes a while to exit. Returns `None` if it is still running.
     pub fn ends_after_closing(&mut self) -> Option<String> {
         self.ends_within(3 * GRACE_POLLS)
     }
@@ -251,10 +251,10 @@ fn how(status: ExitStatus) -> String {
     }
 }
 
-fn cannot(what: &str, error: &std::io::Error) -> OutsideFault {
+fn cannot(what: &str, error: &std::io::Error) -> ExternalFault {
     broke(format!("{what}: {}", error.to_string().to_lowercase()))
 }
 
-fn broke(reason: String) -> OutsideFault {
-    OutsideFault { late: false, reason }
+fn broke(reason: String) -> ExternalFault {
+    ExternalFault { late: false, reason }
 }

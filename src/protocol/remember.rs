@@ -4,7 +4,7 @@
 use nalgebra::Isometry3;
 
 use crate::message::{End, WirePose};
-use actcheck_actions::{ActionCall, Held, Operator, OutsideFault, feels_in};
+use actcheck_actions::{ActionCall, ExternalFault, Held, Operator, feels_in};
 use actcheck_data::{Perceived, PerceivedPlane, PerceivedThing, Pose};
 use actcheck_world::Observation;
 
@@ -45,7 +45,7 @@ impl Taken {
 ///
 /// # Errors
 /// A pose of the message is invalid.
-pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Operator<'_>) -> Result<(), OutsideFault> {
+pub fn remember(call: &ActionCall, end: &End, grasped: Grasped, robot: &mut Operator<'_>) -> Result<(), ExternalFault> {
     if end.perceived.is_some() || end.plane.is_some() {
         let perceived = perceived(end)?;
         robot.remember(perceived);
@@ -87,17 +87,17 @@ fn seen_now(id: &str, robot: &mut Operator<'_>) -> Option<(Isometry3<f64>, [f64;
     Some((now.pose.to_isometry(), now.size_m, Taken::now(robot)))
 }
 
-fn perceived(end: &End) -> Result<Perceived, OutsideFault> {
+fn perceived(end: &End) -> Result<Perceived, ExternalFault> {
     let plane = end.plane.map(|plane| Ok(PerceivedPlane { pose: plane.pose.pose()?, size_m: plane.size_m }));
     let things = end.perceived.iter().flatten().map(|thing| {
         let pose = upright(&thing.pose)?;
         Ok(PerceivedThing { category: thing.category.clone(), pose: Pose::from_isometry(&pose), size_m: thing.size_m })
     });
-    Ok(Perceived { plane: plane.transpose()?, things: things.collect::<Result<_, OutsideFault>>()? })
+    Ok(Perceived { plane: plane.transpose()?, things: things.collect::<Result<_, ExternalFault>>()? })
 }
 
 /// Reduces a pose to position and yaw: objects are upright on their foot.
-fn upright(pose: &WirePose) -> Result<Isometry3<f64>, OutsideFault> {
+fn upright(pose: &WirePose) -> Result<Isometry3<f64>, ExternalFault> {
     let pose = pose.pose()?;
     Ok(Pose::upright(pose.position, pose.yaw()).to_isometry())
 }

@@ -6,7 +6,7 @@ use crate::frame::Wire;
 use crate::hello::{Joints, introduction};
 use crate::message::{Hello, PROTOCOL, Plain, ToProgram, kind_of, parse};
 use crate::process::Process;
-use actcheck_actions::OutsideFault;
+use actcheck_actions::ExternalFault;
 use actcheck_config::Skill;
 use actcheck_world::World;
 
@@ -48,13 +48,13 @@ impl Session {
         tested: &BTreeSet<String>,
         world: &World,
         clock_secs: fn() -> f64,
-    ) -> Result<Self, (OutsideFault, Vec<String>)> {
+    ) -> Result<Self, (ExternalFault, Vec<String>)> {
         let mut process = Process::start(skill, worker).map_err(|fault| (fault, Vec::new()))?;
         let began = clock_secs();
         let stream = process.accept(skill.startup_secs, clock_secs).map_err(|fault| (fault, process.end()))?;
         let wire = Wire::new(stream, clock_secs).map_err(|error| {
             let reason = format!("its connection can't be used: {error}");
-            (OutsideFault { late: false, reason }, process.end())
+            (ExternalFault { late: false, reason }, process.end())
         })?;
         let mut session = Self {
             process,
@@ -77,12 +77,12 @@ impl Session {
         }
     }
 
-    fn introduce(&mut self, ours: &impl serde::Serialize, tested: &BTreeSet<String>) -> Result<(), OutsideFault> {
+    fn introduce(&mut self, ours: &impl serde::Serialize, tested: &BTreeSet<String>) -> Result<(), ExternalFault> {
         let result = self.exchange_hello(ours, tested);
         result.map_err(|fault| self.refuse(fault))
     }
 
-    fn exchange_hello(&mut self, ours: &impl serde::Serialize, tested: &BTreeSet<String>) -> Result<(), OutsideFault> {
+    fn exchange_hello(&mut self, ours: &impl serde::Serialize, tested: &BTreeSet<String>) -> Result<(), ExternalFault> {
         self.send(ours, &[])?;
         let message = self.receive()?;
         expect(&kind_of(message)?, "hello")?;
@@ -108,7 +108,7 @@ impl Session {
     ///
     /// # Errors
     /// A fault of the program.
-    pub fn reset(&mut self, reset: &ToProgram<'_>) -> Result<(), OutsideFault> {
+    pub fn reset(&mut self, reset: &ToProgram<'_>) -> Result<(), ExternalFault> {
         self.printed_before = self.process.output.n_bytes();
         self.send(reset, &[])?;
         let message = self.receive()?;
@@ -120,7 +120,7 @@ impl Session {
     ///
     /// # Errors
     /// A fault of the program.
-    pub fn abort(&mut self, reason: &str) -> Result<(), OutsideFault> {
+    pub fn abort(&mut self, reason: &str) -> Result<(), ExternalFault> {
         self.send(&ToProgram::Abort { reason }, &[])?;
         let message = self.receive()?;
         expect(&kind_of(message)?, "aborted")?;
@@ -131,7 +131,7 @@ impl Session {
     ///
     /// # Errors
     /// The message can't be delivered.
-    pub fn send(&mut self, message: &impl serde::Serialize, binaries: &[&[u8]]) -> Result<(), OutsideFault> {
+    pub fn send(&mut self, message: &impl serde::Serialize, binaries: &[&[u8]]) -> Result<(), ExternalFault> {
         let limit_secs = self.timeout_secs;
         self.wire.send(message, binaries, limit_secs).map_err(|fault| self.cause(fault))
     }
@@ -140,7 +140,7 @@ impl Session {
     ///
     /// # Errors
     /// The program is late, has exited, exceeds the output limit, or sends an invalid message.
-    pub fn receive(&mut self) -> Result<&[u8], OutsideFault> {
+    pub fn receive(&mut self) -> Result<&[u8], ExternalFault> {
         let limit_secs = self.timeout_secs;
         let (process, before) = (&mut self.process, self.printed_before);
         let mut watch = || match process.output.n_bytes() - before {
@@ -154,12 +154,12 @@ impl Session {
     }
 
     /// Replaces a closed connection by the exit of the process if it exits, which is more informative.
-    fn cause(&mut self, fault: OutsideFault) -> OutsideFault {
+    fn cause(&mut self, fault: ExternalFault) -> ExternalFault {
         cause_of(&mut self.process, fault)
     }
 
     /// Notifies the program of its fault if it still reads, and returns the fault.
-    pub fn refuse(&mut self, fault: OutsideFault) -> OutsideFault {
+    pub fn refuse(&mut self, fault: ExternalFault) -> ExternalFault {
         // The run is over because of this fault; a failure to deliver the notification changes nothing.
         let told = self.wire.send(&ToProgram::Error { reason: &fault.reason }, &[], REFUSAL_SECS);
         self.refused = told.is_ok() && !fault.late;
@@ -187,20 +187,20 @@ impl Session {
 /// Time limit for delivering a fault notification. Unit: seconds.
 const REFUSAL_SECS: f64 = 0.2;
 
-fn cause_of(process: &mut Process, fault: OutsideFault) -> OutsideFault {
+fn cause_of(process: &mut Process, fault: ExternalFault) -> ExternalFault {
     if fault.late || !fault.reason.contains("closed the connection") {
         return fault;
     }
     process.ends_after_closing().map_or(fault, broke)
 }
 
-fn expect(kind: &str, expected: &str) -> Result<(), OutsideFault> {
+fn expect(kind: &str, expected: &str) -> Result<(), ExternalFault> {
     if kind == expected {
         return Ok(());
     }
     Err(broke(format!("it sent `{kind}`, but `{expected}` was expected")))
 }
 
-fn broke(reason: String) -> OutsideFault {
-    OutsideFault { late: false, reason }
+fn broke(reason: String) -> ExternalFault {
+    ExternalFault { late: false, reason }
 }

@@ -41,7 +41,7 @@ pub struct Discard {
 /// # Errors
 /// No free place was found for an object or the robot.
 pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
-    let mut hand = Hand {
+    let mut hand = SceneBuilder {
         space,
         choices,
         objects: Vec::new(),
@@ -103,7 +103,7 @@ pub(super) fn platform(id: String, model: Arc<ObjectModel>, pose: Pose) -> Scene
 }
 
 /// A scene under construction.
-pub(super) struct Hand<'a> {
+pub(super) struct SceneBuilder<'a> {
     pub(super) space: &'a Space,
     pub(super) choices: &'a mut Choices,
     pub(super) objects: Vec<SceneObject>,
@@ -118,7 +118,7 @@ pub(super) struct Hand<'a> {
     pub(super) front: Option<Location>,
 }
 
-impl<'a> Hand<'a> {
+impl<'a> SceneBuilder<'a> {
     /// Chooses values of designators that are names. Nominal: the first candidate.
     fn choose_names(&mut self) {
         for (designator, values) in &self.space.names {
@@ -237,7 +237,7 @@ impl<'a> Hand<'a> {
     fn set_others(&mut self, surface: &Surface) -> Result<(), Discard> {
         let counts = self.space.other_counts.beside_target;
         if !self.space.others.is_empty() && counts.1 > 0 {
-            let ids = self.strew(Role::Other, counts, surface)?;
+            let ids = self.place_others(Role::Other, counts, surface)?;
             self.designators.insert("surfaceObjects".to_owned(), ids);
         }
         Ok(())
@@ -255,14 +255,19 @@ impl<'a> Hand<'a> {
             return Ok(());
         }
         let platform = self.platform.replace(pose);
-        let strewn = self.strew(Role::PlaceOther, counts, &surface);
+        let strewn = self.place_others(Role::PlaceOther, counts, &surface);
         self.platform = platform;
         strewn.map(|_| ())
     }
 
     /// Places other objects anywhere on a surface and returns their ids. Nominal: the fewest, on a ring around the
     /// centre, the first at the far side.
-    fn strew(&mut self, role: Role, (least, most): (u32, u32), surface: &Surface) -> Result<Vec<String>, Discard> {
+    fn place_others(
+        &mut self,
+        role: Role,
+        (least, most): (u32, u32),
+        surface: &Surface,
+    ) -> Result<Vec<String>, Discard> {
         let (more, numbered): (ChoiceName, fn(u32) -> PlacedObject) = match role {
             Role::PlaceOther => (ChoiceName::PlaceOtherCount, PlacedObject::PlaceOther),
             _ => (ChoiceName::OtherCount, PlacedObject::Other),
@@ -287,7 +292,7 @@ impl<'a> Hand<'a> {
         Ok(ids)
     }
 
-    /// Chooses one of the models. Nominal: the first.
+    /// Chooses one of the models. Nominal: the first. Returns `None` if there are no models.
     pub(super) fn choose(&mut self, name: ChoiceName, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
         if models.is_empty() {
             return None;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use crate::draw::{Discard, Hand, TRIES};
+use crate::draw::{Discard, SceneBuilder, TRIES};
 use crate::floor_plan::{FRONT_GAP_M, front_of};
 use crate::overlap::Solid;
 use crate::surroundings::Surroundings;
@@ -42,7 +42,7 @@ const ARENA_M: [[f64; 2]; 2] = [[-2.2, 1.2], [-2.2, 2.2]];
 /// Without rooms, obstacles are placed within this distance of the robot. Unit: metres.
 const FIELD_M: f64 = 2.0;
 
-impl Hand<'_> {
+impl SceneBuilder<'_> {
     /// Draws the start of the base: in the ranges of the configuration if it has any, else in front of the surface.
     /// Nominal: straight in front of the surface's centre, facing it.
     pub(super) fn start_robot(&mut self, surface: Option<&Surface>) -> Result<[f64; 3], Discard> {

@@ -7,12 +7,12 @@ use actcheck_data::{Part, Pose, Shape};
 
 /// The robot's collision shapes in one posture.
 #[derive(Debug, Clone)]
-pub struct OwnBody {
+pub struct RobotBody {
     /// Each shape with its transform from the world frame.
     solids: Vec<(Isometry3<f64>, Shape)>,
 }
 
-impl OwnBody {
+impl RobotBody {
     /// Returns the shapes at the given joint positions.
     pub fn new(kinematics: &Kinematics, positions: &[f64]) -> Self {
         let solids = kinematics.solids(positions).into_iter().map(|(pose, shape)| bounded(pose, shape));

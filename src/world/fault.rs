@@ -36,9 +36,9 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A realistic external disturbance of an object, for tests of its detection.
+/// A realistic external perturbation of an object, for tests of its detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Mishap {
+pub enum Perturbation {
     /// The object jumps to this pose, at rest.
     Pose(Pose),
     /// Its friction coefficient changes.
@@ -47,7 +47,7 @@ pub enum Mishap {
     Fall,
 }
 
-/// A disturbance that breaks the simulation, for tests of physics.
+/// A perturbation that breaks the simulation, for tests of physics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Poison {
     /// The body's velocity becomes NaN.

@@ -17,14 +17,14 @@ use rapier3d::prelude::{ContactData, ContactManifoldData, NarrowPhase};
 
 /// Creates a narrow phase that does not reuse contact points from the previous step.
 pub fn narrow_phase() -> NarrowPhase {
-    NarrowPhase::with_query_dispatcher(Forget.chain(DefaultQueryDispatcher))
+    NarrowPhase::with_query_dispatcher(RecomputeContacts.chain(DefaultQueryDispatcher))
 }
 
 /// Invalidates cached contacts and leaves all queries to the next dispatcher in the chain. Warm starting still works:
 /// impulses are matched by feature.
-struct Forget;
+struct RecomputeContacts;
 
-impl QueryDispatcher for Forget {
+impl QueryDispatcher for RecomputeContacts {
     fn intersection_test(&self, _: &Pose, _: &dyn Shape, _: &dyn Shape) -> Result<ShapeIntersection, Unsupported> {
         Err(Unsupported)
     }
@@ -66,7 +66,7 @@ impl QueryDispatcher for Forget {
     }
 }
 
-impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for Forget {
+impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for RecomputeContacts {
     fn contact_manifolds(
         &self,
         _: &Pose,

@@ -66,7 +66,7 @@ mod tests {
     use crate::robot::tests::lonely;
 
     #[test]
-    fn what_was_measured_and_told_comes_back() {
+    fn measurements_and_targets_are_read_back() {
         let mut world = lonely();
         world.begin_record();
         let mut command = world.hold();
@@ -79,12 +79,12 @@ mod tests {
         let observed = world.observe();
         let motion = world.end_record().robot.motion;
         let moments: Vec<_> = motion.moments().collect();
-        assert_eq!(moments.len(), 11, "ten a second, and how it began");
+        assert_eq!(moments.len(), 11, "ten per second and the first state");
         assert_eq!(motion.joints.len(), world.kinematics().joints().len());
         let (first, last) = (moments[0], moments[10]);
         assert_eq!((first.time_secs, last.time_secs), (0.0, 1.0));
         assert!((f64::from(last.opening_m) - observed.gripper_opening_m).abs() < 1e-4);
-        assert!((last.told_opening_m - 0.1).abs() < 1e-6);
+        assert!((last.commanded_opening_m - 0.1).abs() < 1e-6);
         let joint = last.joints().nth(lift).expect("it has as many joints as the robot");
         assert!((joint.target - 0.2).abs() < 1e-6);
         assert!((f64::from(joint.position) - observed.positions[lift]).abs() < 1e-4);

@@ -99,7 +99,7 @@ struct Watch {
     clock_secs: fn() -> f64,
     spent_secs: f64,
     /// In a cell, because taking an image does not change the world.
-    looked_secs: Cell<f64>,
+    camera_secs: Cell<f64>,
 }
 
 /// Builds the simulation of a scene, before any step: see [`World::settle`].
@@ -200,7 +200,7 @@ impl World {
         f64::from(self.steps_per_tick) / f64::from(self.steps_per_second)
     }
 
-    /// Returns the fault of the simulation, if any. A fault is permanent.
+    /// Returns the fault of the simulation, or `None` if there is none. A fault is permanent.
     pub fn fault(&self) -> Option<&Fault> {
         self.fault.as_ref()
     }
@@ -275,17 +275,17 @@ impl World {
 
     /// Starts measuring the wall time of the engine's steps, with a clock in seconds.
     pub fn watch(&mut self, clock_secs: fn() -> f64) {
-        self.watch = Some(Watch { clock_secs, spent_secs: 0.0, looked_secs: Cell::new(0.0) });
+        self.watch = Some(Watch { clock_secs, spent_secs: 0.0, camera_secs: Cell::new(0.0) });
     }
 
     /// Returns the wall time of the engine's steps since [`World::watch`]; 0 without it. Unit: seconds.
-    pub fn watched_secs(&self) -> f64 {
+    pub fn engine_secs(&self) -> f64 {
         self.watch.as_ref().map_or(0.0, |watch| watch.spent_secs)
     }
 
     /// Returns the wall time of camera images since [`World::watch`]; 0 without it. Unit: seconds.
-    pub fn looked_secs(&self) -> f64 {
-        self.watch.as_ref().map_or(0.0, |watch| watch.looked_secs.get())
+    pub fn camera_secs(&self) -> f64 {
+        self.watch.as_ref().map_or(0.0, |watch| watch.camera_secs.get())
     }
 
     /// Returns the clock's time, or `None` without a clock. Unit: seconds.
@@ -296,7 +296,7 @@ impl World {
     /// Adds the time of an image that was started at this time. Unit: seconds.
     pub(super) fn looked(&self, began_secs: Option<f64>) {
         if let (Some(watch), Some(began)) = (&self.watch, began_secs) {
-            watch.looked_secs.set(watch.looked_secs.get() + (watch.clock_secs)() - began);
+            watch.camera_secs.set(watch.camera_secs.get() + (watch.clock_secs)() - began);
         }
     }
 

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use crate::navigate::grid::{Evidence, Grid};
 use crate::operator::Operator;
 use crate::route::length;
-use actcheck_world::OwnBody;
+use actcheck_world::RobotBody;
 
 /// Points below this are floor. Unit: metres. Four times the range noise at 3 m, seen at a slant. The robot drives over
 /// lower objects.
@@ -54,7 +54,7 @@ impl Size {
 pub fn look(robot: &mut Operator<'_>, size: Size, grid: &mut Grid) {
     let positions = robot.observe().positions;
     let camera = robot.kinematics().camera(&positions);
-    let own = OwnBody::new(robot.kinematics(), &positions);
+    let own = RobotBody::new(robot.kinematics(), &positions);
     let base = robot.base_of(&positions).translation.vector;
     let image = robot.look();
     let mut evidence = Evidence::default();

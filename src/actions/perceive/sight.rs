@@ -6,7 +6,7 @@ use crate::operator::{Interrupt, Operator};
 use crate::perceive::cloud::{points, thinned};
 use crate::perceive::gaze::towards;
 use crate::perceive::interpret::{GRID_M, Surface};
-use actcheck_world::{DepthImage, OwnBody};
+use actcheck_world::{DepthImage, RobotBody};
 
 /// Time for the head to come to rest. Unit: seconds.
 const REST_SECS: f64 = 0.3;
@@ -39,7 +39,7 @@ impl Sight {
         robot.wait(REST_SECS)?;
         let positions = robot.observe().positions;
         let camera = robot.kinematics().camera(&positions);
-        let own = OwnBody::new(robot.kinematics(), &positions);
+        let own = RobotBody::new(robot.kinematics(), &positions);
         let image = robot.look();
         let seen = thinned(&points(&image, &camera), GRID_M);
         self.points.extend(seen.into_iter().filter(|point| !own.is_near(point, OWN_M)));
@@ -74,7 +74,7 @@ impl Sight {
         Ok(surface)
     }
 
-    /// A corner of the surface that is not well inside the borders of any picture.
+    /// A corner of the surface that is not well inside the borders of any picture. Returns `None` if all corners are.
     pub(super) fn unseen(&self, surface: &Surface) -> Option<Point3<f64>> {
         surface.corners().into_iter().find(|corner| !self.views.iter().any(|view| view.shows(corner)))
     }

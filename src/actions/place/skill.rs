@@ -9,7 +9,7 @@ use crate::perceive::{Survey, survey};
 use crate::pick::failed;
 use crate::place::touch::Touch;
 use crate::place::{carry, spot};
-use crate::plan::{self, Plan, Wanted};
+use crate::plan::{self, Plan, PlanRequest};
 use crate::{ActionCall, memory};
 use actcheck_data::ActionReport;
 use actcheck_world::Sighting;
@@ -125,7 +125,7 @@ fn look_out(surface: &str, held: &Held, robot: &mut Operator<'_>) -> Result<(Sig
         }
         None => {
             let map = robot.map_of_furniture().unwrap_or_default();
-            let mut seen = robot.see_if(|id| id != held.id && map.iter().all(|piece| piece.id != id));
+            let mut seen = robot.see_where(|id| id != held.id && map.iter().all(|piece| piece.id != id));
             seen.extend(map);
             seen
         }
@@ -173,7 +173,7 @@ fn choose(
     around.extend(memory::obstacles(&robot.memory().floor));
     let ways = spot::ways(held, &spots, robot.profile().max_opening_m);
     // An arm that can't unfold straight moves around obstacles; the held object may tilt meanwhile.
-    let wanted = Wanted { grasps: &ways, all: &ways, taken: None };
+    let wanted = PlanRequest { grasps: &ways, all: &ways, taken: None };
     let plan = plan::plan(robot, wanted, &spot::heightened(&around, held));
     let plan = plan.map_err(|reason| Halt::Failed(format!("{surface}: {reason}")))?;
     let lowest = plan.approach.last().map(|posture| robot.kinematics().grasp(posture).translation.vector.xy().into());

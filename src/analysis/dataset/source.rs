@@ -48,7 +48,7 @@ impl Sheets {
             Cell::text(&action.action),
             Cell::text(parameters),
             Cell::text(&action.end),
-            Cell::Truth(action.reported),
+            Cell::Bool(action.reported),
             Cell::Text(action.message.clone()),
             Cell::number(action.duration_secs),
             Cell::count(passed),
@@ -71,7 +71,7 @@ impl Sheets {
                     self.joints.push(place().into_iter().chain([Cell::text(joint)]).chain(values));
                 }
                 let [left, right] = moment.finger_efforts_n;
-                let hand = [moment.opening_m, left, right, moment.told_opening_m, moment.told_force_n];
+                let hand = [moment.opening_m, left, right, moment.commanded_opening_m, moment.commanded_force_n];
                 let values = hand.into_iter().chain(moment.base_believed).chain(moment.base_true).map(single);
                 self.robot.push(place().into_iter().chain(values));
                 let poses = trace.frames.rows.get(frame).map(|row| row.as_slice()).unwrap_or_default();

@@ -3,10 +3,13 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::case::end_of;
-use crate::shrink::list::{accepted_places, has};
-use crate::shrink::{Explained, Limits, Plan, Search, Tried, explain, reduce};
-use crate::{Env, Manner, run_line};
+use crate::finished_run::RunPlace;
+use crate::line::simulate;
+use crate::run_cases::end_of;
+use crate::shrink::list::{drop_rejected_tries, has};
+use crate::shrink::{Explained, ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
+use crate::{Env, RunContext, RunInput, run_line};
+use actcheck_actions::Interference;
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, did_you_mean, names};
 use actcheck_data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices, ObjectAxis, PlacedObject, Role};
 use actcheck_history::{History, RunRecord, RunStatus};
@@ -37,7 +40,7 @@ pub struct ShrinkOptions<'a> {
     /// Test with fresh noise; `None`: the noise is as recorded, and is shrunk like the other choices.
     pub repeat: Option<Repeat>,
     /// How runs are made.
-    pub manner: Manner,
+    pub context: RunContext,
     /// Whether the time is up or the user has interrupted.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -84,22 +87,22 @@ pub fn shrink(
     on_better: &mut dyn FnMut(&[Choice]),
 ) -> Result<Shrunk, Diagnostics> {
     check_candidates(env, index, recorded)?;
-    let recorded = accepted_places(recorded);
+    let recorded = drop_rejected_tries(recorded);
     let first = remake(env, index, &recorded, options)?;
     let subject = Subject { env, index, failed: signature(&first), options };
     subject.check_property()?;
     let removals = removals(&first, &recorded);
     let others_before = removals.len();
     let ends = ends(env, index);
-    let plan = Plan { removals, ends, group: &group };
-    let start = accepted_places(&first.choices);
+    let plan = ShrinkPlan { removals, ends, group: &group };
+    let start = drop_rejected_tries(&first.choices);
     let fresh_noise = |list: &[Choice]| subject.with_fresh_noise(list);
     let as_recorded = |list: &[Choice]| subject.as_recorded(list);
     let noisy = start.iter().any(|choice| choice.name.is_noise() && choice.value != 0.0);
     let repeated = options.repeat.is_some() && noisy && fresh_noise(&start).made.is_some();
     let test: &(dyn Fn(&[Choice]) -> Tried + Sync) = if repeated { &fresh_noise } else { &as_recorded };
-    let limits = Limits { simulations: options.trials, jobs: options.jobs, stop: options.stop };
-    let mut search = Search::new(test, limits);
+    let limits = TrialLimits { simulations: options.trials, jobs: options.jobs, stop: options.stop };
+    let mut search = TrialSearch::new(test, limits);
     let special_before = special(&start);
     let start = if repeated { start.into_iter().filter(|choice| !choice.name.is_noise()).collect() } else { start };
     let (choices, minimal) = reduce(&mut search, start, &plan, on_better);
@@ -124,27 +127,29 @@ pub fn shrink(
 pub(crate) const SHRUNK: &str = "shrunk ";
 
 /// Runs the shrunk scene again and stores it in the history, in a campaign of its own. Returns the run, which names the
-/// run it was shrunk from.
+/// `original` run, from which it was shrunk. `index` is the original's position in its campaign.
 ///
 /// # Errors
 /// Writing failed; or `S051` if the scene can't be built, for example because the program changed.
-pub fn keep(
+pub fn store(
     env: &Env,
     history: &History,
-    (original, index): (&str, u64),
+    original: &str,
+    index: u64,
     shrunk: &Shrunk,
-    manner: &Manner,
+    context: &RunContext,
 ) -> Result<RunRecord, Diagnostics> {
     let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
-    let mut campaign = env.record(id.clone(), format!("{SHRUNK}{original}"), (manner.clock.now)());
+    let mut campaign = env.record(id.clone(), format!("{SHRUNK}{original}"), (context.clock.now)());
     (campaign.planned_runs, campaign.repeat) = (1, 1);
     campaign.shards.clear();
-    let mut record = run_line(env, &id, index, Choices::recorded(&shrunk.choices), manner)
+    let input = RunInput { campaign: &id, index, choices: Choices::recorded(&shrunk.choices) };
+    let run = simulate(env, input, context, context.clock.start(), Interference::default())
         .map_err(|failure| Diagnostic::error("S051", format!("the shrunk scene can't be built again: {failure}")))?;
-    record.shrunk_from = Some(original.to_owned());
+    let record = run.into_record(RunPlace { shrunk_from: Some(original.to_owned()), ..RunPlace::alone(&id) });
     history.begin_campaign(&campaign)?;
     history.commit(&record)?;
-    history.finish_campaign(&id, &end_of(&record, (manner.clock.now)()))?;
+    history.finish_campaign(&id, &end_of(&record, (context.clock.now)()))?;
     Ok(record)
 }
 
@@ -180,7 +185,7 @@ impl Subject<'_> {
 
     /// Makes one run. Returns `None` unless it completes and fails as required.
     fn run(&self, choices: Choices) -> Option<RunRecord> {
-        let run = || run_line(self.env, "shrink", self.index, choices, &self.options.manner).ok();
+        let run = || run_line(self.env, "shrink", self.index, choices, &self.options.context).ok();
         let record = catch_unwind(AssertUnwindSafe(run)).ok().flatten()?;
         let failed = signature(&record);
         let same = match self.options.property {
@@ -191,7 +196,7 @@ impl Subject<'_> {
     }
 
     fn as_recorded(&self, list: &[Choice]) -> Tried {
-        let made = self.run(Choices::recorded(list)).map(|record| accepted_places(&record.choices));
+        let made = self.run(Choices::recorded(list)).map(|record| drop_rejected_tries(&record.choices));
         Tried { made, simulations: 1 }
     }
 
@@ -218,7 +223,7 @@ impl Subject<'_> {
             }
         }
         let scene = |made: Vec<Choice>| {
-            accepted_places(&made).into_iter().filter(|choice| !choice.name.is_noise()).collect::<Vec<_>>()
+            drop_rejected_tries(&made).into_iter().filter(|choice| !choice.name.is_noise()).collect::<Vec<_>>()
         };
         Tried { made: made.filter(|_| failures >= least).map(scene), simulations }
     }
@@ -233,7 +238,7 @@ impl Subject<'_> {
     fn with_failing_noise(&self, list: &[Choice]) -> Vec<Choice> {
         let of = self.options.repeat.map_or(1, |repeat| repeat.of);
         let failing = (0..of).find_map(|number| self.repetition(list, number));
-        failing.map_or_else(|| list.to_vec(), |record| accepted_places(&record.choices))
+        failing.map_or_else(|| list.to_vec(), |record| drop_rejected_tries(&record.choices))
     }
 }
 
@@ -258,7 +263,7 @@ fn check_candidates(env: &Env, index: u64, recorded: &[Choice]) -> Result<(), Di
 
 /// Makes the run again.
 fn remake(env: &Env, index: u64, recorded: &[Choice], options: &ShrinkOptions<'_>) -> Result<RunRecord, Diagnostics> {
-    run_line(env, "shrink", index, Choices::recorded(recorded), &options.manner).map_err(|failure| {
+    run_line(env, "shrink", index, Choices::recorded(recorded), &options.context).map_err(|failure| {
         Diagnostic::error("S051", format!("the run's scene can no longer be built: {failure}"))
             .help("models, robot or program have changed since the run was made")
             .into()

@@ -27,7 +27,7 @@ pub(super) fn is_nominal(choice: &Choice) -> bool {
     choice.value == choice.kind.nominal()
 }
 
-/// Returns the choice with an id.
+/// Returns the choice with an id. Returns `None` if the list has no such choice.
 pub(super) fn find<'a>(list: &'a [Choice], id: &Id) -> Option<&'a Choice> {
     list.iter().filter(|choice| choice.name == id.name).nth(id.nth)
 }
@@ -75,7 +75,7 @@ pub(super) fn spread(kind: &ChoiceKind) -> f64 {
 }
 
 /// Drops the rejected tries of placements: only the last one, which was accepted, stays.
-pub(crate) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
+pub(crate) fn drop_rejected_tries(list: &[Choice]) -> Vec<Choice> {
     // Sensor noise is drawn repeatedly, and every draw counts.
     let kept = list
         .iter()

@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 
 use crate::shrink::list::{find, has, ids, is_nominal, spread, with_choice, with_nominal, with_value};
-use crate::shrink::{Id, Search};
+use crate::shrink::{Id, TrialSearch};
 use actcheck_data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName};
 
 /// Maximum number of halvings of a value towards nominal; below a quarter, further tries are not worthwhile.
 const HALVINGS: usize = 2;
 
 /// The meaning of the choices for the shrinker.
-pub struct Plan<'a> {
+pub struct ShrinkPlan<'a> {
     /// Choices that each remove one object; the object most likely to be needed comes first.
     pub removals: Vec<Choice>,
     /// Choices that remove the last actions; each removes more than the next.
@@ -25,9 +25,9 @@ pub struct Plan<'a> {
 ///
 /// `list` must fail. `on_better` is called with each smaller list.
 pub fn reduce(
-    search: &mut Search<'_>,
+    search: &mut TrialSearch<'_>,
     list: Vec<Choice>,
-    plan: &Plan<'_>,
+    plan: &ShrinkPlan<'_>,
     on_better: &mut dyn FnMut(&[Choice]),
 ) -> (Vec<Choice>, bool) {
     let mut reducer = Reducer { search, best: list, plan, on_better };
@@ -41,9 +41,9 @@ pub fn reduce(
 }
 
 struct Reducer<'a, 's> {
-    search: &'a mut Search<'s>,
+    search: &'a mut TrialSearch<'s>,
     best: Vec<Choice>,
-    plan: &'a Plan<'a>,
+    plan: &'a ShrinkPlan<'a>,
     on_better: &'a mut dyn FnMut(&[Choice]),
 }
 

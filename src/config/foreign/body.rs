@@ -23,7 +23,7 @@ pub(crate) struct Body {
     /// Masses of the links that state one.
     pub(crate) masses: Vec<Mass>,
     /// Whether a link with shapes has no mass.
-    pub(crate) weighs_unknown: bool,
+    pub(crate) has_unknown_mass: bool,
     pub(crate) friction: Option<f64>,
     pub(crate) restitution: Option<f64>,
     pub(crate) fixed: bool,
@@ -50,7 +50,7 @@ impl Body {
         let surface = surface(&parts, size.z);
         let by_volume = DENSITY * parts.iter().map(|part| part.shape.volume()).sum::<f64>();
         let stated: f64 = self.masses.iter().map(|mass| mass.kg).sum();
-        let is_stated = !self.weighs_unknown && stated > 0.0;
+        let is_stated = !self.has_unknown_mass && stated > 0.0;
         ObjectModel {
             name: name.to_owned(),
             category: names::act("Object"),

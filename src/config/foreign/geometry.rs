@@ -34,7 +34,7 @@ impl Shapes<'_> {
     }
 
     fn sdf_mesh(&mut self, mesh: Node, reader: &mut Reader) -> Option<Shape> {
-        reader.leaves_out(mesh, &["uri", "scale", "submesh", "convex_decomposition"]);
+        reader.warn_about_unknown_children(mesh, &["uri", "scale", "submesh", "convex_decomposition"]);
         if let Some(submesh) = xml::child(mesh, "submesh") {
             let message = "`<submesh>` is not supported".to_owned();
             reader.error("W035", submesh, message, "export that part of the mesh to its own file");
@@ -47,7 +47,7 @@ impl Shapes<'_> {
         self.mesh(uri, xml::text(uri), scale, reader)
     }
 
-    /// Reads the shape of a URDF `<geometry>`.
+    /// Reads the shape of a URDF `<geometry>`. Returns `None` after it has reported a fault.
     pub(crate) fn urdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
         let kind = kind_of(geometry, reader)?;
         if kind.tag_name().name() != "mesh" {

@@ -80,7 +80,7 @@ pub(crate) fn check_version(root: Node, reader: &mut Reader) -> Option<()> {
 
 /// Reads the pose of an element; the identity if it has none.
 ///
-/// Only poses in the frame of the parent element are supported (W035).
+/// Only poses in the frame of the parent element are supported (W035). Returns `None` after it has reported a fault.
 pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     let Some(written) = xml::child(node, "pose") else { return Some(Isometry3::identity()) };
     let relative_to = written.attribute("relative_to").or_else(|| written.attribute("frame")).unwrap_or("");
@@ -119,7 +119,7 @@ pub(crate) fn read_model(model: Node, shapes: &mut Shapes, reader: &mut Reader) 
         "gripper",
         "name",
     ];
-    reader.leaves_out(model, &KNOWN);
+    reader.warn_about_unknown_children(model, &KNOWN);
     let fixed = xml::child(model, "static").is_some_and(|node| reader.boolean(node).unwrap_or(false));
     let mut body = Body { fixed, ..Body::default() };
     for nested in model.children().filter(|child| ["model", "include", "gripper"].contains(&child.tag_name().name())) {
@@ -170,7 +170,7 @@ fn read_link(link: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Read
         "enable_wind",
         "must_be_base_link",
     ];
-    reader.leaves_out(link, &KNOWN);
+    reader.warn_about_unknown_children(link, &KNOWN);
     let Some(at) = pose(link, reader) else { return };
     for (name, usual, message) in [
         ("gravity", true, "a link without gravity can't be simulated"),
@@ -196,15 +196,15 @@ fn read_link(link: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Read
             if let Some(mass) = read_inertial(inertial, &at, reader) {
                 body.masses.push(mass);
             } else {
-                body.weighs_unknown = true;
+                body.has_unknown_mass = true;
             }
         }
-        None => body.weighs_unknown |= body.parts.len() > before,
+        None => body.has_unknown_mass |= body.parts.len() > before,
     }
 }
 
 fn read_collision(collision: Node, link: &Isometry3<f64>, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
-    reader.leaves_out(collision, &["pose", "geometry", "surface", "max_contacts", "laser_retro"]);
+    reader.warn_about_unknown_children(collision, &["pose", "geometry", "surface", "max_contacts", "laser_retro"]);
     let at = pose(collision, reader);
     let shape = reader.required(collision, "geometry").and_then(|geometry| shapes.sdf(geometry, reader));
     if let Some(surface) = xml::child(collision, "surface") {
@@ -226,12 +226,12 @@ fn read_collision(collision: Node, link: &Isometry3<f64>, body: &mut Body, shape
 }
 
 fn read_surface(surface: Node, body: &mut Body, reader: &mut Reader) {
-    reader.leaves_out(surface, &["friction", "bounce"]);
+    reader.warn_about_unknown_children(surface, &["friction", "bounce"]);
     if let Some(friction) = xml::child(surface, "friction") {
-        reader.leaves_out(friction, &["ode"]);
+        reader.warn_about_unknown_children(friction, &["ode"]);
     }
     if let Some(ode) = xml::child(surface, "friction").and_then(|friction| xml::child(friction, "ode")) {
-        reader.leaves_out(ode, &["mu", "mu2"]);
+        reader.warn_about_unknown_children(ode, &["mu", "mu2"]);
         let mut coefficient = |name| xml::child(ode, name).and_then(|node| reader.number(node, Bound::NotNegative));
         let (along, across) = (coefficient("mu"), coefficient("mu2"));
         if let (Some(along), Some(across)) = (along, across)
@@ -243,7 +243,7 @@ fn read_surface(surface: Node, body: &mut Body, reader: &mut Reader) {
         set("friction", &mut body.friction, along, ode, reader);
     }
     if let Some(bounce) = xml::child(surface, "bounce") {
-        reader.leaves_out(bounce, &["restitution_coefficient"]);
+        reader.warn_about_unknown_children(bounce, &["restitution_coefficient"]);
         let coefficient = xml::child(bounce, "restitution_coefficient");
         let value = coefficient.and_then(|node| reader.number(node, Bound::NotNegative));
         set("restitution", &mut body.restitution, value.map(|value| value.min(1.0)), bounce, reader);
@@ -269,7 +269,7 @@ fn set(what: &str, place: &mut Option<f64>, value: Option<f64>, node: Node, read
 
 /// Reads the mass of a link; `None` if it has none.
 fn read_inertial(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<Mass> {
-    reader.leaves_out(inertial, &["mass", "pose", "inertia"]);
+    reader.warn_about_unknown_children(inertial, &["mass", "pose", "inertia"]);
     let at = link * pose(inertial, reader)?;
     let kg = reader.number(xml::child(inertial, "mass")?, Bound::Positive)?;
     let moments = xml::child(inertial, "inertia").and_then(|inertia| read_inertia(inertia, reader));

@@ -40,7 +40,7 @@ pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<Sdf
 }
 
 fn read_robot(root: Node, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
-    reader.leaves_out(root, &["link", "joint", "material"]);
+    reader.warn_about_unknown_children(root, &["link", "joint", "material"]);
     let joints: Vec<Node> = xml::children(root, "joint").collect();
     for joint in joints.iter().filter(|joint| joint.attribute("type") != Some("fixed")) {
         let (name, kind) = (joint.attribute("name").unwrap_or(""), joint.attribute("type").unwrap_or("unknown"));
@@ -85,7 +85,7 @@ fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
 }
 
 fn read_link(link: Node, at: &Isometry3<f64>, body: &mut Body, shapes: &mut Shapes, reader: &mut Reader) {
-    reader.leaves_out(link, &["inertial", "collision", "visual"]);
+    reader.warn_about_unknown_children(link, &["inertial", "collision", "visual"]);
     let before = body.parts.len();
     for collision in xml::children(link, "collision") {
         let placed = origin(collision, reader);
@@ -106,7 +106,7 @@ fn read_link(link: Node, at: &Isometry3<f64>, body: &mut Body, shapes: &mut Shap
     }
     match xml::child(link, "inertial").and_then(|inertial| read_inertial(inertial, at, reader)) {
         Some(mass) => body.masses.push(mass),
-        None => body.weighs_unknown |= body.parts.len() > before,
+        None => body.has_unknown_mass |= body.parts.len() > before,
     }
 }
 

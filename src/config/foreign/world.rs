@@ -51,12 +51,12 @@ pub(crate) fn read<'a>(
         Err(faults) => return (None, faults),
     };
     let mut reader = Reader::new(source);
-    let mut map = WorldMap { digest: digest_of(&source.text), ..WorldMap::nothing(name) };
+    let mut map = WorldMap { digest: digest_of(&source.text), ..WorldMap::floor_only(name) };
     let root = document.root_element();
     if check_version(root, &mut reader).is_some()
         && let Some(world) = reader.required(root, "world")
     {
-        reader.leaves_out(world, &WITHOUT_BEARING);
+        reader.warn_about_unknown_children(world, &WITHOUT_BEARING);
         for inline in xml::children(world, "model").filter(|inline| !is_floor(*inline)) {
             let message = "a model defined inside a world is not supported".to_owned();
             reader.error(
@@ -93,7 +93,7 @@ fn read_include<'a>(
     known: &[String],
     reader: &mut Reader,
 ) -> Option<Furniture> {
-    reader.leaves_out(include, &["uri", "name", "pose", "static"]);
+    reader.warn_about_unknown_children(include, &["uri", "name", "pose", "static"]);
     let uri = reader.required(include, "uri")?;
     let named = xml::text(uri).trim_start_matches("model://").trim_end_matches('/');
     if ALWAYS_THERE.contains(&named) {

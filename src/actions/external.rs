@@ -1,0 +1,34 @@
+//! External skills that replace the reference skills.
+
+use crate::ActionCall;
+use crate::operator::{Interrupt, Operator};
+use actcheck_data::ActionReport;
+use actcheck_world::World;
+
+/// Performs actions with a skill that is not part of actcheck.
+pub trait ExternalSkill {
+    /// Begins a run in this world. The external skill learns no more about the world than a robot knows about itself.
+    ///
+    /// # Errors
+    /// Returns an error if the run can't be performed; its first action then ends for this reason.
+    fn begin_run(&mut self, world: &World) -> Result<(), ExternalFault>;
+
+    /// Whether it performs the action. Valid once a run has begun.
+    fn performs(&self, action: &str) -> bool;
+
+    /// Performs an action through commands and observations.
+    ///
+    /// # Errors
+    /// [`Interrupt`] if the action has to end, possibly because of the external skill.
+    fn perform(&mut self, call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport, Interrupt>;
+}
+
+/// A fault of an external skill.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{reason}")]
+pub struct ExternalFault {
+    /// Whether it failed to answer in time; otherwise it did something wrong.
+    pub late: bool,
+    /// The reason, for people.
+    pub reason: String,
+}

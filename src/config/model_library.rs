@@ -1,0 +1,345 @@
+//! The contents of `model_dir`: objects, worlds and robots by name.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::foreign::{self, Lookup};
+use crate::paths::resolve_path;
+use crate::{Furniture, Located, Table, WorldMap, model, robot, world_map};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, did_you_mean};
+use actcheck_data::{ObjectModel, Range, RobotProfile};
+
+/// Folder of the models embedded in the program.
+const SHIPPED_MODELS: &str = "models";
+/// The robot if the configuration names none.
+const DEFAULT_ROBOT: &str = "mobile_manipulator";
+
+/// The models that a configuration can name.
+pub(crate) struct ModelLibrary {
+    files: Files,
+    folder: PathBuf,
+    /// Objects by name.
+    pub(crate) models: BTreeMap<String, Arc<ObjectModel>>,
+    /// Names of object files, including invalid ones, so that an invalid model is not also reported as missing.
+    names: Vec<String>,
+    /// Faults of SDF and URDF models, reported in full only if the configuration names the model.
+    diagnostics: BTreeMap<String, Diagnostics>,
+    /// Models without a category.
+    pub(crate) uncategorised: BTreeSet<String>,
+    /// The worlds that the configuration names.
+    pub(crate) worlds: BTreeMap<String, Arc<WorldMap>>,
+    /// Ranges of the base's initial x, y and heading.
+    pub(crate) start: Option<[Range; 3]>,
+    /// Warnings about ignored parts of the worlds.
+    warnings: Diagnostics,
+}
+
+/// The world with only a floor, which needs no file.
+const FLOOR_ALONE: &str = "empty";
+
+/// Reads all models of `model_dir`, or of the shipped folder. Faults of TOML models are reported at once; those of SDF
+/// and URDF models by [`ModelLibrary::report`].
+pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> ModelLibrary {
+    let written = table.string("model_dir");
+    let (files, dir) = match &written {
+        Some(written) => (Files::Disk, resolve_path(folder, &written.value)),
+        None => (Files::Shipped, PathBuf::from(SHIPPED_MODELS)),
+    };
+    let mut library = ModelLibrary {
+        files,
+        folder: dir,
+        models: BTreeMap::new(),
+        names: Vec::new(),
+        diagnostics: BTreeMap::new(),
+        uncategorised: BTreeSet::new(),
+        worlds: BTreeMap::new(),
+        start: None,
+        warnings: Diagnostics::new(),
+    };
+    for path in library.toml_files("objects") {
+        library.names.push(stem(&path));
+        match library.files.read(&path) {
+            Ok(source) => match model::read(&source) {
+                Ok(model) => _ = library.models.insert(model.name.clone(), Arc::new(model)),
+                Err(faults) => found.extend(faults),
+            },
+            Err(reason) => {
+                let message = format!("cannot read the model {}: {reason}", path.display());
+                table.fault("C014", 0..0, message, "every file in `objects` of the model folder is read");
+            }
+        }
+    }
+    library.read_foreign();
+    if let (Some(written), true) = (written, library.names.is_empty()) {
+        let message = format!("the model folder {} contains no models", library.folder.display());
+        let help = "it needs a folder `objects` with one TOML file for each model, or a folder with `model.config` and \
+            `model.sdf` for each; without `model_dir`, the shipped models are used";
+        table.fault("C010", written.span, message, help);
+    }
+    library.read_categories(table, found);
+    library
+}
+
+impl ModelLibrary {
+    /// Reads the SDF and URDF models.
+    fn read_foreign(&mut self) {
+        let folders = [self.folder.clone(), self.folder.join("objects")];
+        let lookup = Lookup { files: &self.files, folders: folders.to_vec() };
+        for model in folders.iter().flat_map(|folder| foreign::find(&self.files, folder)) {
+            if self.names.contains(&model.name) {
+                let message = format!("there are two models `{0}`: {1} is ignored", model.name, model.path.display());
+                let fault = Diagnostic::warning("W036", message).help("give one of them another name");
+                self.diagnostics.entry(model.name).or_default().push(fault);
+                continue;
+            }
+            match foreign::read(&model, &lookup) {
+                Ok((read, warnings)) => {
+                    self.models.insert(model.name.clone(), Arc::new(read));
+                    self.uncategorised.insert(model.name.clone());
+                    self.diagnostics.insert(model.name.clone(), warnings);
+                }
+                Err(faults) => _ = self.diagnostics.insert(model.name.clone(), faults),
+            }
+            self.names.push(model.name);
+        }
+    }
+
+    /// Reads `[categories]`: categories by model name, which override those in the models' files.
+    fn read_categories(&mut self, root: &mut Table, found: &mut Diagnostics) {
+        let Some(mut table) = root.table("categories") else { return };
+        for key in table.keys() {
+            let name = Located { value: key.clone(), span: table.key_span(&key).unwrap_or(0..0) };
+            self.check_name(&mut table, &name);
+            let Some(written) = table.string(&key) else { continue };
+            match model::full_iri(&written.value) {
+                Some(category) => {
+                    if let Some(model) = self.models.get_mut(&key) {
+                        Arc::make_mut(model).category = category;
+                        self.uncategorised.remove(&key);
+                    }
+                }
+                None => {
+                    let message = format!("the category `{}` is not an IRI", written.value);
+                    table.fault("W003", written.span, message, format!("write it like `{key} = \"act:Glass\"`"));
+                }
+            }
+        }
+        table.finish(found);
+    }
+
+    /// Returns the faults of SDF and URDF models: all of them for a model that the configuration names, and only the
+    /// errors, as warnings, for the others.
+    pub(crate) fn report(&self, named: &BTreeSet<&str>) -> Diagnostics {
+        let mut report = self.warnings.clone();
+        for (name, diagnostics) in &self.diagnostics {
+            if named.contains(name.as_str()) {
+                report.extend(diagnostics.clone());
+            } else if diagnostics.has_errors() {
+                let errors = diagnostics.iter().filter(|fault| fault.severity == Severity::Error);
+                errors.for_each(|fault| {
+                    report.push(Diagnostic { severity: Severity::Warning, ..fault.clone() });
+                });
+            }
+        }
+        report
+    }
+
+    /// Reports an unknown model name (C008).
+    pub(crate) fn check_name(&self, table: &mut Table, name: &Located<String>) {
+        // An empty model folder has already been reported.
+        if !self.names.is_empty() && !self.names.contains(&name.value) {
+            let message = format!("there is no model `{}` in {}", name.value, self.objects_folder().display());
+            table.fault("C008", name.span.clone(), message, choose(&name.value, &self.names));
+        }
+    }
+
+    /// Reads a world by name from the model folder, or else from the shipped one.
+    pub(crate) fn read_world(&mut self, table: &mut Table, name: &Located<String>, found: &mut Diagnostics) {
+        if name.value == FLOOR_ALONE {
+            self.worlds.insert(name.value.clone(), Arc::new(WorldMap::floor_only(FLOOR_ALONE)));
+            return;
+        }
+        let Some((files, path)) = self.world_files().into_iter().find(|(_, path)| stem(path) == name.value) else {
+            let known: Vec<String> = self.world_files().iter().map(|(_, path)| stem(path)).collect();
+            let message = format!("there is no world `{}`", name.value);
+            table.fault("C020", name.span.clone(), message, choose(&name.value, &known));
+            return;
+        };
+        if files != self.files {
+            self.add_shipped_models();
+        }
+        let source = match files.read(&path) {
+            Ok(source) => source,
+            Err(reason) => {
+                let message = format!("cannot read the world {}: {reason}", path.display());
+                table.fault(
+                    "C020",
+                    name.span.clone(),
+                    message,
+                    "worlds are in the folder `worlds` of the model folder",
+                );
+                return;
+            }
+        };
+        let model = |name: &str| self.models.get(name).map(|model| &**model);
+        let known: Vec<String> = self.models.keys().cloned().collect();
+        let (world, diagnostics) = if is_toml(&path) {
+            match world_map::read(&name.value, &source, model, &known) {
+                Ok(world) => (Some(world), Diagnostics::new()),
+                Err(faults) => (None, faults),
+            }
+        } else {
+            foreign::world::read(&name.value, &source, model, &known)
+        };
+        let (errors, warnings): (Vec<Diagnostic>, Vec<Diagnostic>) =
+            diagnostics.into_iter().partition(|fault| fault.severity == Severity::Error);
+        found.extend(errors.into_iter().collect());
+        self.warnings.extend(warnings.into_iter().collect());
+        if let Some(world) = world {
+            self.worlds.insert(world.name.clone(), Arc::new(world));
+        }
+    }
+
+    /// The worlds of the model folder, then the shipped ones.
+    fn world_files(&self) -> Vec<(Files, PathBuf)> {
+        let is_world = |path: &PathBuf| is_toml(path) || path.extension().is_some_and(|e| e == "world" || e == "sdf");
+        let own = self.files.list(&self.folder.join("worlds")).into_iter().map(|path| (self.files.clone(), path));
+        let shipped = Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("worlds"));
+        own.chain(shipped.into_iter().map(|path| (Files::Shipped, path))).filter(|(_, path)| is_world(path)).collect()
+    }
+
+    /// Adds the shipped models, which shipped worlds use as furniture.
+    fn add_shipped_models(&mut self) {
+        for path in Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("objects")) {
+            let model = Files::Shipped.read(&path).ok().and_then(|source| model::read(&source).ok());
+            if let Some(model) = model.filter(|model| !self.names.contains(&model.name)) {
+                self.models.entry(model.name.clone()).or_insert_with(|| Arc::new(model));
+            }
+        }
+    }
+
+    /// Reports a location that no named world has (C021). If no world has locations, any name is accepted.
+    pub(crate) fn check_location(&self, table: &mut Table, name: &Located<String>) {
+        let known: Vec<String> =
+            self.worlds.values().flat_map(|world| &world.locations).map(|location| location.name.clone()).collect();
+        let is_named = known.is_empty() || known.contains(&name.value);
+        if !is_named {
+            let message = format!("no world of the configuration has a location `{}`", name.value);
+            table.fault("C021", name.span.clone(), message, choose(&name.value, &known));
+        }
+    }
+
+    /// Reports a surface that is not furniture of a named world (C021). If a world has no surfaces, models are accepted
+    /// too (else C008).
+    pub(crate) fn check_surface(&self, table: &mut Table, name: &Located<String>) {
+        let surfaces = |world: &WorldMap| -> Vec<String> {
+            let carries =
+                |piece: &&Furniture| self.models.get(&piece.model).is_some_and(|model| model.surface.is_some());
+            world.furniture.iter().filter(carries).map(|piece| piece.name.clone()).collect()
+        };
+        let known: Vec<String> = self.worlds.values().flat_map(|world| surfaces(world)).collect();
+        let takes_models = known.is_empty() || self.worlds.values().any(|world| surfaces(world).is_empty());
+        if known.contains(&name.value) {
+            return;
+        }
+        if takes_models {
+            self.check_name(table, name);
+        } else {
+            let message = format!("no world of the configuration has a surface `{}`", name.value);
+            table.fault("C021", name.span.clone(), message, choose(&name.value, &known));
+        }
+    }
+
+    /// Returns the folder of objects for messages: `objects` if it has files, else the model folder.
+    fn objects_folder(&self) -> PathBuf {
+        let objects = self.folder.join("objects");
+        if self.files.list(&objects).is_empty() { self.folder.clone() } else { objects }
+    }
+
+    /// Reads the robot of `[robot] profile`: a path to a TOML file, or a name in the model folder or the shipped one.
+    pub(crate) fn read_robot(
+        &mut self,
+        root: &mut Table,
+        folder: &Path,
+        found: &mut Diagnostics,
+    ) -> Option<Arc<RobotProfile>> {
+        let mut table = root.table("robot");
+        let written = table.as_mut().and_then(|table| table.string("profile"));
+        let name = written.as_ref().map_or(DEFAULT_ROBOT, |written| &written.value);
+        let place = match &written {
+            Some(path) if path.value.ends_with(".toml") => {
+                let place = resolve_path(folder, &path.value);
+                Files::Disk.read(&place).map(|_| (Files::Disk, place.clone())).map_err(|reason| {
+                    let help = "the path is relative to the configuration";
+                    (format!("cannot read the robot profile {}: {reason}", place.display()), help.to_owned())
+                })
+            }
+            _ => self.find_robot(name),
+        };
+        if let Err((message, help)) = &place {
+            match (&written, &mut table) {
+                (Some(written), Some(table)) => table.fault("C011", written.span.clone(), message, help),
+                _ => root.fault("C011", 0..0, message, help),
+            }
+        }
+        let mut packages = Vec::new();
+        if let Some(mut table) = table {
+            let written = table.strings("package_dirs").unwrap_or_default();
+            self.start = read_start(&mut table);
+            packages = written.iter().map(|written| resolve_path(folder, &written.value)).collect();
+            table.finish(found);
+        }
+        let (files, path) = place.ok()?;
+        robot::read_with(&files, &path, &packages).map(Arc::new).map_err(|faults| found.extend(faults)).ok()
+    }
+
+    /// Finds a robot's profile by name.
+    ///
+    /// # Errors
+    /// A message and a help text if there is no such robot.
+    fn find_robot(&self, name: &str) -> Result<(Files, PathBuf), (String, String)> {
+        self.robots().into_iter().find(|(_, path)| stem(path) == name).ok_or_else(|| {
+            let mut known: Vec<String> = self.robots().iter().map(|(_, path)| stem(path)).collect();
+            known.dedup();
+            (format!("there is no robot `{name}`"), choose(name, &known))
+        })
+    }
+
+    /// The robots of the model folder, then the shipped ones.
+    fn robots(&self) -> Vec<(Files, PathBuf)> {
+        let own = self.toml_files("robots").into_iter().map(|path| (self.files.clone(), path));
+        let shipped = Files::Shipped.list(&Path::new(SHIPPED_MODELS).join("robots"));
+        let shipped = shipped.into_iter().filter(|path| is_toml(path)).map(|path| (Files::Shipped, path));
+        own.chain(shipped).collect()
+    }
+
+    fn toml_files(&self, kind: &str) -> Vec<PathBuf> {
+        self.files.list(&self.folder.join(kind)).into_iter().filter(|path| is_toml(path)).collect()
+    }
+}
+
+/// Reads `start_x_m`, `start_y_m` and `start_heading_rad`, which must be given together.
+fn read_start(table: &mut Table) -> Option<[Range; 3]> {
+    let keys = ["start_x_m", "start_y_m", "start_heading_rad"];
+    if !keys.iter().any(|key| table.has(key)) {
+        return None;
+    }
+    table.require(&keys);
+    let (x, y) = (table.range(keys[0], -14.0..=14.0), table.range(keys[1], -14.0..=14.0));
+    let heading = table.range(keys[2], -std::f64::consts::TAU..=std::f64::consts::TAU);
+    Some([x?, y?, heading?])
+}
+
+fn is_toml(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending == "toml")
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+}
+
+/// Returns "did you mean", or the whole list.
+fn choose(name: &str, known: &[String]) -> String {
+    did_you_mean(name, known.iter().map(String::as_str))
+}
