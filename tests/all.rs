@@ -24,6 +24,7 @@ mod fuzz_corpus;
 mod health;
 mod help;
 mod history;
+mod last_failed;
 mod merge;
 mod models;
 mod more_scenes;
