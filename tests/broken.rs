@@ -1,9 +1,9 @@
-//! A fault of simulation ends its run as broken, with the reason, and never the campaign.
+//! A simulation fault ends its run as broken, with the reason, and never ends the campaign.
 
 use std::sync::atomic::AtomicBool;
 
 use actcheck::base::Outcome;
-use actcheck::campaign::{Clock, Ending, Env, Manner, Options, run_all};
+use actcheck::campaign::{CampaignOptions, Clock, Ending, Env, RunContext, run_all};
 use actcheck::config::Overrides;
 use actcheck::history::{History, RunFilter, RunStatus};
 use actcheck::report::RunSummary;
@@ -11,7 +11,8 @@ use actcheck::world::{Poison, World};
 
 use crate::support::root;
 
-/// Run 1 gets a pose that is not a number, run 2 a body far outside, run 3 a crash; the others are left alone.
+/// Run 1 gets a pose that is not a number, run 2 a body far outside the world, run 3 a panic; the other runs are
+/// unchanged.
 fn disturb(index: u64, world: &mut World) {
     match index {
         1 => assert!(world.poison("glass_1", Poison::NotFinite)),
@@ -22,14 +23,14 @@ fn disturb(index: u64, world: &mut World) {
 }
 
 #[test]
-fn faults_of_simulation_are_broken_runs_and_the_campaign_goes_on() {
+fn simulation_faults_break_single_runs_and_the_campaign_continues() {
     let folder = tempfile::tempdir().unwrap();
     let overrides = Overrides { runs: Some(5), history: Some(folder.path().join("h")), ..Overrides::default() };
     let env = Env::prepare(&root().join("configs/pick.toml"), &overrides).unwrap();
     let history = History::open(&env.campaign.history).unwrap();
     let clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
     history.begin_campaign(&env.record("test".into(), "pick".into(), (clock.now)())).unwrap();
-    let options = Options { jobs: 2, manner: Manner { clock, disturb: Some(disturb) } };
+    let options = CampaignOptions { jobs: 2, context: RunContext { clock, disturb: Some(disturb) } };
     let mut runs = Vec::new();
     let end = run_all(&env, &history, "test", &options, &AtomicBool::new(false), |record| {
         runs.push(RunSummary::of(record));

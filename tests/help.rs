@@ -99,7 +99,7 @@ fn the_help_of_every_command_ends_with_an_example() {
 }
 
 #[test]
-fn completions_know_every_command() {
+fn completions_list_every_command() {
     for shell in ["bash", "zsh", "fish"] {
         let output = actcheck(root(), &["completions", shell]);
         assert!(output.status.success(), "{}", stderr(&output));
@@ -121,7 +121,7 @@ fn completions_know_every_command() {
     assert_eq!(wrong.status.code(), Some(2));
 }
 
-/// What bash offers for a line whose last word is being typed.
+/// The completions that bash offers for a line whose last word is being typed.
 #[test]
 fn bash_completes_commands_and_options() {
     let script = stdout(&actcheck(root(), &["completions", "bash"]));
@@ -142,13 +142,13 @@ fn bash_completes_commands_and_options() {
     }
 }
 
-/// The rendered page, or its source if groff is not installed. A warning of groff fails the test.
+/// The rendered page, or its source if groff is not installed. A groff warning fails the test.
 fn rendered(page: &Path) -> String {
     static HAS_GROFF: OnceLock<bool> = OnceLock::new();
     let has_groff = *HAS_GROFF.get_or_init(|| {
         let found = foreign::has("groff");
         if !found {
-            foreign::left_out("how manual pages look", "there is no groff");
+            foreign::left_out("rendering of the manual pages", "groff is not installed");
         }
         found
     });
@@ -169,7 +169,7 @@ fn rendered(page: &Path) -> String {
 }
 
 #[test]
-fn the_manual_has_every_command_with_its_options_and_examples() {
+fn the_manual_has_every_command_with_options_and_examples() {
     let folder = tempfile::tempdir().unwrap();
     let page = folder.path().join("actcheck.1");
     std::fs::write(&page, stdout(&actcheck(root(), &["man"]))).unwrap();
@@ -184,8 +184,8 @@ fn the_manual_has_every_command_with_its_options_and_examples() {
     assert!(words.contains("--until-width") && words.contains("actcheck run configs/pick.toml --runs 5"), "{words}");
     assert!(!text.contains("serve-query") && !text.contains("EXTRA"), "{text}");
 
-    let told = stdout(&actcheck(folder.path(), &["man", "--out", "man1"]));
-    assert!(told.contains("man -l man1/actcheck.1"), "{told}");
+    let printed = stdout(&actcheck(folder.path(), &["man", "--out", "man1"]));
+    assert!(printed.contains("man -l man1/actcheck.1"), "{printed}");
     for command in commands().into_iter().chain(["new-campaign".to_owned(), "new-property".to_owned()]) {
         let text = rendered(&folder.path().join(format!("man1/actcheck-{command}.1")));
         assert!(text.contains("DESCRIPTION"), "{text}");

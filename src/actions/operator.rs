@@ -7,7 +7,7 @@ use crate::grip::GripWatch;
 use crate::memory::{Held, Memory, Standing};
 use crate::sabotage::IDLE_SECS;
 use crate::{Cut, ExternalFault, Saboteur};
-use actcheck_data::{ActionReport, Choices, KnownKind, Perceived, Percept, Phase, RobotProfile};
+use actcheck_data::{ActionReport, ChoiceName, Choices, KnownKind, Perceived, Percept, Phase, RobotProfile};
 use actcheck_scenario::FloorPlan;
 use actcheck_world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
 
@@ -167,7 +167,7 @@ impl<'a> Operator<'a> {
         self.world.floor_plan()
     }
 
-    /// The kind of object that a designator's value refers to.
+    /// The kind of object that a designator's value refers to. Returns `None` if the scene has no object with this id.
     pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
         self.world.kind_of(id)
     }
@@ -179,7 +179,7 @@ impl<'a> Operator<'a> {
 
     /// Selects the sequence of postures that an arm planner samples: a number from 0 to 1, recorded like every choice.
     pub fn choose_samples(&mut self) -> f64 {
-        self.choices.real("motion.samples", 0.0, 1.0, 0.5)
+        self.choices.simple(ChoiceName::MotionSamples, 0.0, 1.0)
     }
 
     /// Knowledge from earlier actions of the run.
@@ -231,7 +231,8 @@ impl<'a> Operator<'a> {
         self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
     }
 
-    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection.
+    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection. Returns
+    /// `None` if the scene has no object with this id.
     pub fn see(&mut self, id: &str) -> Option<Sighting> {
         let mut seen = self.world.perceive(id, self.choices)?;
         if let Some(saboteur) = &mut self.saboteur {

@@ -24,7 +24,7 @@ pub struct Consistency {
     /// Number of scenes with at least two decided runs, all failed.
     pub always_failed: u64,
     /// The other scenes with at least two decided runs, sorted by number.
-    pub flaky: Vec<Flaky>,
+    pub flaky: Vec<SceneCounts>,
     /// pass^k for k from 1 to the most decided runs of a scene.
     pub pass_powers: Vec<PassPower>,
     /// Variance of the outcome: 1 for passed, 0 for failed.
@@ -37,7 +37,7 @@ pub struct Consistency {
 
 /// A scene with its number of passed runs. In [`Consistency::flaky`], a scene with different outcomes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Flaky {
+pub struct SceneCounts {
     /// Number of the scene.
     pub scene: u64,
     /// Number of passed runs.
@@ -81,7 +81,7 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
     for run in runs {
         scenes.entry(run.scene).or_default().push(run);
     }
-    let counts: Vec<Flaky> = scenes.iter().map(|(scene, runs)| count(*scene, runs)).collect();
+    let counts: Vec<SceneCounts> = scenes.iter().map(|(scene, runs)| count(*scene, runs)).collect();
     let several = || counts.iter().filter(|scene| scene.of >= 2);
     let numbers = |number: &dyn Fn(&Repeated) -> f64| -> Vec<Vec<f64>> {
         scenes.values().map(|runs| runs.iter().map(|run| number(run)).collect()).collect()
@@ -101,13 +101,13 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
     }
 }
 
-fn count(scene: u64, runs: &[&Repeated]) -> Flaky {
-    Flaky { scene, passed: runs.iter().filter(|run| run.passed).count() as u64, of: runs.len() as u64 }
+fn count(scene: u64, runs: &[&Repeated]) -> SceneCounts {
+    SceneCounts { scene, passed: runs.iter().filter(|run| run.passed).count() as u64, of: runs.len() as u64 }
 }
 
 /// Returns the mean over scenes of C(passed, k) / C(runs, k), an unbiased estimate for any distribution of the scenes'
 /// probabilities.
-fn pass_power(counts: &[Flaky], k: u64) -> Option<PassPower> {
+fn pass_power(counts: &[SceneCounts], k: u64) -> Option<PassPower> {
     let enough: Vec<f64> = counts
         .iter()
         .filter(|scene| scene.of >= k)
@@ -212,7 +212,7 @@ impl SceneRuns {
     }
 
     /// Returns the share of some of the runs, given by their indices, with an interval that accounts for runs of the
-    /// same scene.
+    /// same scene. Returns `None` if there are no runs.
     pub fn share(&self, runs: impl IntoIterator<Item = usize>) -> Option<Interval> {
         let mut scenes: Vec<[u64; 2]> = self.sizes.iter().map(|size| [0, *size]).collect();
         runs.into_iter().for_each(|run| scenes[self.scene_of[run]][0] += 1);
@@ -233,12 +233,12 @@ mod tests {
     }
 
     #[test]
-    fn scenes_are_told_apart_by_how_their_runs_went() {
+    fn scenes_are_classified_by_the_results_of_their_runs() {
         let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1], &[0, 1]]));
         assert_eq!((found.always_passed, found.always_failed), (1, 1));
         assert_eq!(
             found.flaky,
-            [Flaky { scene: 2, passed: 2, of: 3 }, Flaky { scene: 4, passed: 1, of: 2 }],
+            [SceneCounts { scene: 2, passed: 2, of: 3 }, SceneCounts { scene: 4, passed: 1, of: 2 }],
             "a scene of one run is neither"
         );
         assert_eq!(consistency(&[]), Consistency::default());
@@ -246,7 +246,7 @@ mod tests {
 
     /// If two of three runs passed, one of the three pairs passed entirely. Computed by hand for all scenes.
     #[test]
-    fn pass_powers_are_shares_of_all_choices_of_runs() {
+    fn pass_powers_are_shares_of_all_subsets_of_runs() {
         let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1, 1]]));
         let told: Vec<(u64, u64, f64)> =
             found.pass_powers.iter().map(|power| (power.k, power.scenes, power.probability.rate)).collect();
@@ -262,7 +262,7 @@ mod tests {
     /// Kutner, Nachtsheim, Neter and Li, "Applied Linear Statistical Models", table 25.1: ratings by five officers of
     /// four candidates each; the mean squares are 394.925 and 73.2833, and the officers' variance 80.41.
     #[test]
-    fn published_components_come_out() {
+    fn variance_components_match_published_values() {
         let ratings = [
             vec![76.0, 65.0, 85.0, 74.0],
             vec![59.0, 75.0, 81.0, 67.0],
@@ -305,7 +305,7 @@ mod tests {
             noise += outcome.noise / CAMPAIGNS as f64;
             scene += outcome.scene / CAMPAIGNS as f64;
             both += found.pass_powers[1].probability.rate / CAMPAIGNS as f64;
-            let rate = found.rate.expect("there are runs");
+            let rate = found.rate.expect("the table has runs");
             held += usize::from((rate.low..=rate.high).contains(&0.5));
         }
         assert!((noise - 0.16).abs() < 0.002, "{noise}");
@@ -316,14 +316,14 @@ mod tests {
     }
 
     #[test]
-    fn where_all_runs_went_alike_each_scene_counts_once() {
+    fn scenes_whose_runs_all_agree_count_once() {
         let found = consistency(&runs(&[&[1, 1, 1], &[1, 1, 1]]));
         assert_eq!(found.rate, wilson_share(1.0, 2.0));
         assert_eq!(found.outcome.and_then(|variance| variance.noise_share()), None);
     }
 
     #[test]
-    fn margins_count_where_every_run_has_one() {
+    fn margins_are_used_if_every_run_has_one() {
         let run = |scene, margin| Repeated { scene, passed: true, margin };
         let mut told = vec![run(0, Some(1.0)), run(0, Some(3.0)), run(1, Some(5.0)), run(1, Some(7.0))];
         // Within: 2 each. Between the means 2 and 6: 2 · (4 + 4) / 1 = 16; minus 2, divided by 2.

@@ -6,7 +6,7 @@ use actcheck_history::CampaignRecord;
 
 /// An input that changed since a campaign ran.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Change {
+pub struct InputChange {
     /// Its kind.
     pub kind: ChangeKind,
     /// Name of the model, robot, rule file or configuration.
@@ -50,8 +50,8 @@ impl ChangeKind {
 
 /// Returns the differences between the records of two campaigns, sorted by kind and name. Ontology and rules are
 /// included: they change outcomes, though not traces.
-pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<Change> {
-    let single = |kind, name: &str, was: &str, is: &str| Change {
+pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<InputChange> {
+    let single = |kind, name: &str, was: &str, is: &str| InputChange {
         kind,
         name: name.to_owned(),
         was: Some(was.to_owned()),
@@ -88,13 +88,13 @@ fn programs(was: &CampaignRecord, is: &CampaignRecord) -> [String; 2] {
 }
 
 /// One entry for each name on either side.
-fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String, String>) -> Vec<Change> {
+fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String, String>) -> Vec<InputChange> {
     let mut names: Vec<&String> = was.keys().chain(is.keys()).collect();
     names.sort();
     names.dedup();
     names
         .into_iter()
-        .map(|name| Change { kind, name: name.clone(), was: was.get(name).cloned(), is: is.get(name).cloned() })
+        .map(|name| InputChange { kind, name: name.clone(), was: was.get(name).cloned(), is: is.get(name).cloned() })
         .collect()
 }
 
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_skill_that_changed_or_that_was_not_there_is_named() {
+    fn changed_and_new_skills_are_named() {
         let with = |digest: &str| CampaignRecord {
             skill: Some(SkillRecord { command: "pick.py".to_owned(), digest: digest.to_owned(), privileged: false }),
             ..record("aa")
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_changed_program_is_named_though_its_version_is_the_same() {
+    fn a_changed_program_of_the_same_version_is_named() {
         let found = changes(&record("aa"), &record("bb"));
         let [change] = found.as_slice() else { panic!("{found:?}") };
         assert_eq!((change.kind, change.name.as_str()), (ChangeKind::Program, "actcheck"));

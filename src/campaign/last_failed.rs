@@ -9,11 +9,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use crate::make_run::cut_of;
-use crate::replay::again;
+use crate::attempt::{Attempt, time_limit};
+use crate::finished_run::{FinishedRun, RunPlace};
+use crate::replay::rerun;
 use crate::resume::{config_of, is_same_file};
 use crate::shrink::SHRUNK;
-use crate::{CampaignEnd, Ending, Env, Options};
+use crate::workers::workers;
+use crate::{CampaignOptions, CampaignResult, Ending, Env};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_config as config;
 use actcheck_config::Overrides;
@@ -85,26 +87,27 @@ impl LastFailed {
     pub fn run(
         &self,
         (env, history, id): (&Env, &History, &str),
-        options: &Options,
+        options: &CampaignOptions,
         stop: &AtomicBool,
         mut on_run: impl FnMut(&RunRecord),
-    ) -> (CampaignEnd, Diagnostics) {
-        let mut end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
+    ) -> (CampaignResult, Diagnostics) {
+        let mut end =
+            CampaignResult { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
         let mut faults = Diagnostics::new();
-        let secs = options.manner.clock.secs;
+        let secs = options.context.clock.secs;
         let began_secs = secs();
         let jobs = options.jobs.max(1);
-        let pool = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
+        let pool = match workers(jobs) {
             Ok(pool) => pool,
-            Err(error) => {
-                let fault = Diagnostic::error("X010", format!("workers can't be started: {error}"));
+            Err(fault) => {
                 end.ending = Ending::Stopped(fault.into());
                 return (end, faults);
             }
         };
         let make = |run: &FailedRun| {
-            let recorded = || Choices::recorded(&run.choices);
-            again(env, id, (run.index, &recorded), &options.manner, cut_of(env, &options.manner))
+            let choices = || Choices::recorded(&run.choices);
+            let cut = time_limit(env, &options.context);
+            rerun(env, &Attempt { campaign: id, index: run.index, choices: &choices, cut }, &options.context)
         };
         let numbered: Vec<(u64, &FailedRun)> = (0..).zip(&self.runs).collect();
         // At most one trace for each worker is in memory.
@@ -116,8 +119,13 @@ impl LastFailed {
             let made: Vec<_> = pool.install(|| some.par_iter().map(|(_, run)| make(run)).collect());
             for ((number, run), made) in some.iter().zip(made) {
                 match made {
-                    Ok(record) => {
-                        let record = renumbered(record, (id, *number), run, secs() - began_secs);
+                    Ok(made) => {
+                        let place = RunPlace {
+                            repetition: run.repetition,
+                            elapsed_secs: secs() - began_secs,
+                            ..RunPlace::alone(id)
+                        };
+                        let record = FinishedRun { index: *number, ..made }.into_record(place);
                         if let Err(found) = history.commit(&record) {
                             end.ending = Ending::Stopped(found);
                             return (end, faults);
@@ -136,14 +144,6 @@ impl LastFailed {
         }
         (end, faults)
     }
-}
-
-fn renumbered(mut record: RunRecord, (id, number): (&str, u64), run: &FailedRun, elapsed_secs: f64) -> RunRecord {
-    record.id = format!("{id}-{}", number + 1);
-    record.index = number;
-    record.repetition = run.repetition;
-    record.elapsed_secs = elapsed_secs;
-    record
 }
 
 fn last_campaign(history: &History, config: &Path) -> Result<CampaignRecord, Diagnostics> {

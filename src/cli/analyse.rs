@@ -207,7 +207,7 @@ fn report(
         (true, true) => USUAL_MAPS.iter().map(<[&str; 2]>::as_slice).collect(),
     };
     PropertyReport {
-        maps: maps.into_iter().filter_map(|by| two_way(&findings.subject, by)).collect(),
+        maps: maps.into_iter().filter_map(|by| two_way(&findings.input, by)).collect(),
         unit: ontology.properties.get(&of.property).and_then(|property| property.unit.clone()),
         trend: trend(table, of, asked.level),
         flaky,
@@ -236,7 +236,7 @@ fn rule(summary: &FindingsSummary, number: usize) -> Result<String, Diagnostics>
             .help("`actcheck analyse` with the same options lists them with their numbers")
             .into());
     };
-    scene_rule(&pattern.conditions, &report.findings.subject.parameters, &report.sentence(pattern)).map_err(|unknown| {
+    scene_rule(&pattern.conditions, &report.findings.input.parameters, &report.sentence(pattern)).map_err(|unknown| {
         let message = format!("a scene rule can't constrain {}", unknown.join(", "));
         Diagnostic::error("X049", message).help("narrow the configuration's own ranges and lists instead").into()
     })

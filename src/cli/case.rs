@@ -9,7 +9,7 @@ use crate::run_args::RunArgs;
 use crate::work::quietly;
 use crate::{clock, output, show};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_campaign::{CaseRun, Env, Manner, run_cases};
+use actcheck_campaign::{CaseRun, Env, RunContext, run_cases};
 use actcheck_history::History;
 use actcheck_report::{CaseSummary, case_json, case_text, run_json, run_text};
 
@@ -21,10 +21,10 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     let stem = Path::new(&file).file_stem();
     let name = stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let cases = [(name, env)];
-    let manner = Manner { clock: clock::system(), disturb: None };
+    let context = RunContext { clock: clock::system(), disturb: None };
     let mut summary = None;
     quietly(|| {
-        run_cases(&cases, &history, 1, &manner, &mut |_, made| {
+        run_cases(&cases, &history, 1, &context, &mut |_, made| {
             summary = Some(summarise(&file, &cases[0].1, made));
         })
     })?;

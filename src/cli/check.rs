@@ -19,7 +19,7 @@ pub struct CheckArgs {
     pub config: Option<PathBuf>,
 }
 
-/// Prints what a campaign would use, or returns everything that is wrong with it. `stop` interrupts it.
+/// Prints the parts that a campaign would use, or returns all its faults. `stop` interrupts it.
 pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let usual = Path::new("configs/pick.toml");
     let config = match &args.config {

@@ -13,7 +13,7 @@ use crate::{clock, output, stop};
 use actcheck_analysis::{OracleTrial, oracle_matrix};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
-use actcheck_campaign::{Env, Manner};
+use actcheck_campaign::{Env, RunContext};
 use actcheck_config::Overrides;
 use actcheck_report::{OracleSummary, oracles_json, oracles_table, oracles_text};
 use actcheck_rules::Budget;
@@ -49,8 +49,8 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     let faults: Vec<Fault> = FAULTS.into_iter().filter(concerns).collect();
     let steps = env.planned_runs() * (faults.len() as u64 + 1);
     let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
-    let manner = Manner { clock: clock::system(), disturb: None };
-    let options = TrialOptions { jobs: args.jobs.map_or_else(all_cores, usize::from), manner };
+    let context = RunContext { clock: clock::system(), disturb: None };
+    let options = TrialOptions { jobs: args.jobs.map_or_else(all_cores, usize::from), context };
     let trials = quietly(|| try_faults(&env, &faults, &options, &stop, || bar.inc(1)))?;
     bar.finish_and_clear();
     if stop.load(Ordering::Relaxed) {

@@ -15,7 +15,7 @@ use actcheck_history::{History, RunFilter, RunRow};
 use actcheck_report::{RecheckSummary, recheck_json, recheck_table, recheck_text};
 
 /// Maximum number of faults that are reported; the rest are counted.
-const TOLD: usize = 5;
+const MAX_LISTED: usize = 5;
 
 /// `actcheck recheck`
 #[derive(Debug, Args)]
@@ -122,9 +122,9 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
 }
 
 fn first_of(faults: Diagnostics) -> Diagnostics {
-    let left_out = faults.len().saturating_sub(TOLD);
+    let left_out = faults.len().saturating_sub(MAX_LISTED);
     let mut told = Diagnostics::new();
-    faults.into_iter().take(TOLD).for_each(|fault| told.push(fault));
+    faults.into_iter().take(MAX_LISTED).for_each(|fault| told.push(fault));
     if left_out > 0 {
         told.push(Diagnostic::error("X035", format!("{left_out} more runs could not be judged")));
     }

@@ -14,7 +14,9 @@ use crate::{case, clock, health, output, shrink, stop};
 use actcheck_analysis as analysis;
 use actcheck_analysis::{Interval, Mirror};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
-use actcheck_campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, WeightedRate, resume_all};
+use actcheck_campaign::{
+    CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns, WeightedRate, resume_all,
+};
 use actcheck_history as history;
 use actcheck_history::{History, RunFilter, RunRecord};
 use actcheck_report::{
@@ -49,8 +51,8 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     session.begin((clock.now)())?;
     let Session { env, history, id, failed, kept, regressions, .. } = session;
 
-    let options = Options { jobs, manner: Manner { clock, disturb: None } };
-    let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::again).collect();
+    let options = CampaignOptions { jobs, context: RunContext { clock, disturb: None } };
+    let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
     let mut on_run = |record: &RunRecord| {
         let summary = RunSummary::of(record);
@@ -63,8 +65,8 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let (end, faults) = quietly(|| match &failed {
         Some(failed) => failed.run((&env, &history, &id), &options, &stop, &mut on_run),
         None => {
-            let kept = (&history, Kept::of(&kept));
-            (resume_all(&env, kept, &id, &options, &stop, &mut on_run), Diagnostics::new())
+            let stored = StoredRuns::of(&kept);
+            (resume_all(&env, &history, &id, stored, &options, &stop, &mut on_run), Diagnostics::new())
         }
     });
     progress.finish();
@@ -185,7 +187,7 @@ fn examples(summary: &CampaignSummary) -> Vec<(String, u64)> {
 }
 
 /// The budget that ended a campaign.
-fn spent(end: &CampaignEnd) -> Option<Spent> {
+fn spent(end: &CampaignResult) -> Option<ExhaustedBudget> {
     match end.ending {
         Ending::Budget(spent) => Some(spent),
         _ => None,
@@ -193,7 +195,7 @@ fn spent(end: &CampaignEnd) -> Option<Spent> {
 }
 
 /// Whether a campaign ended on its own, without an interrupt or a fault.
-fn is_whole(end: &CampaignEnd) -> bool {
+fn is_whole(end: &CampaignResult) -> bool {
     matches!(end.ending, Ending::Finished | Ending::Budget(_))
 }
 
@@ -202,7 +204,7 @@ fn finish(
     history: &History,
     id: &str,
     runs: &[RunSummary],
-    end: &CampaignEnd,
+    end: &CampaignResult,
     ended: String,
 ) -> Result<(), Diagnostics> {
     let whole = runs.iter().filter(|run| run.status != history::RunStatus::Broken);
@@ -227,7 +229,7 @@ fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureM
     Ok(analysis::failure_modes(&rows, &scenes))
 }
 
-fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
+fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignResult) -> CampaignSummary {
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
     for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
         for iri in &action.success_properties {
@@ -251,7 +253,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
         privileged: env.is_privileged(),
         planned: env.runs_to_make(),
         discards: end.discards.len() as u64,
-        ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), told: spent.to_string() }),
+        ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), description: spent.to_string() }),
         interrupted: !is_whole(end),
     };
     summary.search = guided_search(env, &summary, end);
@@ -259,7 +261,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
 }
 
 /// The failure rates of a guided search. Returns `None` if another strategy chose the scenes.
-fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignEnd) -> Option<GuidedSearch> {
+fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignResult) -> Option<GuidedSearch> {
     let line = |found: &WeightedRate| WeightedLine {
         test: found.test.clone(),
         property: found.property.clone(),

@@ -11,7 +11,7 @@ use crate::{history_dir, named_queries, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::History;
 use actcheck_serve as serve;
-use actcheck_serve::{Example, Options};
+use actcheck_serve::{ExampleQuery, ServeOptions};
 
 /// `actcheck serve`
 #[derive(Debug, Args)]
@@ -90,7 +90,7 @@ pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
         .map_err(|error| Diagnostic::error("X005", format!("the query can't be read or answered: {error}")).into())
 }
 
-fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
+fn options(args: &ServeArgs, folder: &Path) -> Result<ServeOptions, Diagnostics> {
     let program = std::env::current_exe().map_err(|error| {
         Diagnostic::error("X052", format!("the path of this program can't be found: {error}"))
             .help("start actcheck by its full path")
@@ -98,13 +98,13 @@ fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
     let history = folder.display().to_string();
     let with_history = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).chain([history.clone()]).collect();
     let named = named_queries::all()?;
-    let example = |query: named_queries::NamedQuery| Example {
+    let example = |query: named_queries::NamedQuery| ExampleQuery {
         name: query.name,
         title: query.title,
         description: query.description,
         query: query.text,
     };
-    Ok(Options {
+    Ok(ServeOptions {
         history: folder.to_owned(),
         program,
         query_arguments: with_history(&["serve-query", "--history"]),

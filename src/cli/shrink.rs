@@ -10,8 +10,8 @@ use crate::picture::Picture;
 use crate::work::{all_cores, quietly};
 use crate::{clock, history_dir, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk, unit_of};
-use actcheck_campaign::{Env, Manner};
+use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk};
+use actcheck_campaign::{Env, RunContext};
 use actcheck_data::Choice;
 use actcheck_history::{History, RunRecord};
 use actcheck_report::{ShrunkChoice, ShrunkSummary, Table, shrunk_json, shrunk_text};
@@ -59,17 +59,17 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open(&args.history)?;
     let run = history.run(&args.run)?;
-    let (env, _) = Env::recall(&history, &run.row.campaign, args.config.as_deref())?;
-    let manner = Manner { clock: clock::system(), disturb: None };
-    let until = args.time.map(|secs| (manner.clock.secs)() + secs);
+    let (env, _) = Env::from_history(&history, &run.row.campaign, args.config.as_deref())?;
+    let context = RunContext { clock: clock::system(), disturb: None };
+    let until = args.time.map(|secs| (context.clock.secs)() + secs);
     let asked = stop::on_interrupt(|| eprintln!("stopping; the smallest scene so far follows"));
-    let stop = || asked.load(Ordering::Relaxed) || until.is_some_and(|until| (manner.clock.secs)() >= until);
+    let stop = || asked.load(Ordering::Relaxed) || until.is_some_and(|until| (context.clock.secs)() >= until);
     let options = ShrinkOptions {
         property: args.property.as_deref(),
         trials: args.trials,
         jobs: args.jobs.map_or_else(all_cores, usize::from),
         repeat: args.must_fail,
-        manner,
+        context,
         stop: &stop,
     };
     let recorded = history.choices(&run.row.run)?;
@@ -102,9 +102,9 @@ pub fn shrink_modes(
     jobs: usize,
     asked: &AtomicBool,
 ) -> ShrunkModes {
-    let manner = Manner { clock: clock::system(), disturb: None };
+    let context = RunContext { clock: clock::system(), disturb: None };
     let stop = || asked.load(Ordering::Relaxed);
-    let options = ShrinkOptions { property: None, trials: TRIALS, jobs, repeat: None, manner, stop: &stop };
+    let options = ShrinkOptions { property: None, trials: TRIALS, jobs, repeat: None, context, stop: &stop };
     let mut shrunk = ShrunkModes { done: Vec::new(), faults: Diagnostics::new() };
     for (run, index) in examples.iter().take_while(|_| !stop()) {
         match shrink_one(env, history, (run, *index), &options) {
@@ -125,7 +125,7 @@ fn shrink_one(
 ) -> Result<ShrunkSummary, Diagnostics> {
     let recorded = history.choices(run)?;
     let shrunk = quietly(|| shrink::shrink(env, index, &recorded, options, &mut |_| {}))?;
-    let record = shrink::keep(env, history, (run, index), &shrunk, &options.manner)?;
+    let record = shrink::store(env, history, run, index, &shrunk, &options.context)?;
     summary(env, history, run, shrunk, &record)
 }
 
@@ -138,7 +138,7 @@ fn summary(
 ) -> Result<ShrunkSummary, Diagnostics> {
     let influences = shrunk.explained.influences.iter();
     let shown = |id: &Id| match influences.clone().filter(|other| other.id.name == id.name).count() {
-        0 | 1 => id.name.clone(),
+        0 | 1 => id.name.to_string(),
         _ => format!("{} ({})", id.name, id.nth + 1),
     };
     let choices = influences.clone().map(|influence| shrunk_choice(shown(&influence.id), influence));
@@ -188,7 +188,7 @@ fn shrunk_choice(name: String, influence: &shrink::Influence) -> ShrunkChoice {
         name,
         value: *value,
         nominal: kind.nominal(),
-        unit: unit_of(full),
+        unit: full.unit(),
         matters: influence.matters,
         fails: influence.fails,
         passes: influence.passes,

@@ -23,13 +23,13 @@ pub(super) fn syntax_fault(text: &Source, error: &str) -> Diagnostic {
     let expected: Vec<&str> = expected.strip_prefix("one of ").unwrap_or(expected).split(", ").map(str::trim).collect();
     // Every other item is a keyword, a quoted character or a character class in brackets.
     match expected.iter().find(|item| item.contains(' ') && !item.starts_with(['[', '"', '\''])) {
-        Some(reason) => told(text, end, reason),
+        Some(reason) => with_reason(text, end, reason),
         None => unexpected(text, end, &expected),
     }
 }
 
 /// Reports a reason in the parser's own words. Its place is after the word that it concerns.
-fn told(text: &Source, end: usize, reason: &str) -> Diagnostic {
+fn with_reason(text: &Source, end: usize, reason: &str) -> Diagnostic {
     let before = text.text[..end].trim_end();
     let start = before.rfind(char::is_whitespace).map_or(0, |at| at + 1);
     let word = &before[start..];
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_place_is_a_byte_offset() {
+    fn an_error_position_becomes_a_byte_offset() {
         assert_eq!(offset("äb\ncd", 1, 2), 2);
         assert_eq!(offset("äb\ncd", 2, 2), 5);
         assert_eq!(offset("äb\ncd", 9, 9), 6);
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn strange_errors_of_the_parser_are_still_told() {
+    fn unparsable_parser_errors_are_still_reported() {
         let text = Source::new("q", "SELECT");
         for error in
             ["no place", "error at 1:x: expected a", "error at 9:9: expected one of ", "error at 1:3: expected é"]

@@ -21,7 +21,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_many_contacts_the_strongest_are_told_as_they_began() {
+    fn the_strongest_contacts_are_shown_in_order_of_their_start() {
         let contact = |idx: u32| ContactEpisode {
             pair: ["floor".to_owned(), "mug_1".to_owned()],
             start_secs: f64::from(100 - idx),
@@ -29,10 +29,10 @@ mod tests {
             max_force_n: f64::from(idx % 50),
         };
         let all: Vec<ContactEpisode> = (0..100).map(contact).collect();
-        let told = strongest(&all);
-        assert_eq!(told.len(), MOST_CONTACTS);
-        assert!(told.iter().all(|contact| contact.max_force_n >= 20.0));
-        assert!(told.is_sorted_by(|a, b| a.start_secs <= b.start_secs));
+        let shown = strongest(&all);
+        assert_eq!(shown.len(), MOST_CONTACTS);
+        assert!(shown.iter().all(|contact| contact.max_force_n >= 20.0));
+        assert!(shown.is_sorted_by(|a, b| a.start_secs <= b.start_secs));
         assert_eq!(strongest(&all[..3]), all[..3].iter().collect::<Vec<_>>());
     }
 }

@@ -70,13 +70,10 @@ fn unmet_precondition(
 
 fn outcome_of(result: &Result<Findings, RuleFault>, property: Option<&Property>) -> (Outcome, Option<f64>, String) {
     match result {
-        Err(RuleFault::BudgetSpent(reason)) => (Outcome::Timeout, None, reason.clone()),
-        Err(RuleFault::Value(reason)) => (Outcome::Broken, None, reason.clone()),
-        Err(RuleFault::Interrupted) => (Outcome::Untested, None, RuleFault::Interrupted.to_string()),
-        Ok(found) if !found.applicable => (Outcome::Inapplicable, None, words(found, property)),
+        Err(fault) => (fault.outcome(), None, fault.reason().to_owned()),
         Ok(found) => {
-            let outcome = if found.holds { Outcome::Passed } else { Outcome::Failed };
-            (outcome, found.margin, words(found, property))
+            let margin = found.margin.filter(|_| found.applicable);
+            (found.outcome(), margin, words(found, property))
         }
     }
 }
@@ -151,14 +148,14 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_of_the_tool_is_not_a_failure_of_the_robot() {
+    fn a_tool_fault_is_not_a_robot_failure() {
         assert_eq!(outcome_of(&found(false), None).0, Outcome::Failed);
         assert_eq!(outcome_of(&Err(RuleFault::BudgetSpent("rule x".into())), None).0, Outcome::Timeout);
         assert_eq!(outcome_of(&Err(RuleFault::Value("no number".into())), None).0, Outcome::Broken);
     }
 
     #[test]
-    fn words_say_how_far_it_was() {
+    fn witnesses_include_the_margin() {
         assert_eq!(outcome_of(&found(false), None).2, "no success was derived; missed by 0.016");
         assert_eq!(short(0.000_412_34), "0.0004123");
         assert_eq!(short(1234.6), "1235");

@@ -13,7 +13,7 @@ use crate::World;
 use crate::convert::{from_pose, to_real};
 use crate::engine::Owner;
 use crate::rays::{Lens, Solids};
-use actcheck_data::{Camera, Choices, Stream};
+use actcheck_data::{Camera, ChoiceName, Choices, Stream};
 
 /// Number of noise seeds, including 0 (no noise).
 const FRAMES: usize = 1 << 32;
@@ -56,7 +56,7 @@ impl World {
     pub fn look(&self, choices: &mut Choices) -> DepthImage {
         let began_secs = self.watch_secs();
         let camera = &self.sensing.camera;
-        let frame = choices.index("sense.camera.frame", FRAMES);
+        let frame = choices.index(ChoiceName::CameraFrame, FRAMES);
         let noise = (frame > 0).then(|| Noise { camera, stream: Stream::new(frame as u64) });
         let eye = self.robot.kinematics.camera(&self.robot.state(&self.engine).0);
         let solids = Solids::new(lens(camera), &eye, self.solids());
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_is_everywhere_as_deep_as_it_is_far() {
+    fn a_parallel_wall_has_the_same_depth_everywhere() {
         let image = look(&[(2.5, &Cuboid::new([0.5, 5.0, 5.0].into()))]);
         assert!(image.depths.iter().all(|depth| (depth - 2.0).abs() < 1e-5));
         // The outermost pixel centres are half a pixel inside the field of view.
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearer_of_two_hides_the_other_and_range_is_limited() {
+    fn nearer_objects_occlude_and_range_is_limited() {
         let (ball, wall) = (Ball::new(0.2), Cuboid::new([0.1, 9.0, 9.0].into()));
         assert!((middle(&look(&[(3.0, &wall), (1.0, &ball)])) - 0.8).abs() < 2e-3);
         assert!((middle(&look(&[(3.0, &wall)])) - 2.9).abs() < 1e-4);

@@ -1,10 +1,10 @@
-//! Made-up runs of which it is known when they fail: what pattern mining has to find, and nothing else.
+//! Made-up runs with known failure conditions: pattern mining must find exactly these.
 
 use std::f64::consts::PI;
 
-use actcheck::analysis::{Condition, Parameter, Subject, Values};
+use actcheck::analysis::{Condition, Parameter, PatternInput, Values};
 
-/// Kinds of objects with the kinds above them, the nearest first.
+/// Kinds of objects with their ancestors, the nearest first.
 pub const KINDS: [(&str, &[&str]); 8] = [
     ("Bottle", &["Container", "Graspable"]),
     ("Bowl", &["Container", "Graspable"]),
@@ -29,7 +29,7 @@ const NUMBERS: [(&str, f64, f64); 8] = [
     ("position_noise_m", 0.0, 0.03),
     ("neighbour_distance_m", 0.05, 0.9),
 ];
-/// Things around at most.
+/// The largest number of surrounding objects.
 const MOST_OTHERS: u64 = 6;
 
 pub const CATEGORY: usize = 0;
@@ -39,11 +39,11 @@ pub const FRICTION: usize = 4;
 pub const YAW: usize = 6;
 pub const X: usize = 7;
 
-/// Share of failures where nothing is planted, and where something is.
+/// Failure rates without and with a planted pattern.
 pub const ELSEWHERE: f64 = 0.08;
 pub const WITHIN: f64 = 0.6;
 
-/// Numbers that are as good as random and always the same.
+/// A deterministic pseudo-random generator.
 pub struct Dice(u64);
 
 impl Dice {
@@ -60,7 +60,7 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// From 0 to 1.
+    /// A number from 0 to 1.
     pub fn share(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -70,8 +70,8 @@ impl Dice {
     }
 }
 
-/// Runs with twelve parameters that fail more often where one of the patterns holds.
-pub fn subject(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> Subject {
+/// Runs with twelve parameters that fail more often if one of the patterns holds.
+pub fn input(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> PatternInput {
     let mut dice = Dice::new(seed);
     let mut parameters = vec![
         kinds("target_category", KINDS.len(), |kind| KINDS[kind], runs, &mut dice),
@@ -83,7 +83,7 @@ pub fn subject(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> Subject {
         let unit = name.rsplit_once('_').map(|(_, unit)| unit.to_owned());
         parameters.push(numbers(name, unit, (0..runs).map(|_| low + (high - low) * dice.share()).collect()));
     }
-    // Where nothing is around, nothing is near.
+    // Without surrounding objects there is no nearest distance.
     if let (Values::Numbers(others), rest) = (parameters[OTHERS].values.clone(), parameters.last_mut().unwrap()) {
         let Values::Numbers(distances) = &mut rest.values else { unreachable!("they are numbers") };
         distances
@@ -93,27 +93,27 @@ pub fn subject(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> Subject {
             .for_each(|(distance, _)| *distance = f64::NAN);
     }
     let held_out = (0..runs).map(|_| dice.below(3) == 0).collect();
-    let mut subject = Subject { failed: vec![false; runs], held_out, parameters };
+    let mut input = PatternInput { failed: vec![false; runs], held_out, parameters };
     let mut within = vec![false; runs];
     for conditions in planted {
         let mut all = vec![true; runs];
         for condition in conditions {
-            all.iter_mut().zip(condition.holds(&subject)).for_each(|(all, holds)| *all &= holds);
+            all.iter_mut().zip(condition.holds(&input)).for_each(|(all, holds)| *all &= holds);
         }
         within.iter_mut().zip(all).for_each(|(within, all)| *within |= all);
     }
-    subject.failed = within.iter().map(|within| dice.share() < if *within { WITHIN } else { ELSEWHERE }).collect();
-    subject
+    input.failed = within.iter().map(|within| dice.share() < if *within { WITHIN } else { ELSEWHERE }).collect();
+    input
 }
 
-/// The same runs, and which of them fail is drawn by lot.
-pub fn shuffled(subject: &Subject, seed: u64) -> Subject {
+/// The same runs with randomly permuted failures.
+pub fn shuffled(input: &PatternInput, seed: u64) -> PatternInput {
     let mut dice = Dice::new(seed);
-    let mut failed = subject.failed.clone();
+    let mut failed = input.failed.clone();
     for at in (1..failed.len()).rev() {
         failed.swap(at, dice.below(at as u64 + 1) as usize);
     }
-    Subject { failed, ..subject.clone() }
+    PatternInput { failed, ..input.clone() }
 }
 
 fn kinds(
@@ -143,7 +143,7 @@ pub fn range(parameter: usize, low: Option<f64>, high: Option<f64>) -> Condition
     Condition::Range { parameter, low, high }
 }
 
-/// What is planted, by name: each alone, and all at once.
+/// The planted patterns, by name: each alone, and all at once.
 pub fn plantings() -> Vec<(&'static str, Vec<Vec<Condition>>)> {
     let single = vec![kind(SURFACE, "shelf")];
     let conjunction = vec![kind(CATEGORY, "Bottle"), range(FRICTION, None, Some(0.35))];

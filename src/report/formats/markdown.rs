@@ -33,8 +33,8 @@ impl MarkdownReport {
 
     /// Records which campaigns had a skill program that received ground truth.
     pub fn know(&mut self, campaigns: &[CampaignRow]) {
-        let told = campaigns.iter().filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
-        self.privileged = told.map(|row| row.id.clone()).collect();
+        let privileged = campaigns.iter().filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
+        self.privileged = privileged.map(|row| row.id.clone()).collect();
     }
 
     /// Adds a run.
@@ -193,12 +193,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn witnesses_can_not_become_markup() {
+    fn witnesses_are_escaped() {
         assert_eq!(plain("a|b\n<img> @all [x](y) *z*"), "a\\|b &lt;img&gt; &#64;all \\[x\\](y) \\*z\\*");
     }
 
     #[test]
-    fn nothing_is_never_a_success() {
+    fn an_empty_report_is_not_a_success() {
         assert!(markdown(&MarkdownReport::new()).starts_with("## actcheck: nothing was judged"));
     }
 }
