@@ -152,4 +152,10 @@ const CODES_S: &[Code] = &[
         "it has no `[case]`",
         "keep only files from `actcheck export` in this folder",
     ),
+    code(
+        "S066",
+        "a candidate in a case is written as an index",
+        "an earlier version exported the case; the index means another candidate if candidates are added before it",
+        "write the candidate's name, as the help shows",
+    ),
 ];
