@@ -64,8 +64,36 @@ fn a_standalone_datalog_program_exports_and_explains() {
     let trace = actcheck(folder.path(), &["datalog", "paths.rls", "--trace", "path(a, d)"]);
     assert!(trace.status.success(), "{}", stderr(&trace));
     assert!(stdout(&trace).contains("paths.rls"), "{}", stdout(&trace));
+    for (format, begins) in [("csv", "predicate,tuples\n"), ("json", "[")] {
+        let table = actcheck(folder.path(), &["datalog", "paths.rls", "-D", "out", "--format", format]);
+        assert!(stdout(&table).starts_with(begins), "{}", stdout(&table));
+        assert!(stderr(&table).contains("6 lines"), "one document on standard output: {}", stderr(&table));
+    }
+    let trace = ["datalog", "paths.rls", "--trace", "path(a, d)", "--format"];
+    let csv = stdout(&actcheck(folder.path(), &[&trace[..], &["csv"]].concat()));
+    assert!(csv.starts_with("fact,holds,margin,explanation\n\"path(a, d)\","), "{csv}");
+    let dot = actcheck(folder.path(), &["datalog", "paths.rls", "--format", "dot"]);
+    assert_eq!(dot.status.code(), Some(2));
+    assert!(stderr(&dot).contains("X004") && stderr(&dot).contains("--trace"), "{}", stderr(&dot));
     std::fs::write(folder.path().join("endless.rls"), "n(0) .\nn(?y) :- n(?x), ?y = ?x + 1 .\n").unwrap();
-    let endless = actcheck(folder.path(), &["datalog", "endless.rls", "--max-tuples", "10000"]);
+    let endless = actcheck(folder.path(), &["datalog", "endless.rls", "--max-tuples", "10000", "--max-time", "1m"]);
     assert_eq!(endless.status.code(), Some(2));
     assert!(stderr(&endless).contains("endless.rls"), "{}", stderr(&endless));
+}
+
+/// Old spellings work for one more version.
+#[test]
+fn old_names_of_options_are_hidden_aliases() {
+    let folder = tempfile::tempdir().unwrap();
+    let rules = |format: &str| stdout(&actcheck(folder.path(), &["rules", "--format", format]));
+    assert_eq!(rules("table"), rules("text"));
+    std::fs::write(folder.path().join("one.rls"), "p(1) .\n").unwrap();
+    for limit in [["--max-secs", "60"], ["--max-time", "60"], ["--max-time", "1.5s"]] {
+        let run = actcheck(folder.path(), &["datalog", "one.rls", limit[0], limit[1]]);
+        assert!(run.status.success(), "{limit:?}: {}", stderr(&run));
+    }
+    for wrong in ["0", "0s", "-1s", "soon", "10 apples"] {
+        let run = actcheck(folder.path(), &["datalog", "one.rls", &format!("--max-time={wrong}")]);
+        assert_eq!(run.status.code(), Some(2), "{wrong}");
+    }
 }

@@ -96,7 +96,7 @@ fn the_failed_runs_of_the_last_campaign_run_again_from_the_same_choices() {
     ] {
         refused(folder, &[&again[..], &wrong].concat(), text);
     }
-    refused(folder, &["run", "--last-failed"], "required");
+    refused(folder, &["run", "--last-failed"], "X014");
     std::fs::copy(folder.join("configs/pick.toml"), folder.join("configs/other.toml")).unwrap();
     refused(folder, &["run", "configs/other.toml", "--last-failed", "--history", "h"], "X038");
 }

@@ -49,7 +49,7 @@ def actcheck(folder, graph, program):
         raise Missing(f"no program `{program}`: build it with `make`, or name another with --actcheck")
     facts = "".join(f"e({a}, {b}) .\n" for a, b in graph)
     (folder / "closure.rls").write_text("p(?x, ?y) :- e(?x, ?y) .\np(?x, ?z) :- p(?x, ?y), e(?y, ?z) .\n" + facts)
-    command = [str(Path(found).resolve()), "datalog", "closure.rls", "--max-tuples", "100000000", "--max-secs", "600"]
+    command = [str(Path(found).resolve()), "datalog", "closure.rls", "--max-tuples", "100000000", "--max-time", "10m"]
     return command, r"^\s*p\s+(\d+)"
 
 

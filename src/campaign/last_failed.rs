@@ -120,12 +120,7 @@ impl LastFailed {
             for ((number, run), made) in some.iter().zip(made) {
                 match made {
                     Ok(made) => {
-                        let place = RunPlace {
-                            repetition: run.repetition,
-                            elapsed_secs: secs() - began_secs,
-                            ..RunPlace::alone(id)
-                        };
-                        let record = FinishedRun { index: *number, ..made }.into_record(place);
+                        let record = renumbered(made, id, (*number, run), secs() - began_secs);
                         if let Err(found) = history.commit(&record) {
                             end.ending = Ending::Stopped(found);
                             return (end, faults);
@@ -144,6 +139,11 @@ impl LastFailed {
         }
         (end, faults)
     }
+}
+
+fn renumbered(made: FinishedRun, id: &str, (number, run): (u64, &FailedRun), elapsed_secs: f64) -> RunRecord {
+    let place = RunPlace { repetition: run.repetition, elapsed_secs, ..RunPlace::alone(id) };
+    FinishedRun { index: number, ..made }.into_record(place)
 }
 
 fn last_campaign(history: &History, config: &Path) -> Result<CampaignRecord, Diagnostics> {

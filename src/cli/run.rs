@@ -49,27 +49,19 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     // From here on, an interrupt must end the campaign properly.
     shown.get_or_init(|| progress.bar());
     session.begin((clock.now)())?;
-    let Session { env, history, id, failed, kept, regressions, .. } = session;
-
     let options = CampaignOptions { jobs, context: RunContext { clock, disturb: None } };
-    let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::from_history).collect();
+    let mut runs: Vec<RunSummary> = session.kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
-    let mut on_run = |record: &RunRecord| {
+    let (end, faults) = make_runs(&session, &options, &stop, |record| {
         let summary = RunSummary::of(record);
         progress.run(&summary);
         runs.push(summary);
         if runs.len().is_multiple_of(MIRROR_EVERY) {
-            mirror(&history);
-        }
-    };
-    let (end, faults) = quietly(|| match &failed {
-        Some(failed) => failed.run((&env, &history, &id), &options, &stop, &mut on_run),
-        None => {
-            let stored = StoredRuns::of(&kept);
-            (resume_all(&env, &history, &id, stored, &options, &stop, &mut on_run), Diagnostics::new())
+            mirror(&session.history);
         }
     });
     progress.finish();
+    let Session { env, history, id, failed, regressions, .. } = session;
     // Sums are taken in the order of indices, so that a campaign merged from parts gets bit-identical results.
     runs.sort_by_key(|run| run.index);
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
@@ -79,7 +71,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         mirror(&history);
         summary.failure_modes = failure_modes(&history, id)?;
     }
-    // If the history failed, only that fault is reported. Failed runs are no sample whose health could be examined.
+    // If the history failed, only that fault is reported. Failed runs are a biased sample, so their health means little.
     let health =
         if finished.is_ok() && failed.is_none() { Some(health::examine(&history, &summary.campaign)?) } else { None };
     let results = Results { summary: &summary, health: health.as_ref(), format: args.format };
@@ -89,12 +81,35 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     } else {
         results.print();
     }
-    match end.ending {
+    let interrupted = shrinks && stop.load(Ordering::Relaxed);
+    let code = exit_code(end.ending, faults, &summary)?;
+    finished.map(|()| if interrupted { stop::INTERRUPTED } else { code })
+}
+
+/// Makes the runs of a campaign, or those of `--last-failed`. Returns also the faults of runs that can't be made again.
+fn make_runs(
+    session: &Session,
+    options: &CampaignOptions,
+    stop: &AtomicBool,
+    mut on_run: impl FnMut(&RunRecord),
+) -> (CampaignResult, Diagnostics) {
+    let Session { env, history, id, failed, kept, .. } = session;
+    quietly(|| match failed {
+        Some(failed) => failed.run((env, history, id), options, stop, &mut on_run),
+        None => {
+            let stored = StoredRuns::of(kept);
+            (resume_all(env, history, id, stored, options, stop, &mut on_run), Diagnostics::new())
+        }
+    })
+}
+
+/// The exit code of a campaign, unless an error ended it or runs could not be made again.
+fn exit_code(ending: Ending, faults: Diagnostics, summary: &CampaignSummary) -> Result<u8, Diagnostics> {
+    match ending {
         Ending::Stopped(faults) => Err(faults),
-        _ if shrinks && stop.load(Ordering::Relaxed) => finished.map(|()| stop::INTERRUPTED),
-        _ if faults.has_errors() => Err(faults),
-        Ending::Finished | Ending::Budget(_) => finished.map(|()| summary.exit_code()),
-        Ending::Interrupted => finished.map(|()| stop::INTERRUPTED),
+        Ending::Interrupted => Ok(stop::INTERRUPTED),
+        Ending::Finished | Ending::Budget(_) if faults.has_errors() => Err(faults),
+        Ending::Finished | Ending::Budget(_) => Ok(summary.exit_code()),
     }
 }
 

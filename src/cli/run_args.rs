@@ -22,7 +22,7 @@ pub struct RunArgs {
     /// Run the failed runs of CONFIG's last campaign again, and nothing else: those in which a property failed, with their
     /// recorded choices, and the present configuration, rules, models and skills. They form a campaign of their own,
     /// which statistics leave out; the next `--last-failed` runs those of them that still fail
-    #[arg(long, requires = "config")]
+    #[arg(long)]
     #[arg(conflicts_with_all = ["resume", "runs", "time", "until_width", "max_failures", "seed", "repeat", "strategy", "shard", "shrink"])]
     pub last_failed: bool,
     /// Scenes for each test, instead of the configuration's `test_count`; an upper limit if a budget ends the campaign

@@ -37,7 +37,7 @@ pub(super) struct Area {
 }
 
 /// All areas, in the order in which a campaign passes through them.
-pub(super) const AREAS: [Area; 10] = [
+pub(super) static AREAS: [Area; 10] = [
     config::CONFIG,
     models::MODELS,
     ontology::ONTOLOGY,
@@ -68,9 +68,7 @@ pub(super) fn nearest(name: &str) -> Option<&'static str> {
     let wanted = number(name);
     let of_area = all().filter(|(area, _)| area.letter == letter).map(|(_, code)| code.code);
     match wanted {
-        Some(wanted) => {
-            of_area.min_by_key(|code| number(code).map_or(i64::MAX, |number| number.abs_diff(wanted) as i64))
-        }
+        Some(wanted) => of_area.min_by_key(|code| number(code).map_or(u64::MAX, |number| number.abs_diff(wanted))),
         None => actcheck_base::nearest(&name.to_ascii_uppercase(), all().map(|(_, code)| code.code)),
     }
 }
@@ -120,7 +118,7 @@ mod tests {
 
     #[test]
     fn codes_are_sorted_and_unique_and_their_texts_read_like_messages() {
-        for area in AREAS {
+        for area in &AREAS {
             assert!(area.codes.is_sorted_by(|one, next| one.code < next.code), "{}", area.title);
             for code in area.codes {
                 assert!(is_code(code.code) && code.code.starts_with(area.letter), "{}", code.code);

@@ -200,6 +200,12 @@ const CODES_R: &[Code] = &[
         "write `ASK { … }` (true is passed) or `SELECT … { … }` (every row is a violation)",
     ),
     code(
+        "R062",
+        "a property is a SPARQL query, which this build can't evaluate",
+        "a program uses the crate `actcheck-rules` without its feature `sparql`",
+        "build the crate with the feature `sparql`, or write the property in Datalog (`.rls`)",
+    ),
+    code(
         "R070",
         "an unknown format of an import or export",
         "the format is misspelt or not supported",
