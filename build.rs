@@ -1,4 +1,4 @@
-//! Digest of this program's sources, so that a replay can name a changed program even where its version is the same.
+//! Computes a digest of this program's sources, so that a replay detects a changed program of the same version.
 
 use std::fs;
 use std::io;
@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-/// What the program is made from, beside the rules, ontology and models that it carries: these have digests of their own.
+/// The sources of the program. The embedded rules, ontology and models have their own digests.
 const MADE_FROM: [&str; 3] = ["src", "Cargo.toml", "Cargo.lock"];
 
 fn main() -> io::Result<()> {
     let mut digest = Sha256::new();
     for name in MADE_FROM {
-        // Cargo looks into folders by itself.
+        // Cargo watches folders recursively.
         println!("cargo::rerun-if-changed={name}");
         let mut files = Vec::new();
         collect(Path::new(name), &mut files)?;
@@ -20,7 +20,7 @@ fn main() -> io::Result<()> {
         for file in files {
             let text = fs::read(&file)?;
             digest.update(file.to_string_lossy().replace('\\', "/"));
-            // Lengths keep parts from running into each other.
+            // Lengths separate the parts.
             digest.update((text.len() as u64).to_le_bytes());
             digest.update(&text);
         }
@@ -30,7 +30,7 @@ fn main() -> io::Result<()> {
     Ok(())
 }
 
-/// The file, or all files of the folder; none where it is not there.
+/// The file, or all files of the folder; empty if the path does not exist.
 fn collect(path: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
     if path.is_dir() {
         for entry in fs::read_dir(path)? {

@@ -116,8 +116,8 @@ fn in_a_browser(file: &Path) {
     browser.picture();
     browser.open(file, "/");
     let paint = browser.value(
-        "new Promise((done) => { const told = () => { const it = performance.getEntriesByName('first-contentful-paint')[0]; \
-         if (it) done(it.startTime); else setTimeout(told, 10); }; told(); })",
+        "new Promise((done) => { const poll = () => { const it = performance.getEntriesByName('first-contentful-paint')[0]; \
+         if (it) done(it.startTime); else setTimeout(poll, 10); }; poll(); })",
     );
     tell("first paint", paint.as_f64().unwrap_or(f64::NAN) / 1e3, 1.0, "s");
     // The first paint comes before the data.

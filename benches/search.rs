@@ -131,7 +131,7 @@ fn search(planted: Planted, strategy: Strategy) -> Outcome {
             search.tell(vec![PropertyResult { failed: margin < 0.0, margin: Some(margin) }]);
         }
         if samples == RATE_SAMPLES {
-            let estimate = search.estimates()[0].expect("points were told");
+            let estimate = search.estimates()[0].expect("the search has results");
             covered = (estimate.low..=estimate.high).contains(&planted.volume);
             rate = estimate.rate;
         }

@@ -83,7 +83,7 @@ def check_points(lines):
         checked += 1
         failing += ours < 0.0
     if checked == 0 or failing == 0:
-        sys.exit("there are no points to check the functions with")
+        sys.exit("no points to check the functions with")
     print(f"the functions agree at {checked} points, {failing} of them failing")
 
 

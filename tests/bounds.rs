@@ -1,4 +1,5 @@
-//! Rule texts beyond all measure: read, or refused in a bounded number of words, with a bounded stack and no quadratic work.
+//! Very large and deep rule texts are read, or refused with a bounded number of messages, a bounded stack and no
+//! quadratic work.
 
 use std::path::Path;
 
@@ -9,12 +10,12 @@ use actcheck::rules::{Budget, RuleBook};
 
 const TEN_MEGABYTES: usize = 10 << 20;
 
-/// All that is said about a text as a program of its own.
+/// Checks a text as a standalone program.
 fn program(text: &str) -> Result<Program, Diagnostics> {
     Program::load(&Source::new("p.rls", text), Path::new(""))
 }
 
-/// All that is said about a text as the rules of a property.
+/// Checks a text as the rules of a property.
 fn property(text: &str) -> Result<RuleBook, Diagnostics> {
     let mut ontology = ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).unwrap();
     let property = ontology.properties.values_mut().next().unwrap();
@@ -43,11 +44,12 @@ fn lines(size: usize, line: impl Fn(usize) -> String) -> String {
     text
 }
 
-/// The text is refused, as a program and as a property, with a code among its faults, in few and short words.
+/// Checks that the text is refused both as a program and as a property, with `code` among its faults and few, short
+/// messages.
 fn refused(what: &str, text: &str, code: &str) {
     for faults in [program(text).map(drop), property(text).map(drop)] {
         let faults = faults.expect_err(what);
-        // The parser, the definitions and the rules of a file note fifty each.
+        // The parser, the definitions and the rules of a file each report at most fifty faults.
         assert!(faults.len() <= 400, "{what}: {} faults", faults.len());
         assert!(faults.iter().any(|fault| fault.code == code), "{what}: no {code} in {faults}");
         for fault in faults.iter().filter(|fault| fault.code == code) {
@@ -85,7 +87,7 @@ fn ten_megabytes_of_facts_are_read() {
     let program = program(&text).unwrap_or_else(|faults| panic!("{faults}"));
     let closure = program.close(Engine::Fast, &Budget::default()).unwrap();
     assert_eq!(closure.count("edge"), text.lines().count());
-    // A property's file is no place for them.
+    // A property's file must not contain facts.
     let faults = property(&text).unwrap_err();
     assert!(faults.iter().any(|fault| fault.code == "R006"), "{faults}");
 }
@@ -107,12 +109,13 @@ fn ten_megabytes_in_one_token_are_read() {
     }
 }
 
-/// Before, each of these took hours or gigabytes: the lexer noted every strange character, the place of every definition was
-/// counted in lines, prefixes and variables were looked up in long lists, and each fault looked for names alike.
+/// Each of these inputs once took hours or gigabytes: the lexer reported every invalid character, the line of every
+/// definition was counted from the start, prefixes and variables were looked up in long lists, and each fault
+/// searched for similar names.
 #[test]
-fn ten_megabytes_of_faults_are_told_in_a_few() {
+fn ten_megabytes_of_faults_give_few_messages() {
     refused("strange characters", &"'".repeat(TEN_MEGABYTES), "R002");
-    refused("strings without end", &"\"\n".repeat(TEN_MEGABYTES / 2), "R003");
+    refused("unterminated strings", &"\"\n".repeat(TEN_MEGABYTES / 2), "R003");
     refused("no statements", &". ".repeat(TEN_MEGABYTES / 2), "R010");
     refused("prefixes", &lines(TEN_MEGABYTES, |n| format!("@prefix p{n}: <a:> .")), "R006");
     refused("arguments", &format!("p(1) :- q(1), 1 < SUM({}) .", lines(TEN_MEGABYTES, |n| format!("?x{n},"))), "R006");
@@ -138,7 +141,7 @@ fn texts_over_the_largest_size_are_refused() {
 }
 
 #[test]
-fn a_thousand_rules_in_a_chain_are_closed() {
+fn a_chain_of_a_thousand_rules_reaches_its_closure() {
     let text = "p0(1) .\n".to_owned();
     let chain: String = (0..1000).map(|n| format!("p{}(?x + 1) :- p{n}(?x), ~q{n}(?x) .\n", n + 1)).collect();
     let program = program(&(text + &chain)).unwrap();
@@ -147,7 +150,7 @@ fn a_thousand_rules_in_a_chain_are_closed() {
 }
 
 #[test]
-fn a_thousand_rules_in_a_cycle_of_negations_are_refused_in_short() {
+fn a_negation_cycle_of_a_thousand_rules_is_refused_with_a_short_message() {
     let cycle: String = (0..1000).map(|n| format!("p{}(?x) :- e(?x), ~p{n}(?x) .\n", (n + 1) % 1000)).collect();
     let text = format!("e(1) .\n{cycle}success(?x) :- p1(?x) .\n");
     refused("a cycle", &text, "R050");
@@ -155,9 +158,9 @@ fn a_thousand_rules_in_a_cycle_of_negations_are_refused_in_short() {
     assert!(help.contains("→ (987 more) →"), "{help}");
 }
 
-/// Ontologies that import each other are read once each.
+/// Ontologies that import each other are each read once.
 #[test]
-fn cyclic_imports_end() {
+fn cyclic_imports_terminate() {
     let folder = tempfile::tempdir().unwrap();
     let head = "@prefix act: <http://actions#> . @prefix owl: <http://www.w3.org/2002/07/owl#> .\n";
     for (name, other, action) in [("a", "b", "Wait"), ("b", "c", "Look"), ("c", "a", "Nod")] {
@@ -168,7 +171,8 @@ fn cyclic_imports_end() {
     assert_eq!(ontology.actions.keys().collect::<Vec<_>>(), ["Look", "Nod", "Wait"]);
 }
 
-/// They are exact and equal to themselves, whatever their spelling; nothing is computed from a rounded value.
+/// They are exact and equal to themselves, whatever their spelling; arithmetic on them gives no result rather than a
+/// rounded one.
 #[test]
 fn integers_beyond_64_bits_are_exact_and_give_no_result() {
     let folder = tempfile::tempdir().unwrap();
@@ -212,17 +216,21 @@ fn integers_beyond_64_bits_are_exact_and_give_no_result() {
     }
 }
 
-/// A fault in a line of ten megabytes is told with what stands around it: drawing such a line took minutes.
+/// A fault in a line of ten megabytes is shown with its surroundings only: rendering the whole line took minutes.
 #[test]
-fn a_fault_in_a_very_long_line_is_shown_with_its_surroundings() {
+fn a_fault_in_a_very_long_line_is_shown_with_nearby_text_only() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in
         [("quotes", "'".repeat(10_000_000)), ("dots", ". ".repeat(5_000_000)), ("umlauts", "ä".repeat(5_000_000))]
     {
         std::fs::write(folder.path().join(format!("{name}.rls")), text).unwrap();
         let output = crate::support::actcheck(folder.path(), &["datalog", &format!("{name}.rls")]);
-        let told = crate::support::stderr(&output);
-        assert_eq!(output.status.code(), Some(2), "{name}: {told}");
-        assert!(told.contains(&format!("{name}.rls:1:")) && told.len() < 200_000, "{name}: {} bytes", told.len());
+        let printed = crate::support::stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{name}: {printed}");
+        assert!(
+            printed.contains(&format!("{name}.rls:1:")) && printed.len() < 200_000,
+            "{name}: {} bytes",
+            printed.len()
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! A fault of simulation ends its run as broken, with the reason, and never the campaign.
+//! A simulation fault ends its run as broken, with the reason, and never ends the campaign.
 
 use std::sync::atomic::AtomicBool;
 
@@ -11,7 +11,8 @@ use actcheck::world::{Poison, World};
 
 use crate::support::root;
 
-/// Run 1 gets a pose that is not a number, run 2 a body far outside, run 3 a crash; the others are left alone.
+/// Run 1 gets a pose that is not a number, run 2 a body far outside the world, run 3 a panic; the other runs are
+/// unchanged.
 fn disturb(index: u64, world: &mut World) {
     match index {
         1 => assert!(world.poison("glass_1", Poison::NotFinite)),
@@ -22,7 +23,7 @@ fn disturb(index: u64, world: &mut World) {
 }
 
 #[test]
-fn faults_of_simulation_are_broken_runs_and_the_campaign_goes_on() {
+fn simulation_faults_break_single_runs_and_the_campaign_continues() {
     let folder = tempfile::tempdir().unwrap();
     let overrides = Overrides { runs: Some(5), history: Some(folder.path().join("h")), ..Overrides::default() };
     let env = Env::prepare(&root().join("configs/pick.toml"), &overrides).unwrap();

@@ -1,6 +1,7 @@
-//! The report in a browser: Debian's Chromium without a window reads it, filters, watches a failed run, and finds no fault.
+//! The report in a browser: headless Chromium reads it, filters it, plays back a failed run, and reports no error.
 //!
-//! Pictures of every view in both themes, and on a phone, lie afterwards in the folder `report` of Cargo's folder for tests.
+//! Afterwards, pictures of every view in both themes, and on a phone, are in the folder `report` of Cargo's folder
+//! for tests.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,7 +20,7 @@ const VIEWS: [&str; 7] = ["/", "/properties", "/modes", "/patterns", "/map", "/h
 const DESKTOP: (u32, u32) = (1280, 860);
 const PHONE: (u32, u32) = (390, 844);
 
-/// The report of the shipped picks, of which at least one failed.
+/// The report of the shipped picks, with at least one failure.
 fn reported(folder: &Path) -> PathBuf {
     let output = actcheck(folder, &["report", "--html", "report.html", "--history", "h"]);
     assert!(output.status.success(), "{}", stderr(&output));
@@ -32,7 +33,8 @@ fn json_of(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(&output)).unwrap()
 }
 
-/// Keeps a picture for people to look at; it shows more than one colour, or it would be far smaller.
+/// Saves a picture for people to look at, and checks that it is not a single colour (such a picture would be far
+/// smaller).
 fn keep(browser: &mut Chromium, name: &str) -> Vec<u8> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
     std::fs::create_dir_all(&folder).unwrap();
@@ -43,23 +45,23 @@ fn keep(browser: &mut Chromium, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_report_is_read_filtered_and_watched_in_a_browser() {
+fn a_report_can_be_read_filtered_and_played_in_a_browser() {
     let project = shipped("pick").copied();
     let file = reported(project.path());
     let mut browser = Chromium::start();
     browser.size(DESKTOP.0, DESKTOP.1);
-    tells_what_the_program_tells(&mut browser, &file, project.path());
+    shows_the_counts_of_the_program(&mut browser, &file, project.path());
     let failed = filters(&mut browser, &file, project.path());
     watches(&mut browser, &file, &failed);
     is_seen_in_every_size(&mut browser, &file, &failed);
     let loaded =
         browser.value("performance.getEntriesByType('resource').filter((it) => !it.name.startsWith('blob:')).length");
-    assert_eq!(loaded, json!(0), "the page loads something");
+    assert_eq!(loaded, json!(0), "the page loads external resources");
     assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
 }
 
-/// Counts on the page are those that `analyse` prints, and intervals are computed alike.
-fn tells_what_the_program_tells(browser: &mut Chromium, file: &Path, folder: &Path) {
+/// Counts on the page equal those that `analyse` prints, and intervals are computed alike.
+fn shows_the_counts_of_the_program(browser: &mut Chromium, file: &Path, folder: &Path) {
     browser.open(file, "/");
     let analysed = json_of(folder, &["analyse", "--history", "h", "--format", "json"]);
     let tiles = browser.value(
@@ -68,10 +70,10 @@ fn tells_what_the_program_tells(browser: &mut Chromium, file: &Path, folder: &Pa
     let counts: Vec<&Value> = Outcome::ALL.iter().map(|outcome| &analysed["outcomes"][outcome.word()]).collect();
     assert_eq!(tiles, json!(counts));
     for (successes, trials) in [(3u64, 20u64), (0, 7), (7, 7), (811, 1234)] {
-        let told = browser.value(&format!("wilson({successes}, {trials})"));
+        let interval = browser.value(&format!("wilson({successes}, {trials})"));
         let known = wilson(successes, trials).unwrap();
         for (name, value) in [("rate", known.rate), ("low", known.low), ("high", known.high)] {
-            assert!((told[name].as_f64().unwrap() - value).abs() < 1e-12, "{successes} of {trials}: {told}");
+            assert!((interval[name].as_f64().unwrap() - value).abs() < 1e-12, "{successes} of {trials}: {interval}");
         }
     }
     for view in VIEWS {
@@ -80,7 +82,7 @@ fn tells_what_the_program_tells(browser: &mut Chromium, file: &Path, folder: &Pa
     }
 }
 
-/// Chooses failed runs, searches one of them, and goes to it by keys. Returns its id.
+/// Selects failed runs, searches for one of them, and opens it with the keyboard. Returns its id.
 fn filters(browser: &mut Chromium, file: &Path, folder: &Path) -> String {
     browser.open(file, "/runs");
     let rows = "document.querySelectorAll('.rows .row').length";
@@ -102,7 +104,7 @@ fn filters(browser: &mut Chromium, file: &Path, folder: &Path) -> String {
         browser.value("document.querySelector('.told').textContent.split(' of ')[0]"),
         browser.value(&format!("String({rows})"))
     );
-    browser.value(&set("text", "nothing is called so", "input"));
+    browser.value(&set("text", "no such name", "input"));
     assert_eq!(browser.value(rows), json!(0));
     browser.value(&set("text", &id, "input"));
     browser.value("document.querySelector('.list').focus()");
@@ -117,10 +119,10 @@ fn watches(browser: &mut Chromium, file: &Path, id: &str) {
     browser.open(file, &format!("/run/{id}"));
     browser.until("document.querySelector('.watch').dataset.ready");
     let slider = "Number(document.querySelector('.slider').value)";
-    let told = browser.value("document.querySelector('.failure button').textContent.match(/[\\d.]+/)[0]");
-    let decided: f64 = told.as_str().unwrap().parse().unwrap();
+    let moment = browser.value("document.querySelector('.failure button').textContent.match(/[\\d.]+/)[0]");
+    let decided: f64 = moment.as_str().unwrap().parse().unwrap();
     let opened = browser.value(slider).as_f64().unwrap();
-    assert!(opened <= decided + 0.06, "it opens at {opened}, was decided at {decided}");
+    assert!(opened <= decided + 0.06, "the playback opens at {opened}, but the outcome was decided at {decided}");
     for words in
         ["details", ".proof .line", ".timeline .action", ".timeline .decided", ".parameters dt", ".pictures canvas"]
     {
@@ -144,7 +146,7 @@ fn watches(browser: &mut Chromium, file: &Path, id: &str) {
     assert!(seen > 8, "the stage shows {seen} colours");
 }
 
-/// Both themes by the system's wish and by the button, and nothing is wider than a phone.
+/// The theme follows the system's preference and the button, and no view is wider than a phone.
 fn is_seen_in_every_size(browser: &mut Chromium, file: &Path, id: &str) {
     let run = format!("/run/{id}");
     let views: Vec<&str> = VIEWS.into_iter().chain([run.as_str()]).collect();
@@ -174,10 +176,10 @@ fn is_seen_in_every_size(browser: &mut Chromium, file: &Path, id: &str) {
     assert_eq!((browser.value(paper), dark != light), (light, true));
 }
 
-/// Ends a script, begins an image that runs something, and is cut by every quote.
+/// Closes a script, starts an image that runs code, and contains every quote character.
 const HOSTILE: &str = "</script></textarea><img src=x onerror=\"window.hacked=1\">'\"`&amp;<b>";
 
-/// A page whose every word is hostile.
+/// A page in which every text is hostile.
 fn hostile(folder: &Path) -> PathBuf {
     let mut dice = Dice::new(7);
     let judge = |_: &_, _: usize, dice: &mut Dice| {
@@ -219,11 +221,11 @@ fn hostile(folder: &Path) -> PathBuf {
 }
 
 #[test]
-fn no_word_of_a_model_rule_or_message_becomes_markup() {
+fn texts_of_models_rules_and_messages_never_become_markup() {
     let folder = tempfile::tempdir().unwrap();
     let file = hostile(folder.path());
     let page = std::fs::read_to_string(&file).unwrap();
-    assert!(!page.contains("onerror") && !page.contains("textarea"), "a hostile word stands in the page");
+    assert!(!page.contains("onerror") && !page.contains("textarea"), "the page contains hostile markup");
     let mut browser = Chromium::start();
     browser.size(DESKTOP.0, DESKTOP.1);
     let encoded =
@@ -243,7 +245,7 @@ fn no_word_of_a_model_rule_or_message_becomes_markup() {
     }
     browser.open(&file, &run);
     browser.until("document.querySelector('.details .failure')");
-    let told = browser.value("document.querySelector('.details').textContent");
-    assert!(told.as_str().unwrap().contains(HOSTILE), "the words themselves are shown");
+    let text = browser.value("document.querySelector('.details').textContent");
+    assert!(text.as_str().unwrap().contains(HOSTILE), "the hostile text is shown as text");
     assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
 }

@@ -1,4 +1,4 @@
-//! Budgets end campaigns and runs, and say so.
+//! Budgets end campaigns and runs, and the output says so.
 
 use std::path::Path;
 
@@ -17,9 +17,9 @@ fn listed(folder: &Path, history: &str) -> String {
     stdout(&actcheck(folder, &["list", "--history", history, "--format", "csv"]))
 }
 
-/// The run at which a count of failures or the width of intervals ends a campaign is the same at any number of workers.
+/// A failure count or an interval width ends a campaign at the same run with any number of workers.
 #[test]
-fn failures_and_widths_end_a_campaign_at_the_same_run_whoever_makes_it() {
+fn failure_and_width_budgets_end_at_the_same_run_with_any_number_of_workers() {
     let project = looking();
     for (name, budget) in [("failures", ["--max-failures", "2"]), ("width", ["--until-width", "0.6"])] {
         let of = |jobs: &str| {
@@ -38,7 +38,7 @@ fn failures_and_widths_end_a_campaign_at_the_same_run_whoever_makes_it() {
         let failed = |run: &Value| run.to_string().contains("\"failed\"");
         if name == "failures" {
             assert_eq!(runs.iter().filter(|run| failed(run)).count(), 2);
-            assert!(failed(&runs[runs.len() - 1]), "the last one is the second that failed");
+            assert!(failed(&runs[runs.len() - 1]), "the last run is the second failed run");
             assert_eq!(one.0["exit_code"], 1);
         } else {
             for property in one.0["properties"].as_array().unwrap() {
@@ -50,22 +50,22 @@ fn failures_and_widths_end_a_campaign_at_the_same_run_whoever_makes_it() {
 }
 
 #[test]
-fn time_ends_a_campaign_that_has_no_number_of_runs() {
+fn a_time_budget_ends_a_campaign_without_a_run_count() {
     let project = project();
     let summary = json(project.path(), &["run", "configs/lone_glass.toml", "--time", "4s", "--history", "h"]);
     assert_eq!((&summary["ended_by"], &summary["interrupted"]), (&Value::from("time"), &Value::from(false)));
     assert_eq!(summary["planned_runs"], 10_000_000);
     let kept = listed(project.path(), "h");
     assert_eq!(kept.lines().count() - 1, summary["finished_runs"].as_u64().unwrap() as usize);
-    // What was kept is the beginning of the plan.
+    // The kept runs are the beginning of the plan.
     let indices: Vec<usize> =
         kept.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
     assert_eq!(indices, (0..indices.len()).collect::<Vec<_>>());
 }
 
-/// A run that the clock ends is a timeout; replay makes the same of it, without the clock, and says how far it compares.
+/// A run that the clock ends is a timeout. Replay repeats it without the clock, and says how far it compares.
 #[test]
-fn a_run_that_takes_too_long_on_the_clock_is_a_timeout_and_can_be_replayed() {
+fn a_run_over_the_wall_clock_limit_is_a_timeout_and_can_be_replayed() {
     let project = project();
     let config = project.path().join("configs/lone_glass.toml");
     let text = std::fs::read_to_string(&config).unwrap();
@@ -92,7 +92,7 @@ fn a_run_that_takes_too_long_on_the_clock_is_a_timeout_and_can_be_replayed() {
 }
 
 #[test]
-fn budgets_that_are_none_are_refused() {
+fn invalid_budgets_are_refused() {
     let project = project();
     for (arguments, word) in [
         (["--time", "ten"], "not a duration such as"),

@@ -1,4 +1,4 @@
-//! The main job with the built program: campaigns, their exit codes, and what they leave behind.
+//! The main job with the built program: campaigns, their exit codes, and the files and records they leave.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -25,7 +25,8 @@ fn run_json(folder: &Path, arguments: &[&str]) -> (i32, Value) {
     (code, json)
 }
 
-/// The columns of `actcheck list` that must not depend on how or when the runs were made: all but the campaign's id.
+/// The columns of `actcheck list` that must not depend on how or when the runs were made: all except the campaign's
+/// id.
 fn listed(folder: &Path, history: &str) -> Vec<String> {
     let output = actcheck(folder, &["list", "--history", history, "--format", "csv"]);
     assert!(output.status.success(), "{}", stderr(&output));
@@ -45,7 +46,7 @@ fn outcomes(json: &Value) -> Vec<(u64, String, f64)> {
 }
 
 #[test]
-fn the_shipped_pick_has_passed_and_failed_runs_and_exits_with_one() {
+fn the_shipped_pick_has_passed_and_failed_runs_and_exits_with_1() {
     let (made, text) = (shipped("pick"), &shipped("pick").text);
     assert_eq!(made.code, Some(1), "{text}");
     let folder = made.copied();
@@ -53,7 +54,7 @@ fn the_shipped_pick_has_passed_and_failed_runs_and_exits_with_one() {
         assert!(text.contains(property), "{property} is not in the table:\n{text}");
     }
     assert!(text.contains("over 15 runs"), "{text}");
-    assert!(text.contains("actcheck show "), "no command that shows more:\n{text}");
+    assert!(text.contains("actcheck show "), "no suggested command that shows more:\n{text}");
     let count = actcheck(folder.path(), &["query", "--history", "h", "--format", "csv", COUNT]);
     assert_eq!(stdout(&count), "n\n15\n", "{}", stderr(&count));
     let json = actcheck(folder.path(), &["list", "--history", "h", "--format", "json"]);
@@ -62,7 +63,7 @@ fn the_shipped_pick_has_passed_and_failed_runs_and_exits_with_one() {
     assert!(rows.iter().any(|row| row["score"].as_f64().unwrap() < 1.0), "no run failed");
 }
 
-/// In as many runs as it takes, at most ninety-six: what one seed does is not the point.
+/// Uses as many runs as needed, at most ninety-six: the test is not about one seed.
 #[test]
 fn a_campaign_shows_several_ways_to_fail() {
     let project = project();
@@ -73,8 +74,8 @@ fn a_campaign_shows_several_ways_to_fail() {
         let seed = seed.to_string();
         let (code, json) = run_json(project.path(), &["--runs", "16", "--seed", &seed, "--history", &history]);
         assert!(code <= 1 && json["finished_runs"] == 16, "{json:#}");
-        assert_eq!(json["counts"]["broken"], 0, "a broken run in a sound simulation");
-        assert_eq!(json["counts"]["timeout"], 0, "a timeout in a sound simulation");
+        assert_eq!(json["counts"]["broken"], 0, "a run of the shipped campaign is broken");
+        assert_eq!(json["counts"]["timeout"], 0, "a run of the shipped campaign timed out");
         passed += json["runs_passed"]["count"].as_u64().unwrap();
         finished += 16;
         for run in json["runs"].as_array().unwrap() {
@@ -92,7 +93,7 @@ fn a_campaign_shows_several_ways_to_fail() {
 }
 
 #[test]
-fn a_lone_glass_and_perfect_senses_make_a_pick_that_works() {
+fn a_lone_glass_is_picked_with_perfect_sensors() {
     let folder = shipped("lone_glass").copied();
     let listed = actcheck(folder.path(), &["list", "--history", "h", "--format", "json"]);
     let rows: Vec<Value> = serde_json::from_str(&stdout(&listed)).unwrap();
@@ -101,7 +102,7 @@ fn a_lone_glass_and_perfect_senses_make_a_pick_that_works() {
 }
 
 #[test]
-fn the_number_of_workers_and_the_day_change_nothing() {
+fn results_do_not_depend_on_the_number_of_workers_or_the_date() {
     let project = project();
     let one = run_json(project.path(), &["--runs", "4", "--jobs", "1", "--history", "one"]);
     let two = run_json(project.path(), &["--runs", "4", "--jobs", "2", "--history", "two"]);
@@ -118,7 +119,7 @@ fn the_number_of_workers_and_the_day_change_nothing() {
 }
 
 #[test]
-fn a_new_rule_file_is_judged_by_the_next_run_without_recompiling() {
+fn a_new_rule_file_is_used_by_the_next_run_without_recompiling() {
     let project = project();
     std::fs::write(
         project.path().join("rules/short_pick.rls"),
@@ -147,7 +148,7 @@ fn a_new_rule_file_is_judged_by_the_next_run_without_recompiling() {
     assert_eq!(new.unwrap()["counts"]["failed"], 2);
 }
 
-/// The largest number of runs that a progress bar has shown, from what it wrote to a terminal.
+/// The largest number of runs that a progress bar has shown, from its terminal output.
 fn runs_shown(typescript: &Path) -> usize {
     let text = String::from_utf8_lossy(&std::fs::read(typescript).unwrap_or_default()).into_owned();
     let counts = text.split("/400 runs").filter_map(|before| before.rsplit(' ').next()?.parse().ok());
@@ -155,17 +156,17 @@ fn runs_shown(typescript: &Path) -> usize {
 }
 
 #[test]
-fn killing_a_campaign_loses_no_reported_run_and_leaves_no_half_one() {
+fn a_killed_campaign_keeps_all_reported_runs_and_no_partial_run() {
     let project = looking();
     for round in 0..3 {
         let (history, seen) = (format!("h{round}"), project.path().join(format!("seen{round}")));
         let program = env!("CARGO_BIN_EXE_actcheck");
-        // Progress is shown to terminals only: `script` is one. The shell gives its process number to what it becomes.
+        // Progress is shown only on terminals; `script` provides one. `exec` keeps the shell's process id.
         let command =
             format!("echo $$ > pid{round}; exec {program} run configs/look.toml --runs 400 --history {history}");
         let mut child = Command::new("script")
             .args(["-qfc", &command, seen.to_str().unwrap()])
-            // Whatever terminal the tests run in: a dumb one shows no bar.
+            // Sets `TERM`, since a dumb terminal shows no bar.
             .env("TERM", "xterm")
             .current_dir(project.path())
             .stdin(Stdio::null())
@@ -185,7 +186,7 @@ fn killing_a_campaign_loses_no_reported_run_and_leaves_no_half_one() {
         let rows = listed(project.path(), &history);
         assert!(rows.len() >= reported, "{} of {reported} reported runs are in the history", rows.len());
         assert!(rows.len() < 400, "the campaign was over before it was killed");
-        // A whole run has its score and hash, its three graphs, and an outcome of each of the three properties.
+        // A complete run has its score and hash, its three graphs, and an outcome of each of the three properties.
         let whole = "SELECT ?r WHERE { ?r a act:Run ; act:score ?s ; act:traceHash ?h . \
                      ?e act:ofRun ?r ; act:before ?b ; act:after ?a ; act:during ?d . \
                      ?assertion earl:subject ?e ; earl:result/act:outcome ?o . \
@@ -222,7 +223,7 @@ fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
 }
 
 #[test]
-fn a_second_process_on_the_same_history_is_told_so() {
+fn a_second_process_on_the_same_history_is_refused() {
     let project = project();
     let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args(["run", "configs/pick.toml", "--runs", "400", "--history", "h"])
@@ -245,7 +246,7 @@ fn a_second_process_on_the_same_history_is_told_so() {
 }
 
 #[test]
-fn away_from_the_repository_the_carried_files_serve() {
+fn embedded_files_are_used_outside_the_repository() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(
         folder.path().join("mine.toml"),
@@ -256,13 +257,13 @@ fn away_from_the_repository_the_carried_files_serve() {
     let output = actcheck(folder.path(), &["run", "mine.toml", "--format", "json"]);
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     assert_eq!(json["finished_runs"], 2);
-    assert!(folder.path().join(".actcheck").is_dir(), "the history lies beside the configuration");
+    assert!(folder.path().join(".actcheck").is_dir(), "the history is beside the configuration");
     let found = actcheck(folder.path(), &["list", "--format", "csv"]);
     assert_eq!(stdout(&found).lines().count(), 3, "{}", stderr(&found));
 }
 
 #[test]
-fn what_cannot_run_exits_with_two_and_says_where() {
+fn invalid_input_exits_with_2_and_names_its_place() {
     let project = project();
     edit(&project.path().join("configs/pick.toml"), "test_count", "test_cuont");
     let output = actcheck(project.path(), &["run", "configs/pick.toml"]);
@@ -272,11 +273,11 @@ fn what_cannot_run_exits_with_two_and_says_where() {
     let missing = actcheck(project.path(), &["run", "configs/pcik.toml"]);
     assert_eq!(missing.status.code(), Some(2));
     assert!(stderr(&missing).contains("configs/pcik.toml"), "{}", stderr(&missing));
-    assert!(!project.path().join("configs/.actcheck").exists(), "a refused campaign leaves no history");
+    assert!(!project.path().join("configs/.actcheck").exists(), "a refused campaign must not create a history");
 }
 
 #[test]
-fn a_reader_that_goes_away_is_no_panic() {
+fn a_closed_output_pipe_does_not_panic() {
     let project = project();
     let (_, _) = run_json(project.path(), &["--runs", "1", "--history", "h"]);
     let output = Command::new("sh")
@@ -287,9 +288,9 @@ fn a_reader_that_goes_away_is_no_panic() {
     assert_eq!(stderr(&output), "");
 }
 
-/// What a campaign ran with comes back from the history, also where the project's folder has moved.
+/// The history returns the campaign's configuration, also after the project's folder has moved.
 #[test]
-fn a_campaign_is_recalled_with_its_configuration_of_then() {
+fn a_campaign_is_recalled_with_its_original_configuration() {
     let folder = tempfile::tempdir().unwrap();
     let before = folder.path().join("before");
     std::fs::create_dir(&before).unwrap();
@@ -307,7 +308,7 @@ fn a_campaign_is_recalled_with_its_configuration_of_then() {
         record
     };
     assert_eq!(record.config_path, "../small.toml");
-    // Later edits change nothing of what was run, and a folder may move as a whole.
+    // Later edits do not change the stored configuration, and a folder may move as a whole.
     std::fs::write(&config, text.replace("glass", "mug")).unwrap();
     let after = folder.path().join("after");
     std::fs::rename(&before, &after).unwrap();
@@ -318,6 +319,7 @@ fn a_campaign_is_recalled_with_its_configuration_of_then() {
     assert_eq!(again.campaign.candidates["pickObject"], ["glass"]);
     let edited = Env::from_history(&history, "k7f3", Some(&after.join("small.toml"))).unwrap().0;
     assert_eq!(edited.campaign.candidates["pickObject"], ["mug"]);
-    let fault = Env::from_history(&history, "k7f4", None).err().expect("there is none").into_iter().next().unwrap();
+    let fault =
+        Env::from_history(&history, "k7f4", None).err().expect("no such campaign exists").into_iter().next().unwrap();
     assert_eq!((fault.code, fault.help.as_deref()), ("H014", Some("did you mean `k7f3`?")));
 }

@@ -1,4 +1,4 @@
-//! Stored runs that travel as files, and the corpus of them that campaigns run first, with the built program.
+//! Stored runs exported as files, and the corpus of them that campaigns run first, with the built program.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::support::look::blurred;
 use crate::support::{actcheck, copy, edit, project, root, stderr, stdout};
 
-/// A project in which the second run of a campaign of two fails; the campaign's id.
+/// A project in which the second run of a campaign of two fails. Returns the campaign's id.
 fn failing(folder: &Path) -> String {
     failing_of(folder, "configs/clutter.toml")
 }
@@ -24,7 +24,7 @@ fn export(folder: &Path, run: &str, to: &str) {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
 
-/// Exit code and what is said about the case.
+/// Exit code and the report about the case.
 fn run_case(folder: &Path, file: &str) -> (Option<i32>, Value) {
     let output = actcheck(folder, &["run", file, "--history", "h2", "--format", "json"]);
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
@@ -38,7 +38,7 @@ fn refused(folder: &Path, arguments: &[&str]) -> String {
 }
 
 #[test]
-fn an_exported_run_goes_the_same_way_inside_the_project_and_anywhere() {
+fn an_exported_run_reproduces_inside_and_outside_the_project() {
     let project = project();
     let run = failing(project.path());
     export(project.path(), &run, "configs/case.toml");
@@ -51,7 +51,7 @@ fn an_exported_run_goes_the_same_way_inside_the_project_and_anywhere() {
     let file = elsewhere.path().join("case.toml");
     export(project.path(), &run, file.to_str().unwrap());
     let text = std::fs::read_to_string(&file).unwrap();
-    assert!(!text.contains("model_dir") && !text.contains("ontology ="), "the program carries the same: {text}");
+    assert!(!text.contains("model_dir") && !text.contains("ontology ="), "the embedded files are the same: {text}");
     let machine = tempfile::tempdir().unwrap();
     std::fs::copy(&file, machine.path().join("case.toml")).unwrap();
     drop(project);
@@ -59,7 +59,7 @@ fn an_exported_run_goes_the_same_way_inside_the_project_and_anywhere() {
     assert_eq!((code, &case["same_trace"]), (Some(1), &true.into()), "{case:#}");
     let output = actcheck(machine.path(), &["run", "case.toml"]);
     assert!(stdout(&output).contains("still fails as recorded: NoGraspCollisions; same trace"), "{}", stdout(&output));
-    // The run of a case is a run like any other: it can be replayed and exported once more.
+    // The run of a case is an ordinary run: it can be replayed and exported again.
     let again = case["run"].as_str().unwrap();
     let replayed = actcheck(machine.path(), &["replay", again, "--history", "h2"]);
     assert!(stdout(&replayed).contains("the same, every bit"), "{}{}", stdout(&replayed), stderr(&replayed));
@@ -87,7 +87,11 @@ fn a_case_is_readable_and_its_values_have_names_units_and_bounds() {
     }
     let yaw = text.lines().find(|line| line.starts_with("target.yaw = ")).unwrap();
     assert!(yaw.ends_with("  # rad, -3.1416 to 3.1416"), "{yaw}");
-    assert_eq!(text.lines().filter(|line| line.starts_with("other.12.x = ")).count(), 1, "only the accepted place");
+    assert_eq!(
+        text.lines().filter(|line| line.starts_with("other.12.x = ")).count(),
+        1,
+        "only the accepted position is exported"
+    );
     assert!(!text.contains("other.12.x = ["), "{text}");
 }
 
@@ -96,7 +100,7 @@ fn a_case_survives_edits_of_rules_comments_and_ontology() {
     let project = project();
     let run = failing(project.path());
     export(project.path(), &run, "case.toml");
-    edit(&project.path().join("case.toml"), "[case.choices]", "# Somebody's remark.\n[case.choices]");
+    edit(&project.path().join("case.toml"), "[case.choices]", "# A remark.\n[case.choices]");
     let rule = project.path().join("rules/no_grasp_collisions.rls");
     let kept = std::fs::read_to_string(&rule).unwrap();
     std::fs::write(&rule, "violation(?x) :- during(?x, <http://nothing.of/that#sort>, ?x) .\n").unwrap();
@@ -117,8 +121,8 @@ fn a_case_survives_edits_of_rules_comments_and_ontology() {
     let (code, case) = run_case(project.path(), "case.toml");
     assert_eq!((code, &case["recurrence"]), (Some(1), &"otherwise".into()), "{case:#}");
     let output = actcheck(project.path(), &["run", "case.toml", "--history", "h2"]);
-    let told = "fails differently: MovedObject + NoGraspCollisions (was NoGraspCollisions); same trace";
-    assert!(stdout(&output).contains(told), "{}", stdout(&output));
+    let printed = "fails differently: MovedObject + NoGraspCollisions (was NoGraspCollisions); same trace";
+    assert!(stdout(&output).contains(printed), "{}", stdout(&output));
 
     let ontology = project.path().join("ontology/actions.ttl");
     let added = "\nact:Extra a owl:Class ; rdfs:label \"extra\" .\n";
@@ -127,7 +131,7 @@ fn a_case_survives_edits_of_rules_comments_and_ontology() {
 }
 
 #[test]
-fn values_that_can_not_be_are_refused_at_their_lines() {
+fn impossible_values_are_refused_with_their_lines() {
     let project = project();
     let run = failing(project.path());
     export(project.path(), &run, "case.toml");
@@ -161,9 +165,9 @@ fn values_that_can_not_be_are_refused_at_their_lines() {
     ];
     for (text, code, line, help) in cases {
         std::fs::write(&file, &text).unwrap();
-        let told = refused(project.path(), &["run", "case.toml", "--history", "h2"]);
-        assert!(told.contains(code) && told.contains(line) && told.contains(help), "{code} {line}: {told}");
-        assert!(told.contains("case.toml:"), "the place: {told}");
+        let printed = refused(project.path(), &["run", "case.toml", "--history", "h2"]);
+        assert!(printed.contains(code) && printed.contains(line) && printed.contains(help), "{code} {line}: {printed}");
+        assert!(printed.contains("case.toml:"), "the place: {printed}");
         let checked = refused(project.path(), &["check", "case.toml"]);
         assert!(checked.contains(code), "{checked}");
     }
@@ -171,12 +175,12 @@ fn values_that_can_not_be_are_refused_at_their_lines() {
     let (_, case) = run_case(project.path(), "case.toml");
     assert_eq!(case["same_trace"], false, "an edited value counts: {case:#}");
     std::fs::write(&file, &good).unwrap();
-    let told = refused(project.path(), &["run", "case.toml", "--runs", "5", "--seed", "3", "--shrink"]);
-    assert_eq!(told.matches("X040").count(), 3, "{told}");
+    let printed = refused(project.path(), &["run", "case.toml", "--runs", "5", "--seed", "3", "--shrink"]);
+    assert_eq!(printed.matches("X040").count(), 3, "{printed}");
 }
 
 #[test]
-fn a_shrunk_run_and_a_run_of_several_tests_travel_too() {
+fn shrunk_runs_and_runs_of_several_tests_can_be_exported() {
     let project = blurred();
     let config = project.path().join("configs/look.toml");
     let look = "\"PerceivePlane\"";
@@ -185,7 +189,7 @@ fn a_shrunk_run_and_a_run_of_several_tests_travel_too() {
     let output = actcheck(project.path(), &["shrink", &run, "--trials", "8", "--history", "h", "--format", "json"]);
     let small: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     let small = small["run"].as_str().unwrap();
-    // A shrunk run has one run in its campaign, and may perform fewer actions than its test.
+    // A shrunk run is the only run of its campaign, and may perform fewer actions than its test.
     let replayed = actcheck(project.path(), &["replay", small, "--history", "h"]);
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
     for exported in [run.as_str(), small] {
@@ -198,7 +202,7 @@ fn a_shrunk_run_and_a_run_of_several_tests_travel_too() {
 }
 
 #[test]
-fn a_campaign_runs_its_regressions_first_and_reports_them_apart() {
+fn a_campaign_runs_its_regressions_first_and_reports_them_separately() {
     let project = project();
     let run = failing(project.path());
     let added = actcheck(project.path(), &["export", &run, "--regression", "--history", "h"]);
@@ -210,25 +214,25 @@ fn a_campaign_runs_its_regressions_first_and_reports_them_apart() {
     let output = campaign(&["--format", "json"]);
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
     assert_eq!(json["regressions"][0]["recurrence"], "as before", "{json:#}");
-    assert_eq!(json["runs"].as_array().unwrap().len(), 1, "not counted among the runs");
+    assert_eq!(json["runs"].as_array().unwrap().len(), 1, "regressions are not counted among the runs");
     assert_eq!((json["exit_code"].as_i64(), output.status.code()), (Some(1), Some(1)));
     let text = stdout(&campaign(&["--jobs", "1"]));
-    let told = format!("regressions: 1 ran, 1 fails again: {run}.toml (NoGraspCollisions)\n");
-    assert!(text.starts_with(&told), "{text}");
+    let printed = format!("regressions: 1 ran, 1 fails again: {run}.toml (NoGraspCollisions)\n");
+    assert!(text.starts_with(&printed), "{text}");
 
     let file = project.path().join(format!("regressions/{run}.toml"));
     edit(&file, "target.model = \"glass\"", "target.model = \"glas\"");
     std::fs::copy(project.path().join("configs/pick.toml"), project.path().join("regressions/pick.toml")).unwrap();
-    let told = refused(project.path(), &arguments);
-    assert!(told.contains("C015") && told.contains(&format!("{run}.toml:")), "{told}");
+    let printed = refused(project.path(), &arguments);
+    assert!(printed.contains("C015") && printed.contains(&format!("{run}.toml:")), "{printed}");
     assert!(refused(project.path(), &["check", "configs/lone_glass.toml"]).contains("C015"));
     edit(&file, "target.model = \"glas\"", "target.model = \"glass\"");
-    let told = refused(project.path(), &arguments);
-    assert!(told.contains("regressions/pick.toml") && told.contains("S0"), "{told}");
+    let printed = refused(project.path(), &arguments);
+    assert!(printed.contains("regressions/pick.toml") && printed.contains("S0"), "{printed}");
 }
 
 #[test]
-fn a_lone_configuration_keeps_its_regressions_beside_itself() {
+fn regressions_of_a_standalone_configuration_are_beside_it() {
     let folder = tempfile::tempdir().unwrap();
     copy(&root().join("configs"), &folder.path().join("mine"));
     let config = folder.path().join("mine/clutter.toml");
@@ -248,7 +252,7 @@ fn a_lone_configuration_keeps_its_regressions_beside_itself() {
 }
 
 #[test]
-fn of_a_campaign_in_parts_the_first_runs_the_regressions() {
+fn only_the_first_shard_runs_the_regressions() {
     let project = project();
     let run = failing(project.path());
     actcheck(project.path(), &["export", &run, "--regression", "--history", "h"]);

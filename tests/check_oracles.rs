@@ -1,4 +1,4 @@
-//! Tests of the oracles: every fault is noticed, every property notices one, and a weak rule is named.
+//! Tests of the oracles: every fault is noticed, every property notices a fault, and a weak rule is named.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -28,7 +28,7 @@ fn trials(env: &Env, faults: &[Fault], jobs: usize) -> Vec<Trial> {
     try_faults(env, faults, &TrialOptions { jobs, context: CONTEXT }, &AtomicBool::new(false), || {}).unwrap()
 }
 
-/// The matrix of some of the properties.
+/// The matrix restricted to some of the properties.
 fn matrix_of(env: &Env, faults: &[Fault], trials: &[Trial], is_asked: impl Fn(&str) -> bool) -> OracleMatrix {
     let mut properties = properties(env);
     properties.retain(|property| is_asked(property));
@@ -55,7 +55,7 @@ fn matrix_over(properties: &[String], faults: &[Fault], trials: &[Trial]) -> Ora
     oracle_matrix(&names, properties, &trials)
 }
 
-/// The shipped pick as a robot does it whose senses are perfect: where nothing is put in, nothing goes wrong.
+/// The shipped pick by a robot with perfect sensors: without an injected fault, nothing fails.
 fn sure(folder: &Path) {
     let config = folder.join("configs/pick.toml");
     let text = std::fs::read_to_string(&config).unwrap();
@@ -64,34 +64,34 @@ fn sure(folder: &Path) {
     std::fs::write(&config, format!("{before}[budget]{after}")).unwrap();
 }
 
-/// The faults that can come about in a pick.
+/// The faults that can occur in a pick.
 fn of_pick() -> usize {
     FAULTS.iter().filter(|fault| fault.concerns(&["Pick".to_owned()])).count()
 }
 
-/// In the scenes of the shipped campaign: no gap, so every fault is noticed, every property notices one, and a robot that does
-/// nothing passes nowhere.
+/// In the scenes of the shipped campaign: every fault is noticed, every property notices one, and an idle robot
+/// passes in no scene.
 #[test]
 fn the_shipped_properties_notice_every_fault() {
     let project = project();
     sure(project.path());
     let output = actcheck(project.path(), &["check-oracles", "configs/pick.toml", "--runs", "8", "--format", "json"]);
-    let told: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
-    assert_eq!(output.status.code(), Some(0), "{}", told["gaps"]);
-    assert_eq!(told["gaps"], serde_json::json!([]));
-    let faults = told["faults"].as_array().unwrap();
+    let printed: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    assert_eq!(output.status.code(), Some(0), "{}", printed["gaps"]);
+    assert_eq!(printed["gaps"], serde_json::json!([]));
+    let faults = printed["faults"].as_array().unwrap();
     assert_eq!(faults.len(), of_pick());
     let notices = |fault: &Value, idx: usize| fault["properties"][idx]["verdict"] == "noticed";
     for fault in faults {
         assert!((0..5).any(|idx| notices(fault, idx)), "{fault}");
         assert!(fault["came_about"].as_u64().unwrap() >= 7, "{fault}");
-        // A fault that came about spoils every action.
+        // A fault that occurred spoils every action.
         assert_eq!(fault["passed_anyway"], 0, "{fault}");
     }
     for idx in 0..5 {
         assert!(faults.iter().any(|fault| notices(fault, idx)), "property {idx}: {faults:?}");
     }
-    // What only the world can tell is noticed whatever the report says.
+    // Faults that only the world shows are noticed whatever the report says.
     let noticing = |name: &str| -> Vec<&str> {
         let fault = faults.iter().find(|fault| fault["fault"] == name).unwrap();
         let properties = fault["properties"].as_array().unwrap();
@@ -104,8 +104,8 @@ fn the_shipped_properties_notice_every_fault() {
     assert_eq!(noticing("neighbour-falls"), ["NoGraspCollisions"]);
 }
 
-/// The actions of the whole task, each with what it needs before it, in a room with nothing unusual. (What is half a metre
-/// farther away than on a cabinet is never on it any more.)
+/// The actions of the whole task, each with its preceding actions, in a room with nothing unusual. (An object
+/// displaced by half a metre from a cabinet is never still on it.)
 const TASK: &str = "test_count = 8\nseed = 3\n\
     nav_obstacle_list = [\"bottle\"]\nnav_obstacle_count = 1\n[world]\nworlds = [\"empty_room\"]\n\
     [objectLocation]\nlocation_list = [\"left_corner\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n\
@@ -128,12 +128,12 @@ fn every_property_of_the_whole_task_notices_a_fault() {
         .collect();
     let mut asked = Vec::new();
     let mut tried = Vec::new();
-    // Where nothing is grasped, the coarsest physics does.
+    // Without a grasp, the coarsest physics is enough.
     for (tests, physics) in [(LOOKS, COARSEST), (GRASPS, COARSE)] {
         std::fs::write(folder.path().join("task.toml"), format!("tests = {tests}\n{TASK}{physics}")).unwrap();
         let env = Env::prepare(&folder.path().join("task.toml"), &Overrides::default()).unwrap();
         asked.extend(properties(&env));
-        // Scenes of different tests have different numbers.
+        // Scenes of different tests have different indices.
         let before = tried.iter().map(|trial: &Trial| trial.index + 1).max().unwrap_or(0);
         tried.extend(trials(&env, &faults, 2).into_iter().map(|trial| Trial { index: trial.index + before, ..trial }));
     }
@@ -150,7 +150,7 @@ fn every_property_of_the_whole_task_notices_a_fault() {
     for property in ["GoalReached", "LocalisationAgrees", "StayedInZone"] {
         assert!(carried_off.contains(&property), "{carried_off:?}");
     }
-    // It says that it succeeded: only the world tells.
+    // The action reports success; only the world shows the fault.
     assert!(noticing("dropped-on-the-way").contains(&"ObjectOnSurface"));
     assert!(!noticing("dropped-on-the-way").contains(&"PlaceReported"));
     assert_eq!(noticing("placed-and-fallen"), ["ObjectOnSurface"]);
@@ -158,9 +158,9 @@ fn every_property_of_the_whole_task_notices_a_fault() {
     assert_eq!(noticing("place-neighbour-falls"), ["NoPlaceCollisions"]);
 }
 
-/// Beside the shipped rule stands one that never believes a report to be a failure: nothing notices a robot that says so.
+/// Adds a variant of the shipped rule that ignores reported failures, so it notices no false report of one.
 #[test]
-fn a_rule_weakened_on_purpose_is_named() {
+fn a_deliberately_weakened_rule_is_named() {
     let project = project();
     sure(project.path());
     let rules = project.path().join("rules");
@@ -188,26 +188,26 @@ fn a_rule_weakened_on_purpose_is_named() {
 }
 
 #[test]
-fn too_few_scenes_tell_nothing_and_say_so() {
+fn too_few_scenes_are_reported_as_inconclusive() {
     let folder = tempfile::tempdir().unwrap();
     let config = root().join("configs/pick.toml");
     let output =
         actcheck(folder.path(), &["check-oracles", config.to_str().unwrap(), "--runs", "1", "--format", "csv"]);
     assert_eq!(output.status.code(), Some(1));
-    let (rows, told) = (stdout(&output), stderr(&output));
+    let (rows, printed) = (stdout(&output), stderr(&output));
     assert_eq!(rows.lines().count(), 1 + 5 * of_pick(), "{rows}");
     assert!(rows.lines().skip(1).all(|line| line.ends_with(",too few")), "{rows}");
-    assert!(told.contains("V003") && told.contains("V004") && told.contains("--runs"), "{told}");
-    assert!(!told.contains("V001") && !told.contains("V002"), "too few scenes are no proof:\n{told}");
-    // Nothing of it counts among the robot's runs.
+    assert!(printed.contains("V003") && printed.contains("V004") && printed.contains("--runs"), "{printed}");
+    assert!(!printed.contains("V001") && !printed.contains("V002"), "too few scenes must not prove a gap:\n{printed}");
+    // Sabotaged runs are not counted among the robot's runs.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     let missing = actcheck(folder.path(), &["check-oracles", "nowhere.toml"]);
     assert_eq!(missing.status.code(), Some(2));
 }
 
-/// Sabotage that touches neither the robot nor the world leaves every bit of every state as it is.
+/// Sabotage that changes neither the robot nor the world leaves every bit of every state unchanged.
 #[test]
-fn who_only_lies_changes_no_physics() {
+fn false_reports_do_not_change_the_physics() {
     let env = env(root(), 2);
     let choices = || Choices::random(env.campaign.seed, 0);
     let sound = run_line(&env, "k", 0, choices(), &CONTEXT).unwrap();

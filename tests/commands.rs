@@ -1,11 +1,11 @@
-//! The commands beside `run`, with the built program.
+//! The commands other than `run`, with the built program.
 
 use serde_json::Value;
 
 use crate::support::{actcheck, project, stderr, stdout};
 
 #[test]
-fn a_new_property_is_judged_as_it_is_written() {
+fn a_new_property_is_judged_as_soon_as_it_is_written() {
     let project = project();
     let new = actcheck(project.path(), &["new", "property", "StaysUpright", "--for", "Pick"]);
     assert!(new.status.success(), "{}", stderr(&new));
@@ -25,7 +25,7 @@ fn a_new_property_is_judged_as_it_is_written() {
 }
 
 #[test]
-fn why_tells_the_proof_or_what_was_missing() {
+fn why_prints_the_proof_or_the_missing_facts() {
     let project = project();
     actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
     let list = stdout(&actcheck(project.path(), &["list", "--history", "h", "--format", "csv"]));
@@ -48,7 +48,7 @@ fn why_tells_the_proof_or_what_was_missing() {
 }
 
 #[test]
-fn a_datalog_program_of_its_own_exports_and_explains() {
+fn a_standalone_datalog_program_exports_and_explains() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("edges.csv"), "a,b\nb,c\nc,d\n").unwrap();
     std::fs::write(

@@ -1,4 +1,5 @@
-//! Two campaigns side by side: alarms as rare and findings as frequent as theory says, by simulation; and with real skills.
+//! Comparison of two campaigns: the rates of false alarms and of findings agree with theory in simulation; and with
+//! real skills.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,7 +17,7 @@ use crate::support::{actcheck, edit, project, stderr, stdout};
 const LEVEL: f64 = 0.05;
 const CAMPAIGNS: u64 = 200;
 
-/// A campaign of coin flips: each property passes with its own probability, in each scene anew.
+/// A campaign of coin flips: each property passes with its own probability, independently in each scene.
 fn flipped(choices: &mut Choices, scenes: u64, rates: &[f64]) -> Vec<ComparedRun> {
     let (mut rows, mut outcomes, mut digests) = (Vec::new(), Vec::new(), BTreeMap::new());
     for index in 0..scenes {
@@ -49,7 +50,7 @@ fn flipped(choices: &mut Choices, scenes: u64, rates: &[f64]) -> Vec<ComparedRun
     compared_runs(&rows, &digests, &outcomes)
 }
 
-/// Pairs of campaigns with the given rates, and in how many of them an alarm is raised.
+/// Generates pairs of campaigns with the given rates; returns the number of pairs that raise an alarm.
 fn alarms(seed: u64, scenes: u64, first: &[f64], second: &[f64]) -> u64 {
     (0..CAMPAIGNS)
         .filter(|index| {
@@ -73,9 +74,10 @@ fn binomial(trials: u64, probability: f64) -> Vec<f64> {
     })
 }
 
-/// Probability of an alarm with one property, by going through all tables: how many scenes differ, and which way.
+/// Probability of an alarm with one property, by enumerating all tables: the number of discordant scenes, and their
+/// direction.
 ///
-/// A campaign of one property has two lines that say the same, so that each has to be found at half the level.
+/// A campaign of one property has two identical lines, so each is tested at half the level.
 fn theory(scenes: u64, first: f64, second: f64) -> f64 {
     let (down, up) = (first * (1.0 - second), (1.0 - first) * second);
     let mut power = 0.0;
@@ -89,14 +91,14 @@ fn theory(scenes: u64, first: f64, second: f64) -> f64 {
 }
 
 #[test]
-fn equal_skills_raise_false_alarms_at_most_at_the_level() {
+fn false_alarms_for_equal_skills_are_at_most_the_level() {
     for (seed, scenes, rates) in
         [(1, 30, &[0.5][..]), (2, 100, &[0.8]), (3, 60, &[0.9, 0.7, 0.5]), (4, 200, &[0.95, 0.6, 0.4, 0.2])]
     {
         let found = alarms(seed, scenes, rates, rates);
         assert!(found as f64 <= LEVEL * CAMPAIGNS as f64, "{found} false alarms of {CAMPAIGNS} with {rates:?}");
     }
-    // Not by luck: the exact probability is at most the level whatever the number of scenes and the rate.
+    // Not by chance: the exact probability is at most the level for any number of scenes and any rate.
     for scenes in [1, 5, 10, 30, 60, 100] {
         for rate in [0.1, 0.5, 0.8, 0.99] {
             let probability = theory(scenes, rate, rate);
@@ -106,12 +108,12 @@ fn equal_skills_raise_false_alarms_at_most_at_the_level() {
 }
 
 #[test]
-fn a_better_skill_raises_fewer_alarms_still() {
+fn a_better_skill_raises_even_fewer_alarms() {
     assert_eq!(alarms(5, 60, &[0.6, 0.6], &[0.9, 0.9]), 0);
 }
 
 #[test]
-fn a_worse_skill_is_found_as_often_as_theory_says() {
+fn a_worse_skill_is_found_with_the_theoretical_power() {
     for (seed, scenes, first, second) in
         [(11, 40, 0.9, 0.6), (12, 60, 0.8, 0.65), (13, 100, 0.7, 0.5), (14, 100, 0.95, 0.85), (15, 30, 0.95, 0.3)]
     {
@@ -159,7 +161,7 @@ fn whole(json: &Value) -> &Value {
 }
 
 #[test]
-fn a_skill_that_sees_worse_is_worse_on_the_same_scenes_and_an_equal_one_is_not() {
+fn a_skill_with_worse_perception_is_found_worse_and_an_equal_one_is_not() {
     let project = looking();
     let folder = project.path();
     let look = std::fs::read_to_string(folder.join("configs/look.toml")).unwrap();
@@ -191,11 +193,11 @@ fn a_skill_that_sees_worse_is_worse_on_the_same_scenes_and_an_equal_one_is_not()
         a == b
     };
     assert!(flipped.iter().all(same_number), "{flipped:?}");
-    // The other way round it is better: no alarm.
+    // The other way round, the skill is better: no alarm.
     assert_eq!(compared(folder, &[&format!("b#{bad}"), "a", "--fail-if-worse", "0.05"]).0, 0);
 }
 
-/// A history of sample runs, of which those with an index in `failing` fail where all others pass.
+/// A history of sample runs. Those with an index in `failing` fail `MovedObject`; all other outcomes are passes.
 fn samples(folder: &Path, name: &str, campaign: &str, runs: u64, failing: &[u64]) -> History {
     let history = History::open(&folder.join(name)).unwrap();
     history.begin_campaign(&sample_campaign(campaign, 0)).unwrap();
@@ -211,7 +213,7 @@ fn samples(folder: &Path, name: &str, campaign: &str, runs: u64, failing: &[u64]
 }
 
 #[test]
-fn every_format_tells_the_flips_and_the_verdict() {
+fn every_format_shows_the_flips_and_the_verdict() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     drop(samples(folder, "a", "k", 12, &[3]));
@@ -225,7 +227,7 @@ fn every_format_tells_the_flips_and_the_verdict() {
     ] {
         assert!(text.contains(wanted), "no `{wanted}` in\n{text}");
     }
-    // 9 scenes differ, 8 of them one way: (1 + 9) / 2⁹ = 0.0195, which six lines multiply.
+    // 9 scenes differ, 8 of them in one direction: (1 + 9) / 2⁹ = 0.0195, multiplied by six for the six lines.
     assert!(text.contains("B is not shown to be worse"), "{text}");
     let csv = stdout(&actcheck(folder, &["compare", "a", "b", "--format", "csv"]));
     let moved = csv.lines().find(|line| line.contains("MovedObject")).unwrap();
@@ -237,7 +239,7 @@ fn every_format_tells_the_flips_and_the_verdict() {
 }
 
 #[test]
-fn later_judgements_are_a_side_of_their_own() {
+fn later_judgements_can_be_compared_as_a_side() {
     let project = project();
     let folder = project.path();
     actcheck(folder, &["run", "configs/pick.toml", "--runs", "5", "--history", "h"]);
@@ -262,7 +264,7 @@ fn later_judgements_are_a_side_of_their_own() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_said() {
+fn impossible_comparisons_are_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     drop(samples(folder, "a", "k", 2, &[]));
@@ -292,8 +294,8 @@ fn what_cannot_be_compared_is_said() {
     fails(&["a"], &["<B>"]);
 }
 
-/// A campaign may begin within the second in which its regressions ran. The newest campaign of the history was then the one whose id came
-/// last in the alphabet.
+/// Regression: if a campaign began in the same second as its regressions, the last id in the alphabet counted as the newest
+/// campaign.
 #[test]
 fn a_campaign_is_newer_than_its_regressions() {
     let project = looking();
@@ -317,7 +319,7 @@ fn a_campaign_is_newer_than_its_regressions() {
 }
 
 #[test]
-fn the_same_campaign_twice_is_no_difference() {
+fn a_campaign_compared_with_itself_shows_no_difference() {
     let runs = flipped(&mut Choices::random(31, 0), 20, &[0.5, 0.5]);
     let Comparison { pairs, lines, .. } = compare(&runs, &runs);
     assert_eq!((pairs, lines.len(), &lines[0].of), (20, 3, &Compared::WholeRun));

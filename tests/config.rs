@@ -1,4 +1,4 @@
-//! Configurations: all parameters, what serves where nothing is said, and files that can't be read.
+//! Configurations: all parameters, the defaults, and files that can't be read.
 //!
 //! Wrong values are in `tests/diagnostics/config/`.
 
@@ -31,7 +31,7 @@ fn every_shipped_configuration_loads() {
     }
 }
 
-/// The paper's eleven parameters, those of later actions included.
+/// The paper's eleven parameters, including those of later actions.
 #[test]
 fn all_parameters_of_the_paper_are_read() {
     let campaign = load_text(
@@ -77,7 +77,7 @@ fn all_parameters_of_the_paper_are_read() {
 }
 
 #[test]
-fn without_anything_said_the_shipped_files_serve() {
+fn shipped_files_are_the_defaults() {
     let campaign = load_text("tests = [[\"Pick\"]]\ntest_count = 1\n");
     assert_eq!(campaign.ontology, (Files::Shipped, PathBuf::from("ontology/actions.ttl")));
     assert!(campaign.models.contains_key("glass") && campaign.models["coffee_table"].surface.is_some());
@@ -92,14 +92,14 @@ fn without_anything_said_the_shipped_files_serve() {
 }
 
 #[test]
-fn a_table_of_one_list_may_be_named_after_any_designator() {
+fn a_single_list_table_may_be_named_after_any_designator() {
     let campaign = load_text("tests = [[\"Pour\"]]\ntest_count = 1\n[drink]\nkinds = [\"tea\", \"milk\"]\n");
     assert_eq!(campaign.candidates["drink"], ["tea", "milk"]);
     assert!(campaign.places.contains_key("drink") && campaign.places.contains_key("drink.1"));
 }
 
 #[test]
-fn numbers_of_other_objects_may_be_exact() {
+fn the_number_of_other_objects_may_be_exact() {
     let count = |text: &str| {
         load_text(&format!(
             "tests = [[\"Pick\"]]\ntest_count = 1\n[surfaceObjects]\nmodel_list = [\"mug\"]\ncount = {text}\n"
@@ -125,7 +125,7 @@ fn paths_are_relative_to_the_configuration_and_the_command_line_wins() {
 }
 
 #[test]
-fn places_are_kept_for_later_stages() {
+fn source_spans_are_kept_for_later_stages() {
     let campaign = load(Path::new("configs/pick.toml"));
     let written = |key: &str| &campaign.source.text[campaign.places[key].clone()];
     assert_eq!(written("tests.0.0"), "\"Pick\"");
@@ -134,7 +134,7 @@ fn places_are_kept_for_later_stages() {
 }
 
 #[test]
-fn a_configuration_that_can_not_be_read_is_told_why() {
+fn an_unreadable_configuration_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let missing = folder.path().join("none.toml");
     assert!(refused(&missing).contains("there is no such file"));
@@ -148,9 +148,9 @@ fn a_configuration_that_can_not_be_read_is_told_why() {
     assert!(refused(&empty).contains("`tests` is missing"));
 }
 
-/// Deep nesting and long lists are refused or read, never a crash.
+/// Deep nesting and long lists are refused or read, without a crash.
 #[test]
-fn monstrous_texts_do_no_harm() {
+fn huge_and_deeply_nested_texts_do_not_crash() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("c.toml");
     for text in [
@@ -162,7 +162,7 @@ fn monstrous_texts_do_no_harm() {
         "\"tests\" = [[\"Päck🦀\"]]\n'test_count' = 0x10\n".to_owned(),
     ] {
         std::fs::write(&path, text).unwrap();
-        // Whatever it says, it says it.
+        // The result does not matter, as long as it returns.
         let _ = config::load(&path, &Overrides::default()).map_err(|found| found.to_string());
     }
 }

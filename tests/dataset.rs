@@ -1,4 +1,4 @@
-//! `actcheck export --dataset`: what is in it, by other people's reader, and that it agrees with the history.
+//! `actcheck export --dataset`: its contents, read by an independent reader, and their agreement with the history.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -27,8 +27,8 @@ fn schema(folder: &Path) -> Value {
 }
 
 #[test]
-fn every_table_is_told_and_described() {
-    let (folder, told) = exported(&[]);
+fn every_table_is_listed_and_described() {
+    let (folder, printed) = exported(&[]);
     let schema = schema(folder.path());
     let files: Vec<&str> =
         schema["tables"].as_array().unwrap().iter().map(|table| table["file"].as_str().unwrap()).collect();
@@ -37,7 +37,7 @@ fn every_table_is_told_and_described() {
         ["actions", "joints", "robot", "objects", "percepts", "outcomes"].map(|name| format!("{name}.parquet"))
     );
     for file in files {
-        assert!(folder.path().join("data").join(file).is_file() && told.contains(file), "{told}");
+        assert!(folder.path().join("data").join(file).is_file() && printed.contains(file), "{printed}");
     }
     for table in schema["tables"].as_array().unwrap() {
         for column in table["columns"].as_array().unwrap() {
@@ -47,7 +47,7 @@ fn every_table_is_told_and_described() {
 }
 
 #[test]
-fn the_tables_agree_with_each_other_by_another_reader() {
+fn the_tables_are_consistent_for_an_independent_reader() {
     let Some(python) = foreign::python() else { return };
     let (folder, _) = exported(&[]);
     let output = Command::new(python)
@@ -60,8 +60,8 @@ fn the_tables_agree_with_each_other_by_another_reader() {
 }
 
 #[test]
-fn only_what_is_asked_for_is_in_it() {
-    let (_folder, told) = exported(&["--since", "2999-01-01"]);
-    assert!(told.contains("joints.parquet holds 0 rows") && told.contains("of 0 runs"), "{told}");
+fn the_dataset_has_only_the_requested_runs() {
+    let (_folder, printed) = exported(&["--since", "2999-01-01"]);
+    assert!(printed.contains("joints.parquet holds 0 rows") && printed.contains("of 0 runs"), "{printed}");
     assert_eq!(export(&["--campaign", "none"]).1.status.code(), Some(2));
 }

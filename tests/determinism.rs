@@ -1,9 +1,9 @@
-//! Every shipped campaign gives the same outcomes, scores and states of every body at one worker and at two.
+//! Every shipped campaign gives the same outcomes, scores and body states with one worker and with two.
 
 use crate::support::{COARSEST, actcheck, project_with, root, stderr, stdout};
 
 #[test]
-fn every_shipped_campaign_is_the_same_at_one_and_two_workers() {
+fn every_shipped_campaign_is_the_same_with_one_and_two_workers() {
     let project = project_with(COARSEST);
     let mut configs: Vec<String> = std::fs::read_dir(root().join("configs"))
         .unwrap()

@@ -1,7 +1,8 @@
-//! Wrong configurations, ontologies and scene spaces, each with all that is said about it.
+//! Wrong configurations, ontologies and scene spaces, each with all its diagnostics.
 //!
-//! A case is a file below `tests/diagnostics/`; beside it lies what is said, in a file of the same name with `.expected`
-//! behind it. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write what is missing, and read it.
+//! A case is a file below `tests/diagnostics/`; its diagnostics are beside it, in a file of the same name with
+//! `.expected` appended. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write missing files, and review
+//! them.
 
 use std::path::{Path, PathBuf};
 
@@ -42,17 +43,17 @@ fn check(kind: &str, least: usize, load: impl Fn(&Path) -> Result<(), Diagnostic
 }
 
 #[test]
-fn wrong_configurations_are_told_everything_at_once() {
+fn all_faults_of_a_configuration_are_reported_at_once() {
     check("config", 20, |path| config::load(path, &Overrides::default()).map(drop));
 }
 
 #[test]
-fn wrong_ontologies_are_told_everything_at_once() {
+fn all_faults_of_an_ontology_are_reported_at_once() {
     check("ontology", 12, |path| ontology::load(&Files::Disk, path).map(drop));
 }
 
 #[test]
-fn configurations_that_the_ontology_can_not_serve_are_told_everything_at_once() {
+fn all_mismatches_of_configuration_and_ontology_are_reported_at_once() {
     check("scenario", 6, |path| {
         let campaign = config::load(path, &Overrides::default())?;
         let ontology = ontology::load(&campaign.ontology.0, &campaign.ontology.1)?;

@@ -1,4 +1,4 @@
-//! The invariants of `ontology/extra.ttl` over real runs: judged along with the rest, after the fact too, and beside the
+//! The invariants of `ontology/extra.ttl` over real runs: judged in the campaign and afterwards, in addition to the
 //! paper's properties, whose number they do not change.
 
 use std::path::Path;
@@ -27,7 +27,7 @@ fn runs(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn invariants_are_judged_with_the_rest_where_a_configuration_asks_for_them() {
+fn invariants_are_judged_if_a_configuration_selects_them() {
     let project = project();
     edit(&project.path().join("configs/pick.toml"), "../ontology/actions.ttl", "../ontology/extra.ttl");
     let output = actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "3", "--history", "h"]);
@@ -39,7 +39,7 @@ fn invariants_are_judged_with_the_rest_where_a_configuration_asks_for_them() {
         for property in EXTRA {
             let found = outcomes(&table, property);
             assert_eq!(found.len(), 1, "{table}");
-            // Where nothing was held there is nothing to say of it.
+            // Invariants about a held object are inapplicable if nothing was held.
             let decided = ["passed", "failed"].contains(&found[0].as_str());
             assert!(decided || (property == "SteadyInHand" && found[0] == "inapplicable"), "{property}: {table}");
         }
@@ -47,9 +47,10 @@ fn invariants_are_judged_with_the_rest_where_a_configuration_asks_for_them() {
     }
 }
 
-/// Runs of the shipped ontology, judged by the invariants afterwards; with a threshold that no contact keeps, all fail.
+/// Runs of the shipped ontology, judged by the invariants afterwards. With a threshold that no contact keeps, all
+/// fail.
 #[test]
-fn stored_runs_are_judged_by_the_invariants_afterwards() {
+fn stored_runs_can_be_judged_by_the_invariants_afterwards() {
     let project = project();
     let output = actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "2", "--history", "h"]);
     assert!(output.status.code() < Some(2), "{}", stderr(&output));

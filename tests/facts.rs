@@ -1,4 +1,4 @@
-//! Facts: what a trace says, said in the world vocabulary, with nothing lost that rules need.
+//! Facts: the contents of a trace in the world vocabulary, complete for the rules.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use actcheck::data::{
 };
 use actcheck::facts::extract;
 
-/// A number as physics has it.
+/// A number in single precision, as the physics engine has it.
 fn single(choices: &mut Choices, low: f64, high: f64) -> f64 {
     f64::from(choices.real("x", low, high, 0.0) as f32)
 }
@@ -22,7 +22,7 @@ fn strings(ids: &[&str]) -> Vec<String> {
     ids.iter().map(|id| (*id).to_owned()).collect()
 }
 
-/// Ids of a scene of common size: a table, the target and five others.
+/// Ids of a scene of typical size: a table, the target and five others.
 pub const BODIES: [&str; 7] = ["coffee_table_1", "glass_1", "mug_1", "bottle_1", "can_1", "salt_shaker_1", "plate_1"];
 
 fn body(id: &str, asleep: bool, choices: &mut Choices) -> BodyState {
@@ -122,7 +122,7 @@ fn frames(choices: &mut Choices, seconds: f64) -> Frames {
     Frames { period_secs: 0.1, rows: (0..(seconds * 10.0) as usize).map(|i| row(i as f64 * 0.1)).collect(), names }
 }
 
-/// A pick as it commonly is: 25 seconds, seven bodies, contacts that chatter.
+/// A typical pick: 25 seconds, seven bodies, chattering contacts.
 pub fn sample_trace(seed: u64) -> Trace {
     let mut choices = Choices::random(seed, 0);
     let before: Vec<BodyState> = BODIES.iter().map(|id| body(id, true, &mut choices)).collect();
@@ -192,7 +192,7 @@ fn values(facts: &RunFacts, triples: &[[TermId; 3]], subject: &Term, property: &
 }
 
 #[test]
-fn a_body_is_described_in_its_own_words() {
+fn a_body_is_described_with_its_own_terms() {
     let trace = sample_trace(1);
     let facts = extract(&trace);
     let after = &facts.snapshots[1];
@@ -210,7 +210,7 @@ fn a_body_is_described_in_its_own_words() {
 }
 
 #[test]
-fn only_what_can_move_has_velocities() {
+fn only_movable_bodies_have_velocities() {
     let facts = extract(&sample_trace(1));
     assert_eq!(values(&facts, &facts.snapshots[1], &obj("glass_1"), "vx").len(), 1);
     for still in ["mug_1", "coffee_table_1"] {
@@ -219,7 +219,7 @@ fn only_what_can_move_has_velocities() {
 }
 
 #[test]
-fn what_happened_meanwhile_is_told() {
+fn events_during_the_action_are_facts() {
     let facts = extract(&sample_trace(1));
     let during = &facts.during[0];
     assert_eq!(values(&facts, during, &w("action"), "reported"), [Term::string("succeeded")]);
@@ -247,7 +247,7 @@ fn a_chattering_pair_keeps_its_strongest_contacts() {
 }
 
 #[test]
-fn designators_name_objects_where_there_are_such() {
+fn designators_refer_to_objects_if_these_exist() {
     let facts = extract(&sample_trace(1));
     let pairs: BTreeSet<[Term; 2]> =
         facts.parameters[0].iter().map(|pair| pair.map(|id| facts.terms.term(id).clone())).collect();
@@ -269,7 +269,7 @@ fn the_same_trace_gives_the_same_facts_and_numbers() {
 }
 
 #[test]
-fn an_action_that_was_never_reached_has_designators_and_nothing_else() {
+fn an_unreached_action_has_only_designators() {
     let mut trace = sample_trace(1);
     let mut unreached = trace.actions[0].clone();
     unreached.end = ActionEnd::NotReached;
@@ -281,7 +281,7 @@ fn an_action_that_was_never_reached_has_designators_and_nothing_else() {
 }
 
 #[test]
-fn a_world_that_broke_is_still_told() {
+fn a_broken_world_still_has_facts() {
     let mut trace = sample_trace(1);
     trace.snapshots[1].bodies[1].pose.position = [f64::NAN, f64::INFINITY, -0.0];
     let facts = extract(&trace);

@@ -1,4 +1,4 @@
-//! From runs to what is told of them: made-up runs through the tables on disk, and real ones through the program.
+//! From runs to findings: made-up runs through the tables on disk, and real runs through the program.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ fn outcome(failed: bool) -> Outcome {
     if failed { Failed } else { Passed }
 }
 
-/// Bottles that slip are not in the hand, and what is not in the hand can't be placed.
+/// Slipping bottles are not in the hand, and objects that are not in the hand can't be placed.
 fn runs(campaign: &str, count: u64, slippery: f64) -> Vec<RunDetail> {
     let mut dice = Dice::new(campaign.len() as u64 * 1000 + count);
     (0..count)
@@ -42,7 +42,7 @@ fn table(runs: impl IntoIterator<Item = RunDetail>, filter: &TableFilter) -> Out
     for run in runs {
         by_campaign.entry(run.row.campaign.clone()).or_default().push(run);
     }
-    // One folder of files, as campaigns have beside a history.
+    // One folder of files, like the mirrors of campaigns beside a history.
     let all: Vec<RunDetail> = by_campaign.into_values().flatten().collect();
     let mirror = Mirror::of_runs(folder.path(), "all", all).unwrap();
     let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
@@ -55,7 +55,7 @@ fn hierarchy() -> Hierarchy {
 }
 
 #[test]
-fn a_pattern_in_runs_is_told_with_its_runs() {
+fn a_pattern_is_reported_with_its_runs() {
     let table = table(runs("k", 3_000, 0.05), &TableFilter::default());
     let judged = judged(&table);
     let names: Vec<&str> = judged.iter().map(|of| of.property.as_str()).collect();
@@ -64,12 +64,12 @@ fn a_pattern_in_runs_is_told_with_its_runs() {
     let found = property_findings(&table, &judged[0], &hierarchy(), &PatternOptions::default());
     let patterns: Vec<_> = found.patterns.confirmed().collect();
     assert_eq!(patterns.len(), 1, "{:#?}", found.patterns);
-    let told: Vec<&str> = patterns[0]
+    let parameters: Vec<&str> = patterns[0]
         .conditions
         .iter()
         .map(|condition| found.input.parameters[condition.parameter()].name.as_str())
         .collect();
-    assert_eq!(told, ["target_category", "target_friction"]);
+    assert_eq!(parameters, ["target_category", "target_friction"]);
     for run in &patterns[0].runs {
         let row = found.examples[*run].row as usize;
         assert_eq!(table.text("target_category").get(row), Some("http://actions#Bottle"));
@@ -118,11 +118,11 @@ fn summary(table: &OutcomeTable, property: usize) -> FindingsSummary {
 #[test]
 fn a_pattern_is_drawn_with_its_sentence_and_every_run_in_its_colour() {
     let table = table(runs("k", 1_500, 0.05), &TableFilter::default());
-    let told = summary(&table, 0);
-    let svg = patterns_picture(&told).expect("there is a pattern").to_svg();
+    let found = summary(&table, 0);
+    let svg = patterns_picture(&found).expect("there is a pattern").to_svg();
     assert!(svg.contains("InHand fails") && svg.contains("Bottle"), "{svg}");
-    // Runs of the pattern's kind are drawn, two strokes for each that failed.
-    let findings = &told.properties[0].findings;
+    // All runs of the pattern's kind are drawn, with two strokes for each failed run.
+    let findings = &found.properties[0].findings;
     let pattern = findings.patterns.confirmed().next().unwrap();
     let kind = pattern.conditions.iter().find(|condition| matches!(condition, Condition::Kind { .. })).unwrap();
     let holds = kind.holds(&findings.input);
@@ -134,21 +134,21 @@ fn a_pattern_is_drawn_with_its_sentence_and_every_run_in_its_colour() {
 }
 
 #[test]
-fn a_failure_that_leads_to_a_later_one_is_told_and_no_other() {
+fn only_a_failure_that_leads_to_a_later_one_is_reported() {
     let table = table(runs("k", 800, 0.1), &TableFilter::default());
     let found = cascades(&table, 0.05);
     assert_eq!(found.len(), 1, "{found:#?}");
     let (first, later) = (&found[0].first, &found[0].later);
     assert_eq!((first.step, first.property.as_str()), (1, "http://actions#InHand"));
     assert_eq!((later.step, later.property.as_str()), (2, "http://actions#Placed"));
-    assert_eq!(found[0].table.passed_in, 0, "what is lost is never placed");
+    assert_eq!(found[0].table.passed_in, 0, "a lost object is never placed");
     let modes = table_failure_modes(&table);
     assert!(modes[0].failed.is_empty() && modes.len() == 3, "{modes:#?}");
     assert_eq!(modes.iter().map(|mode| mode.runs.len()).sum::<usize>(), 800);
 }
 
 #[test]
-fn a_change_between_campaigns_is_found_where_it_is() {
+fn a_change_between_campaigns_is_located() {
     let campaigns = [("a", 0.05), ("b", 0.05), ("c", 0.05), ("d", 0.4), ("e", 0.4)];
     let all = campaigns.into_iter().flat_map(|(name, slippery)| runs(name, 150, slippery));
     let table = table(all, &TableFilter::default());
@@ -159,7 +159,7 @@ fn a_change_between_campaigns_is_found_where_it_is() {
 }
 
 #[test]
-fn runs_that_are_alike_count_once() {
+fn equal_runs_count_once() {
     let mut all = runs("k", 60, 0.3);
     let twin = all[10].row.trace_hash.clone();
     all[40].row.trace_hash = twin;
@@ -170,15 +170,16 @@ fn runs_that_are_alike_count_once() {
     let judged = judged(&table);
     let found = property_findings(&table, &judged[0], &hierarchy(), &PatternOptions::default());
     assert_eq!((found.twins, found.repeated, found.input.len()), (1, 6, 53));
-    assert!(!found.examples.iter().any(|example| example.run == "k-11"), "of two alike the newer one counts");
+    assert!(!found.examples.iter().any(|example| example.run == "k-11"), "of two equal runs the newer one counts");
     let (flaky, scenes) = flaky_scenes(&table, &judged[0]);
     assert_eq!(scenes, 3);
     assert!(flaky.iter().all(|scene| scene.passed > 0 && scene.passed < scene.of && scene.of == 3), "{flaky:?}");
 }
 
-/// Five runs of each scene that all went the same way are worth one: no interval is narrower for them, and no test surer.
+/// Five runs of each scene with equal results have the weight of one: no interval is narrower, and no p-value
+/// smaller.
 #[test]
-fn repeated_runs_of_a_scene_make_nothing_surer() {
+fn repeated_runs_of_a_scene_do_not_increase_significance() {
     let once = runs("k", 60, 0.3);
     let repeat = |number: u64| {
         once.iter().cloned().map(move |mut run| {
@@ -209,7 +210,7 @@ fn repeated_runs_of_a_scene_make_nothing_surer() {
 }
 
 #[test]
-fn what_was_not_decided_is_no_failure() {
+fn undecided_outcomes_are_not_failures() {
     let mut dice = Dice::new(3);
     let all = Outcome::ALL.map(|outcome| {
         made_up::run("k", u64::from(outcome as u8), &mut dice, &["Pick"], |_, _, _| vec![("InHand", outcome)])
@@ -223,7 +224,7 @@ fn what_was_not_decided_is_no_failure() {
 }
 
 #[test]
-fn rows_are_chosen_by_campaign_and_time() {
+fn rows_are_filtered_by_campaign_and_time() {
     let all = || runs("k", 56, 0.1);
     let since = TableFilter { since: Some("2026-01-15T00:00:00Z".to_owned()), ..TableFilter::default() };
     assert_eq!(table(all(), &since).len(), 4 * 28);

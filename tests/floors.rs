@@ -1,10 +1,10 @@
-//! Holds the crates under `src/` to the architecture in `src/lib.rs`: a crate depends only on crates above it in the table, and a
+//! Checks the crates under `src/` against the architecture in `src/lib.rs`: a crate depends only on crates above it in the table, and a
 //! library of the field is a dependency only of the crates that the table names.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Each crate and the crates that it may depend on, in the order of the line. `cli` may depend on all.
+/// Each crate and the crates that it may depend on, in the order of the pipeline. `cli` may depend on all.
 const FLOORS: [(&str, &[&str]); 17] = [
     ("base", &[]),
     ("data", &["base"]),
@@ -85,7 +85,7 @@ fn dependencies(folder: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn every_dependency_points_up_the_table() {
+fn every_crate_depends_only_on_crates_above_it() {
     let mut wrong = Vec::new();
     for (folder, allowed) in FLOORS {
         for dependency in dependencies(folder) {
@@ -99,7 +99,7 @@ fn every_dependency_points_up_the_table() {
 }
 
 #[test]
-fn the_table_only_points_up() {
+fn the_table_lists_only_crates_above() {
     for (idx, (folder, allowed)) in FLOORS.iter().enumerate() {
         let above: Vec<&str> = FLOORS[..idx].iter().map(|(name, _)| *name).collect();
         let wrong: Vec<&&str> = allowed.iter().filter(|name| !above.contains(name)).collect();
@@ -108,7 +108,7 @@ fn the_table_only_points_up() {
 }
 
 #[test]
-fn every_library_stays_behind_its_fence() {
+fn every_library_is_used_only_in_its_crates() {
     let mut wrong = Vec::new();
     for folder in folders() {
         let dependencies = dependencies(&folder);
@@ -122,7 +122,7 @@ fn every_library_stays_behind_its_fence() {
 }
 
 #[test]
-fn every_folder_is_a_crate_with_a_floor() {
+fn every_folder_is_a_crate_in_the_table() {
     let workspace = manifest(&Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
     let members = workspace["workspace"]["members"].as_array().unwrap();
     let members: BTreeSet<&str> = members.iter().map(|member| member.as_str().unwrap()).collect();

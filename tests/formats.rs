@@ -1,4 +1,4 @@
-//! Results in other people's formats: made-up runs of which the counts are known, held to other people's validators and generators.
+//! Results in other formats: made-up runs with known counts, checked with external validators and generators.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use serde_json::Value;
 use crate::support::planted::Dice;
 use crate::support::{actcheck, foreign, made_up, project, root, stderr, stdout};
 
-/// Fifteen outcomes: 11 passed, 3 failed, 1 broken. The runs 4 and 5 are of the scene of run 3, with other outcomes.
+/// Fifteen outcomes: 11 passed, 3 failed, 1 broken. Runs 4 and 5 share the scene of run 3 and have other outcomes.
 fn fifteen() -> Vec<RunDetail> {
     let outcomes = [
         [Outcome::Passed; 3],
@@ -45,7 +45,7 @@ fn fifteen() -> Vec<RunDetail> {
     runs
 }
 
-/// The same outcomes of all six kinds.
+/// The same number of outcomes of each of the six kinds.
 fn six() -> Vec<RunDetail> {
     let mut dice = Dice::new(5);
     vec![made_up::run("bbbb", 0, &mut dice, &["Pick", "Place"], |_, step, _| {
@@ -88,12 +88,12 @@ fn write(files: &BTreeMap<String, Vec<u8>>) -> tempfile::TempDir {
     folder
 }
 
-/// A file of `tests`.
+/// A path below `tests`.
 fn of_tests(name: &str) -> PathBuf {
     root().join("tests").join(name)
 }
 
-/// What `check_formats.py` says; nothing where there is no Python.
+/// Runs `check_formats.py`; returns `None` if Python is not available.
 fn checked(arguments: &[&Path]) -> Option<(bool, String)> {
     let python = foreign::python()?;
     let output = Command::new(python).arg(of_tests("foreign/check_formats.py")).args(arguments).output().unwrap();
@@ -109,7 +109,7 @@ fn allure_results_have_ids_steps_parameters_and_attachments() {
     assert_eq!([count("passed"), count("failed"), count("broken")], [11, 3, 1]);
     assert_eq!(results.len(), 15);
     let distinct = |field: &str| results.iter().map(|result| result[field].to_string()).collect::<BTreeSet<_>>().len();
-    assert_eq!([distinct("uuid"), distinct("historyId")], [15, 15], "repetitions of a scene are no retries");
+    assert_eq!([distinct("uuid"), distinct("historyId")], [15, 15], "repetitions of a scene are not retries");
     assert_eq!(distinct("testCaseId"), 3);
     for result in &results {
         assert_eq!(result["stage"], "finished");
@@ -122,11 +122,11 @@ fn allure_results_have_ids_steps_parameters_and_attachments() {
         assert!(attachments.iter().all(|it| files.contains_key(it["source"].as_str().unwrap())), "{attachments:?}");
     }
     let explained = results.iter().filter(|result| result["attachments"].as_array().unwrap().len() == 3);
-    assert_eq!(explained.count(), 5, "an explanation is shown with the property that it is about");
+    assert_eq!(explained.count(), 5, "each explanation is shown with its property");
 }
 
 #[test]
-fn the_same_scene_has_the_same_history_on_another_day() {
+fn the_same_scene_has_the_same_allure_history_on_another_day() {
     let ids = |runs: &[RunDetail]| -> Vec<String> {
         results(&allure_files(runs)).iter().map(|result| result["historyId"].to_string()).collect()
     };
@@ -140,11 +140,11 @@ fn the_same_scene_has_the_same_history_on_another_day() {
     let sorted = |runs: &[RunDetail]| ids(runs).into_iter().collect::<BTreeSet<_>>();
     assert_eq!(sorted(&today), sorted(&later));
     later[0].objects[1].x += 1e-9;
-    assert_eq!(sorted(&today).intersection(&sorted(&later)).count(), 12, "another scene is another one");
+    assert_eq!(sorted(&today).intersection(&sorted(&later)).count(), 12, "another scene has another history");
 }
 
 #[test]
-fn allure_categories_tell_all_kinds_apart() {
+fn allure_categories_distinguish_all_outcomes() {
     let files = allure_files(&six());
     let categories: Value = serde_json::from_slice(&files["categories.json"]).unwrap();
     let mut of_category: BTreeMap<String, u32> = BTreeMap::new();
@@ -164,7 +164,7 @@ fn allure_categories_tell_all_kinds_apart() {
 }
 
 #[test]
-fn allures_own_generator_shows_the_true_counts() {
+fn the_allure_generator_shows_the_true_counts() {
     let Some(allure) = foreign::allure() else { return };
     let folder = write(&allure_files(&fifteen()));
     let output = Command::new(allure)
@@ -186,7 +186,7 @@ fn allures_own_generator_shows_the_true_counts() {
 }
 
 #[test]
-fn junit_counts_and_is_valid() {
+fn junit_is_valid_and_has_the_true_counts() {
     let mut report = JunitReport::new();
     fifteen().iter().chain(&six()).for_each(|run| report.add(run));
     let text = report.text();
@@ -246,17 +246,17 @@ fn observations_follow_the_schema() {
     assert!(valid && said.trim() == "6 valid", "{said}");
 }
 
-/// A run that was broken, or of which nothing could be judged, has not passed.
+/// A run that is broken, or without any judged property, has not passed.
 #[test]
-fn what_tested_nothing_is_no_passed_observation() {
+fn a_run_that_tested_nothing_is_not_a_passed_observation() {
     let mut run = fifteen().swap_remove(0);
     run.actions.clear();
     assert_eq!(observation(&run, "")["status"], "gave_up");
     run.row.status = RunStatus::Timeout;
     run.reason = Some("300 s on the clock".to_owned());
-    let told = observation(&run, "no moment");
-    assert_eq!([&told["status"], &told["status_reason"]], ["gave_up", "300 s on the clock"]);
-    assert_eq!(told["run_start"], 0.0);
+    let observed = observation(&run, "no moment");
+    assert_eq!([&observed["status"], &observed["status_reason"]], ["gave_up", "300 s on the clock"]);
+    assert_eq!(observed["run_start"], 0.0);
 }
 
 fn turtle(text: &str) -> Vec<[Term; 3]> {
@@ -266,8 +266,8 @@ fn turtle(text: &str) -> Vec<[Term; 3]> {
         oxigraph::model::Term::Literal(literal) => {
             Term::Literal(literal.value().into(), literal.datatype().as_str().into())
         }
-        #[expect(unreachable_patterns, reason = "other builds of the library know quoted triples")]
-        _ => unreachable!("nobody writes quoted triples"),
+        #[expect(unreachable_patterns, reason = "quoted triples exist in other builds of the library")]
+        _ => unreachable!("quoted triples are never written"),
     };
     RdfParser::from_format(RdfFormat::Turtle)
         .with_base_iri("https://w3id.org/actcheck/test")
@@ -312,7 +312,7 @@ fn earl_parses_and_is_consistent_under_owl_rl() {
     };
     assert_eq!(["passed", "failed", "cantTell", "inapplicable", "untested"].map(count), [12, 4, 3, 1, 1]);
 
-    // With what the vocabularies say, ours included, nothing contradicts, and what must not be is found.
+    // Together with the vocabularies, ours included, the data is consistent, and a planted contradiction is found.
     let vocabularies = std::fs::read_to_string(of_tests("data/formats/vocabularies.ttl")).unwrap();
     let mut all = ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).unwrap().triples;
     all.extend(turtle(&std::fs::read_to_string(root().join("ontology/history.ttl")).unwrap()));
@@ -324,10 +324,10 @@ fn earl_parses_and_is_consistent_under_owl_rl() {
         Term::iri(format!("{}type", names::RDF)),
         Term::iri(format!("{}Assertor", names::EARL)),
     ];
-    assert!(closure.contains(&assertor), "what follows from the vocabularies is there");
+    assert!(closure.contains(&assertor), "consequences of the vocabularies are derived");
     let wrong = "@prefix prov: <http://www.w3.org/ns/prov#> . <https://w3id.org/actcheck/run/aaaa-1> a prov:Entity .";
     all.extend(turtle(wrong));
-    assert!(owl_closure(&all).is_err(), "a run is no entity");
+    assert!(owl_closure(&all).is_err(), "a run is not an entity");
 
     let folder = tempfile::tempdir().unwrap();
     let [good, bad] = ["good.ttl", "bad.ttl"].map(|name| folder.path().join(name));
@@ -340,7 +340,7 @@ fn earl_parses_and_is_consistent_under_owl_rl() {
 }
 
 #[test]
-fn markdown_tells_counts_first_and_lets_no_markup_in() {
+fn markdown_shows_counts_first_and_escapes_markup() {
     let mut report = MarkdownReport::new();
     fifteen().iter().for_each(|run| report.add(run));
     let text = markdown(&report);
@@ -350,7 +350,7 @@ fn markdown_tells_counts_first_and_lets_no_markup_in() {
 
 /// The flags of `actcheck report`, on a history that simulation made.
 #[test]
-fn report_writes_what_was_asked_for() {
+fn report_writes_the_requested_formats() {
     let project = project();
     let here = project.path();
     let ran = actcheck(here, &["run", "configs/quick.toml", "--runs", "2", "--jobs", "1"]);
@@ -360,10 +360,13 @@ fn report_writes_what_was_asked_for() {
         (output.status.code(), stdout(&output), stderr(&output))
     };
     let files = ["--allure", "a", "--junit", "j.xml", "--earl", "e.ttl", "--jsonl", "o.jsonl", "--markdown"];
-    let (code, printed, told) = report(&files);
-    assert_eq!(code, Some(0), "{told}");
+    let (code, printed, messages) = report(&files);
+    assert_eq!(code, Some(0), "{messages}");
     assert!(printed.starts_with("## actcheck: "), "{printed}");
-    assert!(!printed.contains("holds") && told.contains("j.xml holds"), "only the summary is printed: {printed}{told}");
+    assert!(
+        !printed.contains("holds") && messages.contains("j.xml holds"),
+        "stdout must have only the summary: {printed}{messages}"
+    );
     let read = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
     // Three properties of PerceivePlane, five of Pick.
     let names: Vec<String> = std::fs::read_dir(here.join("a"))
@@ -372,23 +375,27 @@ fn report_writes_what_was_asked_for() {
         .collect();
     assert_eq!(names.iter().filter(|name| name.ends_with("-result.json")).count(), 2 * 8);
     let not_all_passed = read("o.jsonl").lines().filter(|line| !line.contains("\"passed\":8,")).count();
-    assert_eq!(names.iter().filter(|name| name.ends_with(".svg")).count(), not_all_passed, "each of them is drawn");
+    assert_eq!(
+        names.iter().filter(|name| name.ends_with(".svg")).count(),
+        not_all_passed,
+        "each of them has a picture"
+    );
     assert!(read("j.xml").contains("tests=\"16\""));
     assert_eq!(read("o.jsonl").lines().count(), 2);
     assert!(!turtle(&read("e.ttl")).is_empty());
 
-    // Formats can be printed, one at a time, of one property.
+    // A single format, of one property, can be printed.
     let (code, printed, _) = report(&["--junit", "-", "--property", "MovedObject"]);
     assert!(code == Some(0) && printed.contains("tests=\"2\""), "{printed}");
     for (wrong, fault) in [
-        (vec!["--junit", "-", "--markdown"], "X051"),
+        (vec!["--junit", "-", "--markdown"], "X058"),
         (vec!["--markdown", "--property", "MovedObjekt"], "X045"),
         (vec!["--markdown", "--since", "2999-01-01"], "X044"),
         (vec!["--markdown", "--campaign", "none"], "H014"),
         (vec!["--junit", "no/folder/j.xml"], "X007"),
         (vec![], "--allure"),
     ] {
-        let (code, _, told) = report(&wrong);
-        assert!(code == Some(2) && told.contains(fault), "{wrong:?}: {told}");
+        let (code, _, messages) = report(&wrong);
+        assert!(code == Some(2) && messages.contains(fault), "{wrong:?}: {messages}");
     }
 }

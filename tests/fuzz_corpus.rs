@@ -1,7 +1,7 @@
-//! The inputs below `tests/fuzz_corpus/`, each given to its fuzz target: none panics, and all come back.
+//! Every input below `tests/fuzz_corpus/` is given to its fuzz target: none panics, and all return.
 //!
-//! They are a sample of what ten minutes of libFuzzer kept, short and long ones, because each reached code that no smaller
-//! one did. `fuzz/README.md` tells how to search for more.
+//! The inputs are a sample of those that ten minutes of libFuzzer kept, short and long ones, because each reached
+//! code that no smaller one did. `fuzz/README.md` describes how to search for more.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ fn inputs(target: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// Gives every input to an entrance. Of bytes that are no UTF-8, libFuzzer's adapter gives what stands before them.
+/// Gives every input to an entry point. Of bytes that are not UTF-8, libFuzzer's adapter gives the valid prefix.
 fn run(target: &str, entrance: fn(&str)) {
     let inputs = inputs(target);
     assert!(inputs.len() >= 20, "only {} inputs of {target}", inputs.len());
@@ -45,14 +45,14 @@ fn the_evaluators_agree_on_their_corpus() {
 }
 
 #[test]
-fn sparql_properties_come_back_from_their_corpus() {
+fn sparql_properties_read_their_corpus() {
     run("sparql_property", entrances::sparql_property);
 }
 
-/// Found by `evaluate`: behind a comment without end in the braces of an f-string, the fault's place began one byte before
-/// the end of the text, in the middle of a character, and could not be shown.
+/// Found by `evaluate`: after an unterminated comment in the braces of an f-string, the fault's span began one byte
+/// before the end of the text, in the middle of a character, and could not be shown.
 #[test]
-fn a_torn_f_string_has_its_fault_at_a_character() {
+fn a_fault_in_a_torn_f_string_is_at_a_character_boundary() {
     for text in ["a(f\"{/*é", "a(f\"{/*🦀", "a(f\"{?x🦀\")", "a(f\"{🦀"] {
         entrances::parse(text);
         entrances::check(text);

@@ -1,4 +1,4 @@
-//! The health of campaigns: the shipped ones are healthy, and each warning comes of a campaign that has the fault.
+//! The health of campaigns: the shipped ones are healthy, and each warning comes from a campaign that has the fault.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -23,7 +23,7 @@ fn health(config: &Path, runs: u32, context: RunContext) -> Health {
     let env = Env::prepare(config, &overrides).unwrap();
     let history = History::open(&env.campaign.history).unwrap();
     history.begin_campaign(&env.record("k".into(), "test".into(), (context.clock.now)())).unwrap();
-    // One worker: its clock is that of all runs.
+    // One worker, so that its clock is that of all runs.
     let options = CampaignOptions { jobs: 1, context };
     let end = run_all(&env, &history, "k", &options, &AtomicBool::new(false), |_| {});
     assert!(matches!(end.ending, Ending::Finished), "{:?}", end.ending);
@@ -49,18 +49,18 @@ fn the_shipped_campaigns_are_healthy() {
     };
     let all = [("pick", made("pick")), ("lone_glass", made("lone_glass")), ("clutter", begun("clutter"))];
     for (config, mut health) in all {
-        // How long runs take is told by the machine as well.
+        // The duration of runs depends on the machine as well.
         health.problems.retain(|problem| !matches!(problem, HealthProblem::Slow(..)));
         assert_eq!(health.problems, [], "{config}");
         assert!(health.runs >= 15 && !health.parameters.is_empty(), "{config}: {health:?}");
         let depth = health.deepest.unwrap().0;
-        assert!(depth > 0.0, "{config}: things that push each other do go into each other a little");
+        assert!(depth > 0.0, "{config}: bodies in contact penetrate a little");
     }
 }
 
-/// So many things find no place on a coffee table, and a property that speaks of what is not there never applies.
+/// So many objects do not fit on a coffee table, and a property about absent objects never applies.
 #[test]
-fn a_crowded_table_and_an_idle_property_are_told() {
+fn a_crowded_table_and_an_idle_property_are_reported() {
     let project = project();
     edit(&project.path().join("configs/pick.toml"), "count = [1, 5]", "count = [16, 20]");
     std::fs::write(
@@ -83,11 +83,11 @@ fn a_crowded_table_and_an_idle_property_are_told() {
 
     let output = actcheck(project.path(), &["health", "--history", "h", "--format", "json"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    let told: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let printed: Value = serde_json::from_str(&stdout(&output)).unwrap();
     let codes: Vec<&str> =
-        told["warnings"].as_array().unwrap().iter().map(|warning| warning["code"].as_str().unwrap()).collect();
+        printed["warnings"].as_array().unwrap().iter().map(|warning| warning["code"].as_str().unwrap()).collect();
     assert_eq!(codes[..2], ["S032", "Q001"]);
-    assert!(stderr(&output).contains("larger surface"), "what to do:\n{}", stderr(&output));
+    assert!(stderr(&output).contains("larger surface"), "no help:\n{}", stderr(&output));
     let table = stdout(&actcheck(project.path(), &["health", "--history", "h", "--format", "csv"]));
     assert!(table.starts_with("parameter,draws,bins,hit,expected_hit,least,most\n"), "{table}");
     assert!(table.contains("\nother.count,10,5,"), "{table}");
@@ -97,9 +97,9 @@ fn a_crowded_table_and_an_idle_property_are_told() {
     assert_eq!(missing.status.code(), Some(2));
 }
 
-/// A crowded scene finds no place and is drawn again: what is left leans to few objects.
+/// A crowded scene is rejected and drawn again, so the accepted scenes have fewer objects.
 #[test]
-fn counts_that_hardly_ever_find_a_place_are_neglected() {
+fn object_counts_that_rarely_fit_are_reported_as_neglected() {
     let project = project();
     edit(&project.path().join("configs/pick.toml"), "count = [1, 5]", "count = [1, 20]");
     let env = Env::prepare(&project.path().join("configs/pick.toml"), &Overrides::default()).unwrap();
@@ -120,11 +120,11 @@ fn counts_that_hardly_ever_find_a_place_are_neglected() {
     assert!(neglected.contains(&"other.count".to_owned()), "{neglected:?}");
 }
 
-/// Moments that the fake clock below shows.
+/// The times that the fake clock below returns.
 static LATER_SECS: AtomicU64 = AtomicU64::new(0);
 
 #[test]
-fn a_run_that_takes_far_longer_than_the_others_is_told() {
+fn a_run_far_longer_than_the_others_is_reported() {
     let clock = Clock { secs: || LATER_SECS.load(Ordering::Relaxed) as f64, ..STILL };
     let disturb = |index: u64, _: &mut World| {
         LATER_SECS.fetch_add(if index == 3 { 500 } else { 2 }, Ordering::Relaxed);
@@ -134,9 +134,9 @@ fn a_run_that_takes_far_longer_than_the_others_is_told() {
     assert_eq!(health.problems, [HealthProblem::Slow("k-4".into(), 500.0, 2.0)]);
 }
 
-/// One solid thing is put into another, after everything came to rest.
+/// A solid body is moved into another after everything came to rest.
 #[test]
-fn bad_simulation_is_told() {
+fn bad_simulation_quality_is_reported() {
     let disturb = |index: u64, world: &mut World| {
         let bodies = world.snapshot().bodies;
         let solid = |id: &str| ["box_", "can_", "bottle_", "salt_shaker_"].iter().any(|name| id.starts_with(name));

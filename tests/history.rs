@@ -1,4 +1,5 @@
-//! The memory: what goes in comes out, nothing is half there, and every fault of the folder is told clearly.
+//! The history: stored data is returned unchanged, writes are atomic, and every fault of the folder is reported
+//! clearly.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -59,7 +60,7 @@ fn robot() -> Arc<RobotProfile> {
     })
 }
 
-/// Objects stand in a row, 0.2 m apart; the target is the second.
+/// Objects in a row, 0.2 m apart; the target is the second.
 fn scene() -> Scene {
     let object = |(place, id): (usize, &&str)| SceneObject {
         id: (*id).to_owned(),
@@ -111,7 +112,7 @@ fn judgement(property: &str, outcome: Outcome) -> Judgement {
     }
 }
 
-/// A run; every third has a property that failed.
+/// A run; every third one has a failed property.
 pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
     let trace = sample_trace(index);
     let failed = index.is_multiple_of(3);
@@ -210,7 +211,7 @@ fn facts_as_terms(facts: &RunFacts) -> Vec<BTreeSet<[Term; 3]>> {
 }
 
 #[test]
-fn a_stored_run_has_the_facts_trace_and_choices_that_it_had() {
+fn a_stored_run_keeps_its_facts_trace_and_choices() {
     let (folder, history) = filled();
     let record = sample_run("z2", 3);
     drop(history);
@@ -224,7 +225,7 @@ fn a_stored_run_has_the_facts_trace_and_choices_that_it_had() {
 }
 
 #[test]
-fn the_graphs_say_the_same_bit_for_bit_but_for_what_they_leave_out() {
+fn stored_graphs_equal_the_facts_bit_for_bit_except_documented_omissions() {
     let (_folder, history) = filled();
     let record = sample_run("z2", 3);
     for (graph, all) in ["state/0", "state/1", "1/during"].into_iter().zip(facts_as_terms(&record.facts)) {
@@ -265,7 +266,7 @@ fn the_graphs_say_the_same_bit_for_bit_but_for_what_they_leave_out() {
 }
 
 #[test]
-fn of_each_pair_the_graphs_keep_the_strongest_contact() {
+fn the_graphs_keep_the_strongest_contact_of_each_pair() {
     let (_folder, history) = filled();
     let rows = table(
         &history,
@@ -287,7 +288,7 @@ fn of_each_pair_the_graphs_keep_the_strongest_contact() {
 }
 
 #[test]
-fn a_run_is_shown_with_all_that_was_kept() {
+fn a_run_is_shown_with_all_stored_data() {
     let (_folder, history) = filled();
     let record = sample_run("z2", 3);
     let run = history.run("z2-4").unwrap();
@@ -314,18 +315,18 @@ fn a_run_is_shown_with_all_that_was_kept() {
 }
 
 #[test]
-fn a_run_that_broke_says_why() {
+fn a_broken_run_has_its_reason() {
     let (_folder, history) = filled();
     let mut record = sample_run("a1", 7);
     record.trace.snapshots.clear();
-    record.trace.actions[0].end = ActionEnd::Broken("a pose is no number".to_owned());
+    record.trace.actions[0].end = ActionEnd::Broken("a pose is not a number".to_owned());
     record.trace.actions[0].report = None;
     record.facts = extract(&record.trace);
-    (record.status, record.reason) = (RunStatus::Broken, Some("a pose is no number".to_owned()));
+    (record.status, record.reason) = (RunStatus::Broken, Some("a pose is not a number".to_owned()));
     record.judgements[0].iter_mut().for_each(|judgement| judgement.outcome = Outcome::Broken);
     history.commit(&record).unwrap();
     let run = history.run("a1-8").unwrap();
-    assert_eq!((run.row.status, run.reason.as_deref()), (RunStatus::Broken, Some("a pose is no number")));
+    assert_eq!((run.row.status, run.reason.as_deref()), (RunStatus::Broken, Some("a pose is not a number")));
     assert_eq!((run.actions[0].end.as_str(), run.actions[0].reported), ("broken", None));
     assert!(run.actions[0].judgements.iter().all(|judgement| judgement.outcome == Outcome::Broken));
     let broken = RunFilter { status: Some(RunStatus::Broken), ..RunFilter::default() };
@@ -333,7 +334,7 @@ fn a_run_that_broke_says_why() {
 }
 
 #[test]
-fn lists_are_in_order_and_can_be_filtered() {
+fn lists_are_ordered_and_can_be_filtered() {
     let (_folder, history) = filled();
     let runs: Vec<String> = history.runs(&RunFilter::default()).unwrap().into_iter().map(|row| row.run).collect();
     assert_eq!(runs, ["z2-1", "z2-2", "z2-3", "z2-4", "z2-5", "z2-6", "a1-1", "a1-2"]);
@@ -370,7 +371,7 @@ fn a_campaign_is_listed_with_its_end() {
 }
 
 #[test]
-fn a_run_is_found_by_what_people_type() {
+fn a_run_is_found_by_its_id_prefixed_name_or_iri() {
     let (_folder, history) = filled();
     for name in ["z2-4", "run:z2-4", " z2-4 ", "<https://w3id.org/actcheck/run/z2-4>"] {
         assert_eq!(history.resolve(name).unwrap(), "z2-4", "{name}");
@@ -394,7 +395,7 @@ fn campaign_ids_are_short_new_and_repeatable() {
 }
 
 #[test]
-fn questions_of_people_have_short_queries() {
+fn common_questions_have_short_queries() {
     let (_folder, history) = filled();
     let count = table(&history, "PREFIX act: <http://actions#> SELECT (COUNT(?r) AS ?n) WHERE { ?r a act:Run }");
     assert_eq!(count, [[Some(Term::Integer(8))]]);
@@ -426,7 +427,7 @@ fn questions_of_people_have_short_queries() {
     );
 }
 
-/// Terms of ours that the vocabulary files describe, prefixed.
+/// Terms of our namespaces that the vocabulary files describe, prefixed.
 fn described() -> BTreeSet<String> {
     ["history.ttl", "world.ttl", "actions.ttl"]
         .iter()
@@ -459,7 +460,7 @@ fn every_term_of_a_history_is_described() {
 }
 
 #[test]
-fn a_query_that_is_none_is_told_where() {
+fn invalid_queries_are_reported_with_their_place() {
     let (_folder, history) = filled();
     let fault = |text: &str| history.query(text).unwrap_err().to_string();
     let starts = |text: &str, expected: &str| {
@@ -503,7 +504,7 @@ fn a_long_query_can_be_stopped() {
 }
 
 #[test]
-fn a_second_owner_is_refused_and_changes_nothing() {
+fn a_second_owner_is_refused_without_changes() {
     let (folder, history) = filled();
     let dir = folder.path().join("history");
     let fault = code(History::open(&dir));
@@ -514,7 +515,7 @@ fn a_second_owner_is_refused_and_changes_nothing() {
 }
 
 #[test]
-fn a_history_of_a_newer_program_is_left_alone() {
+fn a_history_of_a_newer_program_is_not_changed() {
     let (folder, history) = filled();
     drop(history);
     let dir = folder.path().join("history");
@@ -526,7 +527,7 @@ fn a_history_of_a_newer_program_is_left_alone() {
 }
 
 #[test]
-fn folders_that_are_no_histories_are_refused() {
+fn folders_without_a_history_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let none = folder.path().join("none");
     assert!(code(History::open_existing(&none)).starts_with("H003: there is no history"));
@@ -541,18 +542,18 @@ fn folders_that_are_no_histories_are_refused() {
 }
 
 #[test]
-fn a_place_where_nothing_can_be_made_is_told() {
-    // Permission bits don't stop root, so this is a place where nobody can make a folder.
+fn an_uncreatable_folder_is_reported() {
+    // Permission bits don't stop root, so this uses a path where no user can create a folder.
     let fault = code(History::open(Path::new("/proc/actcheck")));
     assert!(fault.starts_with("H001") && fault.contains("/proc/actcheck"), "{fault}");
 }
 
-/// Runs a test on a small file system of its own, which is gone afterwards; says so where that is not permitted.
+/// Runs a test on a small file system of its own, which is removed afterwards. Says so if mounting is not permitted.
 fn on_small_disk(test: impl FnOnce(&Path) + std::panic::UnwindSafe) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().to_str().unwrap();
     if !ran(&["mount", "-t", "tmpfs", "-o", "size=12m", "tmpfs", path]) {
-        eprintln!("a small file system can't be mounted here: not tested");
+        eprintln!("a small file system can't be mounted here; test skipped");
         return;
     }
     let outcome = std::panic::catch_unwind(|| test(folder.path()));
@@ -568,7 +569,7 @@ fn ran(command: &[&str]) -> bool {
 }
 
 #[test]
-fn a_read_only_place_is_told() {
+fn a_read_only_folder_is_reported() {
     on_small_disk(|disk| {
         let dir = disk.join("history");
         drop(History::open(&dir).unwrap());
@@ -581,7 +582,7 @@ fn a_read_only_place_is_told() {
 }
 
 #[test]
-fn a_damaged_or_missing_trace_is_told_and_the_rest_is_there() {
+fn a_damaged_or_missing_trace_is_reported_and_other_data_is_readable() {
     let (folder, history) = filled();
     let traces = folder.path().join("history/traces");
     let file = traces.join("z2-1.trace");
@@ -605,7 +606,7 @@ fn traces_without_a_run_are_cleaned_up() {
 }
 
 #[test]
-fn a_full_disk_is_told_and_keeps_what_was_there() {
+fn a_full_disk_is_reported_and_stored_runs_are_kept() {
     on_small_disk(|disk| fill_up(&disk.join("history")));
 }
 
@@ -620,7 +621,7 @@ fn fill_up(dir: &Path) {
             break fault.to_string();
         }
         kept += 1;
-        assert!(kept < 1000, "the disk does not fill up");
+        assert!(kept < 1000, "the disk did not fill up");
     };
     assert!(fault.starts_with("H005") && fault.contains("full") && fault.contains("history"), "{fault}");
     drop(history);

@@ -1,5 +1,5 @@
-//! Parts of a campaign, and histories that become one: nothing lost, nothing twice, in any order; conflicts are told and change
-//! nothing.
+//! Shards of a campaign, and merging of histories: no run is lost or duplicated, in any order; conflicts are reported
+//! and change nothing.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -18,7 +18,7 @@ const END: &str = "SELECT ?p ?o WHERE { ?c a act:Campaign ; ?p ?o
     FILTER (?p IN (act:score, act:scoreWithoutBroken, act:discards, act:interrupted, act:passedCount, act:failedCount,
         act:inapplicableCount, act:brokenCount, act:timeoutCount, act:untestedCount, act:plannedRuns, act:seed,
         act:configDigest, act:ontologyDigest, act:program, rdfs:label)) } ORDER BY ?p";
-/// Everything but times, parts and paths.
+/// All data except times, shards and paths.
 const ALL: &str = "SELECT ?g ?s ?p ?o WHERE { { ?s ?p ?o } UNION { GRAPH ?g { ?s ?p ?o } }
     FILTER (?p NOT IN (prov:startedAtTime, prov:endedAtTime, act:wallSeconds, act:elapsedSeconds, act:shard, act:configPath)) }";
 
@@ -33,7 +33,7 @@ fn all(history: &History) -> BTreeSet<String> {
     table(history, ALL).iter().map(|row| format!("{row:?}")).collect()
 }
 
-/// Columns of `actcheck list` but the ids.
+/// Columns of `actcheck list` without the ids.
 fn listed(folder: &Path, history: &str) -> Vec<String> {
     let output = actcheck(folder, &["list", "--history", history, "--format", "csv"]);
     assert!(output.status.success(), "{}", stderr(&output));
@@ -72,13 +72,13 @@ fn permutations(of: usize) -> Vec<Vec<usize>> {
 }
 
 #[test]
-fn four_parts_in_any_order_are_the_campaign() {
+fn four_shards_merged_in_any_order_equal_the_campaign() {
     let project = looking();
     let folder = project.path();
     run(folder, &["--history", "whole"]);
     for part in 1..=4 {
         run(folder, &["--shard", &format!("{part}/4"), "--history", &format!("s{part}")]);
-        // All parts in one history, where they have ids of their own.
+        // All shards in one history, where each has its own id.
         run(folder, &["--shard", &format!("{part}/4"), "--history", "together"]);
     }
     let wanted = listed(folder, "whole");
@@ -120,19 +120,19 @@ fn four_parts_in_any_order_are_the_campaign() {
 
     drop(sources);
 
-    // Met again it counts once, also as a part of what is there already.
+    // A shard merged again counts once, also as a part of an existing campaign.
     let output = actcheck(folder, &["merge", "cli", "s2", "from one", "--into", "order 0", "--format", "csv"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert_eq!((listed(folder, "order 0"), all(&open(folder, "order 0")) == wanted_all), (wanted, true));
 
-    // The joined campaign can be run again from the configuration that it names.
+    // The merged campaign can be run again from the configuration that it names.
     let id = open(folder, "cli").campaigns().unwrap()[0].id.clone();
     let output = actcheck(folder, &["replay", &format!("{id}-3"), "--history", "cli", "--exact"]);
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
 }
 
 #[test]
-fn what_is_no_part_is_refused() {
+fn invalid_shards_are_refused() {
     let project = project();
     for wrong in ["0/4", "5/4", "4", "1/0", "-1/2", "a/b"] {
         let output = actcheck(project.path(), &["run", "configs/pick.toml", &format!("--shard={wrong}")]);
@@ -142,7 +142,7 @@ fn what_is_no_part_is_refused() {
     assert!(!project.path().join("configs/.actcheck").exists());
 }
 
-/// One part of a campaign of sample runs.
+/// One shard of a campaign of sample runs.
 fn part(folder: &Path, name: &str, id: &str, shard: &str, change: impl Fn(&mut CampaignRecord)) -> History {
     let history = History::open(&folder.join(name)).unwrap();
     let mut record = CampaignRecord { planned_runs: 8, ..sample_campaign(id, 0) };
@@ -160,14 +160,14 @@ fn part(folder: &Path, name: &str, id: &str, shard: &str, change: impl Fn(&mut C
 
 fn fails(folder: &Path, arguments: &[&str], wanted: &[&str]) {
     let output = actcheck(folder, &[&["merge"], arguments].concat());
-    // Long lines are broken.
+    // Undoes line wrapping.
     let text = stderr(&output).replace('│', "").split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(output.status.code(), Some(2), "{arguments:?} {text}");
     wanted.iter().for_each(|wanted| assert!(text.contains(wanted), "no `{wanted}` in {text}"));
 }
 
 #[test]
-fn a_part_that_is_missing_is_told_and_can_come_later() {
+fn a_missing_shard_is_reported_and_can_be_merged_later() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (name, id, shard) in [("a", "k", "1/4"), ("b", "m", "3/4"), ("c", "k", "2/4"), ("d", "p", "4/4")] {
@@ -185,7 +185,7 @@ fn a_part_that_is_missing_is_told_and_can_come_later() {
     let all = open(folder, "all");
     let row = all.campaigns().unwrap().remove(0);
     assert!(!row.interrupted && row.runs == 8, "{row:?}");
-    // Of sample runs every third has one failure in five properties.
+    // Every third sample run has one failure in five properties.
     assert_eq!((row.outcomes[&Outcome::Passed], row.outcomes[&Outcome::Failed]), (37, 3));
     let score = row.score.unwrap();
     assert!((score - (3.0 * 0.8 + 5.0) / 8.0).abs() < 1e-12, "{score}");
@@ -198,7 +198,7 @@ fn a_part_that_is_missing_is_told_and_can_come_later() {
 }
 
 #[test]
-fn conflicts_are_told_with_the_way_out_and_write_nothing() {
+fn conflicts_are_reported_with_a_solution_and_write_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     drop(part(folder, "a", "k", "1/2", |_| ()));
@@ -245,14 +245,14 @@ fn conflicts_are_told_with_the_way_out_and_write_nothing() {
     assert_eq!((detail.row.campaign.as_str(), &detail.actions[0].judgements), (ids[1].as_str(), &run.judgements[0]));
     assert_eq!(new.run("k-1").unwrap().actions[0].judgements, run.judgements[0]);
     drop(new);
-    // The renamed one is known when it comes again.
+    // The renamed campaign is recognised when it is merged again.
     let output = actcheck(folder, &["merge", "whole", "--into", "new"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert_eq!(open(folder, "new").campaigns().unwrap().len(), 2);
 }
 
 #[test]
-fn a_merge_that_was_stopped_is_completed_by_the_next() {
+fn an_interrupted_merge_is_completed_by_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let sources = [part(folder, "a", "k", "1/2", |_| ()), part(folder, "b", "k", "2/2", |_| ())];
@@ -264,11 +264,11 @@ fn a_merge_that_was_stopped_is_completed_by_the_next() {
         let stop = AtomicBool::new(false);
         let mut runs = 0;
         let plan = plan(&sources, Some(&into), &MergeOptions::default()).unwrap();
-        let told = || {
+        let printed = || {
             runs += 1;
             stop.store(runs == wanted, Ordering::Relaxed);
         };
-        let merged = carry_out(&plan, &sources, &into, &stop, told).unwrap();
+        let merged = carry_out(&plan, &sources, &into, &stop, printed).unwrap();
         assert!(merged.interrupted && merged.runs == wanted, "{merged:?}");
         let row = into.campaigns().unwrap().remove(0);
         assert!(row.interrupted && row.ended.is_none(), "{row:?}");
@@ -279,9 +279,9 @@ fn a_merge_that_was_stopped_is_completed_by_the_next() {
     assert!((all(&into), table(&into, END)) == wanted);
 }
 
-/// Every history of a project has its regressions, under the same id and made at another time.
+/// Every history of a project contains its regressions, under the same id and with another time.
 #[test]
-fn what_was_run_twice_with_the_same_results_is_kept_once() {
+fn runs_with_equal_results_are_kept_once() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for (name, minute) in [("a", 1), ("b", 2)] {
@@ -303,7 +303,7 @@ fn what_was_run_twice_with_the_same_results_is_kept_once() {
 }
 
 #[test]
-fn a_copy_that_was_taken_too_early_is_completed() {
+fn an_incomplete_copy_is_completed() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let history = History::open(&folder.join("a")).unwrap();
@@ -323,7 +323,7 @@ fn a_copy_that_was_taken_too_early_is_completed() {
 }
 
 #[test]
-fn later_judgements_and_shrunk_runs_come_along_under_new_names() {
+fn later_judgements_and_shrunk_runs_are_merged_under_new_names() {
     let project = looking();
     let folder = project.path();
     for part in 1..=2 {
@@ -368,7 +368,7 @@ fn later_judgements_and_shrunk_runs_come_along_under_new_names() {
         .collect();
     assert_eq!((found.len(), joined.rules.len()), (8 * 3, 1));
     assert_eq!(found, rows);
-    // Each names one before it that is there, down to the campaign's own.
+    // Each judgement names an earlier one that exists, down to the campaign's own.
     let loose = "SELECT ?a WHERE { GRAPH act:rechecked { ?a act:supersedes ?b }
         FILTER NOT EXISTS { ?b earl:test ?p } FILTER NOT EXISTS { GRAPH act:rechecked { ?b earl:test ?p } } }";
     assert_eq!(table(&new, loose), Vec::<Vec<Option<Term>>>::new());
@@ -376,14 +376,14 @@ fn later_judgements_and_shrunk_runs_come_along_under_new_names() {
         let query =
             "SELECT ?original ?label WHERE { ?r act:shrunkFrom ?original ; act:campaign ?c . ?c rdfs:label ?label }";
         let rows = table(&new, query);
-        let told = format!("{rows:?}");
-        assert_eq!(rows.len(), 1, "{told}");
-        assert!(told.matches(&format!("{id}-{}", index + 1)).count() == 2, "{told} {id} {index}");
+        let printed = format!("{rows:?}");
+        assert_eq!(rows.len(), 1, "{printed}");
+        assert!(printed.matches(&format!("{id}-{}", index + 1)).count() == 2, "{printed} {id} {index}");
     }
 }
 
 #[test]
-fn one_history_alone_is_copied_whole() {
+fn a_single_history_is_copied_completely() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let history = History::open(&folder.join("a")).unwrap();
@@ -392,15 +392,15 @@ fn one_history_alone_is_copied_whole() {
         (0..3).for_each(|index| history.commit(&sample_run(id, index)).unwrap());
     }
     let everything = "SELECT ?g ?s ?p ?o WHERE { { ?s ?p ?o } UNION { GRAPH ?g { ?s ?p ?o } } }";
-    let told =
+    let printed =
         |history: &History| table(history, everything).iter().map(|row| format!("{row:?}")).collect::<BTreeSet<_>>();
-    let wanted = told(&history);
+    let wanted = printed(&history);
     drop(history);
     std::fs::create_dir(folder.join("elsewhere")).unwrap();
     copy(&folder.join("a"), &folder.join("b"));
     let output = actcheck(folder, &["merge", "a", "b", "a", "--into", "all"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    assert!(told(&open(folder, "all")) == wanted);
+    assert!(printed(&open(folder, "all")) == wanted);
     std::fs::remove_file(folder.join("b/traces/z2-1.trace")).unwrap();
     let output = actcheck(folder, &["merge", "b", "--into", "lossy"]);
     assert_eq!(output.status.code(), Some(0));

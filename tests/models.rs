@@ -1,7 +1,7 @@
-//! Other people's models: a folder in Gazebo's layout works as it is, and what is wrong with one is told with its place.
+//! External models: a folder in Gazebo's layout works unchanged, and faults of a model are reported with their place.
 //!
-//! A wrong model is a folder below `tests/diagnostics/models/` that holds the model `thing`, with what is said about it in
-//! `expected`. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write what is missing, and read it.
+//! A wrong model is a folder below `tests/diagnostics/models/` that holds the model `thing`, with its diagnostics in
+//! `expected`. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write missing files, and review them.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use actcheck::config::{self, Campaign, Overrides};
 use actcheck::data::Shape;
 use actcheck::rules::Budget;
 
-use crate::support::wrong::all_are_told;
+use crate::support::wrong::all_are_reported;
 use crate::support::{actcheck, copy, root, stderr, stdout};
 
 const WRONG: &str = "tests/diagnostics/models";
@@ -34,16 +34,16 @@ const USED: &str = "[objectSurface]\nobject_surfaces = [\"cafe_table\"]\n[pickOb
     [surfaceObjects]\nmodel_list = [\"cheese\", \"pill_box\"]\ncount = 2\n";
 
 #[test]
-fn every_wrong_model_is_told_with_its_place() {
-    all_are_told(WRONG, 40, |name| {
+fn every_wrong_model_is_reported_with_its_place() {
+    all_are_reported(WRONG, 40, |name| {
         campaign(Path::new(WRONG), &format!("model_dir = \"{name}\"\n[pickObject]\nmodel_list = [\"thing\"]\n"))
             .map_or_else(|found| found.to_string(), |_| String::new())
     });
 }
 
-/// Sizes, masses and centres as they follow from the files by hand.
+/// Sizes, masses and centres as computed from the files by hand.
 #[test]
-fn models_of_all_formats_are_what_their_files_say() {
+fn models_of_all_formats_have_the_values_of_their_files() {
     let (folder, _) = project("");
     let campaign = campaign(folder.path(), "model_dir = \"models\"\n").unwrap();
     let names: Vec<&str> = campaign.models.keys().map(String::as_str).collect();
@@ -54,7 +54,7 @@ fn models_of_all_formats_are_what_their_files_say() {
     let cup = &campaign.models["paper_cup"];
     near(cup.size_m, [0.076, 0.076, 0.09]);
     assert_eq!((cup.mass_kg, cup.friction, cup.restitution, cup.fixed), (0.12, 0.6, 0.05, false));
-    // The link's pose lifts it, and a model stands on the ground: its centre of mass moves with it.
+    // The link's pose lifts it, and a model is placed on the ground: its centre of mass moves with it.
     near(cup.inertia.unwrap().com_m, [0.0, 0.0, 0.04]);
     near(cup.inertia.unwrap().about_com[2], [0.0, 0.0, 0.000_125]);
     let cheese = &campaign.models["cheese"];
@@ -73,7 +73,7 @@ fn models_of_all_formats_are_what_their_files_say() {
     assert!(matches!(pill_box.parts[1].shape, Shape::Capsule { .. }));
 }
 
-/// The broken one is named with all that is wrong with it; the others work.
+/// The broken model is named with all its faults; the others work.
 #[test]
 fn a_broken_model_is_named_and_the_others_work() {
     let (folder, _) = project(USED);
@@ -85,15 +85,15 @@ fn a_broken_model_is_named_and_the_others_work() {
         assert!(said.contains(part), "{said}");
     }
     assert!(!said.contains("paper_cup/"), "{said}");
-    // Asked for by name, it is refused.
+    // If selected by name, it is refused.
     let asked = USED.replace("paper_cup", "broken_lamp");
     let refused = self::campaign(folder.path(), &format!("model_dir = \"models\"\n{asked}")).unwrap_err();
     assert!(refused.has_errors() && !refused.to_string().contains("C008"), "{refused}");
 }
 
-/// Meshes are taken apart once; what is kept is the same as what is made anew, and what is damaged is made anew.
+/// Meshes are decomposed once. The cached result equals a new one, and a damaged cache is rebuilt.
 #[test]
-fn meshes_are_taken_apart_and_kept_beside_the_history() {
+fn decomposed_meshes_are_cached_beside_the_history() {
     let (folder, path) = project(USED);
     let solids = || {
         let env = Env::prepare_within(&path, &Overrides::default(), Budget::default()).unwrap();
@@ -106,15 +106,15 @@ fn meshes_are_taken_apart_and_kept_beside_the_history() {
     assert_eq!(kept.len(), 3, "{kept:?}");
     assert_eq!(solids(), made);
     for file in &kept {
-        std::fs::write(file, "not what it was").unwrap();
+        std::fs::write(file, "damaged").unwrap();
     }
     assert_eq!(solids(), made);
     assert!(kept.iter().all(|file| std::fs::read(file).unwrap().len() > 100));
 }
 
-/// A name tells what a thing is, `[categories]` tells otherwise, and what nobody tells is an object.
+/// A model's name gives its category, `[categories]` overrides it, and the default is an object.
 #[test]
-fn names_and_the_configuration_say_what_models_are() {
+fn model_categories_come_from_names_and_the_configuration() {
     let category = |text: &str| {
         let (_folder, path) = project(&format!("{USED}{text}"));
         let env = Env::prepare_within(&path, &Overrides::default(), Budget::default()).unwrap();

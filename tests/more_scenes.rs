@@ -1,4 +1,4 @@
-//! A pattern as a rule that asks for more scenes of its kind.
+//! A pattern as a rule that selects more scenes of its kind.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::support::{actcheck, project, stderr};
 
 const CONTEXT: RunContext = RunContext { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
 
-/// Things settle by less than this, in metres and radians.
+/// Objects move less than this while they settle, in metres and radians.
 const SETTLED: f64 = 0.01;
 
 fn parameter(name: &str) -> Parameter {
@@ -27,9 +27,9 @@ fn rows(project: &Path) -> Vec<BTreeMap<String, String>> {
     csv::Reader::from_path(project.join("t/outcomes.csv")).unwrap().deserialize().map(Result::unwrap).collect()
 }
 
-/// A rule that asks for scenes of a pattern gives such scenes, and no others.
+/// A rule for a pattern accepts exactly the scenes with that pattern.
 #[test]
-fn more_scenes_of_a_pattern_can_be_asked_for() {
+fn more_scenes_of_a_pattern_can_be_requested() {
     let names =
         ["target_category", "others", "neighbour_distance_m", "surface_y_m", "target_turned_rad", "target_ahead_m"];
     let parameters: Vec<Parameter> = names.into_iter().map(parameter).collect();
@@ -60,10 +60,10 @@ fn more_scenes_of_a_pattern_can_be_asked_for() {
     }
 }
 
-/// What a scene is, by the row of the table; and what it is not.
+/// A condition that holds in a scene, by its row in the table; and one that does not.
 fn conditions(column: &Column, row: &BTreeMap<String, String>) -> [Condition; 2] {
     let value = &row[column.name];
-    assert!(!value.is_empty(), "the scene has no {}: take another one", column.name);
+    assert!(!value.is_empty(), "the scene has no {}: use another scene", column.name);
     match column.kind {
         ColumnKind::Text => [kind(0, value.rsplit(['#', '/']).next().unwrap()), kind(0, "nothing")],
         _ => {
@@ -73,9 +73,9 @@ fn conditions(column: &Column, row: &BTreeMap<String, String>) -> [Condition; 2]
     }
 }
 
-/// Of every parameter that the table has, a rule says of a scene what the table says.
+/// For every parameter of the table, a rule gives the same value as the table.
 #[test]
-fn rules_know_every_parameter_of_the_tables() {
+fn rules_have_every_parameter_of_the_tables() {
     let project = project();
     let folder = project.path();
     let output =
@@ -114,9 +114,9 @@ fn rules_know_every_parameter_of_the_tables() {
     assert_eq!(record.trace.hash, row["trace_hash"]);
 }
 
-/// Counts are 0 where there is nothing to count.
+/// Counts are 0 if there are no objects to count.
 #[test]
-fn a_rule_can_ask_for_scenes_without_things() {
+fn a_rule_can_request_scenes_without_objects() {
     let project = project();
     let config = project.path().join("configs/pick.toml");
     let text = std::fs::read_to_string(&config).unwrap();

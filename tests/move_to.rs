@@ -1,4 +1,4 @@
-//! Driving to places, from scenes to verdicts: what the base believes, what it sees, and what it runs into.
+//! Driving to places, from scenes to verdicts: localisation, obstacle detection, and collisions.
 
 use std::collections::BTreeMap;
 
@@ -12,20 +12,20 @@ use actcheck::world::{Poison, World};
 use crate::support::line::{self, env_of, run};
 use crate::support::{actcheck, project, stderr, stdout};
 
-/// The front of a table in the kitchen, and a table in the living room: the way leads through the passage.
+/// The front of a table in the kitchen, and a table in the living room: the route goes through the passage.
 const KITCHEN: &str = "[world]\nworlds = [\"apartment\"]\n[objectLocation]\nlocation_list = [\"dining_table_front\"]\n\
     [objectSurface]\nobject_surfaces = [\"dining_table\"]\n";
-/// A table on a floor with nothing else.
+/// A table on a floor without anything else.
 const FLOOR: &str =
     "[objectLocation]\nlocation_list = [\"table_front\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n";
-/// What may stand in the way.
+/// The possible obstacles.
 const TABLE: &str = "nav_obstacle_list = [\"mini_coffee_table\"]\nnav_obstacle_count = 1\n";
 
 fn env(before: &str, tables: &str) -> Env {
     env_of(&format!("tests = [[\"MoveTo\"]]\ntest_count = 1\nseed = 5\n{before}{tables}"))
 }
 
-/// The scene with nothing special but what is said, and no noise.
+/// The nominal scene with some given choices, and no noise.
 fn nominal(env: &Env, choices: &[(&str, f64)], disturb: Option<Disturbance>) -> RunRecord {
     let values: BTreeMap<String, Vec<f64>> =
         choices.iter().map(|(name, value)| ((*name).to_owned(), vec![*value])).collect();
@@ -40,12 +40,12 @@ fn outcomes(run: &RunRecord) -> BTreeMap<&str, Outcome> {
     line::outcomes(run, 0)
 }
 
-/// Where there are no rooms, there is no zone to stay in.
+/// Without rooms there is no zone to stay in.
 fn nothing_failed(run: &RunRecord) -> bool {
     outcomes(run).values().all(|outcome| [Outcome::Passed, Outcome::Inapplicable].contains(outcome))
 }
 
-/// Where the base ended: truly, and by its own belief.
+/// The final base pose: the true one, and the one that the robot believes.
 fn ends(run: &RunRecord) -> [[f64; 3]; 2] {
     let robot = &run.trace.snapshots[1].robot;
     [robot.base_true, robot.base_believed]
@@ -70,7 +70,7 @@ fn without_noise_and_obstacles_every_place_is_reached() {
             let [truly, believed] = ends(&run);
             let name = &run.scene.designators["objectLocation"][0];
             let goal = run.scene.map.locations.iter().find(|location| location.name == *name);
-            let goal = goal.expect("it was sent to a place on the map");
+            let goal = goal.expect("the goal is a place on the map");
             assert!(
                 off(&truly, &goal.at) < 0.01 && off(&truly, &believed) < 1e-6,
                 "run {index}: {truly:?} for {goal:?}"
@@ -79,9 +79,9 @@ fn without_noise_and_obstacles_every_place_is_reached() {
     }
 }
 
-/// The paper's robot failed where an obstacle stood on its goal. Ours finds out, and touches nothing.
+/// The paper's robot failed if an obstacle was on its goal. Ours detects this, and touches nothing.
 #[test]
-fn a_goal_that_is_taken_is_not_reached() {
+fn an_occupied_goal_is_not_reached() {
     let env = env(TABLE, KITCHEN);
     let run = nominal(&env, &[("obstacle.1.x", GOAL[0]), ("obstacle.1.y", GOAL[1])], None);
     assert_eq!(report(&run).message, "dining_table_front: the goal is occupied");
@@ -91,7 +91,7 @@ fn a_goal_that_is_taken_is_not_reached() {
     assert!(off(&ends(&run)[0], &GOAL) > 0.5);
 }
 
-/// The robot starts two metres before the front of a table, and an obstacle is put somewhere.
+/// The robot starts two metres before the front of a table, with one obstacle.
 fn from_afar(obstacle: [f64; 2], disturb: Option<Disturbance>) -> RunRecord {
     let env = env(TABLE, FLOOR);
     let [x, y] = obstacle;
@@ -104,37 +104,37 @@ const ASIDE: [f64; 2] = [-3.4, 2.0];
 const FRONT: [f64; 2] = [-1.29, 0.0];
 
 #[test]
-fn what_stands_in_the_way_is_driven_around() {
+fn the_base_drives_around_obstacles() {
     let (free, blocked) = (from_afar(ASIDE, None), from_afar(IN_THE_WAY, None));
     assert!(nothing_failed(&free) && nothing_failed(&blocked), "{:?} {:?}", free.judgements, blocked.judgements);
     let plans = |run: &RunRecord| run.trace.actions[0].phases.iter().filter(|phase| phase.name == "plan").count();
     assert_eq!(plans(&free), 1);
-    assert!(plans(&blocked) > 1, "it sees that the way by the map is blocked");
+    assert!(plans(&blocked) > 1, "it must see that the mapped route is blocked");
 }
 
-/// Sensors see the obstacle aside, wherever it is.
+/// Sensors always see the obstacle off the route.
 fn hide(_: u64, world: &mut World) {
     assert!(world.poison("mini_coffee_table_1", Poison::Decoy(Pose::upright([ASIDE[0], ASIDE[1], 0.0], 0.0))));
 }
 
-/// Sensors see the obstacle on the goal, wherever it is.
+/// Sensors always see the obstacle on the goal.
 fn pretend(_: u64, world: &mut World) {
     assert!(world.poison("mini_coffee_table_1", Poison::Decoy(Pose::upright([FRONT[0], FRONT[1], 0.0], 0.0))));
 }
 
 #[test]
-fn the_robot_knows_of_obstacles_what_it_sees_and_no_more() {
+fn the_robot_knows_only_the_obstacles_it_sees() {
     let hit = from_afar(IN_THE_WAY, Some(hide));
     assert_eq!(outcomes(&hit)["NoDriveCollisions"], Outcome::Failed);
-    let told = hit.judgements[0].iter().find(|judgement| judgement.property.ends_with("NoDriveCollisions")).unwrap();
-    assert!(told.witness.contains("mini_coffee_table_1"), "{}", told.witness);
+    let printed = hit.judgements[0].iter().find(|judgement| judgement.property.ends_with("NoDriveCollisions")).unwrap();
+    assert!(printed.witness.contains("mini_coffee_table_1"), "{}", printed.witness);
     let deceived = from_afar(ASIDE, Some(pretend));
     assert_eq!(report(&deceived).message, "table_front: the goal is occupied");
     assert_eq!(outcomes(&deceived)["NoDriveCollisions"], Outcome::Passed);
 }
 
 #[test]
-fn a_base_that_drifts_is_not_where_it_believes_to_be_and_landmarks_help() {
+fn drift_causes_a_localisation_error_that_landmarks_reduce() {
     let failures = |sensing: &str| {
         let env = env("", &format!("{KITCHEN}[sensing]\n{sensing}"));
         let runs: Vec<RunRecord> = (0..5).map(|index| run(&env, Choices::random(9, index), None)).collect();
@@ -152,7 +152,7 @@ fn a_base_that_drifts_is_not_where_it_believes_to_be_and_landmarks_help() {
 }
 
 #[test]
-fn every_run_is_the_same_at_one_and_at_two_workers_and_without_its_noise_it_is_another() {
+fn every_run_is_the_same_with_one_and_two_workers_and_differs_without_noise() {
     let project = project();
     let hashes = |jobs: &str| {
         let all = ["run", "configs/move_to.toml", "--runs", "2", "--jobs", jobs, "--history", jobs, "--format", "json"];
@@ -164,9 +164,9 @@ fn every_run_is_the_same_at_one_and_at_two_workers_and_without_its_noise_it_is_a
     let one = hashes("1");
     assert_eq!(one.len(), 2);
     assert_eq!(one, hashes("2"));
-    // A run can be taken out as a case, with all that its wheels got wrong.
+    // A run can be exported as a case, including all odometry errors.
     let listed = stdout(&actcheck(project.path(), &["list", "--history", "1", "--format", "csv"]));
-    let id = listed.lines().nth(1).and_then(|line| line.split(',').next()).expect("there are runs").to_owned();
+    let id = listed.lines().nth(1).and_then(|line| line.split(',').next()).expect("the campaign has runs").to_owned();
     actcheck(project.path(), &["export", &id, "--history", "1", "-o", "configs/case.toml"]);
     let case = actcheck(project.path(), &["check", "configs/case.toml"]);
     assert_eq!(case.status.code(), Some(0), "{}", stderr(&case));

@@ -1,17 +1,17 @@
-//! From an empty folder to a judged property, with nothing but the program.
+//! From an empty folder to a judged property, with only the program.
 
 use std::path::Path;
 
 use crate::support::{actcheck, foreign, stderr, stdout};
 
-/// What a command prints, which succeeds.
+/// Runs a command that must succeed. Returns its output.
 fn done(folder: &Path, arguments: &[&str]) -> String {
     let output = actcheck(folder, arguments);
     assert!(output.status.success(), "{arguments:?}: {}{}", stdout(&output), stderr(&output));
     stdout(&output)
 }
 
-/// What a command says that is refused, with its line breaks taken out.
+/// Runs a command that must be refused. Returns its message without line breaks.
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let output = actcheck(folder, arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}{}", stdout(&output), stderr(&output));
@@ -26,12 +26,12 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_new_campaign_runs_and_a_new_property_is_judged_in_an_empty_folder() {
+fn a_new_campaign_and_a_new_property_work_in_an_empty_folder() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     assert!(refused(folder, &["run"]).contains("`actcheck new campaign` writes pick.toml"));
-    let told = done(folder, &["new", "campaign"]);
-    assert!(told.contains("wrote pick.toml\n") && told.ends_with("next: actcheck run pick.toml\n"), "{told}");
+    let printed = done(folder, &["new", "campaign"]);
+    assert!(printed.contains("wrote pick.toml\n") && printed.ends_with("next: actcheck run pick.toml\n"), "{printed}");
     assert_eq!(names(folder), ["pick.toml"]);
     assert!(done(folder, &["check", "pick.toml"]).contains("built-in:ontology/actions.ttl"));
     let run = actcheck(folder, &["run", "pick.toml", "--runs", "1"]);
@@ -40,7 +40,7 @@ fn a_new_campaign_runs_and_a_new_property_is_judged_in_an_empty_folder() {
     std::fs::write(folder.join("other.toml"), "tests = [[\"Pick\"]]\ntest_count = 1\n").unwrap();
     std::fs::create_dir(folder.join("configs")).unwrap();
     std::fs::copy(folder.join("pick.toml"), folder.join("configs/copy.toml")).unwrap();
-    let told = done(folder, &["new", "property", "StaysUpright", "--for", "Pick"]);
+    let printed = done(folder, &["new", "property", "StaysUpright", "--for", "Pick"]);
     for line in [
         "the shipped ontology and rules",
         "pick.toml uses ontology/actions.ttl from now on",
@@ -48,29 +48,29 @@ fn a_new_campaign_runs_and_a_new_property_is_judged_in_an_empty_folder() {
         "configs/copy.toml uses the shipped ontology: add `ontology = \"../ontology/actions.ttl\"`",
         "edit rules/stays_upright.rls",
     ] {
-        assert!(told.contains(line), "`{line}` in:\n{told}");
+        assert!(printed.contains(line), "`{line}` in:\n{printed}");
     }
     assert!(done(folder, &["check", "pick.toml"]).contains("in ontology/actions.ttl"));
     let judged = actcheck(folder, &["recheck", "StaysUpright"]);
     assert!(judged.status.code() < Some(2), "{}", stderr(&judged));
     assert!(stdout(&judged).contains("StaysUpright"), "{}", stdout(&judged));
-    // A second one goes the usual way, and a second campaign uses the ontology that is here.
-    let told = done(folder, &["new", "property", "StaysLow", "--for", "Pick"]);
-    assert!(told.contains("wrote rules/stays_low.rls and an entry in ontology/actions.ttl"), "{told}");
-    let told = done(folder, &["new", "campaign", "second"]);
-    assert!(told.contains("second.toml uses ontology/actions.ttl, which already existed"), "{told}");
+    // A second property is written in the usual way, and a second campaign uses the existing ontology.
+    let printed = done(folder, &["new", "property", "StaysLow", "--for", "Pick"]);
+    assert!(printed.contains("wrote rules/stays_low.rls and an entry in ontology/actions.ttl"), "{printed}");
+    let printed = done(folder, &["new", "campaign", "second"]);
+    assert!(printed.contains("second.toml uses ontology/actions.ttl, which already existed"), "{printed}");
     let checked = done(folder, &["check", "second.toml"]);
     assert!(checked.contains("in ontology/actions.ttl"), "{checked}");
 }
 
 #[test]
-fn a_new_campaign_brings_parts_and_uses_them() {
+fn a_new_campaign_writes_requested_parts_and_uses_them() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let told = done(folder, &["new", "campaign", "all", "--with", "rules,skill,model"]);
-    assert_eq!(names(folder), ["all.toml", "models", "ontology", "rules", "skills"], "{told}");
+    let printed = done(folder, &["new", "campaign", "all", "--with", "rules,skill,model"]);
+    assert_eq!(names(folder), ["all.toml", "models", "ontology", "rules", "skills"], "{printed}");
     for part in ["all.toml", "models/ (", "ontology/ (", "rules/ (", "skills/pick.py"] {
-        assert!(told.contains(part), "`{part}` in:\n{told}");
+        assert!(printed.contains(part), "`{part}` in:\n{printed}");
     }
     let text = std::fs::read_to_string(folder.join("all.toml")).unwrap();
     for line in ["ontology = \"ontology/actions.ttl\"", "model_dir = \"models\"", "test_launcher = \"skills/pick.py\""]
@@ -79,7 +79,7 @@ fn a_new_campaign_brings_parts_and_uses_them() {
     }
     let checked = done(folder, &["check", "all.toml"]);
     assert!(checked.contains("in ontology/actions.ttl") && checked.contains("17 models"), "{checked}");
-    // Each part is read from here.
+    // Each part is read from this folder.
     let vase = std::fs::read_to_string(folder.join("models/objects/bottle.toml")).unwrap();
     std::fs::write(folder.join("models/objects/vase.toml"), vase.replace("\"bottle\"", "\"vase\"")).unwrap();
     assert!(done(folder, &["check", "all.toml"]).contains("18 models"));
@@ -107,7 +107,7 @@ fn the_skill_of_a_new_campaign_performs_the_pick() {
 }
 
 #[test]
-fn nothing_is_overwritten_and_nothing_is_written_by_halves() {
+fn existing_files_are_kept_and_writes_are_all_or_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     std::fs::write(folder.join("pick.toml"), "mine").unwrap();
@@ -137,7 +137,7 @@ fn nothing_is_overwritten_and_nothing_is_written_by_halves() {
 }
 
 #[test]
-fn without_a_configuration_run_and_check_say_which_there_are() {
+fn without_a_configuration_run_and_check_list_the_existing_ones() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for command in ["run", "check"] {

@@ -1,4 +1,4 @@
-//! Torn and garbled inputs are refused or read; nothing panics, and every message can be shown with its place.
+//! Truncated and garbled inputs are refused or read, without a panic, and every message can be shown with its place.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use actcheck::data::Choices;
 use actcheck::ontology;
 use actcheck::scenario::{self, Space};
 
-/// What people see, as the program prints it.
+/// Renders the diagnostics as the program prints them.
 fn show(found: &Diagnostics) {
     let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none());
     for fault in found.iter() {
@@ -19,7 +19,7 @@ fn show(found: &Diagnostics) {
     }
 }
 
-/// A text with a few bytes taken out, doubled, moved or replaced; always the same for the same number.
+/// A text with a few bytes removed, duplicated, moved or replaced; deterministic for each number.
 fn garbled(text: &str, number: u64) -> String {
     const STRANGE: [&str; 12] = ["\"", "[", "]", "<", ">", ".", "\n", "\u{0}", "é🦀", "\u{feff}", "#", "&"];
     let mut choices = Choices::random(number, 0);
@@ -41,7 +41,7 @@ fn garbled(text: &str, number: u64) -> String {
 }
 
 #[test]
-fn garbled_configurations_do_no_harm() {
+fn garbled_configurations_do_not_panic() {
     let text = std::fs::read_to_string("configs/pick.toml").unwrap();
     let text = text.replace("ontology = \"../ontology/actions.ttl\"", "").replace("model_dir = \"../models\"", "");
     let folder = tempfile::tempdir().unwrap();
@@ -65,7 +65,7 @@ fn garbled_configurations_do_no_harm() {
 }
 
 #[test]
-fn garbled_ontologies_do_no_harm() {
+fn garbled_ontologies_do_not_panic() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("rules")).unwrap();
     for name in ["tests/data/pick.owl", "tests/data/kinds_of_pick.ttl", "ontology/actions.ttl"] {
@@ -74,7 +74,7 @@ fn garbled_ontologies_do_no_harm() {
         let path = folder.path().join(format!("o.{ending}"));
         for number in 0..150 {
             std::fs::write(&path, garbled(&text, number)).unwrap();
-            // The imports and the rules are missing here, so there is always something to say.
+            // The imports and the rules are missing here, so there is always a diagnostic.
             show(&ontology::load(&Files::Disk, &path).map(drop).unwrap_err());
         }
     }

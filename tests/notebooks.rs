@@ -1,4 +1,4 @@
-//! The notebooks run from top to bottom on fresh campaigns, and what is committed of them is what a run leaves.
+//! The notebooks run from top to bottom on fresh campaigns, and the committed output is that of such a run.
 
 use std::process::Command;
 
@@ -25,7 +25,7 @@ fn code(book: &Value) -> Vec<&Value> {
 }
 
 #[test]
-fn committed_notebooks_have_been_run_in_order() {
+fn committed_notebooks_were_run_in_order() {
     let found = notebooks();
     let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["comparing.ipynb", "failure_patterns.ipynb", "first_look.ipynb", "sparql.ipynb"]);
@@ -39,7 +39,7 @@ fn committed_notebooks_have_been_run_in_order() {
         let text = book.to_string();
         assert!(
             !text.contains("/tmp/") && !text.contains("/home/") && !text.contains("/root/"),
-            "{name} names a machine"
+            "{name} contains a machine-specific path"
         );
     }
     let pictures = |book: &Value| book.to_string().matches("image/png").count();
@@ -54,7 +54,7 @@ fn notebooks_run_on_fresh_campaigns() {
         .arg(root().join("notebooks/regenerate.py"))
         .args(["--actcheck", env!("CARGO_BIN_EXE_actcheck"), "--runs", "8", "--into"])
         .arg(folder.path())
-        // No settings of the user's.
+        // Ignores the user's settings.
         .env("HOME", folder.path())
         .output()
         .unwrap();

@@ -1,4 +1,4 @@
-//! Ontologies: what is read from them, and that no trace of a machine stays in it.
+//! Ontologies: their parsed contents, and the absence of machine-specific paths.
 
 use std::path::Path;
 
@@ -30,10 +30,10 @@ fn the_shipped_ontology_has_the_five_properties_of_pick() {
 }
 
 #[test]
-fn every_shipped_term_has_words_for_people() {
+fn every_shipped_term_has_a_label_and_comment() {
     let ontology = load("ontology/actions.ttl");
     for (iri, term) in &ontology.vocabulary.terms {
-        // The ontologies themselves may do with a label.
+        // The ontologies themselves may have only a label.
         if iri.starts_with(names::ACT) || iri.starts_with(names::W) {
             assert!(term.label.is_some() && term.comment.is_some(), "{iri}");
             let comment = term.comment.as_deref().unwrap();
@@ -42,9 +42,9 @@ fn every_shipped_term_has_words_for_people() {
     }
 }
 
-/// The program carries what the repository holds, and it loads without any file.
+/// The embedded ontology equals the repository's, and loads without any file.
 #[test]
-fn the_carried_ontology_is_the_one_on_disk() {
+fn the_embedded_ontology_equals_the_one_on_disk() {
     let carried = ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).unwrap();
     let on_disk = load("ontology/actions.ttl");
     assert_eq!(carried.digest, on_disk.digest);
@@ -82,20 +82,20 @@ fn rdf_xml_is_read_like_turtle() {
     assert_eq!(ontology.properties["http://actions#MovedObject"].rule.path, "../../rules/moved_object.rls");
 }
 
-/// The published listing of Pick names a parameter `pickOject`. It can be read, and is told what is wrong with it.
+/// The published listing of Pick names a parameter `pickOject`. It can be read, and the fault is reported.
 #[test]
-fn the_misspelt_parameter_is_reported_as_what_it_is() {
+fn a_misspelt_parameter_is_reported_with_a_suggestion() {
     let found = ontology::load(&Files::Disk, Path::new("tests/data/pick_misspelt.owl")).unwrap_err();
     let first = found.iter().next().unwrap();
     assert_eq!((first.code, first.place().as_deref()), ("O008", Some("tests/data/pick_misspelt.owl:21:48")));
     assert_eq!(first.message, "the action `Pick` has the parameter `pickOject`, which is not declared");
     assert_eq!(first.help.as_deref(), Some("did you mean `pickObject`?"));
-    // The property's own need is the only other fault.
+    // The property's own requirement is the only other fault.
     assert_eq!(found.iter().map(|fault| fault.code).collect::<Vec<_>>(), ["O008", "O007"]);
 }
 
 #[test]
-fn an_action_inherits_what_is_stated_on_its_classes() {
+fn an_action_inherits_statements_of_its_classes() {
     let ontology = load("tests/data/kinds_of_pick.ttl");
     let of = |name: &str| locals(&ontology.actions[name].success_properties);
     assert_eq!(of("Wave"), ["Reported"]);
@@ -103,15 +103,15 @@ fn an_action_inherits_what_is_stated_on_its_classes() {
     assert_eq!(of("CarefulPick"), ["Reported", "Moved", "Held"]);
     assert!(ontology.actions["CarefulPick"].parameters.contains("pickObject"));
     assert_eq!(ontology.actions["CarefulPick"].label, "Pick with care");
-    // Classes are no actions by themselves.
+    // Classes themselves are not actions.
     assert_eq!(ontology.actions.len(), 3);
     assert_eq!(ontology.sources.len(), 2);
     assert_eq!(ontology.vocabulary.terms[&names::w("wobble")].unit.as_deref(), Some("rad"));
 }
 
-/// The same text gives the same statements, wherever it lies and however often it is read.
+/// The same text gives the same statements, in any folder and at every reading.
 #[test]
-fn statements_name_no_machine_and_do_not_vary() {
+fn statements_are_reproducible_and_free_of_machine_paths() {
     let folder = tempfile::tempdir().unwrap();
     let copy = |from: &str, to: &str| {
         let to = folder.path().join(to);
@@ -136,7 +136,7 @@ fn statements_name_no_machine_and_do_not_vary() {
 
 /// Rule files may have any name, and a reference may escape characters.
 #[test]
-fn file_names_with_spaces_and_signs_are_found() {
+fn file_names_with_spaces_and_special_characters_are_found() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("my rules")).unwrap();
     std::fs::write(folder.path().join("my rules/50% höher.rls"), "success(1) .").unwrap();
@@ -148,9 +148,9 @@ fn file_names_with_spaces_and_signs_are_found() {
     assert_eq!(ontology.properties["http://actions#Up"].rule.path, "my rules/50% höher.rls");
 }
 
-/// A user's ontology adds a property to the shipped ones, far away from this repository.
+/// A user's ontology adds a property to the shipped ones, in a folder outside this repository.
 #[test]
-fn the_carried_ontology_can_be_imported_from_anywhere() {
+fn the_embedded_ontology_can_be_imported_from_any_folder() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("quick.rls"), "success(1) .").unwrap();
     let text = "@prefix act: <http://actions#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\

@@ -15,8 +15,8 @@ fn statements() -> impl Strategy<Value = Vec<String>> {
     proptest::collection::vec(prop_oneof![2 => fact, 3 => rule()], 4..28)
 }
 
-/// Predicates `e0 … e3` have facts, `p0 … p5` are derived. A rule negates and aggregates only over smaller numbers, and reads
-/// equal or smaller ones positively, so that every program is stratified and many are recursive.
+/// Predicates `e0 … e3` have facts, `p0 … p5` are derived. A rule negates and aggregates only over smaller numbers,
+/// and reads equal or smaller ones positively, so that every program is stratified and many are recursive.
 fn rule() -> impl Strategy<Value = String> {
     let variable = || {
         prop_oneof![Just("?x"), Just("?y"), Just("?z"), Just("?u"), Just("_"), Just("1"), Just("2.5"), Just("\"a\"")]
@@ -39,7 +39,7 @@ fn rule() -> impl Strategy<Value = String> {
             match extra {
                 0 => body.push(format!("{first} < {last}")),
                 1 => body.push(format!("{first} != {last}")),
-                // Bounded, so that counting up ends.
+                // Bounded, so that counting up terminates.
                 2 => {
                     body.push(format!("?n = {first} + 1, ?n < 8"));
                     target = format!("p{head}(?n, {last})");
@@ -78,7 +78,7 @@ proptest! {
         let program = load(&text);
         let budget = Budget { tuples: 20_000, secs: 20.0, ..Budget::default() };
         let (Ok(fast), Ok(naive)) = (program.close(Engine::Fast, &budget), program.close(Engine::Naive, &budget)) else {
-            // Too large for the naive one: nothing to compare.
+            // Too large for the naive evaluator: skipped.
             return Ok(());
         };
         for predicate in naive.predicates() {
@@ -87,7 +87,7 @@ proptest! {
     }
 
     #[test]
-    fn every_proof_is_one(statements in statements()) {
+    fn every_proof_is_valid(statements in statements()) {
         let text = statements.join("\n");
         let program = load(&text);
         let budget = Budget { tuples: 2_000, secs: 20.0, ..Budget::default() };
@@ -111,7 +111,8 @@ proptest! {
     }
 }
 
-/// Checks a proof without its maker: facts stand in the text, and a rule alone derives its conclusion from its premises.
+/// Checks a proof independently of the engine's explanation: facts are in the text, and a rule alone derives its
+/// conclusion from its premises.
 fn checked(
     proof: &Proof,
     closure: &Closure,
@@ -135,9 +136,9 @@ fn checked(
     }
     let Support::Rule { rule, premises } = &proof.support else {
         return match proof.support {
-            Support::Fact if !text.contains(&format!("{statement} .")) => Err(format!("{statement} is no fact")),
-            // What is cut must be proved elsewhere in the same tree.
-            Support::Cut if !proved.contains(statement) => Err(format!("{statement} is proved nowhere")),
+            Support::Fact if !text.contains(&format!("{statement} .")) => Err(format!("{statement} is not a fact")),
+            // A cut statement must be proved elsewhere in the same tree.
+            Support::Cut if !proved.contains(statement) => Err(format!("{statement} has no proof in the tree")),
             _ => {
                 proved.push(statement.clone());
                 Ok(())
@@ -152,7 +153,7 @@ fn checked(
                 checked(inner, closure, text, above, proved)?;
                 alone.push_str(&format!("{} .\n", inner.statement));
             }
-            // The same variable twice: the statement can't say that.
+            // The same variable twice: the statement can't express that.
             Premise::Absent(pattern) if pattern.contains('?') => {}
             Premise::Absent(pattern) => {
                 let explained = load(text).explain(pattern, &Budget::default()).map_err(|fault| fault.to_string())?;
@@ -170,7 +171,7 @@ fn checked(
 }
 
 #[test]
-fn a_program_explains_what_it_lacks() {
+fn a_program_explains_missing_facts() {
     let program = load("e(1, 2) . e(2, 3) . p(?x, ?y) :- e(?x, ?y) . p(?x, ?z) :- p(?x, ?y), e(?y, ?z), ?z < 3 .");
     let explanation = program.explain("p(1, 3)", &Budget::default()).unwrap();
     let text = explanation.to_text();
@@ -181,7 +182,7 @@ fn a_program_explains_what_it_lacks() {
 }
 
 #[test]
-fn recursion_closes_a_chain() {
+fn recursion_computes_the_closure_of_a_chain() {
     let program =
         load("e(1, 2) . e(2, 3) . e(3, 1) . e(3, 4) . p(?x, ?y) :- e(?x, ?y) . p(?x, ?z) :- p(?x, ?y), e(?y, ?z) .");
     let closure = program.close(Engine::Fast, &Budget::default()).unwrap();
@@ -190,7 +191,7 @@ fn recursion_closes_a_chain() {
 }
 
 #[test]
-fn a_program_that_never_ends_is_stopped_at_its_rule() {
+fn a_nonterminating_program_is_stopped_and_its_rule_named() {
     let program = load("n(0) .\nn(?y) :- n(?x), ?y = ?x + 1 .");
     let budget = Budget { tuples: 10_000, secs: 10.0, ..Budget::default() };
     let fault = program.close(Engine::Fast, &budget).unwrap_err().to_string();
@@ -201,12 +202,13 @@ fn a_program_that_never_ends_is_stopped_at_its_rule() {
     assert!(fault.contains("0.2 s") && started.elapsed().as_secs_f64() < 5.0, "{fault}");
 }
 
-/// Runs the programs of a checkout of knowsys/nemo: `NEMO=path/to/nemo cargo test --release nemo`. Without it, nothing to do.
+/// Runs the programs of a checkout of knowsys/nemo: `NEMO=path/to/nemo cargo test --release nemo`. Skipped without
+/// `NEMO`.
 ///
-/// Every program gives the expected tables, or stands in `nemo_deviations.tsv` with the code of the fault that refuses it
-/// and the reason. One that stands there and gives its tables all the same has to be taken out.
+/// Every program gives the expected tables, or is listed in `nemo_deviations.tsv` with the code of the fault that
+/// refuses it and the reason. A listed program that gives its tables must be removed from the list.
 #[test]
-fn nemo_programs_give_their_tables() {
+fn nemo_programs_give_their_expected_tables() {
     let Some(nemo) = std::env::var_os("NEMO") else { return };
     let root = PathBuf::from(nemo).join("resources/testcases");
     let deviations: BTreeMap<&str, (&str, &str)> = include_str!("nemo_deviations.tsv")
@@ -222,7 +224,7 @@ fn nemo_programs_give_their_tables() {
         let name = program.strip_prefix(&root).unwrap().with_extension("").display().to_string();
         match (same_tables(&program), deviations.get(name.as_str())) {
             (Ok(()), None) => right += 1,
-            (Ok(()), Some(_)) => faults.push(format!("{name} gives its tables now: take it out of the list")),
+            (Ok(()), Some(_)) => faults.push(format!("{name} gives its tables now: remove it from the list")),
             (Err(why), Some((code, reason))) if why.contains(code) => println!("{name}: {reason}"),
             (Err(why), Some((code, _))) => faults.push(format!("{name} is not refused with {code}: {why}")),
             (Err(why), None) => faults.push(format!("{name}: {why}")),
@@ -230,12 +232,13 @@ fn nemo_programs_give_their_tables() {
         seen.insert(name);
     }
     println!("{right} of {} programs give the expected tables", seen.len());
-    faults.extend(deviations.keys().filter(|name| !seen.contains(**name)).map(|name| format!("{name} is not there")));
+    faults.extend(deviations.keys().filter(|name| !seen.contains(**name)).map(|name| format!("{name} does not exist")));
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     assert_eq!(without_nulls(&root), ["isnull"]);
 }
 
-/// The first fields of the rows that `arithmetic/builtins` lacks when its existential rule, and what reads it, is left out.
+/// The first fields of the rows that `arithmetic/builtins` lacks without its existential rule and the rules that read
+/// it.
 fn without_nulls(root: &Path) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     crate::support::copy(&root.join("arithmetic"), folder.path());

@@ -1,10 +1,10 @@
-//! Patterns: what is planted is found, and where nothing is planted nothing is.
+//! Patterns: planted ones are found, and none is found without a planted one.
 
 use actcheck::analysis::{Condition, Pattern, PatternInput, PatternOptions, Patterns, mine};
 
 use crate::support::planted::{input, kind, plantings, range, shuffled};
 
-/// A seventh of a bound's range is one step of the cuts; the bound itself has to lie much nearer.
+/// One step of the cuts is a seventh of a bound's range; the bound itself must be much nearer.
 const NEAR: f64 = 0.02;
 
 fn same(found: &Condition, planted: &Condition) -> bool {
@@ -26,26 +26,26 @@ fn is(found: &Pattern, planted: &[Condition]) -> bool {
         && planted.iter().all(|wanted| found.conditions.iter().any(|condition| same(condition, wanted)))
 }
 
-fn told(found: &Patterns) -> Vec<&Vec<Condition>> {
+fn conditions(found: &Patterns) -> Vec<&Vec<Condition>> {
     found.patterns.iter().map(|pattern| &pattern.conditions).collect()
 }
 
 #[test]
-fn what_is_planted_in_ten_thousand_runs_is_found_and_nothing_else() {
+fn only_planted_patterns_are_found_in_ten_thousand_runs() {
     for (name, planted) in plantings() {
         for seed in 1..=3 {
             let found = mine(&input(10_000, seed, &planted), &PatternOptions::default());
             for wanted in &planted {
                 let confirmed = found.confirmed().any(|pattern| is(pattern, wanted));
-                assert!(confirmed, "{name}, seed {seed}: {wanted:?} is not in {:#?}", told(&found));
+                assert!(confirmed, "{name}, seed {seed}: {wanted:?} is not in {:#?}", conditions(&found));
             }
-            assert_eq!(found.patterns.len(), planted.len(), "{name}, seed {seed}: {:#?}", told(&found));
+            assert_eq!(found.patterns.len(), planted.len(), "{name}, seed {seed}: {:#?}", conditions(&found));
         }
     }
 }
 
 #[test]
-fn what_is_told_of_a_pattern_is_what_the_runs_say() {
+fn the_figures_of_a_pattern_agree_with_the_runs() {
     let planted = vec![vec![kind(0, "Bottle"), range(4, None, Some(0.35))]];
     let input = input(10_000, 5, &planted);
     let found = mine(&input, &PatternOptions::default());
@@ -62,14 +62,14 @@ fn what_is_told_of_a_pattern_is_what_the_runs_say() {
     assert!(pattern.p < pattern.q && pattern.q < 1e-30 && pattern.p_held_out < 1e-10, "{pattern:?}");
     let searched = pattern.searched;
     let looked_at = searched.failed_in + searched.passed_in + searched.failed_out + searched.passed_out;
-    assert_eq!(looked_at, 10_000 - found.held_out, "the first pattern is looked for in all that are not kept aside");
+    assert_eq!(looked_at, 10_000 - found.held_out, "the first pattern is searched in all runs that are not held out");
     let kept = (0..input.len()).filter(|run| input.held_out[*run] && pattern.runs.contains(run));
     assert_eq!(pattern.held_out.failed_in + pattern.held_out.passed_in, kept.count() as u64);
     assert!((3_200..3_500).contains(&found.held_out), "{}", found.held_out);
 }
 
 #[test]
-fn drawn_by_lot_nothing_is_a_pattern() {
+fn shuffled_failures_have_no_pattern() {
     let planted = plantings().pop().unwrap().1;
     for runs in [300, 1_000, 4_000] {
         let input = input(runs, 9, &planted);
@@ -81,7 +81,7 @@ fn drawn_by_lot_nothing_is_a_pattern() {
 }
 
 #[test]
-fn too_little_to_learn_from_is_no_fault() {
+fn too_few_runs_are_not_an_error() {
     let empty = mine(&PatternInput::default(), &PatternOptions::default());
     assert_eq!((empty.runs, empty.patterns.len(), empty.tried), (0, 0, 0));
     for runs in [1, 2, 7, 30] {

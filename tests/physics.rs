@@ -1,4 +1,4 @@
-//! Simulation against closed-form answers, and what happens when it breaks.
+//! Simulation against closed-form answers, and its reaction to faults.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -35,9 +35,9 @@ fn shipped(name: &str) -> Arc<ObjectModel> {
     Arc::new(actcheck::config::model::read(&source).expect("the shipped models are right"))
 }
 
-/// A robot has a plan of its world, and of nothing that a scene puts into it, even where nothing can move it.
+/// A robot has a map of its world, without the objects that a scene adds, even if these can't move.
 #[test]
-fn what_stands_for_good_is_known_only_if_it_is_on_the_map() {
+fn immovable_objects_are_known_only_if_they_are_on_the_map() {
     let fixed = Arc::new(ObjectModel { fixed: true, ..Arc::unwrap_or_clone(block([0.2, 0.2, 0.2])) });
     let at = |x: f64| Pose::upright([x, 0.0, 0.0], 0.0);
     let objects = vec![
@@ -73,7 +73,7 @@ fn object(id: &str, model: Arc<ObjectModel>, role: Role, pose: Pose, mass_kg: f6
     SceneObject { id: id.to_owned(), restitution: model.restitution, model, role, pose, mass_kg, friction }
 }
 
-/// A scene with the robot out of the way.
+/// A scene with the robot far away.
 fn scene(objects: Vec<SceneObject>) -> Scene {
     Scene {
         map: actcheck::data::SceneMap::default(),
@@ -113,9 +113,9 @@ fn distance(a: &Pose, b: &Pose) -> f64 {
     a.position.iter().zip(&b.position).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Half of g·t², the integrator's first step aside (g·t·dt).
+/// Half of g·t², without the integrator's first step (g·t·dt).
 #[test]
-fn free_fall() {
+fn a_body_falls_by_half_g_t_squared() {
     let pose = Pose::upright([0.0, 0.0, 3.0], 0.0);
     let mut world = world(vec![object("a", block([0.1; 3]), Role::Target, pose, 1.0, 0.5)]);
     run(&mut world, 0.5);
@@ -126,7 +126,7 @@ fn free_fall() {
     assert!((speed / (GRAVITY * time) - 1.0).abs() < 1e-3, "{speed}");
 }
 
-/// How far a block slides down a slope in a second, with the friction's angle given apart from the slope's.
+/// The distance a block slides down a slope in a second, with the friction angle given separately from the slope's.
 fn slide_on_slope(degrees: f64, friction: f64) -> f64 {
     let (half, model) = (degrees.to_radians() / 2.0, block([3.0, 0.5, 0.1]));
     let tilted = |position| Pose { position, rotation: [0.0, half.sin(), 0.0, half.cos()] };
@@ -141,9 +141,9 @@ fn slide_on_slope(degrees: f64, friction: f64) -> f64 {
     distance(&start, &body(&world, "a").pose)
 }
 
-/// Coulomb: below the angle whose tangent is µ a block rests; above it, it slides with g·(sin − µ·cos).
+/// Coulomb: a block rests below the angle whose tangent is µ; above it, it slides with g·(sin − µ·cos).
 #[test]
-fn slope_at_and_below_the_friction_angle() {
+fn a_block_slides_above_the_friction_angle_and_rests_below_it() {
     let friction: f64 = 0.4;
     let critical = friction.atan().to_degrees();
     assert!(slide_on_slope(critical - 0.7, friction) < 2e-3, "slid {}", slide_on_slope(critical - 0.7, friction));
@@ -157,7 +157,7 @@ fn slope_at_and_below_the_friction_angle() {
 
 /// Constant deceleration µ·g: v² / (2·µ·g).
 #[test]
-fn sliding_block_stops() {
+fn a_sliding_block_stops_after_its_stopping_distance() {
     for (friction, speed) in [(0.5, 1.5), (0.3, 1.0)] {
         let floor = block([6.0, 1.0, 0.2]);
         let on_it = Pose::upright([-2.0, 0.0, 0.2], 0.0);
@@ -175,9 +175,9 @@ fn sliding_block_stops() {
     }
 }
 
-/// A stack's contact forces are the weights above them, and what carries is told apart from what only touches.
+/// A stack's contact forces are the weights above them, and supporting contacts are distinguished from mere contacts.
 #[test]
-fn resting_forces_are_weights() {
+fn resting_forces_equal_the_weights() {
     let at = |z| Pose::upright([0.0, 0.0, z], 0.0);
     let mut world = world(vec![
         object("low", block([0.2, 0.2, 0.1]), Role::Target, at(0.0), 2.0, 0.5),
@@ -216,9 +216,9 @@ fn on_table(model: Arc<ObjectModel>, mass_kg: f64, friction: f64) -> Scene {
     scene
 }
 
-/// Two fingers that push with F each hold up to 2·µ·F. Surfaces share the geometric mean of their frictions.
+/// Two fingers that push with F each hold up to 2·µ·F. Surfaces use the geometric mean of their frictions.
 #[test]
-fn grip_at_and_below_its_limit() {
+fn a_grip_holds_below_its_friction_limit_and_slips_above_it() {
     let (friction, profile) = (0.2_f64, robot());
     let limit_kg = 2.0 * (friction * profile.finger_friction).sqrt() * profile.grip_force_n / GRAVITY;
     for (share, holds) in [(0.85, true), (1.12, false)] {
@@ -235,9 +235,9 @@ fn grip_at_and_below_its_limit() {
     }
 }
 
-/// More than the lift's motor can carry stands on it: its stop holds, and the motor does not raise it.
+/// The load on the lift exceeds its motor's effort: the lower stop holds, and the motor does not raise it.
 #[test]
-fn joint_limits_hold_under_load() {
+fn a_joint_limit_holds_under_load() {
     let weight = Pose::upright([0.05, 0.05, 0.402], 0.0);
     let mut scene = scene(vec![object("weight", block([0.08, 0.08, 0.08]), Role::Other, weight, 40.0, 0.8)]);
     scene.robot.base = [0.0, 0.0, 0.0];
@@ -250,7 +250,7 @@ fn joint_limits_hold_under_load() {
         world.step(&command);
     }
     assert_eq!(body(&world, "weight").rests_on, ["robot"]);
-    assert!(40.0 * GRAVITY > lift_joint.effort, "the load has to be more than the motor carries");
+    assert!(40.0 * GRAVITY > lift_joint.effort, "the load must exceed the motor's effort");
     let position = world.observe().positions[lift];
     assert!((lift_joint.lower - 0.002..lift_joint.lower + 0.002).contains(&position), "{position}");
     // Without the load the same motor gets there.
@@ -261,13 +261,13 @@ fn joint_limits_hold_under_load() {
     assert!((world.observe().positions[lift] - 0.3).abs() < 0.002);
 }
 
-/// Commands beyond the limits end at the limits, and no joint is faster than it may be.
+/// Commands beyond the limits end at the limits, and no joint exceeds its velocity limit.
 #[test]
-fn limits_of_position_and_speed_hold_against_commands() {
+fn joint_limits_of_position_and_velocity_override_commands() {
     let mut world = world(Vec::new());
     let mut command = world.hold();
     let arm = world.layout().arm.clone();
-    // The lift goes up first and down last, when the arm is upright again: it would meet the floor.
+    // The lift goes up first and down last, when the arm is upright again: it would hit the floor.
     let courses: [[f64; 5]; 4] = [
         [100.0, 100.0, 100.0, 100.0, 100.0],
         [100.0, -100.0, -100.0, -100.0, -100.0],
@@ -297,9 +297,9 @@ fn limits_of_position_and_speed_hold_against_commands() {
     }
 }
 
-/// The arm stands where it is told to within a tenth of what it would sag without gravity compensation.
+/// The arm holds its commanded posture within a tenth of its sag without gravity compensation.
 #[test]
-fn gravity_is_compensated() {
+fn the_arm_is_gravity_compensated() {
     let mut world = world(Vec::new());
     let mut command = world.hold();
     let arm = world.layout().arm.clone();
@@ -311,13 +311,13 @@ fn gravity_is_compensated() {
     }
     let positions = world.observe().positions;
     let needed = world.kinematics().holding_efforts(&positions);
-    assert!(needed[arm[1]].abs() > 5.0, "the posture has to load the shoulder: {} N·m", needed[arm[1]]);
-    // The motors' stiffness is all effort at an error of 0.02 rad: the shoulder would sag by that much without.
+    assert!(needed[arm[1]].abs() > 5.0, "the posture must load the shoulder: {} N·m", needed[arm[1]]);
+    // The motors reach full effort at an error of 0.02 rad: without compensation the shoulder would sag by that much.
     let shoulder = &world.kinematics().joints()[arm[1]];
     let sag = needed[arm[1]].abs() / shoulder.effort * 0.02;
     let error_of = |joint: usize| (positions[joint] - command.positions[joint]).abs();
     assert!(error_of(arm[1]) < 0.1 * sag, "shoulder: {} rad of {sag} rad", error_of(arm[1]));
-    // The lift's motor is so stiff that the engine's own step error is the larger part.
+    // The lift's motor is so stiff that the engine's own step error dominates.
     assert!(error_of(arm[0]) < 5e-4, "lift: {} m", error_of(arm[0]));
 }
 
@@ -354,7 +354,7 @@ fn call(action: &str) -> ActionCall {
 }
 
 #[test]
-fn a_spent_budget_and_an_unknown_action_end_the_run_as_data() {
+fn a_spent_budget_and_an_unknown_action_end_the_run_with_a_record() {
     let scene = on_table(shipped("glass"), 0.3, 0.45);
     for (action, budget) in [("Pick", 2.0), ("Juggle", 60.0)] {
         let mut world = build(&scene).expect("the scene is right");
@@ -370,9 +370,9 @@ fn a_spent_budget_and_an_unknown_action_end_the_run_as_data() {
     }
 }
 
-/// What the skill sees and where it believes to be are wrong by the same error, so that it still meets the thing.
+/// The percepts and the robot's localisation are wrong by the same error, so the robot still reaches the object.
 #[test]
-fn a_wrong_localisation_alone_does_not_make_a_pick_miss() {
+fn a_localisation_error_alone_does_not_make_a_pick_miss() {
     let mut scene = on_table(shipped("glass"), 0.3, 0.45);
     scene.sensing.localisation_noise_m = 0.1;
     scene.sensing.heading_noise_rad = 0.1;
@@ -380,13 +380,13 @@ fn a_wrong_localisation_alone_does_not_make_a_pick_miss() {
     let (before, after) = (&trace.snapshots[0], &trace.snapshots[1]);
     let [true_x, true_y, _] = before.robot.base_true;
     let [x, y, _] = before.robot.base_believed;
-    assert!((x - true_x).abs() + (y - true_y).abs() > 0.02, "the noise has to show");
+    assert!((x - true_x).abs() + (y - true_y).abs() > 0.02, "the noise must be visible");
     assert_eq!(after.robot.left_touches, ["thing_1"]);
     assert_eq!(after.robot.right_touches, ["thing_1"]);
 }
 
 #[test]
-fn an_object_on_the_floor_is_no_fault_and_one_that_falls_while_settling_is_reported() {
+fn an_object_that_falls_while_settling_is_reported_and_is_not_a_fault() {
     let mut scene = on_table(shipped("glass"), 0.3, 0.45);
     // Half of it is over the edge.
     scene.objects[1].pose = Pose::upright([0.33, 0.0, 0.706], 0.0);
@@ -397,7 +397,7 @@ fn an_object_on_the_floor_is_no_fault_and_one_that_falls_while_settling_is_repor
     assert_eq!(world.fault(), None);
 }
 
-/// A thing that stands tipped on its rim, left alone.
+/// An object tilted on its rim and released.
 fn tipped(model: &Arc<ObjectModel>, tilt_rad: f64, steps_per_second: u32) -> World {
     let tilt = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), tilt_rad);
     let lift = model.size_m[0].max(model.size_m[1]) / 2.0 * tilt_rad.sin();
@@ -417,9 +417,9 @@ fn lean(world: &World, id: &str) -> f64 {
     up.z.clamp(-1.0, 1.0).acos()
 }
 
-/// What rocks on its rim gets no energy from nowhere: it never leans further than at first, and comes to rest.
+/// An object that rocks on its rim gains no energy: it never leans further than at first, and comes to rest.
 #[test]
-fn what_is_tipped_a_little_comes_to_rest() {
+fn slightly_tilted_objects_come_to_rest() {
     let names = ["bottle", "bowl", "box", "can", "fork", "glass", "mug", "plate", "salt_shaker", "spoon"];
     let cases = names.iter().flat_map(|name| [(name, 0.04, 240), (name, 0.1, 240), (name, 0.1, 960), (name, 0.2, 240)]);
     for (name, tilt_rad, rate) in cases {

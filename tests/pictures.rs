@@ -1,4 +1,4 @@
-//! Pictures of real runs, with the built program: pixels that are there, lines that are well formed, endings that are not.
+//! Pictures of real runs, with the built program: PNG pixels, well-formed SVG, and refusal of other file extensions.
 
 use std::io::Read;
 use std::path::Path;
@@ -12,7 +12,7 @@ struct Pixels {
     pixels: Vec<u8>,
 }
 
-/// Reads what we write: eight bits a channel, one filter, one part; every checksum is held to.
+/// Decodes our own PNGs: eight bits a channel, one filter, one chunk. Verifies every checksum.
 fn decode(file: &[u8]) -> Pixels {
     let mut rest = file.strip_prefix(b"\x89PNG\r\n\x1a\n").expect("it begins as PNG does");
     let (mut sides, mut data) = ([0; 2], Vec::new());
@@ -69,12 +69,12 @@ fn draw(folder: &Path, run: &str, file: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_pick_is_drawn_as_pixels_and_as_lines() {
+fn a_pick_is_drawn_as_png_and_svg() {
     let project = project();
     let run = first_run(project.path(), "configs/pick.toml");
     let picture = decode(&draw(project.path(), &run, "pick.PNG"));
     assert!(picture.width == 2400 && picture.height > 1200, "{} × {}", picture.width, picture.height);
-    // Words; what was perceived; the way of the hand.
+    // Text, percepts, and the path of the hand.
     assert!(picture.count([0x1c, 0x24, 0x30]) > 1000);
     assert!(picture.count([0xa0, 0x2c, 0x9a]) > 1000);
     assert!(picture.pixels.chunks(3).filter(|p| p[0] > 200 && p[1] < 120 && p[2] < 60).count() > 1000);
@@ -86,7 +86,7 @@ fn a_pick_is_drawn_as_pixels_and_as_lines() {
         assert!(words.contains(&word), "{word}: {words:?}");
     }
     assert!(words.iter().any(|word| word.starts_with(&format!("{run} · Pick"))), "{words:?}");
-    // The same run, the same picture.
+    // The same run gives the same picture.
     assert_eq!(draw(project.path(), &run, "again.svg"), lines.as_bytes());
 }
 
@@ -112,7 +112,7 @@ fn a_world_is_drawn_with_its_rooms_places_and_walls() {
 }
 
 #[test]
-fn other_endings_are_refused_before_anything_is_done() {
+fn other_file_extensions_are_refused_before_any_work() {
     let folder = tempfile::tempdir().unwrap();
     for file in ["run.jpg", "run", "run.png.gz"] {
         let output = actcheck(folder.path(), &["show", "abcd-1", "--history", "h", "--picture", file]);

@@ -1,4 +1,4 @@
-//! Placing what was picked, from scenes to verdicts: by what the robot sees and feels, and by nothing else.
+//! Placing the picked object, from scenes to verdicts, based only on vision and touch.
 
 use actcheck::base::Outcome;
 use actcheck::campaign::{Disturbance, Env};
@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::support::line::{env_of, nominal, outcomes, report, run};
 use crate::support::{COARSE, actcheck, edit, project, stderr, stdout};
 
-/// Two tables, a glass on the first, and what a test adds.
+/// Two tables, a glass on the first, and further configuration text from the test.
 fn env(actions: &str, more: &str) -> Env {
     env_of(&format!(
         "tests = [{actions}]\ntest_count = 1\nseed = 5\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n\
@@ -18,7 +18,7 @@ fn env(actions: &str, more: &str) -> Env {
     ))
 }
 
-/// The nominal scene with the target of a model, by its number.
+/// The nominal scene with a given target model, by its index.
 fn with_target(env: &Env, model: usize) -> RunRecord {
     let mut choices = Choices::recorded(&[]);
     choices.index("target.model", 2);
@@ -29,18 +29,18 @@ fn with_target(env: &Env, model: usize) -> RunRecord {
 
 fn all_passed(run: &RunRecord, step: usize) {
     assert_eq!(outcomes(run, step).len(), if step + 1 == run.judgements.len() { 4 } else { 5 });
-    let told = format!("{}: {:?}", report(run, step).message, run.judgements[step]);
-    assert!(outcomes(run, step).values().all(|outcome| *outcome == Outcome::Passed), "{told}");
+    let context = format!("{}: {:?}", report(run, step).message, run.judgements[step]);
+    assert!(outcomes(run, step).values().all(|outcome| *outcome == Outcome::Passed), "{context}");
 }
 
-/// Where a body is at the end.
+/// The final pose of a body.
 fn at_end(run: &RunRecord, id: &str) -> Pose {
     let last = run.trace.snapshots.last().unwrap();
     last.bodies.iter().find(|body| body.id == id).unwrap().pose
 }
 
 #[test]
-fn what_was_picked_is_placed_on_the_other_table() {
+fn a_picked_object_is_placed_on_the_other_table() {
     let env = env("[\"Pick\", \"Place\"]", "");
     for (model, id) in ["glass_1", "can_1"].into_iter().enumerate() {
         let run = with_target(&env, model);
@@ -57,7 +57,7 @@ fn what_was_picked_is_placed_on_the_other_table() {
 }
 
 #[test]
-fn after_a_look_around_the_place_is_found_in_pictures() {
+fn after_a_look_around_the_goal_is_found_in_pictures() {
     let env = env("[\"PerceivePlane\", \"Pick\", \"Place\"]", "");
     let run = nominal(&env, None);
     all_passed(&run, 2);
@@ -73,31 +73,31 @@ fn an_empty_hand_reports_failure_at_once() {
     assert!(run.trace.actions[0].duration_secs < 1.0);
     let outcomes = outcomes(&run, 0);
     assert_eq!((outcomes["PlaceReported"], outcomes["ObjectOnSurface"]), (Outcome::Failed, Outcome::Failed));
-    // What was not held can't be let go.
+    // An object that was not held can't be released.
     assert_eq!((outcomes["ObjectReleased"], outcomes["NoPlaceCollisions"]), (Outcome::Inapplicable, Outcome::Passed));
 }
 
-/// Sensors see the table where the glass shall go half a metre farther to the side and 5 cm higher than it is.
+/// Sensors see the goal table half a metre farther to the side and 5 cm higher than it is.
 fn deceive(_: u64, world: &mut World) {
     let decoy = Pose::upright([0.0, 2.41, 0.05], 0.0);
     assert!(world.poison("table_1", Poison::Decoy(decoy)));
 }
 
-/// The same, but only 5 cm higher: by the floor plan it is where it is expected.
+/// The same, only 5 cm higher: its position agrees with the floor plan.
 fn raise(_: u64, world: &mut World) {
     let decoy = Pose::upright([0.0, 1.91, 0.05], 0.0);
     assert!(world.poison("table_1", Poison::Decoy(decoy)));
 }
 
 #[test]
-fn it_acts_on_what_it_perceives_and_not_on_what_is() {
+fn placing_acts_on_percepts_not_on_the_truth() {
     let cases: [(&str, Disturbance); 2] =
         [("[\"Pick\", \"Place\"]", deceive), ("[\"PerceivePlane\", \"Pick\", \"Place\"]", raise)];
     for (actions, disturb) in cases {
         let env = env(actions, "");
         let run = nominal(&env, Some(disturb));
         let last = run.trace.actions.len() - 1;
-        // The hand opens where the table seems to be: the glass falls, and nothing was felt below it.
+        // The hand opens at the perceived table: the glass falls, and no contact was felt below it.
         assert!(!report(&run, last).succeeded, "{}", report(&run, last).message);
         assert!(report(&run, last).message.contains("was not felt"), "{}", report(&run, last).message);
         assert_eq!(outcomes(&run, last)["PlaceReported"], Outcome::Failed);
@@ -107,14 +107,14 @@ fn it_acts_on_what_it_perceives_and_not_on_what_is() {
     assert_eq!((seen.pose.position[1], seen.pose.position[2]), (2.41, 0.05));
 }
 
-/// The whole task with something on the floor, with pictures.
+/// The whole task with an obstacle on the floor, with pictures.
 const TASK: &str = "[\"MoveTo\", \"PerceivePlane\", \"Pick\", \"Place\"]";
 const OBSTACLES: &str = "[surfaceObjects]\nmodel_list = [\"can\"]\ncount = 2\n";
 
-/// Once a robot uses its camera, it uses nothing else to see: what the abstract detector would give, and how wrong that is, makes no
-/// difference to anything, and it is never asked.
+/// A robot that uses its camera uses no other perception: the output and errors of the abstract detector change
+/// nothing, and it is never queried.
 #[test]
-fn with_a_camera_nothing_is_known_by_the_abstract_detector() {
+fn a_camera_replaces_the_abstract_detector() {
     let of = |index: u64, sensing: &str| {
         let text = format!(
             "nav_obstacle_list = [\"bottle\", \"mini_coffee_table\"]\nnav_obstacle_count = 4\n\
@@ -126,7 +126,7 @@ fn with_a_camera_nothing_is_known_by_the_abstract_detector() {
     };
     let looks_where_to_place = |run: &RunRecord| run.trace.actions[3].phases.iter().any(|phase| phase.name == "look");
     let quiet = (0..12).map(|index| (index, of(index, ""))).find(|(_, run)| looks_where_to_place(run));
-    let (index, quiet) = quiet.expect("no run came so far that the robot looked at where to place something");
+    let (index, quiet) = quiet.expect("in no run did the robot look at the goal of a placement");
     let noise = "[sensing]\nposition_noise_m = 0.4\nheight_noise_m = 0.4\nyaw_noise_rad = 1.5\nsize_noise_m = 0.4\n";
     let noisy = of(index, noise);
     let ids = || quiet.scene.objects.iter().map(|object| format!("sense.{}.", object.id));
@@ -138,13 +138,13 @@ fn with_a_camera_nothing_is_known_by_the_abstract_detector() {
     assert!(percepts.clone().all(|percept| targets.contains(&percept.id)), "{:?}", percepts.collect::<Vec<_>>());
 }
 
-/// The glass has no friction at all.
+/// The glass has no friction.
 fn oil(_: u64, world: &mut World) {
     assert!(world.perturb("glass_1", Perturbation::Friction(0.0)));
 }
 
 #[test]
-fn what_slips_is_felt_and_is_not_placed() {
+fn a_slipping_object_is_felt_and_not_placed() {
     let env = env("[\"Pick\", \"Place\"]", "");
     let run = nominal(&env, Some(oil));
     assert!(report(&run, 0).message.contains("slipped out of the hand"), "{}", report(&run, 0).message);
@@ -157,9 +157,9 @@ fn json(folder: &std::path::Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)))
 }
 
-/// (`determinism` has it that the number of workers changes nothing.)
+/// (`determinism` tests that the number of workers changes nothing.)
 #[test]
-fn the_whole_task_is_told_by_action() {
+fn the_whole_task_is_reported_by_action() {
     let project = project();
     let output = actcheck(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "2", "--history", "text"]);
     let text = stdout(&output);
@@ -174,9 +174,9 @@ fn the_whole_task_is_told_by_action() {
     assert_eq!(statuses, ["completed", "completed"], "{text}");
 }
 
-/// With nothing in the way, nothing else on the table and perfect senses, the task works as a whole.
+/// Without obstacles, clutter and noise, the task succeeds as a whole.
 #[test]
-fn without_noise_clutter_and_obstacles_nearly_everything_passes() {
+fn without_noise_clutter_and_obstacles_nearly_all_runs_pass() {
     let project = project();
     let config = project.path().join("configs/pick_and_place.toml");
     edit(&config, "nav_obstacle_count = 5", "nav_obstacle_count = 0");
@@ -188,8 +188,8 @@ fn without_noise_clutter_and_obstacles_nearly_everything_passes() {
         |line: &str| ["_noise", "_drift", "dropout"].iter().any(|word| line.split('=').next().unwrap().contains(word));
     let quiet: Vec<&str> = text.lines().filter(|line| line.starts_with('#') || !is_noise(line)).collect();
     std::fs::write(&config, quiet.join("\n")).unwrap();
-    let told = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "4", "--history", "h"]);
-    assert!(told["score"].as_f64().unwrap() > 0.9, "{told:#}");
+    let whole = json(project.path(), &["run", "configs/pick_and_place.toml", "--runs", "4", "--history", "h"]);
+    assert!(whole["score"].as_f64().unwrap() > 0.9, "{whole:#}");
 }
 
 #[test]

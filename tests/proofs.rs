@@ -1,7 +1,8 @@
-//! A small checker of proofs that shares nothing with the engine: it reads the rules' text itself, takes each step for an
-//! instance of its rule, wants facts at the leaves, and finds out for itself whether what is said to be absent is absent.
+//! A small proof checker that shares no code with the engine: it parses the rules, checks that each step is an
+//! instance of its rule, requires facts at the leaves, and evaluates negations itself.
 //!
-//! It knows as much of the language as the shipped properties use; anything else is an error, so nothing slips through.
+//! It supports only the language features of the shipped properties; any other feature is an error, so none goes
+//! unchecked.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +23,7 @@ enum Value {
 
 type Binding = BTreeMap<String, Value>;
 
-/// A predicate with its arguments as they are written.
+/// A predicate with its arguments as written.
 #[derive(Debug, Clone)]
 struct Atom {
     name: String,
@@ -51,7 +52,7 @@ fn constant(text: &str) -> Value {
     text.parse().map_or_else(|_| Value::Text(text.to_owned()), Value::Number)
 }
 
-/// Parts between separators that stand in no parentheses and no string.
+/// Parts between separators that are outside parentheses and strings.
 fn split(text: &str, separator: char) -> Vec<String> {
     let (mut parts, mut depth, mut quoted) = (vec![String::new()], 0, false);
     for c in text.chars() {
@@ -66,7 +67,7 @@ fn split(text: &str, separator: char) -> Vec<String> {
     parts.iter().map(|part| part.trim().to_owned()).filter(|part| !part.is_empty()).collect()
 }
 
-/// `before(…)`, `after(…)` and `during(…)` are short for `state(PHASE, …)`.
+/// `before(…)`, `after(…)` and `during(…)` abbreviate `state(PHASE, …)`.
 fn atom(text: &str) -> Atom {
     let (name, args) = text.trim().strip_suffix(')').and_then(|text| text.split_once('(')).expect("an atom");
     let mut atom = Atom { name: name.trim().to_owned(), args: split(args, ',') };
@@ -83,7 +84,7 @@ fn rule(text: &str) -> Rule {
     Rule { heads: split(heads, ',').iter().map(|head| atom(head)).collect(), body: split(body, ',') }
 }
 
-/// The rules of a file, in which every rule ends with ` .`, as ours do.
+/// The rules of a file in which every rule ends with ` .`, as ours do.
 fn rules(text: &str) -> Vec<Rule> {
     let code: Vec<&str> = text.lines().filter(|line| !line.starts_with(['%', '@', '#'])).collect();
     let statements = code.join("\n") + "\n";
@@ -116,7 +117,7 @@ fn given(facts: &RunFacts) -> Vec<(String, Vec<Value>)> {
     states.chain(parameters).collect()
 }
 
-/// Extends a binding so that written arguments are the values, where that is possible.
+/// Extends a binding so that the written arguments equal the values. Returns `None` if they do not match.
 fn unify(written: &[String], values: &[Value], binding: &Binding) -> Option<Binding> {
     if written.len() != values.len() {
         return None;
@@ -141,11 +142,11 @@ fn unify(written: &[String], values: &[Value], binding: &Binding) -> Option<Bind
     Some(binding)
 }
 
-/// Evaluates an expression; nothing while a variable has no value.
+/// Evaluates an expression. Returns `None` if a variable has no value yet.
 fn evaluate(text: &str, binding: &Binding) -> Option<Value> {
     let text = text.trim();
     for operators in [['+', '-'], ['*', '/']] {
-        // The last one of the weakest operators is applied last. A sign belongs to its number.
+        // The last of the weakest operators is applied last. A sign belongs to its number.
         let (mut depth, mut quoted, mut at) = (0, false, None);
         for (idx, c) in text.char_indices() {
             quoted ^= c == '"';
@@ -159,7 +160,7 @@ fn evaluate(text: &str, binding: &Binding) -> Option<Value> {
             let (Value::Number(a), Value::Number(b)) =
                 (evaluate(&text[..idx], binding)?, evaluate(&text[idx + 1..], binding)?)
             else {
-                panic!("{text} is no sum of numbers");
+                panic!("{text} is not a sum of numbers");
             };
             return Some(Value::Number(match c {
                 '+' => a + b,
@@ -208,11 +209,12 @@ fn call(name: &str, args: &[Value]) -> Value {
             Value::Text(long.unwrap_or_else(|| short.trim_matches(['<', '>']).to_owned()))
         }
         "STRSTARTS" => Value::Text(text(0).starts_with(&text(1)).to_string()),
-        other => panic!("{other} is not known to the checker"),
+        other => panic!("{other} is not supported by the checker"),
     }
 }
 
-/// A condition that is no atom: the binding that it gives, `Some(None)` where it does not hold, nothing while it waits.
+/// A condition that is not an atom. Returns `Some` with the extended binding, `Some(None)` if it does not hold,
+/// `None` if it lacks a variable.
 fn condition(text: &str, binding: &Binding) -> Option<Option<Binding>> {
     for operator in [" <= ", " >= ", " != ", " < ", " > ", " = "] {
         let Some((left, right)) = text.split_once(operator) else { continue };
@@ -249,8 +251,8 @@ struct Case {
 }
 
 impl Case {
-    /// All tuples of a predicate, from facts and, backwards, from rules. The shipped rules are not recursive but through
-    /// the property in `state`, which the constant in its place keeps apart.
+    /// All tuples of a predicate, from facts and, by backward chaining, from rules. The shipped rules are recursive
+    /// only through the property in `state`, and its constant separates the cases.
     fn tuples(&self, name: &str, pattern: &[Option<Value>]) -> Vec<Vec<Value>> {
         let fits = |values: &[Value]| {
             values.len() == pattern.len()
@@ -266,7 +268,7 @@ impl Case {
                 let possible = head.args.iter().zip(pattern).all(|(arg, asked)| {
                     arg.starts_with(['?', '_']) || asked.as_ref().is_none_or(|asked| same(&constant(arg), asked))
                 });
-                // A property that is left open asks for given facts alone: no shipped rule asks for more.
+                // An open property matches only given facts: no shipped rule needs more.
                 if !possible || (name == "state" && pattern[2].is_none()) {
                     continue;
                 }
@@ -296,7 +298,7 @@ impl Case {
         self.tuples(&atom.name, &pattern).iter().filter_map(|tuple| unify(&atom.args, tuple, binding)).collect()
     }
 
-    /// Bindings that satisfy a body: atoms first, then what can be computed, then what must be absent.
+    /// Bindings that satisfy a body: atoms first, then computations, then negations.
     fn solve(&self, body: &[String], start: &Binding) -> Vec<Binding> {
         let mut bindings = vec![start.clone()];
         for literal in body.iter().filter(|literal| is_atom(literal)) {
@@ -326,7 +328,7 @@ impl Case {
         absent.map(atom).all(|atom| self.matches(&atom, &binding).is_empty()).then_some(binding)
     }
 
-    /// Each step an instance of its rule, each leaf a fact. Gives the number of steps.
+    /// Checks that each step is an instance of its rule and each leaf a fact. Returns the number of steps.
     fn check(&self, proof: &Proof, proved: &mut Vec<String>) -> Result<usize, String> {
         let statement = atom(&proof.statement);
         let values: Vec<Value> = statement.args.iter().map(|arg| constant(arg)).collect();
@@ -344,12 +346,12 @@ impl Case {
                         })
                 };
                 if !self.facts.iter().any(given) && !self.rules.iter().any(stated) {
-                    return Err(format!("{} is no fact", proof.statement));
+                    return Err(format!("{} is not a fact", proof.statement));
                 }
                 1
             }
             Support::Cut if proved.contains(&proof.statement) => 1,
-            Support::Cut => return Err(format!("{} is proved nowhere", proof.statement)),
+            Support::Cut => return Err(format!("{} has no proof in the tree", proof.statement)),
             Support::Aggregate { .. } => return Err("no shipped property aggregates".to_owned()),
             Support::Rule { rule: cited, premises } => {
                 1 + self.check_step(&statement, &values, &cited.text, premises, proved)?
@@ -370,7 +372,7 @@ impl Case {
         let cited = rule(text);
         let known = |known: &Rule| known.body == cited.body && known.heads.len() == cited.heads.len();
         if !self.rules.iter().any(known) {
-            return Err(format!("`{text}` stands in no rule file"));
+            return Err(format!("`{text}` is in no rule file"));
         }
         if premises.len() != cited.body.len() {
             return Err(format!("{} conditions for {} of `{text}`", premises.len(), cited.body.len()));
@@ -383,7 +385,7 @@ impl Case {
                     let (written, proved) = (atom(literal), atom(&inner.statement));
                     let values: Vec<Value> = proved.args.iter().map(|arg| constant(arg)).collect();
                     let fits = (written.name == proved.name).then(|| unify(&written.args, &values, &binding)).flatten();
-                    binding = fits.ok_or_else(|| format!("{} is no instance of {literal}", inner.statement))?;
+                    binding = fits.ok_or_else(|| format!("{} is not an instance of {literal}", inner.statement))?;
                 }
                 Premise::Absent(_) if literal.starts_with('~') => {}
                 Premise::Computed(_) if !is_atom(literal) && !literal.starts_with('~') => {}
@@ -401,7 +403,7 @@ impl Case {
     }
 }
 
-/// The shipped properties in Datalog, with their facts, and what is said of them.
+/// The shipped Datalog properties, with their facts and explanations.
 fn shipped() -> Vec<(String, Case, actcheck::rules::explain::Explanation)> {
     let mut found = Vec::new();
     for folder in cases() {
@@ -411,7 +413,7 @@ fn shipped() -> Vec<(String, Case, actcheck::rules::explain::Explanation)> {
             continue;
         }
         let ontology = ontology_of(&folder);
-        // The checker's own rules know no aggregates. What they derive is compared with the naive evaluator's.
+        // The checker's own rules have no aggregates. Their conclusions are compared with the naive evaluator's.
         let text = &ontology.properties[TESTED].rule.source.text;
         if ["#min(", "#max(", "#sum(", "#count("].iter().any(|aggregate| text.contains(aggregate)) {
             continue;
@@ -427,14 +429,14 @@ fn shipped() -> Vec<(String, Case, actcheck::rules::explain::Explanation)> {
 }
 
 #[test]
-fn every_shipped_proof_is_made_of_instances_of_rules_and_of_facts() {
+fn every_shipped_proof_consists_of_rule_instances_and_facts() {
     let (mut proofs, mut steps) = (0, 0);
     for (name, case, explanation) in shipped() {
         for proof in &explanation.proofs {
             steps += case.check(proof, &mut Vec::new()).unwrap_or_else(|why| panic!("{name}: {why}"));
             proofs += 1;
         }
-        // What the explanation says of the whole, the checker finds by itself.
+        // The checker derives the explanation's conclusion by itself.
         let derived = |predicate: &str| {
             let arities = case.rules.iter().flat_map(|rule| &rule.heads).filter(|head| head.name == predicate);
             arities.map(|head| head.args.len()).any(|arity| !case.tuples(predicate, &vec![None; arity]).is_empty())
@@ -446,7 +448,7 @@ fn every_shipped_proof_is_made_of_instances_of_rules_and_of_facts() {
     assert!(proofs >= 4 && steps >= 30, "{proofs} proofs of {steps} steps");
 }
 
-/// Every statement of a proof, one at a time, made a little wrong.
+/// Every variant of a proof with one statement slightly changed.
 fn spoiled(proof: &Proof) -> Vec<Proof> {
     let mut all = Vec::new();
     let (head, last) = proof.statement.rsplit_once(if proof.statement.contains(", ") { ", " } else { "(" }).unwrap();

@@ -1,4 +1,4 @@
-//! Actions performed by a program of somebody's: what goes over the wire, what it leaves behind, and all that it can do wrong.
+//! Actions performed by a user's program: the messages, the records, and every possible fault of the program.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -40,9 +40,9 @@ fn run(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
     (output.status.code().unwrap(), json, complaints)
 }
 
-/// What is told on several lines, on one.
-fn unwrapped(told: &str) -> String {
-    told.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+/// Joins wrapped output into one line.
+fn unwrapped(text: &str) -> String {
+    text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
 }
 
 fn runs(json: &Value) -> &[Value] {
@@ -53,13 +53,13 @@ fn of<'a>(run: &'a Value, key: &str) -> &'a str {
     run[key].as_str().unwrap_or_default()
 }
 
-/// Everything that is known of a run by its id.
+/// The output of `show` for a run.
 fn shown(folder: &Path, run: &str) -> Value {
     let output = actcheck(folder, &["show", run, "--history", ".actcheck", "--format", "json"]);
     serde_json::from_str(&stdout(&output)).unwrap_or_else(|error| panic!("{error}: {}", stderr(&output)))
 }
 
-/// Nothing of a program whose working folder was this one is left.
+/// Checks that no process of a program with this working folder is left.
 fn nothing_is_left(folder: &Path) {
     let here = std::fs::canonicalize(folder).unwrap();
     let alive = || -> Vec<String> {
@@ -74,14 +74,14 @@ fn nothing_is_left(folder: &Path) {
     assert_eq!(alive(), [""; 0], "these are left");
 }
 
-/// Traces of runs by their index, and what the actions reported.
+/// Trace hash of each run, by index, with the message that its action reported.
 fn courses(folder: &Path, json: &Value) -> Vec<(String, String)> {
     let shown = runs(json).iter().map(|run| shown(folder, of(run, "run")));
     shown.map(|run| (of(&run, "trace_hash").to_owned(), of(&run["actions"][0], "message").to_owned())).collect()
 }
 
 #[test]
-fn a_program_performs_an_action_the_same_with_any_number_of_workers() {
+fn a_program_gives_the_same_results_with_any_number_of_workers() {
     let folder = project("well_behaved.py", "[[\"Pick\"]]", 5, "env = { WIRE_LOG = \"log\" }");
     let (code, one, complaints) = run(folder.path(), &["--jobs", "1"]);
     assert_eq!((code, one["counts"]["broken"].as_u64(), runs(&one).len()), (1, Some(0), 5), "{complaints}\n{one:#}");
@@ -102,7 +102,7 @@ fn a_program_performs_an_action_the_same_with_any_number_of_workers() {
     assert!(stdout(&replayed).contains("skill"), "{}\n{}", stdout(&replayed), stderr(&replayed));
 }
 
-/// Every message that went either way is as `clients/protocol.schema.json` says.
+/// Every message in either direction conforms to `clients/protocol.schema.json`.
 fn described(folder: &Path) {
     let logs = std::fs::read_dir(folder).unwrap().flatten().map(|entry| entry.path());
     let logs: Vec<_> = logs.filter(|path| path.to_string_lossy().contains("log.")).collect();
@@ -116,9 +116,9 @@ fn described(folder: &Path) {
     assert!(output.status.success(), "{}{}", stdout(&output), stderr(&output));
 }
 
-/// What the program perceived, the reference skill picks up: without that it would draw errors of its own.
+/// The reference skill picks up the program's percept; without it, the skill would draw its own errors.
 #[test]
-fn what_the_program_does_not_know_is_done_by_the_reference_skills_which_go_by_what_it_left() {
+fn reference_skills_perform_other_actions_with_the_programs_percepts() {
     let folder = project("mixed.py", "[[\"PerceivePlane\", \"Pick\"]]", 2, "privileged = true");
     let (_, json, complaints) = run(folder.path(), &[]);
     for one in runs(&json) {
@@ -131,13 +131,13 @@ fn what_the_program_does_not_know_is_done_by_the_reference_skills_which_go_by_wh
 }
 
 #[test]
-fn the_truth_is_told_only_where_a_campaign_asks_for_it_and_then_everybody_hears_of_it() {
+fn ground_truth_is_sent_only_on_request_and_reports_mention_it() {
     for privileged in [false, true] {
         let folder = project("truth.py", "[[\"Pick\"]]", 1, &format!("privileged = {privileged}"));
         let (_, json, complaints) = run(folder.path(), &[]);
         let message = of(&shown(folder.path(), of(&runs(&json)[0], "run"))["actions"][0], "message").to_owned();
-        let told = if privileged { "told of coffee_table_1, glass_1" } else { "told nothing" };
-        assert_eq!((message.as_str(), json["privileged"].as_bool()), (told, Some(privileged)), "{complaints}");
+        let expected = if privileged { "received coffee_table_1, glass_1" } else { "received nothing" };
+        assert_eq!((message.as_str(), json["privileged"].as_bool()), (expected, Some(privileged)), "{complaints}");
         let report = |format: &str| stdout(&actcheck(folder.path(), &["report", format, "--history", ".actcheck"]));
         assert_eq!(report("--markdown").contains("the ground truth"), privileged);
         let text = stdout(&actcheck(folder.path(), &["run", "c.toml"]));
@@ -145,7 +145,7 @@ fn the_truth_is_told_only_where_a_campaign_asks_for_it_and_then_everybody_hears_
     }
 }
 
-/// What goes wrong in the first run, how it ends, and what is said of it.
+/// The fault of the first run, its status, and its message.
 const FAULTS: [(&str, &str, &str); 36] = [
     (
         "exit_at_start",
@@ -189,9 +189,9 @@ const FAULTS: [(&str, &str, &str); 36] = [
     ("stays", "completed", ""),
 ];
 
-/// What is wrong about how the first two runs of a campaign with a fault end.
+/// Compares the ends of the first two runs of a campaign with a fault. Returns the difference, or `None`.
 fn wrong_about((fault, status, words): (&str, &str, &str)) -> Option<String> {
-    // A busy machine takes its time for an interpreter: only who shall be late has little.
+    // A busy machine starts interpreters slowly: only programs that must time out get a short limit.
     let startup_secs = if ["never_connects", "silent_at_start"].contains(&fault) { 4.0 } else { 60.0 };
     let timeout_secs = if ["silent", "short_garbage", "drip"].contains(&fault) { 2.0 } else { 60.0 };
     let limits = match fault {
@@ -212,14 +212,14 @@ fn wrong_about((fault, status, words): (&str, &str, &str)) -> Option<String> {
         let all = stdout(&actcheck(folder.path(), &["show", of(first, "run"), "--history", ".actcheck"]));
         assert!(all.contains("the program printed last:\n  Traceback (most recent call last)"), "{all}");
     }
-    let told = of(first, "reason");
-    let right = of(first, "status") == status && told.contains(words) && of(second, "status") == "completed";
-    (!right).then(|| format!("{fault}: {} ({told}), then {}", of(first, "status"), of(second, "status")))
+    let reason = of(first, "reason");
+    let right = of(first, "status") == status && reason.contains(words) && of(second, "status") == "completed";
+    (!right).then(|| format!("{fault}: {} ({reason}), then {}", of(first, "status"), of(second, "status")))
 }
 
 #[test]
-fn each_fault_of_a_program_ends_one_run_and_the_next_one_begins_with_a_new_program() {
-    // Several campaigns at a time: most of it is waiting for programs that do not answer.
+fn each_program_fault_ends_one_run_and_the_next_starts_a_new_program() {
+    // Runs several campaigns at a time: most of the time is spent waiting for programs that do not answer.
     let next = Mutex::new(FAULTS.into_iter());
     let tried = || -> Vec<String> {
         let mut wrong = Vec::new();
@@ -236,7 +236,7 @@ fn each_fault_of_a_program_ends_one_run_and_the_next_one_begins_with_a_new_progr
 }
 
 #[test]
-fn a_hundred_runs_with_faults_by_chance_end_and_nothing_is_lost() {
+fn a_hundred_runs_with_random_faults_all_end_and_are_kept() {
     let folder = project("faulty.py", "[[\"Pick\"]]", 100, "timeout_s = 4.0\nmax_broken = 100");
     let (code, json, complaints) = run(folder.path(), &["--jobs", "8"]);
     assert!(code <= 1, "{complaints}");
@@ -250,7 +250,7 @@ fn a_hundred_runs_with_faults_by_chance_end_and_nothing_is_lost() {
     let listed = |status: &str| kept.iter().filter(|run| of(run, "status") == status).count();
     assert_eq!([listed("completed"), listed("broken"), listed("timeout")], [completed, broken, timeout]);
     nothing_is_left(folder.path());
-    // What a program does goes by the seed that it is given: who makes the runs changes nothing.
+    // A program's behaviour depends on its given seed, so the number of workers changes nothing.
     let (_, again, _) = run(folder.path(), &["--jobs", "4", "--runs", "20"]);
     let statuses = |json: &Value| runs(json).iter().map(|run| of(run, "status").to_owned()).collect::<Vec<_>>();
     assert_eq!(statuses(&again), statuses(&json)[..20]);
@@ -268,9 +268,9 @@ fn a_program_that_breaks_every_run_stops_the_campaign_with_one_error() {
     }
 }
 
-/// `ros2` and `roslaunch` are where the search path has them, and told where it does not.
+/// `ros2` and `roslaunch` are found on the search path; otherwise the message says so.
 #[test]
-fn launch_files_are_started_by_ros_where_it_is_installed() {
+fn launch_files_are_started_with_ros_if_it_is_installed() {
     for (file, program, words) in [("x.launch.py", "ros2", "launch "), ("x.launch", "roslaunch", "")] {
         let folder = project("well_behaved.py", "[[\"Pick\"]]", 1, "args = [\"speed:=0.5\"]");
         let config = folder.path().join("c.toml");
@@ -283,23 +283,23 @@ fn launch_files_are_started_by_ros_where_it_is_installed() {
         };
         let refused = with_path("/nowhere", &["check", "c.toml"]);
         assert_eq!(refused.status.code(), Some(2));
-        let told = unwrapped(&stderr(&refused));
-        assert!(told.contains("C033") && told.contains(&format!("{file} needs `{program}`")), "{told}");
+        let message = unwrapped(&stderr(&refused));
+        assert!(message.contains("C033") && message.contains(&format!("{file} needs `{program}`")), "{message}");
         let tools = folder.path().join("tools");
         std::fs::create_dir(&tools).unwrap();
-        let script = "#!/bin/sh\necho \"$@\" > told\nexec python3 well_behaved.py\n";
+        let script = "#!/bin/sh\necho \"$@\" > arguments\nexec python3 well_behaved.py\n";
         std::fs::write(tools.join(program), script).unwrap();
         std::fs::set_permissions(tools.join(program), std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
         let path = format!("{}:{}", tools.display(), std::env::var("PATH").unwrap());
         let ran = with_path(&path, &["run", "c.toml", "--format", "csv"]);
         assert_eq!(ran.status.code(), Some(1), "{}", stderr(&ran));
-        let told = std::fs::read_to_string(folder.path().join("told")).unwrap();
+        let arguments = std::fs::read_to_string(folder.path().join("arguments")).unwrap();
         let here = std::fs::canonicalize(folder.path()).unwrap();
-        assert_eq!(told, format!("{words}{} speed:=0.5\n", here.join(file).display()));
+        assert_eq!(arguments, format!("{words}{} speed:=0.5\n", here.join(file).display()));
     }
 }
 
-/// What a run of a program's is exported as lies in another folder, and finds the program again.
+/// A case exported from a program's run is in another folder, and finds the program.
 #[test]
 fn an_exported_run_finds_its_program() {
     let folder = project("well_behaved.py", "[[\"Pick\"]]", 1, "");
@@ -309,28 +309,28 @@ fn an_exported_run_finds_its_program() {
     let exported = actcheck(folder.path(), &["export", id, "--history", ".actcheck", "-o", "cases/one.toml"]);
     assert!(exported.status.success(), "{}", stderr(&exported));
     let again = actcheck(folder.path(), &["run", "cases/one.toml", "--history", "h", "--format", "json"]);
-    let told: Value = serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
-    assert!(told.to_string().contains("\"same_trace\":true"), "{told:#}");
+    let replayed: Value = serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
+    assert!(replayed.to_string().contains("\"same_trace\":true"), "{replayed:#}");
 }
 
 #[test]
-fn an_action_that_takes_too_long_ends_for_the_program_too() {
+fn an_action_over_its_budget_also_ends_for_the_program() {
     let folder = project("endless.py", "[[\"Pick\"]]", 2, "");
     let config = folder.path().join("c.toml");
     let text = std::fs::read_to_string(&config).unwrap();
     std::fs::write(&config, text + "[budget]\naction_secs = 2\n").unwrap();
     let (_, json, complaints) = run(folder.path(), &["--jobs", "1"]);
     for run in runs(&json) {
-        let told = (of(run, "status"), of(run, "reason"));
-        assert_eq!(told, ("timeout", "the action took longer than its budget of 2 s"), "{complaints}");
+        let end = (of(run, "status"), of(run, "reason"));
+        assert_eq!(end, ("timeout", "the action took longer than its budget of 2 s"), "{complaints}");
     }
-    // The same process had both runs.
+    // The same process performed both runs.
     assert_eq!(std::fs::read_to_string(folder.path().join("starts")).unwrap().lines().count(), 1);
     nothing_is_left(folder.path());
 }
 
 #[test]
-fn nothing_is_left_when_the_simulator_itself_is_ended() {
+fn no_process_is_left_after_the_simulator_ends() {
     for name in ["INT", "KILL"] {
         let folder = project("faulty.py", "[[\"Pick\"]]", 50, "timeout_s = 60.0\nenv = { FAULT = \"silent\" }");
         let mut simulator = Command::new(env!("CARGO_BIN_EXE_actcheck"))
@@ -350,7 +350,7 @@ fn nothing_is_left_when_the_simulator_itself_is_ended() {
         while !has_program() && Instant::now() < patience {
             std::thread::sleep(Duration::from_millis(20));
         }
-        // The second interrupt insists, where the first has not ended it.
+        // A second interrupt forces the end if the first has not ended it.
         for _ in 0..2 {
             if simulator.try_wait().unwrap().is_none() {
                 signal(simulator.id(), name);

@@ -1,4 +1,4 @@
-//! The Python client: its own tests and types, installed as a user installs it.
+//! The Python client: its own tests and type checks, installed as a user installs it.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::support::{actcheck, foreign, project, root, stderr, stdout};
 
-/// Runs Python in the client's folder, and leaves nothing behind there.
+/// Runs Python in the client's folder without leaving files there.
 fn python(arguments: &[&str]) -> Output {
     Command::new(foreign::client_python())
         .args(arguments)
@@ -18,31 +18,31 @@ fn python(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn its_own_tests_pass_on_the_installed_package() {
+fn the_clients_tests_pass_on_the_installed_package() {
     let place = stdout(&python(&["-c", "import actcheck; print(actcheck.__file__)"]));
     assert!(place.contains("site-packages"), "{place}");
     let output = python(&["-W", "error::DeprecationWarning", "-m", "unittest"]);
-    let told = stderr(&output);
-    assert!(output.status.success(), "{told}");
-    let ran = told.lines().find_map(|line| line.strip_prefix("Ran ")?.split(' ').next()?.parse::<u32>().ok());
-    assert!(ran.is_some_and(|ran| ran >= 40), "{told}");
+    let text = stderr(&output);
+    assert!(output.status.success(), "{text}");
+    let ran = text.lines().find_map(|line| line.strip_prefix("Ran ")?.split(' ').next()?.parse::<u32>().ok());
+    assert!(ran.is_some_and(|ran| ran >= 40), "{text}");
 }
 
 #[test]
-fn its_types_hold() {
+fn the_client_passes_its_type_checks() {
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mypy");
     let output = python(&["-m", "mypy", "--strict", "--cache-dir", &cache.to_string_lossy()]);
     assert!(output.status.success(), "{}", stdout(&output));
 }
 
-/// Where the examples' Python is found first.
+/// A search path with the examples' Python first.
 fn path() -> std::ffi::OsString {
     let bin = foreign::client_python().parent().unwrap().to_owned();
     let others = std::env::var_os("PATH").unwrap_or_default();
     std::env::join_paths(std::iter::once(bin).chain(std::env::split_paths(&others))).unwrap()
 }
 
-/// Runs a configuration whose launcher is an example, and gives back what was printed and the digests of all states, by run.
+/// Runs a configuration whose launcher is an example. Returns the printed output and the state digests, by run.
 fn campaign(folder: &Path, example: &str, arguments: &[&str]) -> (Value, String) {
     let launcher = root().join("clients/python/examples").join(example);
     let config = folder.join("configs/python.toml");
@@ -65,30 +65,30 @@ fn campaign(folder: &Path, example: &str, arguments: &[&str]) -> (Value, String)
     (serde_json::from_slice(&output.stdout).unwrap(), stdout(&kept))
 }
 
-/// The scripted pick, in another process and another language, is as deterministic as our own.
+/// The scripted pick, in another process and another language, is as deterministic as ours.
 #[test]
-fn a_pick_in_python_goes_the_same_way_at_any_number_of_workers() {
+fn a_python_pick_is_the_same_with_any_number_of_workers() {
     let folder = project();
     let (one, hashes) = campaign(folder.path(), "pick.py", &["--runs", "3", "--jobs", "1"]);
     let (two, again) = campaign(folder.path(), "pick.py", &["--runs", "3", "--jobs", "2"]);
     assert_eq!(hashes.lines().count(), 4, "{hashes}");
     assert_eq!(hashes, again);
-    let told = |campaign: &Value| {
+    let text = |campaign: &Value| {
         campaign["runs"].as_array().unwrap().iter().map(|run| run["actions"].clone()).collect::<Vec<_>>()
     };
-    assert_eq!(told(&one), told(&two));
-    // It does what it is there for: in most scenes, whichever they are today.
+    assert_eq!(text(&one), text(&two));
+    // It succeeds in most scenes of any campaign.
     let score = one["runs"].as_array().unwrap().iter().map(|run| run["score"].as_f64().unwrap()).sum::<f64>() / 3.0;
     assert!(score > 0.5, "{one:#}");
 }
 
-/// The careless one and the one that has learned end their action by their own reports, and are judged.
+/// The careless and the learned example end their action with their own reports, and are judged.
 #[test]
-fn the_other_examples_perform_their_action_too() {
+fn the_other_examples_perform_their_actions() {
     let folder = project();
     for (example, words) in [("clumsy_pick.py", "of course"), ("learned_pick.py", "hold")] {
-        let (told, _) = campaign(folder.path(), example, &["--runs", "2"]);
-        for run in told["runs"].as_array().unwrap() {
+        let (text, _) = campaign(folder.path(), example, &["--runs", "2"]);
+        for run in text["runs"].as_array().unwrap() {
             assert_eq!((&run["status"], &run["reason"]), (&"completed".into(), &Value::Null), "{example}: {run:#}");
         }
         let messages = "SELECT ?message { [] act:ofRun ?run ; act:message ?message }";

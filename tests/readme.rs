@@ -15,17 +15,17 @@ fn every_command_of_the_readme_works() {
     let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
     let project = project_with(COARSEST);
     let folder = project.path();
-    // Among four scenes there is a failure to look at.
+    // Among four scenes there is a failure to inspect.
     edit(&folder.join("configs/pick.toml"), "test_count = 15", "test_count = 4");
     std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
     copy(&root().join("clients"), &folder.join("clients"));
-    // The program as the README calls it, with its exit codes written down.
+    // The program as the README calls it, with its exit codes recorded.
     let program = env!("CARGO_BIN_EXE_actcheck");
     script(
         &folder.join("actcheck"),
         &format!("#!/bin/sh\n{program} \"$@\"\ncode=$?\necho \"$code $1\" >> codes\nexit $code\n"),
     );
-    // `make` compiles for half an hour; here it only shows that the target exists.
+    // `make` compiles for half an hour; here it only checks that the target exists.
     std::fs::create_dir(folder.join("bin")).unwrap();
     script(
         &folder.join("bin/make"),
@@ -33,7 +33,7 @@ fn every_command_of_the_readme_works() {
     );
     let path = format!("{}:{}", folder.join("bin").display(), std::env::var("PATH").unwrap());
     let blocks = blocks(&readme, "sh");
-    assert!(blocks.len() >= 4, "the README shows too little");
+    assert!(blocks.len() >= 4, "the README has too few command blocks");
     let mut printed = String::new();
     for block in &blocks {
         let output = Command::new("sh")
@@ -50,7 +50,7 @@ fn every_command_of_the_readme_works() {
     let codes = std::fs::read_to_string(folder.join("codes")).unwrap();
     let wrong: Vec<&str> = codes
         .lines()
-        // 1 is what a campaign with a failed property says, and a recheck that finds one.
+        // Exit code 1 means a campaign, or a recheck, with a failed property.
         .filter(|line| !(line.starts_with("0 ") || ["1 run", "1 recheck"].contains(line)))
         .collect();
     assert!(wrong.is_empty(), "{wrong:#?}\n{printed}");

@@ -1,4 +1,4 @@
-//! Judging the past anew: equal to simulating it again, nothing twice, nothing half, nothing lost.
+//! Judging stored runs again: equal to simulating them again, without duplicates, partial writes or losses.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,7 +27,7 @@ act:StaysUpright a act:Property ; rdfs:label \"stays upright\" ; act:unit \"rad\
 act:Pick act:successProperty act:StaysUpright .
 ";
 
-/// As `ontology/history.ttl` gives it, with what else is compared.
+/// The newest outcomes, as in the query of `ontology/history.ttl`, with the other compared values.
 const NEWEST: &str = "SELECT ?index ?property ?outcome ?margin ?witness WHERE {
     { ?a earl:subject ?e ; earl:test ?property ; earl:result ?r . ?r act:outcome ?outcome ; act:witness ?witness .
       OPTIONAL { ?r act:margin ?margin } }
@@ -47,7 +47,7 @@ fn add_property(folder: &Path) {
     std::fs::write(&ontology, std::fs::read_to_string(&ontology).unwrap() + NEW_ENTRY).unwrap();
 }
 
-/// The object has to move by more than any pick moves it.
+/// The object must move farther than in any pick.
 fn change_rule(folder: &Path) {
     edit(&folder.join("rules/moved_object.rls"), "?d > 0.02", "?d > 0.45");
     edit(&folder.join("rules/moved_object.rls"), "?d - 0.02", "?d - 0.45");
@@ -67,7 +67,7 @@ fn recheck_json(folder: &Path, arguments: &[&str]) -> (i32, Value) {
 }
 
 #[test]
-fn the_past_judged_anew_is_what_simulating_it_again_gives() {
+fn a_recheck_equals_a_new_simulation() {
     let project = project();
     let folder = project.path();
     actcheck(folder, &["run", "configs/pick.toml", "--runs", "6", "--history", "h"]);
@@ -100,7 +100,7 @@ fn the_past_judged_anew_is_what_simulating_it_again_gives() {
 }
 
 #[test]
-fn rules_of_another_time_judge_too_and_nothing_is_written_twice() {
+fn a_recheck_uses_current_or_older_rules_and_writes_no_duplicates() {
     let project = project();
     let folder = project.path();
     actcheck(folder, &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
@@ -123,14 +123,14 @@ fn rules_of_another_time_judge_too_and_nothing_is_written_twice() {
         assert_eq!(ask(folder, "h", NEWEST), own);
         assert_eq!(ask(folder, "h", RECHECKED), "n\n8\n");
     }
-    // All of it within a second or two: no two judgements may fall together.
+    // All judgements are made within a second or two: no two may share a key.
     recheck_json(folder, &[]);
     assert_ne!(ask(folder, "h", NEWEST), own);
     assert_eq!(ask(folder, "h", RECHECKED), "n\n12\n");
 }
 
 #[test]
-fn what_cannot_be_judged_is_said_and_writes_nothing() {
+fn impossible_rechecks_are_refused_without_writes() {
     let project = project();
     let folder = project.path();
     let history = History::open(&folder.join("h")).unwrap();
@@ -143,7 +143,7 @@ fn what_cannot_be_judged_is_said_and_writes_nothing() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?} {text}");
         wanted.iter().for_each(|wanted| assert!(text.contains(wanted), "no `{wanted}` in {text}"));
     };
-    fails(&["MovedObjekt", "Banana", "--history", "h"], &["X030", "did you mean `MovedObject`?", "`Banana`"]);
+    fails(&["MovedObjekt", "Banana", "--history", "h"], &["X037", "did you mean `MovedObject`?", "`Banana`"]);
     fails(&["--campaign", "kk", "--history", "h"], &["X033", "did you mean `k`?"]);
     fails(&["--as-of-rules", "models", "--history", "h"], &["X032", "models"]);
     edit(&folder.join("rules/close_object.rls"), "success(", "success((");
@@ -155,7 +155,7 @@ fn what_cannot_be_judged_is_said_and_writes_nothing() {
     fails(&["--history", "empty"], &["X034", "no runs"]);
 }
 
-/// A history of sample runs, every one of which a new property can be judged in.
+/// A history of sample runs, in each of which a new property can be judged.
 fn filled(runs: u64) -> (TempDir, History, RuleSet) {
     let project = project();
     add_property(project.path());
@@ -166,12 +166,12 @@ fn filled(runs: u64) -> (TempDir, History, RuleSet) {
     (project, history, rules)
 }
 
-/// Judges everything in batches of four; stops after so many of them.
+/// Judges everything in batches of four; stops after a given number of batches.
 fn judge(history: &History, rules: &RuleSet, jobs: usize, batches: usize) -> (RecheckEnd, Vec<Recheck>) {
     let stop = AtomicBool::new(false);
     let runs = history.runs(&RunFilter::default()).unwrap();
     let options = RecheckOptions { jobs, batch: 4, at: "2026-08-02T12:00:00Z".to_owned() };
-    let (mut told, mut seen) = (Vec::new(), 0);
+    let (mut printed, mut seen) = (Vec::new(), 0);
     let end = recheck(
         history,
         &runs,
@@ -179,12 +179,12 @@ fn judge(history: &History, rules: &RuleSet, jobs: usize, batches: usize) -> (Re
         &options,
         &stop,
         |_, batch| {
-            told.extend(batch.to_vec());
+            printed.extend(batch.to_vec());
             seen += 1;
             stop.store(seen >= batches, Ordering::Relaxed);
         },
     );
-    (end, told)
+    (end, printed)
 }
 
 fn kept(history: &History) -> u64 {
@@ -195,60 +195,60 @@ fn kept(history: &History) -> u64 {
 }
 
 #[test]
-fn a_recheck_that_was_stopped_keeps_whole_batches_and_goes_on_later() {
+fn a_stopped_recheck_keeps_whole_batches_and_can_continue() {
     let (_folder, history, rules) = filled(14);
     let rules = rules.only(&["StaysUpright".to_owned()]).unwrap();
-    let (end, told) = judge(&history, &rules, 2, 1);
+    let (end, printed) = judge(&history, &rules, 2, 1);
     assert!(matches!(end.ending, Ending::Interrupted), "{end:?}");
     assert!(end.judged >= 4 && end.judged < 14, "{end:?}");
-    assert_eq!((told.len() as u64, kept(&history)), (end.judged, end.judged));
+    assert_eq!((printed.len() as u64, kept(&history)), (end.judged, end.judged));
     let (end, again) = judge(&history, &rules, 1, usize::MAX);
     assert!(matches!(end.ending, Ending::Finished) && end.judged == 14, "{end:?}");
     assert_eq!(kept(&history), 14);
-    assert_eq!(again.iter().filter(|recheck| recheck.is_news()).count() as u64, 14 - told.len() as u64);
+    assert_eq!(again.iter().filter(|recheck| recheck.is_news()).count() as u64, 14 - printed.len() as u64);
     let order: Vec<&str> = again.iter().map(|recheck| recheck.run.as_str()).collect();
     assert_eq!(order, (1..=14).map(|number| format!("k-{number}")).collect::<Vec<_>>());
 }
 
 #[test]
-fn any_number_of_workers_gives_the_same() {
+fn a_recheck_is_the_same_with_any_number_of_workers() {
     let (_folder, history, rules) = filled(9);
     let (_other_folder, other, _) = filled(9);
-    let told = |history, jobs| judge(history, &rules, jobs, usize::MAX).1;
-    assert_eq!(told(&history, 1), told(&other, 3));
+    let printed = |history, jobs| judge(history, &rules, jobs, usize::MAX).1;
+    assert_eq!(printed(&history, 1), printed(&other, 3));
     assert_eq!(kept(&history), kept(&other));
 }
 
 #[test]
-fn what_did_not_come_to_its_own_end_keeps_its_fate() {
+fn broken_and_timed_out_actions_keep_their_outcomes() {
     let (_folder, history, rules) = filled(1);
     let mut record = sample_run("k", 7);
     record.trace.snapshots.clear();
-    record.trace.actions[0].end = ActionEnd::Broken("a pose is no number".to_owned());
+    record.trace.actions[0].end = ActionEnd::Broken("a pose is not a number".to_owned());
     record.facts = extract(&record.trace);
     record.status = RunStatus::Broken;
     record.judgements[0].iter_mut().for_each(|judgement| judgement.outcome = Outcome::Broken);
     history.commit(&record).unwrap();
-    let (_, told) = judge(&history, &rules, 1, usize::MAX);
-    let broken: Vec<&Recheck> = told.iter().filter(|recheck| recheck.run == "k-8").collect();
+    let (_, printed) = judge(&history, &rules, 1, usize::MAX);
+    let broken: Vec<&Recheck> = printed.iter().filter(|recheck| recheck.run == "k-8").collect();
     assert_eq!(broken.len(), 6);
     assert!(broken.iter().all(|recheck| recheck.now.outcome == Outcome::Broken));
     let news: Vec<&&Recheck> = broken.iter().filter(|recheck| recheck.is_news()).collect();
     assert_eq!(news.len(), 1, "{news:?}");
     assert_eq!(news[0].now.property, names::act("StaysUpright"));
-    assert_eq!(news[0].now.witness, "a pose is no number");
+    assert_eq!(news[0].now.witness, "a pose is not a number");
 }
 
 #[test]
-fn a_run_that_cannot_be_read_does_not_stop_the_others() {
+fn an_unreadable_run_does_not_stop_the_others() {
     let (folder, history, rules) = filled(6);
     std::fs::remove_file(folder.path().join("h/traces/k-3.trace")).unwrap();
     std::fs::write(folder.path().join("h/traces/k-5.trace"), "no trace").unwrap();
-    let (end, told) = judge(&history, &rules, 2, usize::MAX);
+    let (end, printed) = judge(&history, &rules, 2, usize::MAX);
     assert!(matches!(end.ending, Ending::Finished) && end.judged == 4, "{end:?}");
     let codes: Vec<&str> = end.faults.iter().map(|fault| fault.code).collect();
     assert_eq!(codes, ["H009", "H007"]);
-    assert!(told.iter().all(|recheck| !["k-3", "k-5"].contains(&recheck.run.as_str())));
+    assert!(printed.iter().all(|recheck| !["k-3", "k-5"].contains(&recheck.run.as_str())));
     drop(history);
     let output = actcheck(folder.path(), &["recheck", "--history", "h", "--format", "csv"]);
     assert_eq!(output.status.code(), Some(2));
@@ -256,7 +256,7 @@ fn a_run_that_cannot_be_read_does_not_stop_the_others() {
 }
 
 #[test]
-fn each_judgement_says_by_which_rules_and_when() {
+fn each_judgement_records_its_rules_and_time() {
     let (_folder, history, rules) = filled(1);
     judge(&history, &rules, 1, usize::MAX);
     let query = "SELECT ?property ?at ?digest ?old WHERE { GRAPH act:rechecked { ?a earl:test ?property ;

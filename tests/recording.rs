@@ -1,22 +1,22 @@
-//! `actcheck report --rrd`: recordings for the viewer of rerun, read back by rerun's own library; and what a program says that was
-//! built without them.
+//! `actcheck report --rrd`: recordings for the rerun viewer, read back by rerun's own library; and the message of a
+//! program built without them.
 
 use crate::support::{actcheck, stderr, stdout};
 
 #[cfg(not(feature = "rerun"))]
 #[test]
-fn a_program_without_recordings_says_how_to_build_one_with_them() {
+fn a_program_without_recordings_explains_how_to_enable_them() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let build = "cargo build --release --locked --features rerun";
     let said = |output: &std::process::Output| stderr(output).split_whitespace().collect::<Vec<_>>().join(" ");
-    // Before anything else: there is no history here.
+    // Checked before anything else: there is no history here.
     let refused = actcheck(here, &["report", "--rrd", "runs.rrd"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(said(&refused).contains("X055") && said(&refused).contains(build), "{}", stderr(&refused));
     assert_eq!(std::fs::read_dir(here).unwrap().count(), 0, "nothing is written");
     let both = actcheck(here, &["report", "--rrd", "-", "--markdown"]);
-    assert!(said(&both).contains("X051") && said(&both).contains("X055"), "all faults at once: {}", stderr(&both));
+    assert!(said(&both).contains("X058") && said(&both).contains("X055"), "all faults at once: {}", stderr(&both));
     let help = stdout(&actcheck(here, &["report", "--help"])).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(help.contains("--rrd <FILE.rrd>") && help.contains(build), "{help}");
 }
@@ -41,7 +41,7 @@ mod with_recordings {
     use super::{actcheck, stderr, stdout};
     use crate::support::project;
 
-    /// What a file holds: chunks by the id of their recording, in their order.
+    /// The contents of a file: chunks by the id of their recording, in order.
     fn read(bytes: &[u8]) -> BTreeMap<String, Vec<Chunk>> {
         let mut recordings: BTreeMap<String, Vec<Chunk>> = BTreeMap::new();
         for message in DecoderApp::decode_lazy(bytes) {
@@ -54,13 +54,13 @@ mod with_recordings {
                     let chunks = recordings.get_mut(store.recording_id().as_str()).expect("it has begun");
                     chunks.push(Chunk::from_arrow_msg(&message).unwrap());
                 }
-                LogMsg::BlueprintActivationCommand(_) => panic!("the viewer lays it out"),
+                LogMsg::BlueprintActivationCommand(_) => panic!("the layout is left to the viewer"),
             }
         }
         recordings
     }
 
-    /// Chunks of one place that hold at all times, or those that do not.
+    /// Chunks of one entity path that are static, or those that are not.
     fn at<'a>(chunks: &'a [Chunk], path: &str, still: bool) -> Vec<&'a Chunk> {
         let path = EntityPath::parse_forgiving(path);
         chunks.iter().filter(|chunk| *chunk.entity_path() == path && chunk.is_static() == still).collect()
@@ -78,15 +78,15 @@ mod with_recordings {
         texts(at(chunks, "/outcomes", true)[0], TextDocument::descriptor_text().component).concat()
     }
 
-    /// Moments of a chunk. Unit: nanoseconds of simulated time.
+    /// Times of a chunk. Unit: nanoseconds of simulated time.
     fn moments(chunk: &Chunk) -> Vec<i64> {
-        assert_eq!(chunk.timelines().len(), 1, "no clock but the simulated one");
+        assert_eq!(chunk.timelines().len(), 1, "the only timeline is simulated time");
         let times = chunk.timelines().values().next().unwrap();
         assert_eq!(times.name(), "sim_time");
         times.times_raw().to_vec()
     }
 
-    /// How many solids of each kind a form has: boxes, cylinders, capsules, balls, and whether there is a mesh.
+    /// Numbers of solids of each kind in a form: boxes, cylinders, capsules, balls, and whether it has a mesh.
     fn kinds(parts: &[Part]) -> [usize; 5] {
         let count = |is: fn(&Shape) -> bool| parts.iter().filter(|part| is(&part.shape)).count();
         [
@@ -116,7 +116,7 @@ mod with_recordings {
         if body.contains('/') { format!("/scene/{body}") } else { format!("/scene/objects/{body}") }
     }
 
-    /// Every body is there once, with its solids, where it was in each frame.
+    /// Every body is recorded once, with its solids, and with its pose in each frame.
     fn holds_the_trace(chunks: &[Chunk], trace: &Trace) {
         let frames = &trace.frames;
         for form in &trace.forms {
@@ -130,7 +130,7 @@ mod with_recordings {
                 assert_eq!(
                     solids.iter_slices::<[f32; 3]>(translation).count(),
                     1,
-                    "{} stands still somewhere",
+                    "{} is static in some frames",
                     form.name
                 );
                 continue;
@@ -139,9 +139,11 @@ mod with_recordings {
             let expected: Vec<i64> =
                 (0..frames.rows.len()).map(|idx| (idx as f64 * period_nanos).round() as i64).collect();
             assert_eq!(moments(course), expected);
-            let told: Vec<[f32; 3]> = course.iter_slices::<[f32; 3]>(translation).map(|at| at[0]).collect();
+            let printed: Vec<[f32; 3]> = course.iter_slices::<[f32; 3]>(translation).map(|at| at[0]).collect();
             let traced: Vec<&[f32]> = frames.rows.iter().map(|row| &row[7 * slot..7 * slot + 3]).collect();
-            assert!(told.iter().zip(&traced).all(|(told, traced)| told == traced) && told.len() == traced.len());
+            assert!(
+                printed.iter().zip(&traced).all(|(printed, traced)| printed == traced) && printed.len() == traced.len()
+            );
         }
         let bodies =
             chunks.iter().filter(|chunk| chunk.is_static() && chunk.entity_path().to_string().starts_with("/scene/"));
@@ -157,8 +159,8 @@ mod with_recordings {
             assert_eq!(text.matches(&format!(": **{}**", outcome.word())).count(), count, "{text}");
         }
         let not_passed = judged.iter().filter(|judgement| judgement.outcome != Outcome::Passed).count();
-        let told = at(chunks, "/events/outcomes", false);
-        assert_eq!(told.iter().map(|chunk| chunk.num_rows()).sum::<usize>(), not_passed);
+        let printed = at(chunks, "/events/outcomes", false);
+        assert_eq!(printed.iter().map(|chunk| chunk.num_rows()).sum::<usize>(), not_passed);
     }
 
     /// A project with a history of two runs.
@@ -178,7 +180,7 @@ mod with_recordings {
     }
 
     #[test]
-    fn a_recording_holds_what_was_simulated_and_what_came_of_it() {
+    fn a_recording_holds_the_trace_and_the_outcomes() {
         let project = two_runs();
         let here = project.path();
         let report = |arguments: &[&str]| actcheck(here, &[&["report", "--history", "h"], arguments].concat());
@@ -196,9 +198,9 @@ mod with_recordings {
             let chunks = &recordings[&run.row.run];
             holds_the_trace(chunks, trace);
             holds_the_outcomes(chunks, run);
-            let [actions] = at(chunks, "/events/actions", false)[..] else { panic!("actions are told once") };
-            let told = texts(actions, TextLog::descriptor_text().component);
-            assert!(told[0].ends_with("PerceivePlane begins") && moments(actions).is_sorted(), "{told:?}");
+            let [actions] = at(chunks, "/events/actions", false)[..] else { panic!("actions are recorded once") };
+            let printed = texts(actions, TextLog::descriptor_text().component);
+            assert!(printed[0].ends_with("PerceivePlane begins") && moments(actions).is_sorted(), "{printed:?}");
             let mut ids: Vec<ChunkId> = chunks.iter().map(Chunk::id).collect();
             let mut rows: Vec<RowId> = chunks.iter().flat_map(Chunk::row_ids).collect();
             let (all_ids, all_rows) = (ids.len(), rows.len());
@@ -209,7 +211,7 @@ mod with_recordings {
             assert_eq!((ids.len(), rows.len()), (all_ids, all_rows), "ids differ");
         }
 
-        // As much as there is room for, and one run at least; only what was asked for.
+        // As many runs as fit, at least one; only the requested runs.
         let narrow = report(&["--rrd", "one.rrd", "--replay-mb", "0", "--property", "MovedObject"]);
         assert!(stdout(&narrow).starts_with("one.rrd holds 1 of 2 runs ("), "{}", stdout(&narrow));
         let one = read(&std::fs::read(here.join("one.rrd")).unwrap());
@@ -217,9 +219,9 @@ mod with_recordings {
         assert!(one.len() == 1 && text.matches("\n- ").count() == 1 && text.contains("- MovedObject: "), "{text}");
     }
 
-    /// One real run, with an outcome made up: no seed has to fail for it.
+    /// One real run with a made-up outcome, so that no seed has to fail.
     #[test]
-    fn a_failure_is_told_with_its_explanation_and_lets_no_markup_in() {
+    fn a_recorded_failure_has_its_explanation_with_markup_escaped() {
         let project = two_runs();
         let (mut run, trace) = kept(project.path()).remove(0);
         let step = run.actions[1].step;
@@ -232,9 +234,9 @@ mod with_recordings {
             let mut recordings = Recordings::new().unwrap();
             recordings.add(&run, trace, std::slice::from_ref(&why)).unwrap();
             assert_eq!(recordings.runs(), 1);
-            let told = recordings.bytes();
+            let printed = recordings.bytes();
             let bytes = recordings.finish().unwrap();
-            assert!(told > 0 && told <= bytes.len() as u64);
+            assert!(printed > 0 && printed <= bytes.len() as u64);
             read(&bytes).remove(&run.row.run).unwrap()
         };
         let chunks = recorded(Some(&trace));
@@ -243,7 +245,7 @@ mod with_recordings {
         let text = document(&chunks);
         assert!(text.contains(": **failed**") && text.contains("\n      success(?o)\n        was missing\n"), "{text}");
         assert!(text.contains(r"it came \[nearer\](http://example.org) &lt;b&gt;twice&lt;/b&gt;"), "{text}");
-        let [failures] = at(&chunks, "/events/outcomes", false)[..] else { panic!("failures are told once") };
+        let [failures] = at(&chunks, "/events/outcomes", false)[..] else { panic!("failures are recorded once") };
         let levels = failures.iter_component::<TextLogLevel>(TextLog::descriptor_level().component);
         assert!(levels.flat_map(|level| level.as_slice().to_vec()).any(|level| level.to_string() == "ERROR"));
         let run_nanos = (trace.snapshots.last().unwrap().time_secs - trace.snapshots[0].time_secs) * 1e9;
@@ -252,7 +254,7 @@ mod with_recordings {
             at(&chunks, "/__properties", true)[0].iter_component::<Name>(RecordingInfo::descriptor_name().component);
         assert!(name.flat_map(|name| name.as_slice().to_vec()).any(|name| name.to_string().starts_with(&run.row.run)));
 
-        // Without a state there is nothing in 3D, and the rest is told.
+        // Without a state there is no 3D data, and the other data is recorded.
         let untraced = recorded(None);
         assert!(untraced.iter().all(|chunk| !chunk.entity_path().to_string().starts_with("/scene")));
         holds_the_outcomes(&untraced, &run);

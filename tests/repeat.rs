@@ -1,4 +1,4 @@
-//! Scenes that are run more than once: the same scene, other noise, and what that says.
+//! Repeated runs of a scene: the same scene, other noise, and the resulting statistics.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn list(folder: &Path, history: &str) -> Vec<Value> {
     json(folder, &["list", "--history", history]).as_array().unwrap().clone()
 }
 
-/// Objects as they were placed, and where the robot was.
+/// Initial object poses and the start of the robot.
 fn scene(folder: &Path, run: &Value, history: &str) -> String {
     let shown = json(folder, &["show", run["run"].as_str().unwrap(), "--history", history]);
     let placed = |object: &Value| {
@@ -29,7 +29,7 @@ fn scene(folder: &Path, run: &Value, history: &str) -> String {
 }
 
 #[test]
-fn repetitions_have_the_scene_and_not_the_noise() {
+fn repetitions_share_the_scene_and_differ_in_noise() {
     let project = looking();
     let folder = project.path();
     let run = ["run", "configs/look.toml", "--runs", "3"];
@@ -43,8 +43,8 @@ fn repetitions_have_the_scene_and_not_the_noise() {
     assert_eq!(of(&one, "index"), (0..9).map(Value::from).collect::<Vec<_>>());
     assert_eq!(of(&one, "scene"), [0, 0, 0, 1, 1, 1, 2, 2, 2].map(Value::from));
     assert_eq!(of(&one, "repetition"), [0, 1, 2, 0, 1, 2, 0, 1, 2].map(Value::from));
-    assert!(single[0].get("scene").is_none() && one[0].get("weight").is_none(), "no columns of nothing");
-    // The number of workers changes nothing, nor where the number of repetitions stands.
+    assert!(single[0].get("scene").is_none() && one[0].get("weight").is_none(), "no empty columns");
+    // Neither the number of workers nor the source of the repetition count changes the result.
     assert_eq!(of(&one, "trace_hash"), of(&two, "trace_hash"));
 
     for (number, alone) in single.iter().enumerate() {
@@ -60,32 +60,32 @@ fn repetitions_have_the_scene_and_not_the_noise() {
 fn repeated_runs_can_be_replayed_and_shrunk() {
     let project = looking();
     let folder = project.path();
-    let told = json(folder, &["run", "configs/look.toml", "--runs", "12", "--repeat", "2", "--history", "h"]);
+    let printed = json(folder, &["run", "configs/look.toml", "--runs", "12", "--repeat", "2", "--history", "h"]);
     let rows = list(folder, "h");
     let runs: Vec<&str> = rows.iter().map(|row| row["run"].as_str().unwrap()).collect();
     let replayed = actcheck(folder, &[&["replay", "--history", "h"], &runs[..]].concat());
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
-    let failing = told["runs"].as_array().unwrap().iter().rev().find(|run| run["score"].as_f64().unwrap() < 1.0);
-    let failing = failing.expect("one in four looks sees what is not there, or not what is")["run"].as_str().unwrap();
+    let failing = printed["runs"].as_array().unwrap().iter().rev().find(|run| run["score"].as_f64().unwrap() < 1.0);
+    let failing = failing.expect("one in four looks misses a thing or sees a wrong one")["run"].as_str().unwrap();
     let shrunk = actcheck(folder, &["shrink", failing, "--history", "h", "--trials", "8"]);
     assert_eq!(shrunk.status.code(), Some(0), "{}{}", stdout(&shrunk), stderr(&shrunk));
-    // The small run is one of its own.
+    // The shrunk run is a separate run.
     let last = list(folder, "h").pop().unwrap();
     assert_eq!((&last["scene"], &last["repetition"]), (&Value::Null, &Value::Null));
     let replayed = actcheck(folder, &["replay", "--history", "h", last["run"].as_str().unwrap()]);
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
 }
 
-/// The shares are counted again here, from the outcomes of the runs.
+/// The shares are computed again here, from the outcomes of the runs.
 #[test]
-fn the_report_counts_what_the_runs_say() {
+fn the_report_agrees_with_the_runs() {
     let project = looking();
     let folder = project.path();
-    let told = json(folder, &["run", "configs/look.toml", "--runs", "6", "--repeat", "3", "--history", "h"]);
-    let whole = told["repetitions"].as_array().unwrap().last().unwrap().clone();
+    let printed = json(folder, &["run", "configs/look.toml", "--runs", "6", "--repeat", "3", "--history", "h"]);
+    let whole = printed["repetitions"].as_array().unwrap().last().unwrap().clone();
     assert_eq!(whole["property"], Value::Null);
     let mut passed: BTreeMap<u64, u64> = (0..6).map(|scene| (scene, 0)).collect();
-    for run in told["runs"].as_array().unwrap() {
+    for run in printed["runs"].as_array().unwrap() {
         let all =
             run["actions"][0]["outcomes"].as_array().unwrap().iter().all(|outcome| outcome["outcome"] == "passed");
         *passed.get_mut(&(run["index"].as_u64().unwrap() / 3)).unwrap() += u64::from(all);
@@ -122,7 +122,7 @@ fn the_report_counts_what_the_runs_say() {
 }
 
 #[test]
-fn no_run_of_a_scene_is_none_and_a_thousand_are_enough() {
+fn the_number_of_repetitions_must_be_from_1_to_1000() {
     let project = project();
     for repeat in ["0", "1001", "-1", "\"three\""] {
         let config = project.path().join("configs/pick.toml");

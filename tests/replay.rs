@@ -1,4 +1,4 @@
-//! Runs that are run again, with the built program.
+//! Replay of stored runs, with the built program.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::support::look::looking;
 use crate::support::{actcheck, edit, project, stderr, stdout};
 
-/// The only campaign of a new history with so many runs of the shipped pick.
+/// The only campaign of a new history, with the given number of runs of the shipped pick.
 fn campaign(folder: &Path, runs: &str) -> String {
     let output = actcheck(folder, &["run", "configs/pick.toml", "--runs", runs, "--history", "h", "--format", "json"]);
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
@@ -23,7 +23,7 @@ fn replayed(folder: &Path, arguments: &[&str]) -> (i32, Value) {
 }
 
 #[test]
-fn stored_runs_go_the_same_way_in_a_new_process_at_any_number_of_workers() {
+fn replay_reproduces_stored_runs_in_a_new_process_with_any_number_of_workers() {
     let project = project();
     let id = campaign(project.path(), "6");
     let (code, one) = replayed(project.path(), &["--campaign", &id, "--jobs", "1", "--exact"]);
@@ -42,7 +42,7 @@ fn stored_runs_go_the_same_way_in_a_new_process_at_any_number_of_workers() {
 }
 
 #[test]
-fn runs_by_chance_go_the_same_way_at_one_and_two_workers() {
+fn random_runs_are_the_same_with_one_and_two_workers() {
     let project = looking();
     let arguments = ["run", "configs/look.toml", "--runs", "12", "--history", "h"];
     assert_ne!(actcheck(project.path(), &arguments).status.code(), Some(2));
@@ -60,7 +60,7 @@ fn runs_by_chance_go_the_same_way_at_one_and_two_workers() {
 }
 
 #[test]
-fn a_changed_model_is_named_with_the_first_thing_that_went_another_way() {
+fn a_changed_model_is_named_with_the_first_difference() {
     let project = project();
     let id = campaign(project.path(), "1");
     let run = format!("{id}-1");
@@ -81,7 +81,7 @@ fn a_changed_model_is_named_with_the_first_thing_that_went_another_way() {
 }
 
 #[test]
-fn choices_that_do_not_fit_are_refused_by_name_or_brought_to_the_nearest() {
+fn mismatched_choices_are_refused_by_name_or_clamped() {
     let project = project();
     let run = format!("{}-1", campaign(project.path(), "1"));
     let other = project.path().join("configs/other.toml");
@@ -99,7 +99,7 @@ fn choices_that_do_not_fit_are_refused_by_name_or_brought_to_the_nearest() {
 }
 
 #[test]
-fn other_rules_change_outcomes_and_no_trace() {
+fn other_rules_change_outcomes_but_not_the_trace() {
     let project = project();
     let id = campaign(project.path(), "3");
     let rule = project.path().join("rules/moved_object.rls");
@@ -119,7 +119,7 @@ fn other_rules_change_outcomes_and_no_trace() {
 }
 
 #[test]
-fn what_can_not_be_replayed_is_said() {
+fn runs_that_cannot_be_replayed_are_refused_with_the_reason() {
     let project = project();
     let run = format!("{}-1", campaign(project.path(), "1"));
     let unknown = actcheck(project.path(), &["replay", "zzzz-9", "--history", "h"]);

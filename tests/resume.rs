@@ -1,4 +1,4 @@
-//! A campaign that was killed goes on as if nobody had killed it.
+//! A killed campaign resumes with the same results as an uninterrupted one.
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::support::look::looking;
 use crate::support::{actcheck, edit, project, signal, stderr, stdout};
 
-/// A look at a crowded small table, on which scenes are discarded too: runs that end one after the other within moments.
+/// A look at a crowded small table, with some discarded scenes: runs that end within moments of each other.
 const CROWDED: &str = "tests = [[\"PerceivePlane\"]]\ntest_count = 24\nseed = 3\nontology = \"../ontology/actions.ttl\"\n\
     model_dir = \"../models\"\n[objectSurface]\nobject_surfaces = [\"coffee_table\"]\n[pickObject]\n\
     model_list = [\"glass\"]\n[surfaceObjects]\nmodel_list = [\"bottle\", \"plate\", \"bowl\", \"mug\"]\n\
@@ -47,20 +47,20 @@ fn traces(folder: &Path, history: &str) -> usize {
     std::fs::read_dir(folder.join(history).join("traces")).map_or(0, Iterator::count)
 }
 
-/// The summary but for where its history lies: all outcomes, margins, witnesses, scores and discards.
+/// The summary without its paths: all outcomes, margins, witnesses, scores and discards.
 fn without_place(mut summary: Value) -> Value {
     let history = summary.as_object_mut().unwrap().remove("history").unwrap();
-    // Commands that tell more name it.
+    // Suggested commands name the history.
     let named = format!("--history {}", history.as_str().unwrap());
     let mut summary: Value = serde_json::from_str(&summary.to_string().replace(&named, "--history H")).unwrap();
-    // How long runs took is no part of what came out.
+    // The duration of runs is not part of the result.
     if let Some(health) = summary["health"].as_object_mut() {
         health.retain(|key, _| !key.starts_with("wall_"));
     }
     summary
 }
 
-/// What the history says of the discards, run by run.
+/// The discards in the history, run by run.
 fn discards(folder: &Path, history: &str) -> String {
     let query = "SELECT ?run ?n ?attempt ?reason WHERE { ?run act:discards ?n ; a act:Run \
                  OPTIONAL { ?d act:ofRun ?run ; a act:Discard ; act:attempt ?attempt ; act:reason ?reason } } \
@@ -68,15 +68,15 @@ fn discards(folder: &Path, history: &str) -> String {
     stdout(&actcheck(folder, &["query", "--history", history, "--format", "csv", query]))
 }
 
-/// Twenty kills at moments that a small generator chooses: some before the first run, some within a run, some within a
-/// write. The campaign comes out bit by bit as the one that nobody killed.
+/// Twenty kills at pseudo-random moments: some before the first run, some within a run, some within a write. The
+/// campaign equals an uninterrupted one bit by bit.
 #[test]
-fn twenty_kills_change_nothing() {
+fn twenty_kills_do_not_change_the_results() {
     let project = crowded();
     let folder = project.path();
     let whole = json(folder, &["run", "configs/crowded.toml", "--history", "whole", "--jobs", "2"]);
     let (expected, expected_discards) = (listed(folder, "whole"), discards(folder, "whole"));
-    assert!(whole["discarded_scenes"].as_u64().unwrap() > 0, "the scenes are too roomy for this test");
+    assert!(whole["discarded_scenes"].as_u64().unwrap() > 0, "the scenes are too spacious for this test");
     let (mut kills, mut round, mut state) = (0, 0, 88_172_645_463_325_252_u64);
     while kills < 20 {
         round += 1;
@@ -85,7 +85,7 @@ fn twenty_kills_change_nothing() {
         let go_on = ["run", "--resume", "--jobs", "2", "--history", &history];
         let mut before = 0;
         while kills < 20 && before < 20 {
-            // A campaign that was killed before it was begun can't go on, but only begin.
+            // A campaign that was killed before it was recorded can't be resumed, only started.
             let begun = folder.join(&history).join("store").exists() && {
                 let asked = "SELECT ?c WHERE { ?c a act:Campaign }";
                 let known = actcheck(folder, &["query", "--history", &history, "--format", "csv", asked]);
@@ -112,7 +112,7 @@ fn twenty_kills_change_nothing() {
         let resumed = actcheck(folder, &[&go_on[..], &["--format", "json"]].concat());
         let text = stdout(&resumed);
         if resumed.status.code() == Some(2) {
-            // It had come to its end before the last kill.
+            // The campaign had finished before the last kill.
             assert!(stderr(&resumed).contains("no unfinished campaign"), "{}", stderr(&resumed));
         } else {
             let summary: Value = serde_json::from_str(&text).unwrap();
@@ -126,29 +126,30 @@ fn twenty_kills_change_nothing() {
     println!("{kills} kills in {round} campaigns");
 }
 
-/// Ctrl-C keeps the runs in flight, and the campaign goes on later with another number of workers; budgets count what was there.
+/// Ctrl-C keeps the runs in flight, and the campaign resumes with another number of workers; budgets count the
+/// earlier runs.
 #[test]
-fn an_interrupted_campaign_goes_on_with_its_budgets() {
+fn an_interrupted_campaign_resumes_with_its_budgets() {
     let project = looking();
     let budgets = ["--runs", "90", "--max-failures", "20", "--seed", "11"];
     assert_eq!(interrupted_and_resumed(project.path(), &budgets)["ended_by"], "failures");
-    // A configuration is found by its path, and another one has no campaign here.
+    // Campaigns are found by the path of their configuration; another configuration has none here.
     let other = actcheck(project.path(), &["run", "configs/clutter.toml", "--resume", "--history", "h"]);
     assert_eq!(other.status.code(), Some(2));
     assert!(stderr(&other).contains("X050") && stderr(&other).contains("clutter.toml"), "{}", stderr(&other));
 }
 
-/// A guided search decides by what came of earlier scenes; those of before the interruption count as if there had been none.
+/// A guided search depends on the results of earlier scenes; those before the interruption count as usual.
 #[test]
-fn an_interrupted_search_goes_on_to_the_same_scenes() {
+fn an_interrupted_search_resumes_with_the_same_scenes() {
     let project = looking();
     let search = ["--runs", "30", "--strategy", "cross-entropy", "--seed", "5"];
     let whole = interrupted_and_resumed(project.path(), &search);
     assert_eq!((&whole["finished_runs"], &whole["ended_by"]), (&Value::from(30), &Value::Null));
 }
 
-/// Runs a campaign as a whole, and once more with a Ctrl-C in between and another number of workers. Both must come out the
-/// same. Returns the summary.
+/// Runs a campaign without interruption, and again with a Ctrl-C and another number of workers. Both must give the
+/// same results. Returns the summary.
 fn interrupted_and_resumed(folder: &Path, options: &[&str]) -> Value {
     let whole = json(folder, &[&["run", "configs/look.toml", "--history", "whole"][..], options].concat());
     assert_eq!(whole["interrupted"], false);
@@ -170,7 +171,7 @@ fn interrupted_and_resumed(folder: &Path, options: &[&str]) -> Value {
 }
 
 #[test]
-fn what_can_not_go_on_is_refused_with_the_reason() {
+fn campaigns_that_cannot_resume_are_refused_with_the_reason() {
     let project = project();
     let folder = project.path();
     let refused = |arguments: &[&str], words: &[&str]| {

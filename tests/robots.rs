@@ -1,8 +1,8 @@
-//! Robots: those that ship with the project do their task, and what is wrong with one is told with its place.
+//! Robots: the shipped ones perform their tasks, and faults of a robot are reported with their place.
 //!
-//! A wrong robot is a folder below `tests/diagnostics/robots/` that holds `robot.toml` and what it names, with what is said about
-//! it in `expected`. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write what is missing, and read it. All are
-//! `tests/models/crane` but for what is wrong.
+//! A wrong robot is a folder below `tests/diagnostics/robots/` that holds `robot.toml` and the files it names, with
+//! its diagnostics in `expected`. A new case needs no Rust: run with `ACTCHECK_BLESS=1` to write missing files, and
+//! review them. All are variants of `tests/models/crane` with a fault.
 
 use std::path::Path;
 use std::process::Command;
@@ -11,12 +11,12 @@ use actcheck::base::Source;
 use actcheck::config::{self, Overrides};
 use serde_json::Value;
 
-use crate::support::wrong::all_are_told;
+use crate::support::wrong::all_are_reported;
 use crate::support::{actcheck, copy, project, root, stderr, stdout};
 
 const WRONG: &str = "tests/diagnostics/robots";
 
-/// What is said of a robot; nothing if nothing is wrong.
+/// The diagnostics of a robot; empty if there are none.
 fn said_of(folder: &Path, profile: &str) -> String {
     let text = format!("tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"{profile}\"\n");
     config::load_text(Source::new(folder.join("c.toml").display().to_string(), text), folder, &Overrides::default())
@@ -24,9 +24,9 @@ fn said_of(folder: &Path, profile: &str) -> String {
 }
 
 #[test]
-fn every_wrong_robot_is_told_with_its_place() {
+fn every_wrong_robot_is_reported_with_its_place() {
     assert_eq!(said_of(Path::new("tests/models"), "crane/robot.toml"), "");
-    all_are_told(WRONG, 30, |name| said_of(Path::new(WRONG), &format!("{name}/robot.toml")));
+    all_are_reported(WRONG, 30, |name| said_of(Path::new(WRONG), &format!("{name}/robot.toml")));
     let said = said_of(Path::new(WRONG), "fixed_amr");
     assert!(said.contains("there is no robot `fixed_amr`") && said.contains("did you mean `fixed_arm`?"), "{said}");
 }
@@ -51,10 +51,10 @@ fn check_xacro(path: &Path, body: &str) -> (Option<i32>, String) {
     (output.status.code(), format!("{}{}", stdout(&output), stderr(&output)))
 }
 
-/// A stand-in for the program: what matters here is that its output is read, and what it refuses is told.
+/// A replacement for the program: the test covers the use of its output and the report of its errors.
 #[cfg(unix)]
 #[test]
-fn xacro_is_expanded_by_the_program_of_that_name_or_refused_with_help() {
+fn xacro_files_are_expanded_with_xacro_or_refused_with_help() {
     use std::os::unix::fs::PermissionsExt as _;
     let urdf = std::fs::read_to_string(root().join("tests/models/crane/robot.urdf")).unwrap();
     let tools = tempfile::tempdir().unwrap();
@@ -71,20 +71,20 @@ fn xacro_is_expanded_by_the_program_of_that_name_or_refused_with_help() {
     let (code, said) = check_xacro(tools.path(), "<robot><xacro:if value=\"${arm}\"/></robot>\n");
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("xacro cannot expand robot.urdf.xacro: undefined name 'arm'"), "{said}");
-    // Faults of what came out are told with their lines in it.
+    // Faults in the expanded text are reported with their lines in it.
     let (code, said) = check_xacro(tools.path(), &urdf.replace("value=\"3\"", "value=\"-3\""));
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("robot.urdf.xacro (expanded):10:"), "{said}");
 }
 
-/// The lone glass of `configs/lone_glass.toml`, for the arm that can't drive.
+/// The lone glass of `configs/lone_glass.toml`, for the fixed arm.
 fn lone_glass_for_fixed_arm() -> String {
     let text = std::fs::read_to_string(root().join("configs/lone_glass.toml")).unwrap();
     format!("{text}\n[robot]\nprofile = \"fixed_arm\"\n")
 }
 
 #[test]
-fn a_fixed_arm_takes_a_lone_glass_nearly_always() {
+fn a_fixed_arm_picks_a_lone_glass_nearly_always() {
     let project = project();
     std::fs::write(project.path().join("configs/lone.toml"), lone_glass_for_fixed_arm()).unwrap();
     let arguments = ["run", "configs/lone.toml", "--runs", "16", "--history", "h", "--format", "json"];
@@ -94,10 +94,10 @@ fn a_fixed_arm_takes_a_lone_glass_nearly_always() {
     assert!(passed >= 15, "{passed} of 16 runs passed fully with a lone object and no noise");
 }
 
-/// Where the arm has to find ways around things, the same seed still gives the same bits, whatever the number of workers, and
-/// every run can be made again from its record.
+/// If the arm must plan around obstacles, the same seed still gives the same bits with any number of workers, and
+/// every run can be replayed from its record.
 #[test]
-fn a_campaign_of_the_fixed_arm_comes_out_the_same_and_replays() {
+fn a_fixed_arm_campaign_is_deterministic_and_replays() {
     let project = project();
     let run = |history: &str, jobs: &str| {
         let arguments =
@@ -109,9 +109,9 @@ fn a_campaign_of_the_fixed_arm_comes_out_the_same_and_replays() {
     assert_eq!(replayed.status.code(), Some(0), "{}{}", stdout(&replayed), stderr(&replayed));
 }
 
-/// The mobile manipulator without the joints of its base, which `base = "planar"` gives back, does what it did.
+/// The mobile manipulator without its base joints, replaced by `base = "planar"`, behaves as before.
 #[test]
-fn a_planar_base_drives_a_urdf_that_has_none() {
+fn a_planar_base_drives_a_urdf_without_a_base() {
     let project = project();
     let folder = project.path().join("models/robots");
     let urdf = std::fs::read_to_string(folder.join("mobile_manipulator.urdf")).unwrap();
@@ -132,9 +132,9 @@ fn a_planar_base_drives_a_urdf_that_has_none() {
     assert_eq!(json["runs_passed"]["count"].as_u64(), Some(5), "{}", stdout(&output));
 }
 
-/// An arm that can't drive looks down from its mast, and takes what it found in its pictures.
+/// A fixed arm looks down from its mast, and picks an object found in its pictures.
 #[test]
-fn a_fixed_arm_takes_what_it_saw_with_its_camera() {
+fn a_fixed_arm_picks_an_object_seen_with_its_camera() {
     let project = project();
     let text = lone_glass_for_fixed_arm().replace("[[\"Pick\"]]", "[[\"PerceivePlane\", \"Pick\"]]");
     std::fs::write(project.path().join("configs/see.toml"), text).unwrap();

@@ -1,9 +1,9 @@
 //! Rule files over facts: every folder of `tests/rules/` is a case.
 //!
-//! A case holds `rules.rls` or `rules.rq` (or `shipped`, the name of a file in `rules/`), perhaps libraries of its own
-//! (`lib*.rls`; otherwise the shipped ones serve), `facts.trig` with the graphs `act:before`, `act:after`, `act:during` and
-//! `act:parameters` (statements `act:pickObject act:value obj:…`), and `expected`: the findings, or the diagnostics.
-//! `UPDATE_EXPECT=1` rewrites `expected`.
+//! A case holds `rules.rls` or `rules.rq` (or `shipped`, the name of a file in `rules/`), optionally its own
+//! libraries (`lib*.rls`; the default is the shipped ones), `facts.trig` with the graphs `act:before`, `act:after`,
+//! `act:during` and `act:parameters` (statements `act:pickObject act:value obj:…`), and `expected`: the findings, or
+//! the diagnostics. `UPDATE_EXPECT=1` rewrites `expected`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use actcheck::rules::{Budget, RuleBook, explain::Support, owl_closure, standalon
 pub const TESTED: &str = "http://actions#Tested";
 
 fn root() -> PathBuf {
-    // The package may stand elsewhere than the tests; the working directory of tests is the package's.
+    // The package may be in another folder than the tests; the working directory of tests is the package's.
     ["tests/rules", "../../main/tests/rules"].map(PathBuf::from).into_iter().find(|path| path.is_dir()).unwrap()
 }
 
@@ -32,7 +32,7 @@ fn rule_file(path: &Path) -> RuleFile {
     }
 }
 
-/// The shipped ontology with one property, the case's, in place of its own.
+/// The shipped ontology with its properties replaced by the case's single property.
 pub fn ontology_of(case: &Path) -> Ontology {
     let mut ontology = shipped_ontology();
     let shipped = root().join("../../rules");
@@ -58,12 +58,12 @@ pub fn ontology_of(case: &Path) -> Ontology {
     ontology
 }
 
-/// With the invariants, which say in which units their margins are.
+/// With the invariants, which state the units of their margins.
 fn shipped_ontology() -> Ontology {
     ontology::load(&Files::Disk, &root().join("../../ontology/extra.ttl")).unwrap()
 }
 
-/// The property that a rule decides, its margin in a unit.
+/// The property that a rule decides, with the unit of its margin.
 fn tested(rule: RuleFile, unit: Option<String>) -> std::collections::BTreeMap<String, Property> {
     let property = Property {
         iri: TESTED.into(),
@@ -102,7 +102,7 @@ fn term(term: &oxigraph::model::Term) -> Term {
     }
 }
 
-/// Facts of a case; none where it has no such file.
+/// Facts of a case; empty if it has no `facts.trig`.
 pub fn facts_of(case: &Path) -> RunFacts {
     let mut facts = RunFacts {
         snapshots: vec![vec![], vec![]],
@@ -170,7 +170,7 @@ fn outcome(case: &Path) -> String {
     }
 }
 
-/// Compares with a file of the case, or rewrites it.
+/// Compares the text with a file of the case, or rewrites the file. Returns the difference, or `None`.
 fn differs(file: &Path, got: &str) -> Option<String> {
     if std::env::var_os("UPDATE_EXPECT").is_some() {
         std::fs::write(file, got).unwrap();
@@ -184,7 +184,7 @@ pub fn cases() -> Vec<PathBuf> {
 }
 
 #[test]
-fn every_case_has_its_findings() {
+fn every_case_gives_its_expected_findings() {
     let wrong: Vec<String> =
         cases().iter().filter_map(|case| differs(&case.join("expected"), &outcome(case))).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -205,7 +205,7 @@ fn every_explanation_is_as_expected() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Statements of one line, read as Turtle; a final statement with a literal as subject is read by itself.
+/// Statements of one line, parsed as Turtle; a final statement with a literal as subject is parsed separately.
 fn statements(text: &str) -> Vec<[Term; 3]> {
     let mut prefixes: String =
         names::PREFIXES.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
@@ -228,7 +228,7 @@ fn owl(triples: &[[Term; 3]]) -> Program {
 }
 
 #[test]
-fn every_rule_of_owl_2_rl_derives_what_it_should() {
+fn every_owl_2_rl_rule_derives_its_conclusions() {
     let text = std::fs::read_to_string(root().join("owl-rl.txt")).unwrap();
     let rules = std::fs::read_to_string(root().join("../../rules/lib/owl-rl.rls")).unwrap();
     let mut tested = 0;
@@ -236,13 +236,13 @@ fn every_rule_of_owl_2_rl_derives_what_it_should() {
         let [name, given, wanted] = line.split(" | ").collect::<Vec<_>>()[..] else { panic!("{line}") };
         let given = statements(given);
         let program = owl(&given);
-        assert!(name == "dt-eq" || rules.contains(&format!("#[name(\"{name}\")]")), "{name} is no rule");
+        assert!(name == "dt-eq" || rules.contains(&format!("#[name(\"{name}\")]")), "{name} is not a rule");
         if wanted == "contradiction" {
             let found = program.explain(&format!("contradiction(\"{name}\", _, _)"), &Budget::default()).unwrap();
             assert!(!found.proofs.is_empty(), "{line}");
             assert!(owl_closure(&given).unwrap_err().to_string().contains(name), "{line}");
             for left_out in 0..given.len() {
-                // What makes up a list or a double value stays.
+                // Statements that make up a list or a double value stay.
                 let rest: Vec<_> =
                     given.iter().enumerate().filter(|(idx, _)| *idx != left_out).map(|(_, t)| t.clone()).collect();
                 let part_of_list = given[left_out][1].to_string().contains("rdf:");
@@ -250,7 +250,7 @@ fn every_rule_of_owl_2_rl_derives_what_it_should() {
             }
         } else {
             let goal = match wanted.split_once(" a ").or(wanted.split_once(" owl:sameAs ")) {
-                // A literal is no subject in Turtle.
+                // Turtle does not allow a literal as subject.
                 Some(("1", object)) => {
                     let property = if wanted.contains(" a ") { "rdf:type" } else { "owl:sameAs" };
                     format!("t(1, {property}, {object})")
@@ -269,7 +269,7 @@ fn every_rule_of_owl_2_rl_derives_what_it_should() {
         }
         tested += 1;
     }
-    // Every named rule has a line, and dt-eq, which needs no rule.
+    // Every named rule has a line, and so has dt-eq, which needs no rule.
     let named: std::collections::BTreeSet<&str> = rules
         .match_indices("#[name(\"")
         .map(|(at, mark)| rules[at + mark.len()..].split('"').next().unwrap())
@@ -278,7 +278,7 @@ fn every_rule_of_owl_2_rl_derives_what_it_should() {
 }
 
 #[test]
-fn an_ontology_that_contradicts_itself_is_refused_with_the_proof() {
+fn an_inconsistent_ontology_is_refused_with_the_proof() {
     let mut ontology = ontology_of(&root().join("moved_object_passes"));
     ontology.triples.extend(statements("w:Body owl:disjointWith w:Robot . w:robot a w:Body"));
     let faults = RuleBook::prepare(&ontology).unwrap_err().to_string();
@@ -288,7 +288,7 @@ fn an_ontology_that_contradicts_itself_is_refused_with_the_proof() {
     );
 }
 
-/// The fenced blocks of the README: the words behind the fence, and the text.
+/// The fenced blocks of the README: the words after the fence, and the text.
 fn examples() -> Vec<(String, String)> {
     let text = std::fs::read_to_string(root().join("../../rules/README.md")).unwrap();
     let parts: Vec<&str> = text.split("```").collect();
@@ -302,7 +302,7 @@ fn examples() -> Vec<(String, String)> {
         .collect()
 }
 
-/// Every example of `rules/README.md` does what it is for, on the scene of a successful pick.
+/// Every example of `rules/README.md` works on the scene of a successful pick.
 #[test]
 fn every_example_of_the_readme_runs() {
     let facts = facts_of(&root().join("moved_object_passes"));
@@ -348,9 +348,9 @@ fn every_example_of_the_readme_runs() {
     assert_eq!(counts["prolog property"], 3);
 }
 
-/// Large, deep and strange texts are refused or read, without a panic and soon.
+/// Large, deep and invalid texts are refused or read, quickly and without a panic.
 #[test]
-fn hostile_texts_are_bounded() {
+fn hostile_texts_are_handled_in_bounded_time() {
     let long_chain = format!("p(1) . q(?x) :- p(?y), ?x = {}1 .", "?y + ".repeat(20_000));
     let many_rules: String =
         (0..1000).map(|n| format!("p{}(?x) :- p{n}(?x) .\n", n + 1)).collect::<String>() + "p0(1) .";

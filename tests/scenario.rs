@@ -1,4 +1,4 @@
-//! Scenes: nothing overlaps, the same choices give the same scene, and what can't be placed is said.
+//! Scenes: no overlaps, determinism, and reports of objects that can't be placed.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ fn space_of(path: &Path) -> Space {
     Space::new(&campaign, &ontology).unwrap_or_else(|found| panic!("{found}"))
 }
 
-/// The space of a configuration in which only the objects differ.
+/// The space of a configuration that varies only the objects.
 fn space(targets: &str, others: &str, count: &str, surfaces: &str) -> Space {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("c.toml");
@@ -34,7 +34,7 @@ fn crowded() -> Space {
     space(r#"["glass", "mug", "spoon"]"#, ALL, "[0, 7]", r#"["coffee_table", "table", "mini_coffee_table"]"#)
 }
 
-/// What two scenes have in common when they are the same, to the last bit.
+/// The parts of a scene that must be equal in equal scenes, to the last bit.
 fn shown(scene: &Scene) -> String {
     let objects: Vec<String> = scene
         .objects
@@ -44,7 +44,7 @@ fn shown(scene: &Scene) -> String {
     format!("{} {objects:?} {:?} {:?}", scene.world, scene.robot.base, scene.designators)
 }
 
-/// Parry's own shapes, built here once more from the parts of the model.
+/// Parry's own shapes, built independently from the parts of the model.
 fn shapes(object: &SceneObject) -> Vec<(ParryPose, Box<dyn ParryShape>)> {
     let solids = object.model.solids();
     let build = |pose: &Pose, shape: &Shape| -> (ParryPose, Box<dyn ParryShape>) {
@@ -94,7 +94,7 @@ fn nothing_overlaps_in_500_scenes() {
 }
 
 #[test]
-fn everything_stands_wholly_on_its_surface() {
+fn every_object_is_entirely_on_its_surface() {
     let space = crowded();
     for index in 0..500 {
         let Ok(scene) = scenario::draw(&space, 0, &mut Choices::random(5, index)) else { continue };
@@ -116,7 +116,7 @@ fn everything_stands_wholly_on_its_surface() {
 }
 
 #[test]
-fn the_same_choices_give_the_same_scene_and_a_record_gives_it_again() {
+fn the_same_choices_and_their_record_give_the_same_scene() {
     let space = crowded();
     for index in 0..100 {
         let mut first = Choices::random(3, index);
@@ -139,7 +139,7 @@ fn the_same_choices_give_the_same_scene_and_a_record_gives_it_again() {
 }
 
 #[test]
-fn scenes_differ_from_index_to_index() {
+fn scenes_of_different_indices_differ() {
     let space = crowded();
     let scenes: std::collections::BTreeSet<String> = (0..200)
         .filter_map(|index| scenario::draw(&space, 0, &mut Choices::random(3, index)).ok())
@@ -148,7 +148,7 @@ fn scenes_differ_from_index_to_index() {
     assert!(scenes.len() > 180);
 }
 
-/// The simplest scene is the one of an empty record: the first models, in the middle, not turned, and nothing else.
+/// The simplest scene is that of an empty record: the first models, in the middle, not rotated, and no other objects.
 #[test]
 fn an_empty_record_is_the_simplest_scene() {
     let space = crowded();
@@ -163,7 +163,7 @@ fn an_empty_record_is_the_simplest_scene() {
     assert_eq!(scene.designators["objectSurface"], ["coffee_table_1"]);
 }
 
-/// Neighbours that a test insists on stand around the middle, so that simple scenes of several objects exist.
+/// Nominal neighbours are placed around the middle, so that simple scenes of several objects exist.
 #[test]
 fn the_simplest_scene_of_several_objects_has_room_for_all() {
     for count in 1..=5 {
@@ -174,9 +174,9 @@ fn the_simplest_scene_of_several_objects_has_room_for_all() {
     }
 }
 
-/// Taking choices from a record one by one gives a scene or a discard, never a crash, and never an overlap.
+/// Removing choices from a record one by one gives a scene or a discard, without a crash or an overlap.
 #[test]
-fn any_part_of_a_record_gives_a_sound_scene() {
+fn any_part_of_a_record_gives_a_valid_scene() {
     let space = crowded();
     let mut full = Choices::random(8, 1);
     let _ = scenario::draw(&space, 0, &mut full);
@@ -213,7 +213,7 @@ fn values_stay_in_their_ranges() {
     assert!(mass.0 >= 0.7 && mass.0 < 0.71 && mass.1 <= 1.3 && mass.1 > 1.29, "the whole range: {mass:?}");
 }
 
-/// Ids are unique and speak of the model, also where several objects are of one model.
+/// Ids are unique and contain the model's name, also if several objects share a model.
 #[test]
 fn ids_are_unique() {
     let space = space(r#"["glass"]"#, r#"["glass"]"#, "3", r#"["coffee_table"]"#);
@@ -224,20 +224,20 @@ fn ids_are_unique() {
 }
 
 #[test]
-fn a_surface_that_is_too_full_is_a_discard_that_says_what_found_no_place() {
+fn a_full_surface_gives_a_discard_that_names_the_unplaced_object() {
     let space = space(r#"["glass"]"#, r#"["plate"]"#, "40", r#"["coffee_table"]"#);
     let mut choices = Choices::random(1, 0);
     let discard = scenario::draw(&space, 0, &mut choices).unwrap_err();
     assert_eq!((discard.model.as_str(), discard.tries), ("plate", 50));
     assert_eq!(discard.to_string(), format!("found no free place for `plate` ({}) in 50 tries", discard.name));
-    // Every try is on record.
+    // Every try is recorded.
     let tries = choices.made().iter().filter(|choice| choice.name == format!("{}.x", discard.name)).count();
     assert_eq!(tries, 50);
 }
 
-/// A hollow wall counts where it is, not the box around it; and the clearance is kept between walls too.
+/// A hollow wall counts at its true position, not as its bounding box; and the clearance is kept between walls too.
 #[test]
-fn exact_shapes_decide_where_boxes_touch() {
+fn exact_shapes_decide_if_bounding_boxes_overlap() {
     let campaign = config::load(Path::new("configs/pick.toml"), &Overrides::default()).unwrap();
     let model = |name: &str| -> &ObjectModel { &campaign.models[name] };
     let at = |name: &str, x: f64, y: f64| Solid::new(model(name), &Pose::upright([x, y, 0.0], 0.0));

@@ -1,4 +1,4 @@
-//! The schema of configurations and the program accept and refuse the same.
+//! The schema of configurations and the program accept and refuse the same texts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,7 +12,7 @@ use toml::Value;
 
 use crate::support::{actcheck, copy_made_history, foreign, root, stderr, stdout};
 
-/// A configuration with every key that there is.
+/// A configuration with every key.
 const EVERY_KEY: &str = r#"
 tests = [["MoveTo", "PerceivePlane", "Pick", "Place"]]
 test_count = 2
@@ -76,7 +76,7 @@ trace = "00"
 choices = { "target.yaw" = 0.5, "target.model" = "glass", "other.count" = 2, other = { 1 = { left_out = true, x = [0.1, 0.2] } } }
 "#;
 
-/// The least that a configuration has, and the tables of which keys have defaults.
+/// The smallest configuration, and the tables whose keys have defaults.
 const FEW_KEYS: &str = r#"
 tests = [["Pick"]]
 test_count = 1
@@ -108,18 +108,18 @@ fn load(folder: &Path, table: &toml::Table) -> Result<Campaign, Diagnostics> {
     config::load(&path, &Overrides::default())
 }
 
-/// The faults of the program, without warnings: code and message.
+/// The program's errors, without warnings: code and message.
 fn faults(folder: &Path, table: &toml::Table) -> Vec<(&'static str, String)> {
     let found = load(folder, table).err().unwrap_or_default();
     let errors = found.iter().filter(|fault| fault.severity == Severity::Error);
     errors.map(|fault| (fault.code, fault.message.clone())).collect()
 }
 
-/// A part of the schema with what it refers to.
+/// A part of the schema with its reference resolved.
 fn resolved(part: &Json) -> Json {
     let mut part = part.clone();
     let Some(reference) = part.get("$ref").and_then(Json::as_str).map(str::to_owned) else { return part };
-    let target = schema().pointer(reference.trim_start_matches('#')).expect("the reference leads somewhere").clone();
+    let target = schema().pointer(reference.trim_start_matches('#')).expect("the reference can be resolved").clone();
     let own = part.as_object_mut().unwrap();
     for (key, value) in target.as_object().unwrap() {
         own.entry(key.clone()).or_insert(value.clone());
@@ -154,7 +154,7 @@ fn leaves() -> Vec<(Vec<String>, Json)> {
 
 /// The table at a path.
 fn table_at<'a>(root: &'a mut toml::Table, path: &[String]) -> &'a mut toml::Table {
-    path.iter().fold(root, |table, key| table[key].as_table_mut().expect("there is such a table"))
+    path.iter().fold(root, |table, key| table[key].as_table_mut().expect("the table exists"))
 }
 
 fn with(text: &str, path: &[String], value: Value) -> toml::Table {
@@ -164,12 +164,12 @@ fn with(text: &str, path: &[String], value: Value) -> toml::Table {
     table
 }
 
-/// A value of a type that no key takes.
+/// A value of a type that no key accepts.
 fn moment() -> Value {
     Value::Datetime("1979-05-27T07:32:00Z".parse().unwrap())
 }
 
-/// Configurations that are refused by the schema, by file name with the reason; `None` where Python can't be had.
+/// Configurations refused by the schema, by file name with the reason. Returns `None` if Python is not available.
 fn refused_by_schema(folder: &Path) -> Option<BTreeMap<String, String>> {
     let output = Command::new(foreign::python()?)
         .arg(root().join("tests/foreign/check_campaigns.py"))
@@ -190,7 +190,7 @@ fn the_program_prints_the_schema() {
 }
 
 #[test]
-fn every_key_of_the_schema_is_known_to_the_program_and_has_a_description() {
+fn every_schema_key_is_accepted_by_the_program_and_described() {
     let folder = tempfile::tempdir().unwrap();
     let found = load(folder.path(), &parsed(EVERY_KEY));
     assert!(found.is_ok(), "{}", found.unwrap_err());
@@ -209,7 +209,7 @@ fn every_key_of_the_schema_is_known_to_the_program_and_has_a_description() {
     }
 }
 
-/// What the program says about an unknown key names the keys that it knows.
+/// The program's message about an unknown key lists the known keys.
 #[test]
 fn every_key_of_the_program_is_in_the_schema() {
     let folder = tempfile::tempdir().unwrap();
@@ -217,7 +217,8 @@ fn every_key_of_the_program_is_in_the_schema() {
         let unknown: Vec<String> = path.iter().cloned().chain(["qqqqqqqqqqqq".to_owned()]).collect();
         let said = load(folder.path(), &with(EVERY_KEY, &unknown, Value::Boolean(true))).unwrap_err();
         let fault = said.iter().find(|fault| fault.code == "C003").unwrap_or_else(|| panic!("{path:?}: {said}"));
-        let known = fault.help.as_deref().unwrap().strip_prefix("known names: ").expect("the key is like no other");
+        let known =
+            fault.help.as_deref().unwrap().strip_prefix("known names: ").expect("the key resembles no known key");
         let known: BTreeSet<&str> = known.split(", ").collect();
         let properties = part["properties"].as_object().unwrap();
         assert_eq!(known, properties.keys().map(String::as_str).collect(), "[{}]", path.join("."));
@@ -225,14 +226,14 @@ fn every_key_of_the_program_is_in_the_schema() {
 }
 
 #[test]
-fn names_of_strategies_are_those_of_the_program() {
+fn strategy_names_equal_the_programs() {
     let names = schema()["properties"]["search"]["properties"]["strategy"]["enum"].clone();
     assert_eq!(names, Json::from(Strategy::ALL.map(Strategy::name).to_vec()));
 }
 
-/// A configuration in which every default of the schema is written means the same as one without them.
+/// A configuration with every default of the schema written out equals one without them.
 #[test]
-fn defaults_of_the_schema_are_those_of_the_program() {
+fn schema_defaults_equal_the_programs() {
     let folder = tempfile::tempdir().unwrap();
     let (few, mut all) = (parsed(FEW_KEYS), parsed(FEW_KEYS));
     let mut written = 0;
@@ -260,7 +261,7 @@ fn defaults_of_the_schema_are_those_of_the_program() {
 }
 
 #[test]
-fn shipped_new_and_exported_configurations_fit_the_schema() {
+fn shipped_new_and_exported_configurations_match_the_schema() {
     let folder = tempfile::tempdir().unwrap();
     let here = |name: &str| folder.path().join(name);
     for config in Files::Disk.list(&root().join("configs")) {
@@ -273,7 +274,7 @@ fn shipped_new_and_exported_configurations_fit_the_schema() {
     let history = here("h").display().to_string();
     copy_made_history(Path::new(&history));
     let list = stdout(&actcheck(root(), &["list", "--history", &history, "--format", "csv"]));
-    let run = list.lines().nth(1).and_then(|line| line.split(',').next()).expect("there is a run");
+    let run = list.lines().nth(1).and_then(|line| line.split(',').next()).expect("the campaign has a run");
     let case = here("case.toml").display().to_string();
     let export =
         actcheck(root(), &["export", run, "--history", &history, "--config", "configs/quick.toml", "-o", &case]);
@@ -284,7 +285,7 @@ fn shipped_new_and_exported_configurations_fit_the_schema() {
     }
 }
 
-/// Values at the edge of what a key takes, and beyond.
+/// Values at the limits of a key's range, and beyond.
 fn trials(part: &Json) -> Vec<Value> {
     if let Some(forms) = part.get("anyOf").and_then(Json::as_array) {
         return forms.iter().flat_map(trials).collect();
@@ -329,7 +330,8 @@ fn lists(part: &Json) -> Vec<Value> {
     lists
 }
 
-/// Changed configurations with a word for each change: every key with values at its edges and of wrong types, unknown and missing keys.
+/// Changed configurations with a description of each change: every key with values at its limits and of wrong types,
+/// unknown and missing keys.
 fn changed() -> Vec<(String, toml::Table)> {
     let mut changed = Vec::new();
     for (path, part) in leaves() {
@@ -359,7 +361,7 @@ fn changed() -> Vec<(String, toml::Table)> {
     changed
 }
 
-/// Faults that no schema can see: relations between keys, files and names that must exist, and durations.
+/// Faults that a schema can't express: relations between keys, existence of files and names, and durations.
 fn is_beyond_a_schema(code: &str, message: &str) -> bool {
     let names_and_files = ["C008", "C009", "C010", "C011", "C012", "C020", "C021", "C031", "C034", "C015"];
     names_and_files.contains(&code)

@@ -1,4 +1,4 @@
-//! Campaigns whose scenes a search chooses.
+//! Campaigns whose scenes are chosen by a search.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ fn pick(runs: u32, seed: u64, repeat: u32, strategy: Strategy) -> Env {
     Env::prepare(Path::new("configs/pick.toml"), &overrides).unwrap()
 }
 
-/// Where in its range a recorded choice lies.
+/// The quantile of a recorded choice in its range.
 fn quantile(choice: &Choice) -> f64 {
     match choice.kind {
         ChoiceKind::Index { of } => (choice.value + 0.5) / of as f64,
@@ -38,8 +38,8 @@ fn quantile(choice: &Choice) -> f64 {
     }
 }
 
-/// What a made-up robot does in a planned run: it fails in the most crowded fifth of the scenes where the base stands in
-/// the nearer quarter. Where the base stands far to one side, nothing can be built: nothing of that is simulated.
+/// The result of a made-up robot in a planned run: it fails in the most crowded fifth of the scenes with the base in
+/// the nearer quarter. If the base is far to one side, the scene can't be built and is not simulated.
 fn made_up(env: &Env, planned: &Planned) -> RunResult {
     for attempt in 0.. {
         let mut choices = planned.choices(env.campaign.seed, attempt);
@@ -56,25 +56,25 @@ fn made_up(env: &Env, planned: &Planned) -> RunResult {
         let outcomes = ["CloseObject", "MovedObject"].map(|name| said(&format!("http://actions#{name}")));
         return RunResult { index: planned.index, discards: attempt, outcomes: outcomes.to_vec() };
     }
-    unreachable!("some scene can be built")
+    unreachable!("some scenes can be built")
 }
 
-/// Every batch of a schedule, with what the made-up robot did.
+/// Every batch of a schedule, with the results of the made-up robot.
 fn made_up_campaign(env: &Env) -> (Vec<Vec<Planned>>, Box<dyn Schedule>) {
     let mut schedule = schedule_of(env);
-    let (mut batches, mut told) = (Vec::new(), Vec::new());
+    let (mut batches, mut results) = (Vec::new(), Vec::new());
     loop {
-        let batch = schedule.next_batch(&told);
+        let batch = schedule.next_batch(&results);
         if batch.is_empty() {
             return (batches, schedule);
         }
-        told = batch.iter().map(|planned| made_up(env, planned)).collect();
+        results = batch.iter().map(|planned| made_up(env, planned)).collect();
         batches.push(batch);
     }
 }
 
 #[test]
-fn what_is_asked_depends_on_the_seed_and_on_what_was_told() {
+fn chosen_scenes_depend_on_the_seed_and_the_results() {
     for strategy in Strategy::ALL {
         let env = pick(90, 3, 1, strategy);
         let (batches, _) = made_up_campaign(&env);
@@ -83,24 +83,24 @@ fn what_is_asked_depends_on_the_seed_and_on_what_was_told() {
         assert_eq!(indices, (0..90).collect::<Vec<_>>(), "{strategy:?}");
         if strategy != Strategy::Random {
             assert!(batches.iter().all(|batch| batch.len() <= GENERATION), "{strategy:?}");
-            // Random scenes are not planned but drawn: by the seed, when they are made.
+            // Random scenes are not planned but drawn from the seed, when they are made.
             assert_ne!(batches, made_up_campaign(&pick(90, 4, 1, strategy)).0, "{strategy:?}");
         }
-        // A robot that never fails, and says by how much, leads elsewhere.
+        // A robot that never fails, with margins, leads to other scenes.
         let mut other = schedule_of(&env);
-        let mut told = Vec::new();
+        let mut results = Vec::new();
         let mut same = true;
         for batch in &batches {
-            let asked = other.next_batch(&told);
+            let asked = other.next_batch(&results);
             same &= asked == *batch;
-            told = asked
+            results = asked
                 .iter()
                 .map(|planned| {
-                    let mut told = made_up(&env, planned);
-                    told.outcomes.iter_mut().for_each(|outcome| {
+                    let mut results = made_up(&env, planned);
+                    results.outcomes.iter_mut().for_each(|outcome| {
                         (outcome.outcome, outcome.margin) = (Outcome::Passed, Some(1.0 + planned.index as f64));
                     });
-                    told
+                    results
                 })
                 .collect();
         }
@@ -108,9 +108,9 @@ fn what_is_asked_depends_on_the_seed_and_on_what_was_told() {
     }
 }
 
-/// Of the scenes that can be built 0.2 · 0.25 fail, whatever was looked at and however many can't be built.
+/// Of the scenes that can be built, 0.2 · 0.25 fail, whichever were sampled and however many can't be built.
 #[test]
-fn weighted_rates_are_those_of_scenes_as_configured() {
+fn weighted_rates_estimate_the_configured_distribution() {
     const SEEDS: u64 = 60;
     for strategy in [Strategy::CrossEntropy, Strategy::Bandit, Strategy::Boundary] {
         let (mut mean, mut held, mut failing) = (0.0, 0, 0);
@@ -129,13 +129,13 @@ fn weighted_rates_are_those_of_scenes_as_configured() {
         }
         assert!((mean - 0.05).abs() < 0.012, "{strategy:?}: {mean}");
         assert!(held * 100 >= SEEDS * 93, "{strategy:?}: {held} of {SEEDS}");
-        // Random would find 0.05 · 110 · 60 = 330, with a standard deviation of 18.
+        // Random search would find 0.05 · 110 · 60 = 330, with a standard deviation of 18.
         assert!(failing > 390, "{strategy:?}: {failing}");
     }
 }
 
 #[test]
-fn repetitions_of_a_searched_scene_share_it_and_keep_their_noise() {
+fn repetitions_of_a_searched_scene_share_it_and_differ_in_noise() {
     let env = pick(30, 5, 3, Strategy::Bandit);
     let (batches, schedule) = made_up_campaign(&env);
     let planned: Vec<&Planned> = batches.iter().flatten().collect();
@@ -146,7 +146,7 @@ fn repetitions_of_a_searched_scene_share_it_and_keep_their_noise() {
         assert!(steering.quantiles.keys().all(|name| !name.starts_with("sense.")), "{steering:?}");
         assert_eq!(scene.iter().map(|run| run.repetition).collect::<Vec<_>>(), [Some(0), Some(1), Some(2)]);
     }
-    // Scenes count, not runs.
+    // Counts scenes, not runs.
     assert!(schedule.rates().iter().all(|rate| rate.scenes == 30));
 }
 
@@ -155,13 +155,13 @@ fn json(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)))
 }
 
-/// Real runs: a whole generation and the beginning of the next, at one worker and at two, and from the file.
+/// Real runs: a whole generation and the beginning of the next, with one worker and with two, and from the file.
 #[test]
-fn a_guided_campaign_is_the_same_at_any_number_of_workers() {
+fn a_guided_campaign_is_the_same_with_any_number_of_workers() {
     let project = looking();
     let folder = project.path();
     let run = ["run", "configs/look.toml", "--runs", "22"];
-    let told = json(folder, &[&run[..], &["--strategy", "boundary", "--jobs", "1", "--history", "one"]].concat());
+    let results = json(folder, &[&run[..], &["--strategy", "boundary", "--jobs", "1", "--history", "one"]].concat());
     edit(&folder.join("configs/look.toml"), "[camera]", "[search]\nstrategy = \"boundary\"\n\n[camera]");
     let text = stdout(&actcheck(folder, &[&run[..], &["--jobs", "2", "--history", "two"]].concat()));
     let list = |history: &str| json(folder, &["list", "--history", history]).as_array().unwrap().clone();
@@ -171,7 +171,7 @@ fn a_guided_campaign_is_the_same_at_any_number_of_workers() {
     assert_eq!(of(&one, "weight"), of(&two, "weight"));
     assert_eq!(of(&one, "weight").iter().map(Value::to_string).collect::<BTreeSet<_>>().len(), 22);
 
-    // Killed on the way, and gone on with: what was told before is told again.
+    // Killed and resumed: earlier results are given to the search again.
     let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args([&run[..], &["--jobs", "1", "--history", "three"]].concat())
         .current_dir(folder)
@@ -189,21 +189,24 @@ fn a_guided_campaign_is_the_same_at_any_number_of_workers() {
     let three = list("three");
     assert_eq!(of(&one, "trace_hash"), of(&three, "trace_hash"));
     assert_eq!(of(&one, "weight"), of(&three, "weight"));
-    assert_eq!(resumed["search"], told["search"]);
+    assert_eq!(resumed["search"], results["search"]);
 
     assert!(text.contains("are not failure rates") && text.contains("weighted, 22 scenes"), "{text}");
-    assert_eq!((&told["search"]["strategy"], &told["search"]["counts_are_rates"]), (&"boundary".into(), &false.into()));
-    let rates = told["search"]["weighted_failure_rates"].as_array().unwrap();
+    assert_eq!(
+        (&results["search"]["strategy"], &results["search"]["counts_are_rates"]),
+        (&"boundary".into(), &false.into())
+    );
+    let rates = results["search"]["weighted_failure_rates"].as_array().unwrap();
     assert_eq!(rates.len(), 3);
-    let weights: BTreeMap<String, f64> = told["runs"]
+    let weights: BTreeMap<String, f64> = results["runs"]
         .as_array()
         .unwrap()
         .iter()
         .map(|run| (run["run"].as_str().unwrap().to_owned(), run["weight"].as_f64().unwrap()))
         .collect();
     for rate in rates {
-        // The weights are those of the runs: the rate is their sum over the runs that failed.
-        let failing = told["runs"].as_array().unwrap().iter().filter(|run| {
+        // The weights are those of the runs: the rate is their sum over the failed runs.
+        let failing = results["runs"].as_array().unwrap().iter().filter(|run| {
             let outcomes = run["actions"][0]["outcomes"].as_array().unwrap();
             outcomes.iter().any(|outcome| outcome["property"] == rate["property"] && outcome["outcome"] == "failed")
         });
@@ -218,15 +221,15 @@ fn a_guided_campaign_is_the_same_at_any_number_of_workers() {
 }
 
 #[test]
-fn a_strategy_that_is_none_is_refused_with_the_names() {
+fn an_unknown_strategy_is_refused_with_the_known_names() {
     let refused = actcheck(Path::new("."), &["run", "configs/pick.toml", "--strategy", "boundry"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("did you mean `boundary`"), "{}", stderr(&refused));
 }
 
-/// Parts don't hear of each other, and the width of an interval of counted runs says nothing here.
+/// Shards do not share results, and the interval width of counted runs does not apply here.
 #[test]
-fn what_a_search_for_failures_can_not_be_is_refused() {
+fn options_that_conflict_with_a_search_are_refused() {
     let project = project();
     for other in [["--shard", "1/2"], ["--until-width", "0.2"]] {
         let refused =
@@ -238,5 +241,5 @@ fn what_a_search_for_failures_can_not_be_is_refused() {
         ["run", "configs/pick.toml", "--runs", "2", "--strategy", "halton", "--shard", "1/2", "--history", "h"];
     assert_ne!(actcheck(project.path(), &allowed).status.code(), Some(2));
     let refused = actcheck(project.path(), &["run", "--resume", "--strategy", "bandit", "--history", "h"]);
-    assert_eq!(refused.status.code(), Some(2), "a campaign goes on as it was begun");
+    assert_eq!(refused.status.code(), Some(2), "a campaign resumes with its strategy");
 }

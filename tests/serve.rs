@@ -1,4 +1,4 @@
-//! `actcheck serve` from outside: what it answers, and what it refuses.
+//! `actcheck serve` from outside: its answers and refusals.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
@@ -12,11 +12,11 @@ use tempfile::TempDir;
 
 use crate::support::{actcheck, copy_made_history, foreign, made_history, signal, stderr, stdout};
 
-/// A server that ends with the test.
+/// A server that is stopped at the end of the test.
 struct Server {
     process: Child,
     port: u16,
-    /// Its history, unless others use it too.
+    /// Its private history, if it has one.
     _history: Option<TempDir>,
 }
 
@@ -36,7 +36,7 @@ impl Server {
         Self { process, port, _history: None }
     }
 
-    /// A server with a history of its own.
+    /// A server with a private history.
     fn alone(options: &[&str]) -> Self {
         let history = made_history();
         let mut server = Self::start(history.path(), options);
@@ -50,7 +50,7 @@ impl Server {
         stream
     }
 
-    /// Sends bytes as they are.
+    /// Sends raw bytes.
     fn raw(&self, request: &[u8]) -> Reply {
         let mut stream = self.connect();
         stream.write_all(request).unwrap();
@@ -74,7 +74,7 @@ impl Server {
         self.request("GET", target, &[], b"")
     }
 
-    /// Asks by POST, the query as it is.
+    /// Sends the query by POST, unencoded.
     fn ask(&self, query: &str, accept: &str) -> Reply {
         let headers = [("Content-Type", "application/sparql-query"), ("Accept", accept)];
         self.request("POST", "/sparql", &headers, query.as_bytes())
@@ -119,13 +119,13 @@ impl Reply {
 
 /// A server with narrow limits.
 fn limited() -> Server {
-    Server::alone(&["--max-secs", "3", "--max-rows", "1000", "--max-queries", "64"])
+    Server::alone(&["--max-time", "3s", "--max-rows", "1000", "--max-queries", "64"])
 }
 
 const RUNS: &str = "SELECT ?run ?index { ?run a act:Run ; act:index ?index } ORDER BY ?index";
 
 #[test]
-fn answers_come_in_the_form_that_is_wanted() {
+fn answers_have_the_requested_media_type() {
     let server = limited();
     for (accept, media_type, piece) in [
         ("", "application/sparql-results+json", "\"vars\":[\"run\",\"index\"]"),
@@ -157,7 +157,7 @@ fn answers_come_in_the_form_that_is_wanted() {
 }
 
 #[test]
-fn a_query_comes_in_three_ways() {
+fn a_query_can_be_sent_in_three_ways() {
     let server = limited();
     let form = ("Content-Type", "application/x-www-form-urlencoded");
     let encoded = "query=ASK%20%7B%20%3Frun%20a%20act%3ARun%20%7D";
@@ -174,7 +174,7 @@ fn a_query_comes_in_three_ways() {
 }
 
 #[test]
-fn what_is_no_query_is_told_with_its_place() {
+fn invalid_queries_are_refused_with_their_place() {
     let server = limited();
     let reply = server.ask("SELECT * WHERE { ?a ?b }", "*/*");
     assert_eq!(reply.status, 400);
@@ -208,9 +208,9 @@ fn updates_are_refused() {
     assert_eq!(count(), before);
 }
 
-/// Another host is never asked: a listener that would be is not.
+/// No other host is contacted: a listener at the address gets no connection.
 #[test]
-fn service_and_graphs_from_elsewhere_are_refused() {
+fn service_clauses_and_remote_graphs_are_refused() {
     let server = limited();
     let other = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     other.set_nonblocking(true).unwrap();
@@ -220,19 +220,19 @@ fn service_and_graphs_from_elsewhere_are_refused() {
         assert_eq!(reply.status, 403, "{}", reply.body);
         assert!(reply.body.contains("H017"), "{}", reply.body);
     }
-    // Escapes hide the keyword from a reader, and nobody is asked all the same.
+    // Escapes hide the keyword from a reader, and still no host is contacted.
     let hidden = server.ask(&format!("SELECT * {{ \\u0053ERVICE SILENT <{there}> {{ ?s ?p ?o }} }}"), "text/csv");
     assert!(hidden.status != 200 || hidden.body.lines().count() <= 2, "{hidden:?}");
     for from in [there.as_str(), "file:///etc/passwd"] {
         let reply = server.ask(&format!("SELECT * FROM <{from}> {{ ?s ?p ?o }}"), "text/csv");
         assert_eq!((reply.status, reply.body.lines().count()), (200, 1), "such a graph is empty: {}", reply.body);
     }
-    assert!(other.accept().is_err(), "somebody was asked");
+    assert!(other.accept().is_err(), "a connection was made");
 }
 
-/// Joins that would take days, in which the evaluator does not look whether it was stopped, and such as crash it.
+/// Joins that would take days, in which the evaluator does not check for cancellation, and queries that crash it.
 #[test]
-fn long_queries_are_ended_and_others_are_answered_meanwhile() {
+fn long_queries_are_stopped_and_do_not_block_others() {
     let server = limited();
     let began = Instant::now();
     let long = [
@@ -245,7 +245,7 @@ fn long_queries_are_ended_and_others_are_answered_meanwhile() {
         assert_eq!(server.ask("ASK {}", "*/*").status, 200);
         for reply in asked {
             let reply = reply.join().unwrap();
-            // Whichever is spent first, time or memory.
+            // Either limit may be reached first, time or memory.
             assert!([500, 504].contains(&reply.status), "{}", reply.body);
             assert!(reply.body.contains("took"), "{}", reply.body);
         }
@@ -255,7 +255,7 @@ fn long_queries_are_ended_and_others_are_answered_meanwhile() {
 }
 
 #[test]
-fn a_query_that_crashes_the_evaluator_harms_nobody() {
+fn a_query_that_crashes_the_evaluator_does_not_stop_the_server() {
     let server = limited();
     let nested = format!("SELECT * {{ FILTER({}1{}) }}", "(".repeat(100_000), ")".repeat(100_000));
     let reply = server.ask(&nested, "*/*");
@@ -282,7 +282,7 @@ fn huge_answers_are_refused() {
 }
 
 #[test]
-fn path_tricks_lead_nowhere() {
+fn path_traversal_is_refused() {
     let server = limited();
     for target in [
         "/etc/passwd",
@@ -303,7 +303,7 @@ fn path_tricks_lead_nowhere() {
         assert!([400, 404].contains(&reply.status), "{target}: {} {}", reply.status, reply.body);
         assert!(!reply.body.contains("root:") && !reply.body.contains("actcheck history"), "{target}: {}", reply.body);
     }
-    // A proxy's form of target, and what is none.
+    // The absolute form of a request target, and invalid targets.
     assert!(server.get("http://evil.example/sparql").status >= 400);
     for raw in [
         "GET /\r\n\r\n",
@@ -326,22 +326,22 @@ fn huge_bodies_are_refused_unread() {
             "POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/sparql-query\r\n{length}\r\n\r\n"
         )
     };
-    // Announced, and never sent.
+    // Announced and never sent.
     assert_eq!(server.raw(headers("Content-Length: 1000000000000").as_bytes()).status, 413);
     // Sent piece by piece, without a length.
     let mut stream = server.connect();
     stream.write_all(headers("Transfer-Encoding: chunked").as_bytes()).unwrap();
     let piece = [format!("{:x}\r\n", 1 << 16).into_bytes(), vec![b' '; 1 << 16], b"\r\n".to_vec()].concat();
-    // The server closes before everything was sent.
+    // The server closes before everything is sent.
     let sent = (0..1000).take_while(|_| stream.write_all(&piece).is_ok()).count();
     assert!(sent < 1000, "64 MB were read");
     assert_eq!(server.ask("ASK {}", "*/*").status, 200);
 }
 
 #[test]
-fn slow_clients_are_let_go_and_hold_nobody_up() {
+fn slow_clients_are_disconnected_and_do_not_block_others() {
     let server = limited();
-    // More than there are processors; none of them ever says what it wants.
+    // More connections than processors; none of them ever sends a complete request.
     let mut silent: Vec<TcpStream> = (0..20).map(|_| server.connect()).collect();
     for stream in &mut silent {
         stream.write_all(b"POST /sparql HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n").unwrap();
@@ -352,14 +352,14 @@ fn slow_clients_are_let_go_and_hold_nobody_up() {
     assert_eq!(server.ask("ASK {}", "*/*").status, 200);
     assert_eq!(Reply::read(half).status, 408);
     for stream in silent {
-        // Closed, with an answer or without.
+        // Closed, with or without an answer.
         let status = Reply::read(stream).status;
         assert!(status == 0 || status >= 400, "{status}");
     }
 }
 
 #[test]
-fn pages_of_other_sites_are_refused() {
+fn requests_from_other_sites_are_refused() {
     let server = limited();
     let target = "/sparql?query=ASK%7B%7D";
     let with = |name, value| server.request("GET", target, &[(name, value)], b"").status;
@@ -368,15 +368,18 @@ fn pages_of_other_sites_are_refused() {
     assert_eq!(with("Origin", "http://evil.example"), 403);
     assert_eq!(with("Origin", "null"), 403);
     assert_eq!(with("Origin", &format!("http://localhost:{}", server.port)), 200);
-    assert_eq!(server.raw(b"GET / HTTP/1.1\r\n\r\n").status, 400, "no host at all");
+    assert_eq!(server.raw(b"GET / HTTP/1.1\r\n\r\n").status, 400, "missing host");
 }
 
 #[test]
-fn the_page_and_the_report_are_there() {
+fn the_page_and_the_report_are_served() {
     let server = limited();
     let page = server.get("/");
     assert_eq!((page.status, page.media_type()), (200, "text/html; charset=utf-8"));
-    assert!(page.body.contains("data-query=") && page.body.contains("worst-failures"), "the shipped queries are there");
+    assert!(
+        page.body.contains("data-query=") && page.body.contains("worst-failures"),
+        "the page lists the shipped queries"
+    );
     assert!(page.headers["content-security-policy"].contains("script-src 'self'"));
     for asset in ["/style.css", "/query.js"] {
         let reply = server.get(asset);
@@ -389,9 +392,9 @@ fn the_page_and_the_report_are_there() {
     assert_eq!(server.request("POST", "/", &[], b"x").status, 405);
 }
 
-/// Nobody else is kept from the history: it is held only while somebody asks.
+/// The server blocks no other process: it opens the history only while it answers a request.
 #[test]
-fn a_second_process_has_the_history_beside_the_server() {
+fn a_second_process_can_use_the_history_beside_the_server() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("history");
     copy_made_history(&history);
@@ -400,7 +403,7 @@ fn a_second_process_has_the_history_beside_the_server() {
     let before = runs(&server);
     let again = Server::start(&history, &[]);
     assert_eq!(runs(&again), before);
-    // Reading goes on beside reading, also while a query is being answered.
+    // Reading is possible in parallel, also while a query is being answered.
     let reader = actcheck::history::History::open_to_read(&history).unwrap();
     assert_eq!(runs(&server), before);
     drop(reader);
@@ -412,9 +415,9 @@ fn a_second_process_has_the_history_beside_the_server() {
         &["run", "configs/quick.toml", "--runs", "1", "--jobs", "1", "--history", &name],
     );
     assert!(ran.status.code().is_some_and(|code| code < 2), "{}", stderr(&ran));
-    assert_eq!(runs(&server), before + 1, "the new run is there at once");
+    assert_eq!(runs(&server), before + 1, "the new run is visible at once");
 
-    // While another process writes, the answer is to come again.
+    // While another process writes, the answer is 503 with Retry-After.
     let _owner = actcheck::history::History::open_existing(&history).unwrap();
     let reply = server.ask(RUNS, "*/*");
     assert_eq!(
@@ -427,7 +430,7 @@ fn a_second_process_has_the_history_beside_the_server() {
 }
 
 #[test]
-fn ctrl_c_ends_it_in_order() {
+fn ctrl_c_stops_the_server_cleanly() {
     let mut server = Server::alone(&[]);
     signal(server.process.id(), "INT");
     assert_eq!(server.process.wait().unwrap().code(), Some(0));
@@ -435,7 +438,7 @@ fn ctrl_c_ends_it_in_order() {
 }
 
 #[test]
-fn what_can_not_be_served_is_told() {
+fn servers_that_cannot_start_report_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let server = limited();
     let own = made_history();
@@ -444,7 +447,9 @@ fn what_can_not_be_served_is_told() {
         (vec!["serve", "--history", "nowhere"], "H003"),
         (vec!["serve", "--history", &history, "--port", &server.port.to_string()], "X053"),
         (vec!["serve", "--history", &history, "--bind", "192.0.2.1", "--port", "0"], "X053"),
-        (vec!["serve", "--history", &history, "--max-secs", "0"], "seconds"),
+        (vec!["serve", "--history", &history, "--max-secs", "0"], "above zero"),
+        (vec!["serve", "--history", &history, "--max-time", "25h"], "at most a day"),
+        (vec!["serve", "--history", &history, "--max-time", "soon"], "not a duration"),
         (vec!["serve", "--history", &history, "--bind", "localhost"], "invalid"),
     ] {
         let output = actcheck(folder.path(), &arguments);
@@ -453,9 +458,9 @@ fn what_can_not_be_served_is_told() {
     }
 }
 
-/// Clients of other people: curl, and SPARQLWrapper for Python.
+/// External clients: curl, and SPARQLWrapper for Python.
 #[test]
-fn foreign_clients_work() {
+fn external_clients_work() {
     let server = limited();
     let endpoint = format!("http://localhost:{}/sparql", server.port);
     if foreign::has("curl") {
@@ -488,8 +493,8 @@ fn foreign_clients_work() {
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(told["GET"], told["POST"]);
-    assert!(told["GET"].as_u64().is_some_and(|rows| rows > 0));
-    assert!(told["triples"].as_u64().is_some_and(|triples| triples > 0));
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(printed["GET"], printed["POST"]);
+    assert!(printed["GET"].as_u64().is_some_and(|rows| rows > 0));
+    assert!(printed["triples"].as_u64().is_some_and(|triples| triples > 0));
 }

@@ -1,5 +1,5 @@
-//! What the build's scripts do on machines that lack something: made-up roots and search paths, and an apt-get that writes down what it
-//! is asked for.
+//! The build scripts on incomplete machines: made-up roots and search paths, and an apt-get that records its
+//! arguments.
 
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
@@ -15,13 +15,13 @@ const TOOLS: [&str; 29] = [
     "ld", "ln", "mkdir", "mktemp", "mv", "rm", "sed", "sh", "sort", "tail", "tee", "touch", "tr", "uname",
 ];
 
-/// A machine that has only what it is given: a search path of its own, and a root in which libclang is looked for.
+/// A machine with only the given tools: its own search path, and a root in which libclang is searched.
 struct Machine {
     folder: TempDir,
 }
 
 impl Machine {
-    /// With Rust and compilers, and an apt-get that has nothing to install.
+    /// With Rust and compilers, and an apt-get that has no packages.
     fn new() -> Self {
         let machine = Self::bare();
         for tool in ["cc", "c++"] {
@@ -47,7 +47,7 @@ impl Machine {
         self.folder.path().join(name)
     }
 
-    /// A command of this machine's.
+    /// Links a command of the real machine.
     fn has(&self, name: &str) {
         let folders = std::env::var_os("PATH").unwrap();
         let found = std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| path.is_file());
@@ -66,12 +66,12 @@ impl Machine {
         std::fs::remove_file(self.path("bin").join(name)).unwrap();
     }
 
-    /// A library in the folder of LLVM.
+    /// A library in LLVM's folder.
     fn library(&self, name: &str, file: &Path) {
         symlink(file, self.path("root/usr/lib/llvm-14/lib").join(name)).unwrap();
     }
 
-    /// Runs a script of `.ci`, with arguments after its name: its exit code and what it printed to the error stream.
+    /// Runs a script of `.ci`, with arguments after its name. Returns its exit code and its error stream.
     fn run(&self, script: &str, variables: &[(&str, &str)]) -> (i32, String) {
         let mut words = script.split(' ');
         let output = Command::new("/bin/sh")
@@ -90,13 +90,13 @@ impl Machine {
         (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
     }
 
-    /// What apt-get was asked for.
+    /// The arguments of apt-get.
     fn installed(&self) -> String {
         std::fs::read_to_string(self.path("apt")).unwrap_or_default()
     }
 }
 
-/// The libclang that this program was built with, unless it was named by `LIBCLANG_PATH`.
+/// The libclang that this program was built with, unless it was set by `LIBCLANG_PATH`.
 fn libclang() -> Option<PathBuf> {
     let folders =
         ["/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib64", "/usr/lib"].map(PathBuf::from);
@@ -108,22 +108,22 @@ fn libclang() -> Option<PathBuf> {
         (name.starts_with("libclang.so") || name.starts_with("libclang-1")) && name.contains(".so") && path.is_file()
     });
     if found.is_none() {
-        left_out("the search for libclang", "this machine's is in none of the usual folders");
+        left_out("the search for libclang", "libclang is in none of the usual folders");
     }
     found
 }
 
 #[test]
-fn libclang_cpp_is_not_taken_for_libclang() {
+fn libclang_cpp_is_not_mistaken_for_libclang() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang-cpp.so.14", &real);
-    let (code, told) = machine.run("system", &[]);
-    assert_eq!(code, 2, "{told}");
+    let (code, printed) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{printed}");
     assert!(machine.installed().contains("install -y -qq --no-install-recommends clang\n"), "{}", machine.installed());
-    assert!(told.contains("'clang' is installed, but there is no libclang"), "{told}");
+    assert!(printed.contains("'clang' is installed, but there is no libclang"), "{printed}");
 
-    // The same, where apt-get brings it.
+    // The same, if apt-get installs it.
     let brings = format!(
         "case $1 in install) ln -sf '{}' \"$ACTCHECK_ROOT/usr/lib/llvm-14/lib/libclang.so.1\" ;; esac",
         real.display()
@@ -133,19 +133,19 @@ fn libclang_cpp_is_not_taken_for_libclang() {
 }
 
 #[test]
-fn a_library_of_another_machine_is_not_taken() {
+fn a_library_of_another_architecture_is_not_accepted() {
     let machine = Machine::new();
     let other = machine.path("other");
-    // The head of a 32-bit library.
+    // The header of a 32-bit library.
     std::fs::write(&other, b"\x7fELF\x01\x01\x01").unwrap();
     machine.library("libclang.so.1", &other);
-    let (code, told) = machine.run("system", &[]);
-    assert_eq!(code, 2, "{told}");
-    assert!(told.contains("there is no libclang"), "{told}");
+    let (code, printed) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{printed}");
+    assert!(printed.contains("there is no libclang"), "{printed}");
 }
 
 #[test]
-fn libclang_without_the_name_for_linkers_is_enough() {
+fn libclang_without_the_linker_name_is_enough() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
@@ -154,17 +154,17 @@ fn libclang_without_the_name_for_linkers_is_enough() {
 }
 
 #[test]
-fn a_libclang_path_that_leads_nowhere_is_named() {
+fn a_wrong_libclang_path_is_named() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
-    let (code, told) = machine.run("system", &[("LIBCLANG_PATH", "/nowhere")]);
+    let (code, printed) = machine.run("system", &[("LIBCLANG_PATH", "/nowhere")]);
     assert_eq!(code, 2);
     let expected = "actcheck needs libclang. LIBCLANG_PATH is wrong: there is no libclang at /nowhere. Unset LIBCLANG_PATH, or set \
                     it to the folder that has it\n";
-    assert_eq!(told, expected);
-    assert_eq!(machine.installed(), "", "installing would not change it");
-    // As a folder and as a file it is taken, whatever lies elsewhere.
+    assert_eq!(printed, expected);
+    assert_eq!(machine.installed(), "", "installing packages would not help");
+    // It is accepted as a folder and as a file, wherever else libclang is installed.
     let named = machine.path("root/usr/lib/llvm-14/lib");
     let file = named.join("libclang.so.1");
     for named in [named, file] {
@@ -172,16 +172,16 @@ fn a_libclang_path_that_leads_nowhere_is_named() {
     }
 }
 
-/// As for bindgen: its extra arguments count, and so do the folders of the program clang.
+/// As in bindgen, its extra arguments and the folders of the program clang are used.
 #[test]
-fn headers_are_looked_for_where_bindgen_looks() {
+fn headers_are_searched_where_bindgen_searches() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
     let without_own = ("BINDGEN_EXTRA_CLANG_ARGS", "-nostdinc -Wall");
-    let (code, told) = machine.run("system", &[without_own]);
-    assert_eq!(code, 2, "{told}");
-    assert!(told.contains("lacks clang's own headers, such as stddef.h"), "{told}");
+    let (code, printed) = machine.run("system", &[without_own]);
+    assert_eq!(code, 2, "{printed}");
+    assert!(printed.contains("lacks clang's own headers, such as stddef.h"), "{printed}");
 
     let headers = machine.path("headers");
     std::fs::create_dir(&headers).unwrap();
@@ -200,36 +200,36 @@ fn without_a_compiler_one_is_installed() {
     machine.lacks("cc");
     machine.lacks("c++");
     machine.lacks("clang++");
-    let (code, told) = machine.run("system", &[]);
-    assert_eq!(code, 2, "{told}");
+    let (code, printed) = machine.run("system", &[]);
+    assert_eq!(code, 2, "{printed}");
     assert!(
         machine.installed().contains("install -y -qq --no-install-recommends g++ clang\n"),
         "{}",
         machine.installed()
     );
-    assert!(told.contains("actcheck needs g++ clang: 'g++ clang' is installed, but"), "{told}");
+    assert!(printed.contains("actcheck needs g++ clang: 'g++ clang' is installed, but"), "{printed}");
 }
 
 #[test]
 fn without_apt_the_packages_are_named() {
     let machine = Machine::new();
     machine.lacks("apt-get");
-    let (code, told) = machine.run("system", &[]);
+    let (code, printed) = machine.run("system", &[]);
     assert_eq!(code, 2);
     let expected = "actcheck needs clang: install them with this system's package manager (the names are Debian's), then run this again\n";
-    assert_eq!(told, expected);
+    assert_eq!(printed, expected);
 }
 
 #[test]
-fn packages_that_are_not_necessary_may_be_missing() {
+fn optional_packages_may_be_missing() {
     let Some(real) = libclang() else { return };
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
     machine.lacks("clang++");
     machine.command("apt-get", "echo 'E: Unable to locate package' >&2; exit 100");
-    let (code, told) = machine.run("system", &[]);
-    assert_eq!(code, 0, "{told}");
-    assert!(told.contains("missing, but optional: clang (apt-get could not install it)"), "{told}");
+    let (code, printed) = machine.run("system", &[]);
+    assert_eq!(code, 0, "{printed}");
+    assert!(printed.contains("missing, but optional: clang (apt-get could not install it)"), "{printed}");
 }
 
 #[test]
@@ -238,15 +238,15 @@ fn only_a_wheel_needs_python() {
     let machine = Machine::new();
     machine.library("libclang.so.1", &real);
     assert_eq!(machine.run("system", &[]), (0, String::new()));
-    // Missing, and without its module venv.
+    // Python is missing, then it lacks its module venv.
     for python in [None, Some("exit 1")] {
         python.iter().for_each(|script| machine.command("python3", script));
-        let (code, told) = machine.run("system wheel", &[]);
+        let (code, printed) = machine.run("system wheel", &[]);
         let asked = machine.installed();
         assert!(asked.ends_with("install -y -qq --no-install-recommends python3 python3-venv\n"), "{asked}");
         let expected = "installing from the system: python3 python3-venv\nactcheck needs python3 python3-venv: 'python3 python3-venv' is \
                         installed, and still python3 can't make environments with venv\n";
-        assert_eq!((code, told.as_str()), (2, expected));
+        assert_eq!((code, printed.as_str()), (2, expected));
     }
     machine.command("python3", "exit 0");
     assert_eq!(machine.run("system wheel", &[]), (0, String::new()));
@@ -255,65 +255,69 @@ fn only_a_wheel_needs_python() {
 }
 
 #[test]
-fn rust_is_asked_for_before_anything_else() {
+fn rust_is_checked_before_anything_else() {
     let machine = Machine::new();
     machine.command("rustc", "echo 'rustc 1.70.0 (90c541806 2023-05-31)'");
     let wanted = env!("CARGO_PKG_RUST_VERSION");
-    let (code, told) = machine.run("system", &[]);
+    let (code, printed) = machine.run("system", &[]);
     let expected = format!("actcheck needs Rust {wanted} or later, but this is 1.70.0: run 'rustup update stable'\n");
-    assert_eq!((code, told), (2, expected));
+    assert_eq!((code, printed), (2, expected));
     machine.lacks("cargo");
-    let (code, told) = machine.run("system", &[]);
+    let (code, printed) = machine.run("system", &[]);
     assert_eq!(code, 2);
-    assert!(told.starts_with(&format!("actcheck needs the Rust toolchain, version {wanted} or later")), "{told}");
+    assert!(printed.starts_with(&format!("actcheck needs the Rust toolchain, version {wanted} or later")), "{printed}");
 }
 
 #[test]
 fn a_target_folder_that_cannot_be_written_is_named() {
     let machine = Machine::new();
-    let (code, told) = machine.run("build", &[("CARGO_TARGET_DIR", "/dev/null/target")]);
+    let (code, printed) = machine.run("build", &[("CARGO_TARGET_DIR", "/dev/null/target")]);
     assert_eq!(code, 2);
-    assert!(told.contains("actcheck was not built: /dev/null/target can't be written; set CARGO_TARGET_DIR"), "{told}");
+    assert!(
+        printed.contains("actcheck was not built: /dev/null/target can't be written; set CARGO_TARGET_DIR"),
+        "{printed}"
+    );
 }
 
 #[test]
 fn a_full_disk_is_named_before_and_after() {
     let machine = Machine::new();
     machine.command("df", "echo head; echo 'disk 1 1 204800 1 /'");
-    let (code, told) = machine.run("build", &[]);
+    let (code, printed) = machine.run("build", &[]);
     assert_eq!(code, 2);
-    assert!(told.contains("actcheck was not built: it needs 3000 MB in "), "{told}");
+    assert!(printed.contains("actcheck was not built: it needs 3000 MB in "), "{printed}");
     assert!(
-        told.contains("but only 200 MB are free; free some space, or set CARGO_TARGET_DIR to a folder on another disk"),
-        "{told}"
+        printed
+            .contains("but only 200 MB are free; free some space, or set CARGO_TARGET_DIR to a folder on another disk"),
+        "{printed}"
     );
-    // It fills up while crates compile.
+    // The disk fills up while crates compile.
     machine.command("df", "[ -e \"$MACHINE/full\" ] && free=0 || free=9000000; echo head; echo \"disk 1 1 $free 1 /\"");
     machine.command("cargo", "[ \"$1\" = fetch ] || { touch \"$MACHINE/full\"; exit 101; }");
-    let (code, told) = machine.run("build", &[]);
+    let (code, printed) = machine.run("build", &[]);
     assert_eq!(code, 2);
-    assert!(told.contains("actcheck was not built: no space is left in "), "{told}");
+    assert!(printed.contains("actcheck was not built: no space is left in "), "{printed}");
 }
 
 #[test]
 fn a_missing_network_is_named() {
     let machine = Machine::new();
     machine.command("cargo", "[ \"$1\" != fetch ] || { echo 'error: failed to download' >&2; exit 101; }");
-    let (code, told) = machine.run("build", &[]);
+    let (code, printed) = machine.run("build", &[]);
     assert_eq!(code, 2);
-    assert!(told.contains("error: failed to download"), "{told}");
+    assert!(printed.contains("error: failed to download"), "{printed}");
     assert!(
-        told.contains("actcheck was not built: its crates can't be downloaded: see cargo's message above"),
-        "{told}"
+        printed.contains("actcheck was not built: its crates can't be downloaded: see cargo's message above"),
+        "{printed}"
     );
 }
 
-/// A fault of the code itself is cargo's to explain.
+/// A fault of the code itself is reported by cargo.
 #[test]
 fn a_failed_build_keeps_its_exit_code() {
     let machine = Machine::new();
     machine.command("cargo", "[ \"$1\" = fetch ] || exit 101");
-    let (code, told) = machine.run("build", &[]);
-    assert_eq!(code, 101, "{told}");
-    assert!(told.contains("The first build compiles RocksDB"), "{told}");
+    let (code, printed) = machine.run("build", &[]);
+    assert_eq!(code, 101, "{printed}");
+    assert!(printed.contains("The first build compiles RocksDB"), "{printed}");
 }

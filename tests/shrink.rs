@@ -1,18 +1,18 @@
-//! How good shrinking is, on test functions whose smallest failing lists are known.
+//! Quality of shrinking, on test functions whose smallest failing lists are known.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use actcheck::campaign::shrink::{ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
 use actcheck::data::{Choice, ChoiceKind, Choices};
 
-/// Things in the list at first.
+/// Objects in the initial list.
 const THINGS: usize = 12;
 
 fn removal(thing: usize) -> Choice {
     Choice { name: format!("thing.{thing}.left_out"), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
 }
 
-/// What a test function asks for: which things are there, with two numbers each, and one number of noise.
+/// The draws of a test function: which things exist, two numbers for each, and one number of noise.
 fn draw(choices: &mut Choices) -> (Vec<(usize, f64, f64)>, f64) {
     let mut things = Vec::new();
     for thing in 0..THINGS {
@@ -39,7 +39,8 @@ fn value(things: &[(usize, f64, f64)], wanted: usize) -> f64 {
     things.iter().find(|(thing, ..)| *thing == wanted).map_or(0.0, |(_, x, _)| *x)
 }
 
-/// A name, what fails, how many things and how many special choices are left at best, and tries that must do.
+/// A name, the failure condition, the smallest possible numbers of things and of special choices, and the allowed
+/// tries.
 const CASES: [(&str, Fails, usize, usize, u64); 6] = [
     ("always", |_, _| true, 0, 0, 4),
     ("one thing far out", |things, _| value(things, 7) > 0.2, 1, 1, 30),
@@ -49,7 +50,7 @@ const CASES: [(&str, Fails, usize, usize, u64); 6] = [
     ("any three things", |things, _| things.len() >= 3, 3, 0, 20),
 ];
 
-/// A list that fails, found by chance.
+/// A failing list, found at random.
 fn failing(fails: Fails) -> Vec<Choice> {
     (0..)
         .find_map(|index| {
@@ -83,7 +84,7 @@ fn special(list: &[Choice]) -> usize {
 }
 
 #[test]
-fn known_failures_become_as_small_as_they_can_be() {
+fn known_failures_shrink_to_their_minimum() {
     for (name, fails, least_things, least_special, tries) in CASES {
         let (list, minimal, simulations) = shrunk(fails, 1, 1000);
         assert!(minimal, "{name}");
@@ -95,7 +96,7 @@ fn known_failures_become_as_small_as_they_can_be() {
 }
 
 #[test]
-fn the_number_of_workers_changes_nothing() {
+fn shrinking_is_the_same_with_any_number_of_workers() {
     for (name, fails, ..) in CASES {
         for limit in [3, 10, 1000] {
             assert_eq!(shrunk(fails, 1, limit), shrunk(fails, 3, limit), "{name}, at most {limit}");
@@ -104,7 +105,7 @@ fn the_number_of_workers_changes_nothing() {
 }
 
 #[test]
-fn a_limit_ends_it_with_the_best_so_far() {
+fn a_limit_ends_shrinking_with_the_best_so_far() {
     for (name, fails, ..) in CASES {
         let (list, _, simulations) = shrunk(fails, 2, 5);
         assert!(simulations <= 5, "{name}");

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::support::look::blurred;
 use crate::support::{actcheck, edit, project, signal, stderr, stdout};
 
-/// A project whose picks all fail, which takes its time: what the robot sees lies decimetres beside what is there.
+/// A project whose picks all fail slowly: percepts are decimetres off.
 fn blind() -> tempfile::TempDir {
     let project = project();
     let config = project.path().join("configs/clutter.toml");
@@ -19,7 +19,7 @@ fn blind() -> tempfile::TempDir {
     project
 }
 
-/// The configuration of a project whose runs all fail within moments.
+/// The configuration of a project whose runs all fail quickly.
 const LOOK: &str = "configs/look.toml";
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
@@ -27,14 +27,14 @@ fn json(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)))
 }
 
-/// Names of what failed in each run of a new campaign, with the runs' ids.
+/// Names of the failed properties in each run of a new campaign, with the runs' ids.
 fn campaign(folder: &Path, config: &str) -> Vec<(String, Vec<String>)> {
     let json = json(folder, &["run", config, "--runs", "1"]);
     let runs = json["runs"].as_array().unwrap();
     runs.iter().map(|run| (run["run"].as_str().unwrap().to_owned(), failed(run))).collect()
 }
 
-/// IRIs of what failed in a run, each once, sorted.
+/// IRIs of the failed properties of a run, deduplicated and sorted.
 fn failed(run: &Value) -> Vec<String> {
     let actions = run["actions"].as_array().unwrap();
     let outcomes = actions.iter().flat_map(|action| action["outcomes"].as_array().unwrap());
@@ -49,7 +49,7 @@ fn names(list: &Value) -> Vec<String> {
     list.as_array().unwrap().iter().map(|name| name.as_str().unwrap().to_owned()).collect()
 }
 
-/// The outcomes of a stored run that failed.
+/// The failed properties of a stored run.
 fn failed_of(folder: &Path, run: &str) -> Vec<String> {
     let output = actcheck(folder, &["show", run, "--history", "h", "--format", "csv"]);
     let table = stdout(&output);
@@ -61,7 +61,7 @@ fn failed_of(folder: &Path, run: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_small_run_is_kept_fails_the_same_and_can_be_drawn() {
+fn the_shrunk_run_is_stored_fails_the_same_and_can_be_drawn() {
     let project = blurred();
     let (run, failing) = campaign(project.path(), LOOK).remove(0);
     let small = json(project.path(), &["shrink", &run, "--picture", "small.svg"]);
@@ -80,28 +80,28 @@ fn the_small_run_is_kept_fails_the_same_and_can_be_drawn() {
 }
 
 #[test]
-fn limits_and_repetitions_are_kept_to() {
+fn limits_and_repetitions_are_respected() {
     let project = blurred();
     let (run, failing) = campaign(project.path(), LOOK).remove(0);
-    let short = json(project.path(), &["shrink", &run, "--time", "0.001"]);
+    let short = json(project.path(), &["shrink", &run, "--time", "1ms"]);
     assert_eq!((&short["minimal"], &short["simulations"]), (&false.into(), &0.into()), "{short:#}");
     assert_eq!(short["others"], short["others_before"]);
     let few = json(project.path(), &["shrink", &run, "--trials", "5", "--jobs", "1"]);
     assert!(few["simulations"].as_u64().unwrap() + few["explaining_simulations"].as_u64().unwrap() <= 5, "{few:#}");
-    let noisy = json(project.path(), &["shrink", &run, "--repeat", "2/3", "--trials", "15"]);
+    let noisy = json(project.path(), &["shrink", &run, "--must-fail", "2/3", "--trials", "15"]);
     assert_eq!(noisy["fresh_noise"]["of"], 3, "{noisy:#}");
     assert_eq!(failed_of(project.path(), noisy["run"].as_str().unwrap()), failing);
     if noisy["noise_kept"] == false {
         assert!(noisy["fresh_noise"]["failed"].as_u64().unwrap() >= 2, "confirmed in 2 of 3: {noisy:#}");
     }
-    for wrong in [["--repeat", "4/3"], ["--time", "0"], ["--trials", "0"]] {
+    for wrong in [["--must-fail", "4/3"], ["--repeat", "5"], ["--time", "0"], ["--time", "soon"], ["--trials", "0"]] {
         let output = actcheck(project.path(), &["shrink", &run, wrong[0], wrong[1], "--history", "h"]);
         assert_eq!(output.status.code(), Some(2), "{wrong:?}");
     }
 }
 
 #[test]
-fn one_property_can_be_kept_instead_of_all() {
+fn a_single_failed_property_can_be_preserved() {
     let project = blurred();
     let (run, failing) = campaign(project.path(), LOOK).remove(0);
     let name = failing[0].rsplit('#').next().unwrap();
@@ -112,9 +112,10 @@ fn one_property_can_be_kept_instead_of_all() {
     assert!(stderr(&unknown).contains("S050") && stderr(&unknown).contains(name), "{}", stderr(&unknown));
 }
 
-/// Once the run of a configuration's second test was shrunk to fewer actions, it was taken for a run of the first.
+/// Regression: a run of the configuration's second test that was shrunk to fewer actions was taken for a run of the
+/// first.
 #[test]
-fn a_run_of_several_actions_loses_those_that_the_failure_does_not_need() {
+fn shrinking_drops_unneeded_actions() {
     let project = blurred();
     edit(
         &project.path().join("configs/look.toml"),
@@ -156,7 +157,7 @@ fn interrupt(child: &Child) {
     signal(child.id(), "INT");
 }
 
-/// Waits until a process catches Ctrl-C, as Linux says of it.
+/// Waits until a process catches Ctrl-C, according to `/proc`.
 fn until_it_catches(child: &mut Child) {
     loop {
         let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
@@ -173,7 +174,7 @@ fn until_it_catches(child: &mut Child) {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn an_interrupt_gives_the_smallest_so_far() {
+fn an_interrupt_returns_the_smallest_run_so_far() {
     let project = blind();
     let (run, failing) = campaign(project.path(), "configs/clutter.toml").remove(0);
     let mut child = started(project.path(), &["shrink", &run, "--history", "h", "--format", "json"]);
@@ -186,7 +187,7 @@ fn an_interrupt_gives_the_smallest_so_far() {
 }
 
 #[test]
-fn an_interrupt_while_a_campaign_shrinks_is_told_by_the_exit_code() {
+fn an_interrupt_while_a_campaign_shrinks_sets_the_exit_code() {
     let project = blind();
     let arguments = ["run", "configs/clutter.toml", "--runs", "1", "--shrink", "--history", "h"];
     let mut child = started(project.path(), &arguments);

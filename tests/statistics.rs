@@ -1,4 +1,4 @@
-//! Statistics against values that scipy and statsmodels gave (`tests/data/statistics.py` made them).
+//! Statistics against values computed with scipy and statsmodels (by `tests/data/statistics.py`).
 
 use actcheck::analysis::{PairedTable, TwoByTwo, benjamini_hochberg, holm, wilson};
 use serde_json::Value;
@@ -29,7 +29,7 @@ fn close(found: f64, wanted: &Value, case: &Value) {
     assert!((found - wanted).abs() <= CLOSE, "{found} instead of {wanted}: {case}");
 }
 
-/// Small probabilities must be right in their digits too, not only small.
+/// Small probabilities must be accurate in their relative error too.
 #[track_caller]
 fn close_relatively(found: f64, wanted: &Value, case: &Value) {
     close(found, wanted, case);
@@ -40,7 +40,7 @@ fn close_relatively(found: f64, wanted: &Value, case: &Value) {
 }
 
 #[test]
-fn wilsons_interval_is_the_known_one() {
+fn wilsons_interval_equals_statsmodels() {
     for case in known("wilson") {
         let interval = wilson(count(&case["passed"]), count(&case["runs"])).unwrap();
         close(interval.low, &case["low"], &case);
@@ -49,7 +49,7 @@ fn wilsons_interval_is_the_known_one() {
 }
 
 #[test]
-fn fishers_test_is_the_known_one() {
+fn fishers_test_equals_scipys() {
     for case in known("fisher") {
         let [failed_in, passed_in, failed_out, passed_out] = counts(&case);
         let test = TwoByTwo { failed_in, passed_in, failed_out, passed_out }.fisher();
@@ -62,7 +62,7 @@ fn fishers_test_is_the_known_one() {
 }
 
 #[test]
-fn mcnemars_test_is_the_known_one() {
+fn mcnemars_test_equals_statsmodels() {
     for case in known("paired") {
         let [both, only_first, only_second, neither] = counts(&case);
         let test = PairedTable { both, only_first, only_second, neither }.test();
@@ -71,7 +71,7 @@ fn mcnemars_test_is_the_known_one() {
 }
 
 #[test]
-fn corrections_are_the_known_ones() {
+fn corrections_equal_statsmodels() {
     for case in known("corrected") {
         let numbers = |key: &str| -> Vec<f64> {
             case[key].as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()

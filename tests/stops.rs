@@ -1,4 +1,4 @@
-//! Evaluations end at their budget and when somebody asks for it, and leave nothing half written.
+//! Evaluations stop at their budget and on request, and leave no partial output.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -17,9 +17,9 @@ use actcheck::rules::{Budget, RuleBook};
 
 use crate::support::{root, signal, stderr};
 
-/// Programs that never end, each stuck in another part of an evaluation.
+/// Nonterminating programs, each in another part of an evaluation.
 const ENDLESS: [&str; 2] = [
-    // Rounds without end.
+    // Endless rounds.
     "n(0) .\nn(?y) :- n(?x), ?y = ?x + 1 .",
     // One round of 10¹² rows.
     "d(0) .\nd(?y) :- d(?x), ?x < 99, ?y = ?x + 1 .\nq(1) :- d(?a), d(?b), d(?c), d(?d), d(?e), d(?f), ?a + ?b + ?c + ?d + ?e + ?f < 0 .",
@@ -30,7 +30,7 @@ fn asked() -> Budget {
 }
 
 #[test]
-fn both_engines_stop_when_asked() {
+fn both_engines_stop_on_request() {
     for text in ENDLESS {
         let program = Program::load(&Source::new("endless.rls", text), Path::new("")).unwrap();
         for engine in [Engine::Fast, Engine::Naive] {
@@ -41,7 +41,7 @@ fn both_engines_stop_when_asked() {
 }
 
 #[test]
-fn what_is_asked_to_stop_writes_no_file() {
+fn a_stopped_program_writes_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("rows.csv", "1\n2\n");
@@ -57,13 +57,13 @@ fn what_is_asked_to_stop_writes_no_file() {
     assert_eq!(std::fs::read_to_string(&done.written[0].0).unwrap(), "1\n");
 }
 
-/// Three patterns that share nothing: a product of the third power.
+/// Three patterns without shared variables: a product of the third power.
 const PRODUCT: &str = "GRAPH act:during { ?a ?p ?x } GRAPH act:during { ?b ?q ?y } GRAPH act:after { ?c ?r ?z } GRAPH act:before { ?d ?t ?w }";
 
-/// What no row of the product satisfies, and only a whole row tells.
+/// A condition that no row of the product satisfies, and that needs a whole row.
 const NEVER: &str = "FILTER(STRLEN(CONCAT(STR(?x), STR(?y), STR(?z), STR(?w))) < 0)";
 
-/// Queries that multiply their patterns before anything of them is handed out.
+/// Queries that multiply their patterns before the first result.
 fn multiplying() -> [(&'static str, String); 5] {
     let named = |name, text: String| (name, text);
     [
@@ -129,7 +129,7 @@ fn queries_that_multiply_stop_at_their_budget() {
         assert!(words.contains(file) && words.contains("0.3 s") && words.contains("share"), "{words}");
         assert_eq!(judged(file, &text, facts, &asked()).unwrap_err(), RuleFault::Interrupted, "{file}");
     }
-    // What a query holds is bounded as well, long before memory is full.
+    // A query's memory is bounded as well, long before memory is full.
     let (file, text) = &multiplying()[1];
     let budget = Budget { tuples: 100_000, secs: f64::MAX, ..Budget::default() };
     let fault = judged(file, text, facts, &budget).unwrap_err().to_string();
@@ -161,7 +161,7 @@ fn a_run_in_flight_is_judged_whole_unless_its_rules_take_long() {
     assert_eq!(made(&env).unwrap_err(), Failure::Interrupted);
 }
 
-/// The program, waiting for rows from a pipe; `rest` stands behind the import.
+/// The program, waiting for rows from a pipe; `rest` is appended after the import.
 fn waiting(folder: &Path, rest: &str) -> Child {
     let text = format!("@import p :- csv{{resource = \"pipe\", format = (int)}} .\n{rest}");
     std::fs::write(folder.join("waits.rls"), text).unwrap();
@@ -184,9 +184,9 @@ fn interrupted(child: Child) {
 }
 
 #[test]
-fn an_interrupt_ends_a_program_at_any_moment() {
+fn an_interrupt_stops_a_program_at_any_moment() {
     let endless = "n(?x) :- p(?x) .\nn(?y) :- n(?x), ?y = ?x + 1 .\n@export n :- csv{} .";
-    // While it waits for its import, where nothing looks at the flag.
+    // While it waits for its import, where the flag is not checked.
     let folder = tempfile::tempdir().unwrap();
     let child = waiting(folder.path(), endless);
     let pipe = std::fs::OpenOptions::new().write(true).open(folder.path().join("pipe")).unwrap();

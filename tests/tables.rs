@@ -1,4 +1,4 @@
-//! Tables and RDF of a real history, the mirror beside it, what `analyse` tells of it, and the queries that have names.
+//! Tables and RDF of a real history, its mirror, the output of `analyse`, and the named queries.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,7 +27,7 @@ fn files(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_history_as_tables_rdf_and_findings() {
+fn a_history_can_be_exported_as_tables_rdf_and_findings() {
     let project = project();
     let here = project.path();
     let run = |runs: &str| actcheck(here, &["run", "configs/pick.toml", "--runs", runs, "--jobs", "1"]);
@@ -36,19 +36,19 @@ fn a_history_as_tables_rdf_and_findings() {
     let written = files(&history.join("tables"));
     assert_eq!(written.len(), 2, "a campaign leaves its mirror: {written:?}");
 
-    tables_say_what_the_history_does(here);
-    a_damaged_mirror_is_made_again(here, &history);
-    rdf_is_all_there(here);
+    tables_agree_with_the_history(here);
+    a_damaged_mirror_is_rebuilt(here, &history);
+    rdf_is_complete(here);
 
-    // Another campaign, by another rule.
+    // Another campaign, with another rule.
     edit(&here.join("rules/moved_object.rls"), "0.02", "0.9");
     assert!(run("6").status.code().is_some_and(|code| code < 2));
     assert_eq!(files(&history.join("tables")).len(), 3);
-    findings_are_told(here);
+    findings_are_reported(here);
     named_queries_answer(here);
 }
 
-fn tables_say_what_the_history_does(here: &Path) {
+fn tables_agree_with_the_history(here: &Path) {
     let output = actcheck(here, &["export", "--csv", "t", "--parquet", "t"]);
     assert!(output.status.success(), "{}", stderr(&output));
     assert_eq!(files(&here.join("t")), ["outcomes.csv", "outcomes.parquet", "schema.json"]);
@@ -71,7 +71,7 @@ fn tables_say_what_the_history_does(here: &Path) {
     assert_eq!(outcomes("#MovedObject"), 6);
 }
 
-fn a_damaged_mirror_is_made_again(here: &Path, history: &Path) {
+fn a_damaged_mirror_is_rebuilt(here: &Path, history: &Path) {
     let before = std::fs::read(here.join("t/outcomes.csv")).unwrap();
     for name in files(&history.join("tables")) {
         std::fs::write(history.join("tables").join(name), b"no table").unwrap();
@@ -84,7 +84,7 @@ fn a_damaged_mirror_is_made_again(here: &Path, history: &Path) {
     assert_eq!(std::fs::read(here.join("t/outcomes.csv")).unwrap(), before);
 }
 
-fn rdf_is_all_there(here: &Path) {
+fn rdf_is_complete(here: &Path) {
     let output = actcheck(here, &["export", "--nquads", "h.nq", "--turtle", "h.ttl"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let quads = std::fs::read_to_string(here.join("h.nq")).unwrap();
@@ -94,7 +94,7 @@ fn rdf_is_all_there(here: &Path) {
     };
     let all = counted("?s ?p ?o") + counted("GRAPH ?g { ?s ?p ?o }");
     assert_eq!(quads.lines().count() as u64, all);
-    assert!(quads.lines().any(|line| line.contains("/during> .")), "facts are in their graphs");
+    assert!(quads.lines().any(|line| line.contains("/during> .")), "facts must be in their graphs");
     let turtle = std::fs::read_to_string(here.join("h.ttl")).unwrap();
     assert!(
         turtle.contains("@prefix act: <http://actions#>") && turtle.contains("a prov:Activity , act:Run"),
@@ -106,7 +106,7 @@ fn rdf_is_all_there(here: &Path) {
     assert!(stderr(&refused).contains("H016"), "{}", stderr(&refused));
 }
 
-fn findings_are_told(here: &Path) {
+fn findings_are_reported(here: &Path) {
     let text = stdout(&actcheck(here, &["analyse"]));
     assert!(text.starts_with("12 runs of 2 campaigns ("), "{text}");
     assert!(text.contains("60 outcomes: ") && text.contains("failure modes"), "{text}");
@@ -114,7 +114,7 @@ fn findings_are_told(here: &Path) {
     let found = json(here, &["analyse", "--property", "MovedObject", "--format", "json"]);
     let of = &found["properties"][0];
     assert_eq!(found["properties"].as_array().unwrap().len(), 1);
-    // The same seed gave the same runs twice: bit for bit alike, they count once.
+    // The same seed gave the same runs twice: they are bit-identical, so they count once.
     let looked_at = of["patterns"]["runs"].as_u64().unwrap();
     let decided = of["outcomes"]["passed"].as_u64().unwrap() + of["outcomes"]["failed"].as_u64().unwrap();
     assert_eq!(looked_at + of["patterns"]["twins"].as_u64().unwrap(), decided);
@@ -124,7 +124,7 @@ fn findings_are_told(here: &Path) {
     assert!(cells.starts_with("action,property,by,down,across,runs,failed,rate,low,high\n"), "{cells}");
     let patterns = stdout(&actcheck(here, &["analyse", "--format", "csv"]));
     assert!(patterns.starts_with("action,property,conditions,sentence,runs,failed,"), "{patterns}");
-    for (arguments, told) in [
+    for (arguments, printed) in [
         (vec!["analyse", "--property", "MovdObject"], "did you mean `MovedObject`?"),
         (vec!["analyse", "--by", "friction"], "scenes have no parameter `friction`"),
         (vec!["analyse", "--campaign", "nope"], "H014"),
@@ -133,11 +133,11 @@ fn findings_are_told(here: &Path) {
     ] {
         let output = actcheck(here, &arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(stderr(&output).contains(told), "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(printed), "{arguments:?}: {}", stderr(&output));
     }
 }
 
-/// Each shipped query is asked; those that may well find nothing here say so in their description.
+/// Runs each shipped query; those that may return no rows here say so in their description.
 fn named_queries_answer(here: &Path) {
     let run = json(here, &["query", "SELECT ?r WHERE { ?r a act:Run } LIMIT 1", "--format", "json"])[0]["r"].clone();
     assert!(actcheck(here, &["recheck"]).status.code().is_some_and(|code| code < 2), "{run}");
@@ -157,8 +157,8 @@ fn named_queries_answer(here: &Path) {
         "the first campaign's runs are judged by the new rule now"
     );
     let failures = json(here, &["query", "--named", "first-failure-after-rule-change", "--format", "json"]);
-    let told: Vec<&str> = failures.as_array().unwrap().iter().map(|row| row["property"].as_str().unwrap()).collect();
-    assert_eq!(told, ["http://actions#MovedObject"], "{failures}");
+    let printed: Vec<&str> = failures.as_array().unwrap().iter().map(|row| row["property"].as_str().unwrap()).collect();
+    assert_eq!(printed, ["http://actions#MovedObject"], "{failures}");
     let unknown = actcheck(here, &["query", "--named", "first-failure"]);
     assert_eq!(unknown.status.code(), Some(2));
     assert!(stderr(&unknown).contains("did you mean `first-failures`?"), "{}", stderr(&unknown));

@@ -1,4 +1,4 @@
-//! What is told about the properties themselves: their list with pass rates, and outcomes that say less than they seem to.
+//! Reports about the properties themselves: their list with pass rates, and warnings about uninformative outcomes.
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ fn json(output: &std::process::Output) -> Value {
     serde_json::from_str(&stdout(output)).unwrap_or_else(|_| panic!("{}", stderr(output)))
 }
 
-/// A property that the picked object fulfils before anything has happened, and one that nothing can violate.
+/// A property that the picked object fulfils before the action, and one that can't be violated.
 fn with_odd_properties() -> tempfile::TempDir {
     let project = project();
     let rules = project.path().join("rules");
@@ -32,19 +32,19 @@ fn with_odd_properties() -> tempfile::TempDir {
 }
 
 #[test]
-fn a_campaign_tells_which_outcomes_say_little() {
+fn a_campaign_warns_of_uninformative_outcomes() {
     let project = with_odd_properties();
     let run = ["run", "configs/pick.toml", "--runs", "6", "--history", "h", "--format"];
-    let told = json(&actcheck(project.path(), &[&run[..], &["json"]].concat()));
+    let printed = json(&actcheck(project.path(), &[&run[..], &["json"]].concat()));
     let remark = |oddity: &str| {
-        let remarks = told["remarks"].as_array().unwrap();
+        let remarks = printed["remarks"].as_array().unwrap();
         remarks.iter().find(|remark| remark["oddity"] == oddity).unwrap_or_else(|| panic!("no {oddity} in {remarks:?}"))
     };
     let held = remark("held before");
     assert_eq!(held["properties"], serde_json::json!(["http://actions#Exists"]));
     assert_eq!((&held["count"], &held["of"], &held["severity"]), (&6.into(), &6.into(), &"warning".into()));
-    // What must not happen has not happened before: no news of it.
-    let properties = told["properties"].as_array().unwrap();
+    // An unviolated prohibition is not reported: it also held before the action.
+    let properties = printed["properties"].as_array().unwrap();
     for property in properties {
         let odd = property["property"] == "http://actions#Exists";
         assert_eq!(property["held_before"], if odd { 6 } else { 0 }, "{property}");
@@ -68,7 +68,7 @@ fn a_campaign_tells_which_outcomes_say_little() {
     let kept = stdout(&kept);
     assert_eq!(kept.lines().count(), 2, "{kept}");
     assert!(kept.contains("Exists") && kept.contains(",6"), "{kept}");
-    let run = told["runs"][0]["run"].as_str().unwrap();
+    let run = printed["runs"][0]["run"].as_str().unwrap();
     let shown = stdout(&actcheck(project.path(), &["show", run, "--history", "h"]));
     assert!(shown.contains("passed, held before"), "{shown}");
 }
@@ -83,12 +83,12 @@ fn rules_lists_every_property_with_its_rate() {
     };
     let before = list(&[]);
     assert!(before.contains("rules/moved_object.rls") && before.contains('–'), "{before}");
-    assert!(before.contains("Pick, Place (before it)"), "a precondition is none:\n{before}");
+    assert!(before.contains("Pick, Place (before it)"), "a precondition is not a postcondition:\n{before}");
     actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
     let rows: Value = serde_json::from_str(&list(&["--history", "h", "--format", "json"])).unwrap();
     let rows = rows.as_array().unwrap();
     assert_eq!(rows.len(), 19);
-    // Nothing but picks was done in this campaign.
+    // This campaign had only picks.
     let is_of_pick = |row: &&Value| row["actions"].as_str().is_some_and(|actions| actions.starts_with("Pick"));
     for row in rows.iter().filter(is_of_pick) {
         let count = |word: &str| row[word].as_u64().unwrap();

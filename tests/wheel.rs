@@ -1,17 +1,19 @@
-//! The wheel, installed into a new environment: there the program runs without a checkout and without Rust, and so do skills in Python.
+//! The wheel, installed into a new environment: there the program runs without a checkout and without Rust, and so do
+//! Python skills.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use crate::support::{COARSE, foreign, root, script, stderr, stdout};
 
-/// Names the wheel to test, such as one of `make wheel`. Without it the tests pack the program that they were built with.
+/// The path of the wheel to test, such as one of `make wheel`. Without it the tests pack the program that they were
+/// built with.
 const WHEEL: &str = "ACTCHECK_WHEEL";
 
-/// What PyPI and this project allow a wheel.
+/// The size limit of PyPI and of this project.
 const MAX_BYTES: u64 = 30_000_000;
 
-/// An environment with the wheel and what it needs, outside the checkout.
+/// An environment with the wheel and its dependencies, outside the checkout.
 struct Installed {
     folder: tempfile::TempDir,
     wheel: PathBuf,
@@ -22,7 +24,7 @@ impl Installed {
         self.folder.path().join("venv/bin")
     }
 
-    /// The installed program in a folder, with nothing on the path but its environment and a shell.
+    /// Runs the installed program in a folder, with only its environment and a shell on the path.
     fn actcheck(&self, folder: &Path, arguments: &[&str]) -> Output {
         let shell = self.folder.path().join("shell");
         if !shell.exists() {
@@ -58,8 +60,8 @@ fn installed() -> Installed {
     Installed { folder, wheel }
 }
 
-/// A wheel that maturin makes of the program as it was built for these tests. In place of cargo maturin calls a script that builds nothing
-/// and names a copy of the program: building it again would take minutes, and maturin moves what it packs.
+/// Packs a wheel with maturin from the already built program. Instead of cargo, maturin calls a script that builds
+/// nothing and names a copy of the program: building again would take minutes, and maturin moves the program.
 fn packed(python: &Path, folder: &Path) -> PathBuf {
     let (source, program, cargo) = (folder.join("source"), folder.join("actcheck"), folder.join("cargo"));
     foreign::run(Command::new(root().join("clients/wheel/stage")).arg(&source)).unwrap();
@@ -89,7 +91,7 @@ fn packed(python: &Path, folder: &Path) -> PathBuf {
     made.next().unwrap()
 }
 
-/// The shipped pick with two cheap runs, in a folder that has nothing else.
+/// The shipped pick with two cheap runs, in an otherwise empty folder.
 fn config(folder: &Path, name: &str, launcher: &str) {
     let pick = std::fs::read_to_string(root().join("configs/pick.toml")).unwrap();
     let alone: Vec<&str> =
@@ -124,12 +126,12 @@ fn a_wheel_needs_no_checkout_and_no_rust() {
     std::fs::copy(&example, folder.join("my_pick.py")).unwrap();
     config(folder, "skill.toml", "my_pick.py");
     let ran = installed.actcheck(folder, &["run", "skill.toml", "--format", "json", "--history", "skill"]);
-    let told: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap_or_else(|_| panic!("{}", stderr(&ran)));
-    for run in told["runs"].as_array().unwrap() {
+    let printed: serde_json::Value = serde_json::from_slice(&ran.stdout).unwrap_or_else(|_| panic!("{}", stderr(&ran)));
+    for run in printed["runs"].as_array().unwrap() {
         assert_eq!(run["status"], "completed", "{run:#}");
     }
 
-    // Its types reach whoever writes a skill.
+    // Skill authors get the package's types.
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mypy-of-wheel");
     let mut mypy = Command::new(foreign::client_python());
     mypy.args(["-m", "mypy", "--strict", "--cache-dir"]).arg(cache).arg("--python-executable");
@@ -144,9 +146,9 @@ fn a_wheel_needs_no_checkout_and_no_rust() {
     }
 }
 
-/// The package is installed by itself too, from its folder: both say the same of it.
+/// The package can also be installed alone, from its folder: both must agree.
 #[test]
-fn the_package_and_the_program_agree_on_version_and_needs() {
+fn the_package_and_the_program_agree_on_version_and_dependencies() {
     let read = |file: &str| std::fs::read_to_string(root().join(file)).unwrap();
     let line = |text: &str, key: &str| text.lines().find(|line| line.starts_with(key)).unwrap().to_owned();
     let (package, wheel) = (read("clients/python/pyproject.toml"), read("clients/wheel/pyproject.toml"));
@@ -156,7 +158,8 @@ fn the_package_and_the_program_agree_on_version_and_needs() {
     }
 }
 
-/// What a source file includes from elsewhere is in the tree that wheel and source distribution are built from: it would not compile else.
+/// Files included by source files from other folders are in the tree that wheel and source distribution are built
+/// from: otherwise they would not compile.
 #[test]
 fn the_source_distribution_has_every_included_file() {
     let folder = tempfile::tempdir().unwrap();

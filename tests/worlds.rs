@@ -1,6 +1,6 @@
-//! Worlds: the shipped ones hold what they promise, scenes lie in them, rules see their maps, and wrong ones are told.
+//! Worlds: the shipped ones are valid, scenes are inside them, rules see their maps, and faults are reported.
 //!
-//! A wrong world is a case of `WRONG` below: a text, and what is said about it.
+//! A wrong world is a case of `WRONG` below: a text, and its diagnostics.
 
 use std::path::Path;
 
@@ -39,9 +39,9 @@ fn scenes(env: &Env, n: u64) -> Vec<Scene> {
 const EVERYWHERE: &str = "[world]\nworlds = [\"apartment\", \"lab\"]\n[objectSurface]\nobject_surfaces = [\"dining_table\", \
     \"coffee_table\", \"side_table\", \"kitchen_cabinet\", \"left_bench\", \"right_bench\", \"assembly_table\"]\n";
 
-/// Furniture and walls do not stand in each other, and a robot fits on every location.
+/// Furniture and walls do not overlap, and a robot fits at every location.
 #[test]
-fn shipped_worlds_leave_room() {
+fn shipped_worlds_have_free_space() {
     for (name, surface) in
         [("apartment", "dining_table"), ("lab", "left_bench"), ("empty_room", "table"), ("kitchen", "kitchen_table")]
     {
@@ -55,12 +55,12 @@ fn shipped_worlds_leave_room() {
             scene.objects.iter().filter(|o| !walls(o)).map(|o| (o.id.clone(), Solid::new(&o.model, &o.pose))).collect();
         for (idx, (id, solid)) in solids.iter().enumerate() {
             for (other_id, other) in &solids[idx + 1..] {
-                assert!(!solid.is_in_the_way_of(other), "{name}: {id} stands in {other_id}");
+                assert!(!solid.is_in_the_way_of(other), "{name}: {id} overlaps {other_id}");
             }
             for wall in scene.objects.iter().filter(walls) {
                 assert!(
                     !solid.is_in_the_way_of(&Solid::new(&wall.model, &wall.pose)),
-                    "{name}: {id} stands in {}",
+                    "{name}: {id} overlaps {}",
                     wall.id
                 );
             }
@@ -82,9 +82,9 @@ fn shipped_worlds_leave_room() {
     }
 }
 
-/// Objects stand on the surface that was drawn, wherever in the world it is, and the robot faces it.
+/// Objects are on the drawn surface, anywhere in the world, and the robot faces it.
 #[test]
-fn scenes_lie_where_their_world_says() {
+fn scenes_match_their_world() {
     let (_folder, env) = env(&format!("{EVERYWHERE}{TABLES}"));
     let scenes = scenes(&env, 60);
     let mut surfaces = std::collections::BTreeSet::new();
@@ -112,7 +112,7 @@ fn scenes_lie_where_their_world_says() {
 }
 
 #[test]
-fn obstacles_stand_on_the_floor_and_in_nobodys_way() {
+fn obstacles_are_on_the_floor_and_clear_of_the_base_and_objects() {
     for text in [
         format!("nav_obstacle_list = [\"box\", \"bottle\"]\nnav_obstacle_count = 4\n{EVERYWHERE}{TABLES}"),
         format!(
@@ -141,9 +141,10 @@ fn obstacles_stand_on_the_floor_and_in_nobodys_way() {
     }
 }
 
-/// Things stand where the target is to be placed too, in a world and without one, and nowhere if nobody asks for them.
+/// Other objects are placed on the goal surface too, in a world and without one, and only if the configuration
+/// requests them.
 #[test]
-fn the_place_can_be_cluttered() {
+fn the_goal_surface_can_be_cluttered() {
     let others =
         "[surfaceObjects]\nmodel_list = [\"mug\", \"bottle\"]\ncount = 2\n[pickObject]\nmodel_list = [\"can\"]\n";
     for world in [
@@ -166,7 +167,7 @@ fn the_place_can_be_cluttered() {
             for object in &standing {
                 let local = platform.pose.to_isometry().inverse() * nalgebra::Point3::from(object.pose.position);
                 assert!(local.x.abs() < surface.size_m[0] / 2.0 && local.y.abs() < surface.size_m[1] / 2.0);
-                assert!((local.z - surface.height_m).abs() < 1e-9, "{} stands on {place}", object.id);
+                assert!((local.z - surface.height_m).abs() < 1e-9, "{} is not on {place}", object.id);
                 assert!(!scene.designators["surfaceObjects"].contains(&object.id));
                 assert_eq!(scene.objects.iter().filter(|other| other.id == object.id).count(), 1);
             }
@@ -175,7 +176,7 @@ fn the_place_can_be_cluttered() {
     }
 }
 
-/// Sizes, lying objects and the start of the base are drawn where the configuration asks for it.
+/// Sizes, lying objects and the start of the base are drawn if the configuration says so.
 #[test]
 fn scenes_use_every_parameter() {
     let text = format!(
@@ -197,7 +198,7 @@ fn scenes_use_every_parameter() {
         assert!((0.95..=1.05).contains(&scale) && scale != 1.0, "{scale}");
         assert_eq!(scene.designators["placeSurface"], ["coffee_table_1"]);
     }
-    // What lies stays where it was put: its lowest point is on the table.
+    // A lying object stays in place: its lowest point is on the table.
     let bottle = others.iter().find(|object| object.model.name == "bottle" && object.pose.tilt() > 1.5).unwrap();
     let low = bottle.model.parts.iter().map(|part| {
         let at = bottle.pose.to_isometry() * part.pose.to_isometry();
@@ -207,9 +208,9 @@ fn scenes_use_every_parameter() {
     assert!((lowest - 0.74).abs() < 0.005, "{lowest}");
 }
 
-/// A rule can ask where things are: the map is part of every state.
+/// Rules can query locations: the map is part of every state.
 #[test]
-fn the_map_is_facts() {
+fn the_map_is_part_of_the_facts() {
     let text = "[world]\nworlds = [\"apartment\"]\n[objectLocation]\nlocation_list = [\"dining_table_front\"]\n[objectSurface]\n\
         object_surfaces = [\"dining_table\"]\n";
     let (_folder, env) = env(&format!("{text}{TABLES}"));
@@ -241,7 +242,7 @@ fn the_map_is_facts() {
     }
 }
 
-/// What is wrong with a world, as a text for `models/worlds/wrong.toml` and the beginnings of all that is said.
+/// A fault of a world: the text of `models/worlds/wrong.toml`, and the beginnings of all its diagnostics.
 const WRONG: [(&str, &[&str]); 12] = [
     ("rooms = 3", &["C004 m/worlds/wrong.toml:1:9: `rooms` must be a list of tables"]),
     ("[[wals]]\nfrom_m = [0, 0]", &["C003 m/worlds/wrong.toml:1:3: unknown key `wals`"]),
@@ -276,7 +277,7 @@ const WRONG: [(&str, &[&str]); 12] = [
 ];
 
 #[test]
-fn wrong_worlds_are_told_with_their_places() {
+fn wrong_worlds_are_reported_with_their_places() {
     for (text, expected) in WRONG {
         let folder = tempfile::tempdir().unwrap();
         let models = folder.path().join("m");
@@ -292,9 +293,9 @@ fn wrong_worlds_are_told_with_their_places() {
     }
 }
 
-/// Configurations that speak of places that are not there.
+/// Configurations that refer to missing places.
 #[test]
-fn names_of_places_that_are_not_there_are_told() {
+fn unknown_place_names_are_reported() {
     let said = |text: &str| match campaign(Path::new(""), text) {
         Err(found) => found.to_string(),
         Ok(campaign) => {
@@ -333,9 +334,9 @@ fn names_of_places_that_are_not_there_are_told() {
     }
 }
 
-/// A Gazebo world with included models works as it is; what it says and we lack is told.
+/// A Gazebo world with included models works unchanged; unsupported elements are reported.
 #[test]
-fn a_gazebo_world_is_furnished_with_its_models() {
+fn a_gazebo_world_gets_its_included_models() {
     let folder = tempfile::tempdir().unwrap();
     let models = folder.path().join("m");
     crate::support::copy(&root().join("tests/models/gazebo"), &models);
@@ -387,7 +388,7 @@ fn a_campaign_runs_in_the_apartment_and_replays() {
 
 /// A scene that does not satisfy the configuration's rules is discarded and counted.
 #[test]
-fn scenes_can_be_asked_for_by_rules() {
+fn rules_can_select_scenes() {
     let folder = crate::support::project();
     let config = |rule: &str| {
         let text = format!(

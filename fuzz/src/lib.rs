@@ -1,7 +1,7 @@
-//! What the fuzz targets feed: each entrance takes any text, and must come back soon without a panic.
+//! Entry points of the fuzz targets: each accepts any text, and must return quickly without a panic.
 //!
-//! The targets below `fuzz_targets/` hand libFuzzer's inputs to these functions; `tests/fuzz_corpus.rs` of the program
-//! includes this file and hands them the corpus, so that what was found once stays found.
+//! The targets below `fuzz_targets/` give libFuzzer's inputs to these functions; `tests/fuzz_corpus.rs` of the program
+//! includes this file and gives them the corpus as a regression test.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -11,7 +11,7 @@ use actcheck::ontology::{self, Ontology, Property, RuleFile, RuleLanguage};
 use actcheck::rules::standalone::{Engine, Program};
 use actcheck::rules::{Budget, RuleBook, parse as parse_rules};
 
-/// Small enough for many inputs a second; a sound engine comes back from any input within it.
+/// Small enough for many inputs per second; a correct engine returns from any input within it.
 fn budget() -> Budget {
     Budget { tuples: 500, secs: 0.2, ..Budget::default() }
 }
@@ -25,10 +25,10 @@ pub fn parse(text: &str) {
     places_are_in(text, &diagnostics);
 }
 
-/// The checker: the text as a program of its own, and as the rules of a property of the shipped ontology.
+/// The checker: the text as a standalone program, and as the rules of a property of the shipped ontology.
 pub fn check(text: &str) {
     drop(program(text));
-    // Preparing a book takes some milliseconds; most inputs are torn, and the program has said so.
+    // Preparing a rule book takes some milliseconds; most inputs are invalid as programs already.
     if !parse_rules(&Source::new("fuzz.rls", text)).0.whole {
         return;
     }
@@ -41,7 +41,7 @@ pub fn check(text: &str) {
     }
 }
 
-/// Both evaluators over a program of its own, which must derive the same, and why it derives that.
+/// Both evaluators on a standalone program, which must derive the same, and the explanations.
 pub fn evaluate(text: &str) {
     let Some(program) = program(text) else { return };
     let (fast, naive) = (program.close(Engine::Fast, &budget()), program.close(Engine::Naive, &budget()));
@@ -51,7 +51,7 @@ pub fn evaluate(text: &str) {
         assert_eq!(tuples, naive.tuples(predicate), "{predicate}");
         if let Some(tuple) = tuples.first() {
             let args: Vec<String> = tuple.iter().map(Term::to_string).collect();
-            // A term that the language can't spell is refused in words.
+            // A term that the language can't express is refused with a message.
             let _ = program.explain(&format!("{predicate}({})", args.join(", ")), &budget()).map(|why| why.to_text());
         }
     }
@@ -67,13 +67,13 @@ pub fn sparql_property(text: &str) {
     for (_, result) in book.judge(&action, &[TESTED.to_owned()], &budget()) {
         match result {
             Ok(findings) => assert!(findings.witness.len() <= findings.witness_count),
-            Err(RuleFault::Interrupted) => unreachable!("nobody asks it to stop"),
+            Err(RuleFault::Interrupted) => unreachable!("no stop is requested"),
             Err(RuleFault::BudgetSpent(reason) | RuleFault::Value(reason)) => assert!(!reason.is_empty()),
         }
     }
 }
 
-/// A program of its own, where it has no fault. It never reads a file: an input that could name one is left out.
+/// A standalone program. Returns `None` if it has a fault or could name a file: fuzzing never reads one.
 fn program(text: &str) -> Option<Program> {
     if text.contains("@import") && text.contains(['/', '\\']) {
         return None;
@@ -91,14 +91,14 @@ fn program(text: &str) -> Option<Program> {
     }
 }
 
-/// Every diagnostic can be shown: its place lies in the text and cuts no character.
+/// Checks that every diagnostic can be shown: its span is in the text and at character boundaries.
 fn places_are_in(text: &str, diagnostics: &Diagnostics) {
     for found in diagnostics.iter() {
         assert!(!found.message.is_empty());
         if let (Some(span), Some(source)) = (&found.span, &found.source)
             && source.text.as_ref() == text
         {
-            assert!(text.get(span.clone()).is_some(), "{span:?} is no place: {found}");
+            assert!(text.get(span.clone()).is_some(), "{span:?} is not a valid span: {found}");
         }
     }
     let _ = diagnostics.to_string();
@@ -110,7 +110,7 @@ fn with_property(text: &str, language: RuleLanguage) -> Ontology {
     let shipped = SHIPPED.get_or_init(|| {
         let path = Path::new("ontology/actions.ttl");
         let mut ontology = ontology::load(&Files::Shipped, path).unwrap_or_else(|found| panic!("{found}"));
-        // Closing them under OWL takes longer than all the rest, and is the same for every input.
+        // The OWL closure takes longer than everything else, and is the same for every input.
         ontology.triples.clear();
         ontology
     });

@@ -149,14 +149,14 @@ mod tests {
     }
 
     #[test]
-    fn low_things_are_taken_from_above_and_tall_ones_from_the_side() {
+    fn low_objects_are_grasped_from_above_and_tall_ones_from_the_side() {
         assert!(grasps(&thing([0.08, 0.08, 0.146]), 0.135).iter().all(|g| g.approach == Approach::Side));
         assert!(grasps(&thing([0.099, 0.077, 0.085]), 0.135).iter().all(|g| g.approach == Approach::Top));
         assert_eq!(grasps(&thing([0.16, 0.16, 0.065]), 0.135), []);
     }
 
     #[test]
-    fn an_arm_that_stands_still_has_all_ways_to_all_things() {
+    fn a_fixed_arm_tries_all_approaches_for_all_objects() {
         let of = |size_m: [f64; 3], approach: Approach| {
             let found = all_grasps(&thing(size_m), 0.135);
             let penalties: Vec<f64> = found.iter().filter(|g| g.approach == approach).map(|g| g.penalty).collect();
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_box_is_taken_across_its_narrow_side() {
+    fn a_flat_box_is_grasped_across_its_narrow_side() {
         let found = grasps(&thing([0.2, 0.05, 0.15]), 0.135);
         assert!(!found.is_empty());
         for grasp in found {

@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hold_is_lost_when_fingers_go_on_closing_or_feel_nothing() {
+    fn a_grip_is_lost_if_the_fingers_close_further_or_feel_no_contact() {
         let held = GripWatch::new(&felt(0.08, 7.0), 7.0);
         let mut shaken = held.clone();
         for effort in [7.0, 1.0, 1.0, 7.0, 6.0] {

@@ -138,9 +138,9 @@ mod tests {
     }
 
     #[test]
-    fn the_best_fit_is_taken_and_of_equal_ones_the_nearest() {
+    fn the_best_match_is_chosen_and_the_nearest_of_equal_ones() {
         let things = vec![thing(None, 0.5, 0.146), thing(Some(GLASS), 1.2, 0.146), thing(Some(GLASS), 1.0, 0.146)];
-        let (target, others) = recalled(things).expect("there are two");
+        let (target, others) = recalled(things).expect("two things match");
         assert_eq!((target.id.as_str(), target.pose.position[0]), ("glass_1", 1.0));
         assert_eq!(others.iter().map(|other| other.id.as_str()).collect::<Vec<_>>(), ["thing_1", "thing_2", "surface"]);
         assert_eq!((others[2].size_m, others[2].furniture), ([0.6, 0.5, 0.7], true));
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_looked_at_is_known_better_than_by_the_map() {
+    fn mapped_furniture_at_the_perceived_surface_is_omitted() {
         let table = |x: f64| Sighting {
             id: "table".to_owned(),
             pose: Pose::upright([x, 0.0, 0.0], 0.3),
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_of_the_floor_are_gathered_in_squares_as_high_as_the_highest() {
+    fn floor_pieces_are_merged_into_squares_of_the_largest_height() {
         let piece = |x: f64, top_m: f64| Standing { at_m: [x, -0.025], top_m };
         let found = obstacles(&[piece(0.125, 0.2), piece(0.175, 0.4), piece(0.225, 0.1)]);
         let told: Vec<([f64; 3], f64)> = found.iter().map(|thing| (thing.pose.position, thing.size_m[2])).collect();
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_perceived_can_not_be_taken() {
+    fn an_unperceived_object_cannot_be_grasped() {
         assert_eq!(recalled(vec![thing(None, 0.5, 0.146)]), Err("no perceived object matches glass_1".to_owned()));
     }
 }

@@ -167,7 +167,7 @@ impl<'a> Operator<'a> {
         self.world.floor_plan()
     }
 
-    /// The kind of object that a designator's value refers to.
+    /// The kind of object that a designator's value refers to. Returns `None` if the scene has no object with this id.
     pub fn kind_of(&self, id: &str) -> Option<KnownKind> {
         self.world.kind_of(id)
     }
@@ -231,7 +231,8 @@ impl<'a> Operator<'a> {
         self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
     }
 
-    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection.
+    /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection. Returns
+    /// `None` if the scene has no object with this id.
     pub fn see(&mut self, id: &str) -> Option<Sighting> {
         let mut seen = self.world.perceive(id, self.choices)?;
         if let Some(saboteur) = &mut self.saboteur {

@@ -170,17 +170,17 @@ mod tests {
     }
 
     #[test]
-    fn a_way_around_a_table_goes_over_its_corners() {
+    fn a_route_around_a_table_passes_its_corners() {
         let ground = Ground::new(&[table()], &[], 0.25, &Point2::new(-1.0, 0.0));
         let straight = ground.route(Point2::new(-1.0, 0.0), Point2::new(-1.0, 1.0)).expect("nothing is in the way");
         assert_eq!(straight.len(), 1);
-        let around = ground.route(Point2::new(-1.0, 0.0), Point2::new(1.0, 0.0)).expect("there is room");
+        let around = ground.route(Point2::new(-1.0, 0.0), Point2::new(1.0, 0.0)).expect("a detour exists");
         assert_eq!(around.len(), 3);
         assert_eq!(ground.route(Point2::new(-1.0, 0.0), Point2::new(0.0, 0.0)), None);
     }
 
     #[test]
-    fn a_base_that_stands_near_something_gets_away_from_it_and_no_nearer() {
+    fn a_base_near_an_obstacle_only_moves_away_from_it() {
         let near = Point2::new(-0.5, 0.0);
         let ground = Ground::new(&[table()], &[], 0.4, &near);
         assert!(ground.route(near, Point2::new(-1.0, 0.4)).is_some());

@@ -352,11 +352,11 @@ mod tests {
     }
 
     fn report(succeeded: bool) -> ActionReport {
-        ActionReport { succeeded, message: "so it is".to_owned() }
+        ActionReport { succeeded, message: "done".to_owned() }
     }
 
     #[test]
-    fn only_a_report_that_differs_from_what_the_action_believes_is_a_lie() {
+    fn only_a_report_against_the_actions_belief_is_a_lie() {
         for (told, honest, lied) in
             [(true, false, true), (true, true, false), (false, true, true), (false, false, false)]
         {
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn sabotage_of_which_a_part_is_missing_did_not_come_about() {
+    fn incomplete_sabotage_does_not_count_as_occurred() {
         let mut saboteur = idle(Some((Moment::Carrying, Accident::HandOpens)), Some(true));
         saboteur.armed = true;
         saboteur.report(report(false));

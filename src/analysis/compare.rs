@@ -271,7 +271,7 @@ mod tests {
     use Outcome::{Broken, Failed, Inapplicable, Passed, Timeout, Untested};
 
     #[test]
-    fn only_runs_of_the_same_scene_are_pairs_and_none_is_lost() {
+    fn runs_are_paired_by_scene_and_unpaired_ones_are_counted() {
         let a = [run(0, "x", &[("p", Passed)]), run(1, "y", &[("p", Passed)]), run(2, "z", &[("p", Failed)])];
         let b = [run(1, "y", &[("p", Failed)]), run(2, "other", &[("p", Failed)]), run(3, "w", &[("p", Passed)])];
         let found = compare(&a, &b);
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn what_says_nothing_of_the_robot_is_left_out_on_both_sides_and_counted() {
+    fn uninformative_outcomes_are_excluded_on_both_sides_and_counted() {
         let open = [Inapplicable, Broken, Timeout, Untested];
         let runs = |outcomes: &[Outcome]| -> Vec<ComparedRun> {
             (0u64..).zip(outcomes).map(|(index, outcome)| run(index, "s", &[("p", *outcome)])).collect()
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_whole_run_fails_with_one_property_and_is_open_with_one_left_open() {
+    fn a_run_fails_with_one_failed_property_and_is_open_with_one_undecided() {
         let whole = |outcomes: &[(&str, Outcome)]| run(0, "s", outcomes).outcomes[&Compared::WholeRun];
         assert_eq!(whole(&[("p", Passed), ("q", Failed), ("r", Timeout)]), Failed);
         assert_eq!(whole(&[("p", Passed), ("q", Timeout)]), Timeout);
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_is_run_often_counts_once_and_passes_when_all_its_runs_do() {
+    fn a_repeated_scene_counts_once_and_passes_if_all_its_runs_pass() {
         let runs = |outcomes: &[&[Outcome]]| -> Vec<ComparedRun> {
             let scenes = (0u64..).zip(outcomes).flat_map(|(scene, outcomes)| {
                 (0u64..).zip(*outcomes).map(move |(number, outcome)| {
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn what_one_side_alone_judged_is_named() {
+    fn properties_judged_on_one_side_only_are_named() {
         let a = [run(0, "s", &[("old", Passed), ("p", Passed)])];
         let b = [run(0, "s", &[("new", Passed), ("p", Passed)])];
         let found = compare(&a, &b);

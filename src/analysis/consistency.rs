@@ -212,7 +212,7 @@ impl SceneRuns {
     }
 
     /// Returns the share of some of the runs, given by their indices, with an interval that accounts for runs of the
-    /// same scene.
+    /// same scene. Returns `None` if there are no runs.
     pub fn share(&self, runs: impl IntoIterator<Item = usize>) -> Option<Interval> {
         let mut scenes: Vec<[u64; 2]> = self.sizes.iter().map(|size| [0, *size]).collect();
         runs.into_iter().for_each(|run| scenes[self.scene_of[run]][0] += 1);
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_are_told_apart_by_how_their_runs_went() {
+    fn scenes_are_classified_by_the_results_of_their_runs() {
         let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1], &[0, 1]]));
         assert_eq!((found.always_passed, found.always_failed), (1, 1));
         assert_eq!(
@@ -246,7 +246,7 @@ mod tests {
 
     /// If two of three runs passed, one of the three pairs passed entirely. Computed by hand for all scenes.
     #[test]
-    fn pass_powers_are_shares_of_all_choices_of_runs() {
+    fn pass_powers_are_shares_of_all_subsets_of_runs() {
         let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1, 1]]));
         let found: Vec<(u64, u64, f64)> =
             found.pass_powers.iter().map(|power| (power.k, power.scenes, power.probability.rate)).collect();
@@ -262,7 +262,7 @@ mod tests {
     /// Kutner, Nachtsheim, Neter and Li, "Applied Linear Statistical Models", table 25.1: ratings by five officers of
     /// four candidates each; the mean squares are 394.925 and 73.2833, and the officers' variance 80.41.
     #[test]
-    fn published_components_come_out() {
+    fn variance_components_match_published_values() {
         let ratings = [
             vec![76.0, 65.0, 85.0, 74.0],
             vec![59.0, 75.0, 81.0, 67.0],
@@ -305,7 +305,7 @@ mod tests {
             noise += outcome.noise / CAMPAIGNS as f64;
             scene += outcome.scene / CAMPAIGNS as f64;
             both += found.pass_powers[1].probability.rate / CAMPAIGNS as f64;
-            let rate = found.rate.expect("there are runs");
+            let rate = found.rate.expect("the table has runs");
             held += usize::from((rate.low..=rate.high).contains(&0.5));
         }
         assert!((noise - 0.16).abs() < 0.002, "{noise}");
@@ -316,14 +316,14 @@ mod tests {
     }
 
     #[test]
-    fn where_all_runs_went_alike_each_scene_counts_once() {
+    fn scenes_whose_runs_all_agree_count_once() {
         let found = consistency(&runs(&[&[1, 1, 1], &[1, 1, 1]]));
         assert_eq!(found.rate, wilson_share(1.0, 2.0));
         assert_eq!(found.outcome.and_then(|variance| variance.noise_share()), None);
     }
 
     #[test]
-    fn margins_count_where_every_run_has_one() {
+    fn margins_are_used_if_every_run_has_one() {
         let run = |scene, margin| Repeated { scene, passed: true, margin };
         let mut runs = vec![run(0, Some(1.0)), run(0, Some(3.0)), run(1, Some(5.0)), run(1, Some(7.0))];
         // Within: 2 each. Between the means 2 and 6: 2 · (4 + 4) / 1 = 16; minus 2, divided by 2.

@@ -225,7 +225,7 @@ mod tests {
 
     /// An index of one of four billion noise images must not allocate four billion counters (34 GB).
     #[test]
-    fn one_of_very_many_things_is_a_number() {
+    fn a_choice_among_very_many_values_is_counted_as_a_number() {
         let mut choices = Choices::random(5, 0);
         choices.index("sense.camera.frame", 1 << 32);
         let mut coverage = Coverage::default();
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_are_pooled_and_what_can_not_vary_is_no_parameter() {
+    fn objects_are_pooled_and_constants_are_not_parameters() {
         let coverage = coverage(10, 0);
         let names: Vec<String> = coverage.parameters().iter().map(|p| format!("{} {}", p.name, p.draws)).collect();
         assert_eq!(names, ["colour 10", "other.*.model 20", "other.*.x 20", "sense.*.x 10"]);
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn random_draws_neglect_nothing_however_many() {
+    fn random_draws_have_no_neglected_values() {
         for runs in [1, 5, 30, 300, 3_000] {
             let coverage = coverage(runs, 0);
             assert!(coverage.parameters().iter().all(|parameter| parameter.neglected.is_none()), "{runs}");
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn so_many_draws_hit_as_many_bins_as_they_should() {
+    fn the_number_of_hit_bins_matches_its_expectation() {
         let mean = (0..200u64).map(|seed| {
             let mut choices = Choices::random(seed, 1);
             let hit: std::collections::BTreeSet<usize> = (0..8).map(|_| choices.index("x", 10)).collect();
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_is_mostly_drawn_again_is_neglected() {
+    fn a_value_that_is_mostly_redrawn_is_neglected() {
         let parameters = coverage(300, 3).parameters();
         let neglected: Vec<(&str, Option<usize>)> = parameters
             .iter()
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn two_parameters_that_go_together_leave_pairs_out() {
+    fn correlated_parameters_leave_pairs_uncovered() {
         let mut coverage = Coverage::default();
         for index in 0..200 {
             let mut choices = Choices::random(5, index);

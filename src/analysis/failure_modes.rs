@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_are_grouped_by_what_failed_in_them() {
+    fn runs_are_grouped_by_their_failed_properties() {
         use Outcome::{Broken, Failed, Inapplicable, Passed};
         let rows = [
             row("k-1", "b", Failed),

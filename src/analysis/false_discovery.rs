@@ -27,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_given_counts_too() {
+    fn omitted_hypotheses_count_too() {
         let close = |found: &[f64], wanted: &[f64]| {
             assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");
         };

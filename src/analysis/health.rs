@@ -249,14 +249,14 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_campaign_has_no_ailment() {
+    fn a_healthy_campaign_has_no_warning() {
         assert_eq!(problems(|_| ()), []);
         // Histories of older versions have no simulation data.
         assert_eq!(problems(|run| (run.deepest_penetration_m, run.energy_gain_j) = (None, None)), []);
     }
 
     #[test]
-    fn each_ailment_is_told_with_its_run() {
+    fn each_warning_names_its_run() {
         let third = |run: &RunVitals| run.index == 2;
         let slow = problems(|run| run.wall_secs += if third(run) { 60.0 } else { 0.0 });
         assert_eq!(slow, [HealthProblem::Slow("k-3".into(), 61.2, 2.1)]);
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_property_that_hardly_ever_applies_is_told() {
+    fn a_property_that_rarely_applies_is_reported() {
         let row = |index: u64, outcome| OutcomeRow {
             run: format!("k-{}", index + 1),
             campaign: "k".to_owned(),

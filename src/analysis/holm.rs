@@ -25,7 +25,7 @@ mod tests {
 
     /// Computed by hand: 4 × 0.005, 3 × 0.01, 2 × 0.03, and 0.04, which must not be adjusted below 0.03's value.
     #[test]
-    fn the_smallest_is_multiplied_most() {
+    fn adjusted_p_values_match_a_calculation_by_hand() {
         let adjusted = holm(&[0.01, 0.04, 0.03, 0.005]);
         for (found, wanted) in adjusted.iter().zip([0.03, 0.06, 0.06, 0.02]) {
             assert!((found - wanted).abs() < 1e-15, "{adjusted:?}");

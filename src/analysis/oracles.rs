@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn what_notices_nothing_and_what_nothing_notices_is_named() {
+    fn unnoticed_faults_and_blind_properties_are_named() {
         let b = || "b".to_owned();
         assert_eq!(gaps("slip", &trials("slip", 10, 10, &["a", "b"])), []);
         assert_eq!(gaps("slip", &trials("slip", 10, 10, &["a"])), [OracleGap::PropertyNoticesNothing(b())]);
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_that_seldom_comes_about_is_not_counted_as_missed() {
+    fn a_fault_that_rarely_occurs_is_not_counted_as_missed() {
         let seldom = trials("slip", 10, 3, &["a"]);
         let matrix = oracle_matrix(&["slip"], &["a".to_owned()], &seldom);
         assert_eq!((matrix.rows[0].came_about, matrix.rows[0].scenes), (3, 10));
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn an_idle_robot_may_pass_nowhere() {
+    fn an_idle_robot_must_not_pass() {
         let mut some = trials("idle", 10, 10, &["a", "b"]);
         assert_eq!(gaps("idle", &some), []);
         some[1].outcomes.values_mut().for_each(|outcome| *outcome = Outcome::Passed);

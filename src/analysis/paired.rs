@@ -140,11 +140,11 @@ mod tests {
     /// complete response (Cavo et al. 2012). Their difference is the first rate minus the second, ours the second minus
     /// the first.
     #[test]
-    fn published_examples_come_out() {
+    fn results_match_published_examples() {
         for (table, low, high, exact, mid_p) in
             [(table(1, 1, 7, 12), 0.026, 0.517, 0.0703, 0.0391), (table(59, 6, 16, 80), 0.0054, 0.124, 0.0525, 0.0347)]
         {
-            let difference = table.difference().expect("there are pairs");
+            let difference = table.difference().expect("the table has pairs");
             assert!((difference.low - low).abs() < 5e-4, "{difference:?}");
             assert!((difference.high - high).abs() < 5e-4, "{difference:?}");
             let test = table.test();
@@ -155,7 +155,7 @@ mod tests {
 
     /// Compares with sums of integer binomial coefficients.
     #[test]
-    fn the_exact_test_is_exact() {
+    fn the_exact_test_matches_binomial_sums() {
         for differing in 0..=40u64 {
             let mut row = vec![1u64];
             for _ in 0..differing {
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_holds_the_difference_at_the_edges_too() {
+    fn the_interval_contains_the_difference_in_extreme_tables() {
         assert_eq!(PairedTable::default().difference(), None);
         for (table, value) in [
             (table(0, 5, 0, 0), -1.0),
@@ -185,7 +185,7 @@ mod tests {
             (table(0, 0, 0, 1), 0.0),
             (table(1, 1, 0, 0), -0.5),
         ] {
-            let difference = table.difference().expect("there are pairs");
+            let difference = table.difference().expect("the table has pairs");
             assert_eq!(difference.value, value);
             assert!(-1.0 <= difference.low && difference.low <= value, "{difference:?}");
             assert!(value <= difference.high && difference.high <= 1.0, "{difference:?}");
@@ -194,9 +194,9 @@ mod tests {
     }
 
     #[test]
-    fn swapping_the_sides_turns_the_difference() {
+    fn swapping_the_sides_negates_the_difference() {
         let (there, back) = (table(30, 12, 3, 9), table(30, 3, 12, 9));
-        let [there, back] = [there, back].map(|table| table.difference().expect("there are pairs"));
+        let [there, back] = [there, back].map(|table| table.difference().expect("the table has pairs"));
         assert!((there.low + back.high).abs() < 1e-12 && (there.high + back.low).abs() < 1e-12);
     }
 }

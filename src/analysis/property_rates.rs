@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_six_outcomes_are_counted_and_only_two_make_the_rate() {
+    fn the_rate_uses_only_passed_and_failed_of_six_outcomes() {
         let row = |property: &str, outcome| OutcomeRow {
             run: "k-1".to_owned(),
             campaign: "k".to_owned(),

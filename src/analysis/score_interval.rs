@@ -22,8 +22,8 @@ mod tests {
 
     /// Reference values from `scipy.stats.t.interval`.
     #[test]
-    fn four_scores_have_the_interval_of_the_tables() {
-        let found = score_interval([0.1, 0.2, 0.3, 0.4, f64::NAN]).expect("there are four");
+    fn the_interval_of_four_scores_equals_scipys() {
+        let found = score_interval([0.1, 0.2, 0.3, 0.4, f64::NAN]).expect("four scores are numbers");
         for (value, known) in
             [(found.rate, 0.25), (found.low, 0.044_573_974_323_919_5), (found.high, 0.455_426_025_676_080_5)]
         {

@@ -1,4 +1,4 @@
-//! What a rule found out about one property in one action.
+//! The findings of a rule about one property in one action.
 
 use crate::Term;
 

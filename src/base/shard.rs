@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_run_is_in_one_part() {
+    fn every_run_is_in_exactly_one_shard() {
         for of in 1..9 {
             let shards: Vec<Shard> = (1..=of).filter_map(|number| Shard::new(number, of)).collect();
             assert_eq!(shards.len() as u64, of);
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn only_parts_can_be_read() {
+    fn invalid_shards_are_rejected() {
         assert_eq!("2/4".parse(), Ok(Shard { number: 2, of: 4 }));
         assert_eq!("2/4".parse::<Shard>().map(|shard| shard.to_string()), Ok("2/4".to_owned()));
         for wrong in [

@@ -37,7 +37,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_typing_error_finds_its_word_and_a_strange_word_finds_none() {
+    fn a_typing_error_gets_a_suggestion_and_an_unrelated_word_none() {
         let names = ["pickObject", "surfaceObjects", "world"];
         assert_eq!(nearest("pickOject", names), Some("pickObject"));
         assert_eq!(nearest("banana", names), None);

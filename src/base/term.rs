@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn terms_of_equal_value_and_other_type_differ() {
+    fn terms_of_equal_value_and_different_type_differ() {
         let mut terms = Terms::new();
         let ids: Vec<TermId> =
             [Term::Integer(1), Term::Decimal("1.0".into()), Term::Double(1.0), Term::string("1"), Term::Integer(1)]

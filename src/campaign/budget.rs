@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_budget_without_a_number_of_runs_has_a_ceiling() {
+    fn a_budget_without_a_run_count_has_a_maximum() {
         let asked = |runs, until_width, time_secs| {
             runs_per_test(&Overrides { runs, until_width, time_secs, ..Overrides::default() })
         };

@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_skill_that_changed_or_that_was_not_there_is_named() {
+    fn changed_and_new_skills_are_named() {
         let with = |digest: &str| CampaignRecord {
             skill: Some(SkillRecord { command: "pick.py".to_owned(), digest: digest.to_owned(), privileged: false }),
             ..record("aa")
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_changed_program_is_named_though_its_version_is_the_same() {
+    fn a_changed_program_of_the_same_version_is_named() {
         let found = changes(&record("aa"), &record("bb"));
         let [change] = found.as_slice() else { panic!("{found:?}") };
         assert_eq!((change.kind, change.name.as_str()), (ChangeKind::Program, "actcheck"));

@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_moment_counts_and_the_parameters_of_bodies_come_first_in_it() {
+    fn the_earliest_difference_is_found_with_body_parameters_first() {
         let mut other = trace();
         other.snapshots[1].bodies[0].pose.position[0] = 0.7;
         other.frames.rows[2][0] = 0.25;
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_or_a_moment_that_only_one_has_is_a_difference() {
+    fn missing_bodies_and_frames_are_differences() {
         let mut other = trace();
         other.snapshots[0].bodies.truncate(1);
         let found = first_difference(&trace(), &other).expect("a body is missing");

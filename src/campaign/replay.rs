@@ -107,6 +107,9 @@ pub struct OutcomeChange {
 /// Replays stored runs on several workers and calls `on_done` after each. `campaigns` has their campaigns by id.
 ///
 /// The results are in the order of `runs`. They depend neither on the number of workers nor on the clock.
+///
+/// # Errors
+/// `X010` if the workers can't be started. Each result has the faults of its own replay.
 pub fn replay_all(
     history: &History,
     campaigns: &BTreeMap<String, StoredCampaign>,
@@ -281,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn every_way_not_to_fit_is_named() {
+    fn every_kind_of_mismatch_is_named() {
         let recorded = [real("a", 1.0, 0.5), real("b", 1.0, 0.9), real("b", 1.0, 0.1), real("c", 1.0, 0.2)];
         let made = [real("a", 2.0, 0.5), real("b", 0.8, 0.8), real("d", 1.0, 0.0), real("c", 1.0, 0.2)];
         let told: Vec<String> = misfits(&recorded, &made).iter().map(Misfit::to_string).collect();

@@ -11,7 +11,7 @@ use crate::shrink::SHRUNK;
 use crate::{Env, InputChange, RunResult, changes};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config as config;
-use actcheck_history::{CampaignRecord, CampaignRow, History, RunDetail};
+use actcheck_history::{CampaignRecord, CampaignRow, FAILED_AGAIN, History, RunDetail};
 use actcheck_rules::Budget;
 
 /// The stored part of a resumed campaign.
@@ -45,10 +45,14 @@ pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) ->
     if let Some(id) = id {
         let record = history.campaign(id)?;
         let finished = history.campaigns()?.iter().any(|row| row.id == id && is_finished(row));
-        return if finished { Err(finished_already(id)) } else { Ok(record) };
+        return match finished {
+            true => Err(finished_already(id)),
+            false if record.name.starts_with(FAILED_AGAIN) => Err(not_resumable(id)),
+            false => Ok(record),
+        };
     }
     for row in history.campaigns()?.iter().rev() {
-        if is_finished(row) || row.name.starts_with(SHRUNK) {
+        if is_finished(row) || row.name.starts_with(SHRUNK) || row.name.starts_with(FAILED_AGAIN) {
             continue;
         }
         let record = history.campaign(&row.id)?;
@@ -72,12 +76,19 @@ fn finished_already(id: &str) -> Diagnostics {
         .into()
 }
 
+/// X050: the campaign ran failed runs again, whose schedule is not in its record.
+fn not_resumable(id: &str) -> Diagnostics {
+    Diagnostic::error("X050", format!("campaign {id} ran failed runs again and can't be resumed"))
+        .help("run all failed runs again: `actcheck run CONFIG --last-failed`")
+        .into()
+}
+
 /// The path of a campaign's configuration.
-fn config_of(history: &History, record: &CampaignRecord) -> PathBuf {
+pub(super) fn config_of(history: &History, record: &CampaignRecord) -> PathBuf {
     config::resolve_path(history.dir(), &record.config_path)
 }
 
-fn is_same_file(one: &Path, other: &Path) -> bool {
+pub(super) fn is_same_file(one: &Path, other: &Path) -> bool {
     match (std::fs::canonicalize(one), std::fs::canonicalize(other)) {
         (Ok(one), Ok(other)) => one == other,
         _ => one == other,

@@ -60,7 +60,7 @@ impl Planned {
         }
     }
 
-    /// The repetition for the run's record.
+    /// The repetition for the run's record. Returns `None` if every scene is run once.
     pub fn repetition(&self) -> Option<Repetition> {
         self.repetition.map(|number| Repetition { scene: self.scene, number })
     }
@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tests_take_turns_and_every_run_is_planned_once() {
+    fn tests_alternate_and_every_run_is_planned_once() {
         let mut schedule = InTurns { tests: 3, scenes: 5_000, repeat: 1, made: 0 };
         let mut indices = Vec::new();
         loop {
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn the_runs_of_a_scene_come_one_after_another() {
+    fn the_runs_of_a_scene_are_consecutive() {
         let batch = InTurns { tests: 2, scenes: 2, repeat: 3, made: 0 }.next_batch(&[]);
         let indices: Vec<u64> = batch.iter().map(|planned| planned.index).collect();
         assert_eq!(indices, [0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11]);
@@ -218,7 +218,7 @@ mod tests {
 
     /// Repetitions share the scene, and their noise does not depend on their number.
     #[test]
-    fn repetitions_differ_in_noise_alone() {
+    fn repetitions_differ_only_in_noise() {
         let drawn = |scene, repetition| {
             let mut choices = Planned { index: 0, scene, repetition, steering: None }.choices(7, 0);
             let yaw = choices.real("yaw", 0.0, 1.0, 0.0).to_bits();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_have_every_run_once() {
+    fn every_run_is_in_one_shard() {
         let mut indices = Vec::new();
         for number in 1..=7 {
             let all = Box::new(InTurns { tests: 2, scenes: 3_334, repeat: 3, made: 0 });
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn attempts_and_runs_have_decisions_of_their_own() {
+    fn attempts_and_runs_have_independent_choices() {
         let first = |index, attempt| {
             Planned { index, scene: index, repetition: None, steering: None }
                 .choices(7, attempt)

@@ -118,7 +118,7 @@ mod tests {
 
     /// Values are read back bit by bit, and a modified file is rejected.
     #[test]
-    fn solids_come_back_as_they_were_or_not_at_all() {
+    fn cached_solids_are_read_back_exactly_or_rejected() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("deep/key.hulls");
         let third = 1.0 / 3.0;

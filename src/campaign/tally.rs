@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_runs_count_and_not_failed_properties() {
+    fn failed_runs_are_counted_not_failed_properties() {
         use Outcome::{Broken, Failed, Passed};
         let mut tally = tally(Limits { max_failures: Some(2), ..Limits::default() });
         assert_eq!(tally.count(&result([Failed, Failed])), None);
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn the_widest_interval_decides_and_what_is_undecided_has_none() {
+    fn the_widest_interval_decides_and_undecided_properties_have_none() {
         use Outcome::{Failed, Inapplicable, Passed};
         let limits = Limits { until_width: Some(0.3), ..Limits::default() };
         // The interval of n passes out of n has the width z² / (n + z²): 0.3 from n = 9 on.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::args::Format;
 use crate::chosen::{self, ChosenRuns, is_meant};
+use crate::options::Format;
 use crate::output;
 use crate::picture::Picture;
 use actcheck_analysis::{
@@ -84,7 +84,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         property: &args.property,
         by: &args.by,
         // In a text about all properties they would be too long.
-        usual_maps: !args.property.is_empty() || args.format != Format::Table,
+        usual_maps: !args.property.is_empty() || args.format != Format::Text,
         depth: args.depth,
         level: args.level,
     };
@@ -100,7 +100,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         return Ok(());
     }
     output::print(&match args.format {
-        Format::Table => findings_text(&summary),
+        Format::Text => findings_text(&summary),
         Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into()),
         Format::Csv => findings_table(&summary).render(args.format.into()),
         Format::Json => format!("{:#}\n", findings_json(&summary)),

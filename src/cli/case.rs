@@ -4,8 +4,9 @@ use std::path::Path;
 
 use serde_json::json;
 
-use crate::args::{Format, RunArgs};
-use crate::run::quietly;
+use crate::options::Format;
+use crate::run_args::RunArgs;
+use crate::work::quietly;
 use crate::{clock, output, show};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::{CaseRun, Env, RunContext, run_cases};
@@ -30,7 +31,7 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     let Some(summary) = summary else { return Ok(2) };
     let run = history.run(&summary.run)?;
     match args.format {
-        Format::Table => output::print(&format!("{}\n{}", run_text(&run), case_text(&summary))),
+        Format::Text => output::print(&format!("{}\n{}", run_text(&run), case_text(&summary))),
         Format::Json => output::print(&format!("{:#}\n", json!({"case": case_json(&summary), "run": run_json(&run)}))),
         Format::Csv => {
             output::print(&show::outcomes(&run).render(Format::Csv.into()));
@@ -64,6 +65,7 @@ fn refuse_campaign_options(args: &RunArgs, file: &str) -> Result<(), Diagnostics
         ("--repeat", args.repeat.is_some()),
         ("--shard", args.shard.is_some()),
         ("--shrink", args.shrink),
+        ("--last-failed", args.last_failed),
     ];
     let mut found = Diagnostics::new();
     for (option, _) in given.into_iter().filter(|(_, given)| *given) {

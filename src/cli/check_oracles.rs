@@ -7,8 +7,8 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-use crate::args::Format;
-use crate::run::{all_cores, quietly};
+use crate::options::Format;
+use crate::work::{all_cores, quietly};
 use crate::{clock, output, stop};
 use actcheck_analysis::{OracleTrial, oracle_matrix};
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -63,7 +63,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     }
     let summary = summarise(args, &env, &faults, &trials);
     output::print(&match args.format {
-        Format::Table => oracles_text(&summary),
+        Format::Text => oracles_text(&summary),
         Format::Csv => oracles_table(&summary).render(Format::Csv.into()),
         Format::Json => format!("{:#}\n", oracles_json(&summary)),
     });

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::args::Format;
+use crate::options::Format;
 use crate::progress::Progress;
 use crate::{output, stop};
 use actcheck_base::{Diagnostic, Diagnostics};

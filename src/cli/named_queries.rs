@@ -78,11 +78,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_query_says_in_its_first_comment_what_it_answers() {
+    fn title_and_description_come_from_the_first_comment() {
         let query = described("q".into(), "# Title\n# One line\n#  and another.\n\n# no more\nSELECT * {}");
         assert_eq!((query.title.as_str(), query.description.as_str()), ("Title", "One line and another."));
         assert_eq!(described("q".into(), "ASK {}").title, "");
-        let all = all().expect("the carried ones can be read");
+        let all = all().expect("the embedded queries can be read");
         assert!(all.len() >= 12 && all.iter().all(|query| !query.title.is_empty() && !query.description.is_empty()));
     }
 }

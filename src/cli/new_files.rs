@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn all_files_are_written_or_none() {
-        let folder = tempfile::tempdir().expect("there is room for a folder");
+        let folder = tempfile::tempdir().expect("a temporary folder");
         let at = |name: &str| folder.path().join(name);
         fs::write(at("taken"), "a file, where a folder is needed").expect("it can be written");
         let mut files = NewFiles::default();
@@ -103,10 +103,10 @@ mod tests {
         files.add(at("taken/three.txt"), "3");
         let faults = files.write("").expect_err("a file is not a folder");
         assert!(faults.iter().all(|fault| fault.code == "X007"), "{faults}");
-        assert!(!at("a").exists(), "what was written is removed");
+        assert!(!at("a").exists(), "written files are removed");
         fs::remove_file(at("taken")).expect("it can be removed");
         files.write("").expect("all can be written");
-        assert_eq!(fs::read_to_string(at("a/b/one.txt")).expect("it is there"), "1");
+        assert_eq!(fs::read_to_string(at("a/b/one.txt")).expect("the file exists"), "1");
         let faults = files.write("move it").expect_err("they exist");
         assert!(faults.iter().all(|fault| fault.code == "X015"), "{faults}");
     }

@@ -1,13 +1,13 @@
 //! `actcheck recheck`
 
-use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::args::{Format, HistoryArgs};
+use crate::options::{Format, HistoryArgs};
 use crate::progress::Progress;
 use crate::why::ontology_file;
+use crate::work::all_cores;
 use crate::{clock, history_dir, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean};
 use actcheck_campaign::{Ending, RecheckOptions, RuleSet, recheck as judge_anew};
@@ -73,7 +73,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     );
     progress.finish();
     output::print(&match args.format {
-        Format::Table => recheck_text(&summary),
+        Format::Text => recheck_text(&summary),
         Format::Csv => recheck_table(&summary).render(args.format.into()),
         Format::Json => format!("{:#}\n", recheck_json(&summary)),
     });
@@ -119,10 +119,6 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
         .into());
     }
     Ok(runs)
-}
-
-fn all_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, NonZero::get)
 }
 
 fn first_of(faults: Diagnostics) -> Diagnostics {

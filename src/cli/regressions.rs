@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::run::quietly;
+use crate::work::quietly;
 use crate::{case, clock};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign as campaign;

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-use crate::args::{Format, HistoryArgs};
+use crate::options::{Format, HistoryArgs};
 use crate::replay_text::{replay_json, replay_table, replay_text};
-use crate::run::{all_cores, quietly};
+use crate::work::{all_cores, quietly};
 use crate::{clock, history_dir, output};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::{Env, Fit, Replay, ReplayOptions, RunContext, StoredCampaign, replay_all};
@@ -69,7 +69,7 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
         }
     }
     output::print(&match args.format {
-        Format::Table => replay_text(&done, faults.len()),
+        Format::Text => replay_text(&done, faults.len()),
         Format::Json => format!("{:#}\n", replay_json(&done)),
         Format::Csv => replay_table(&done).render(Format::Csv.into()),
     });
@@ -100,7 +100,7 @@ fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnost
         }
     }
     if runs.is_empty() {
-        return Err(Diagnostic::error("X030", "there is no run to replay")
+        return Err(Diagnostic::error("X036", "there is no run to replay")
             .help("the campaign has no runs; `actcheck list` shows those of all campaigns")
             .into());
     }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::Value;
 
-use crate::args::{Format, HistoryArgs};
+use crate::options::{Format, HistoryArgs};
 use crate::why::ontology_file;
 use crate::{history_dir, output};
 use actcheck_base::{Diagnostics, Outcome};
@@ -43,7 +43,7 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
     let counts = |property: &Property| judged.get(&property.iri).copied().unwrap_or_default();
     let properties = ontology.properties.values();
     let mut table = match args.format {
-        Format::Table => Table::new(["property", "label", "language", "file", "actions", "unit", "passed"]),
+        Format::Text => Table::new(["property", "label", "language", "file", "actions", "unit", "passed"]),
         Format::Csv | Format::Json => Table::new(
             ["property", "label", "language", "file", "actions", "precondition_of", "unit"]
                 .into_iter()
@@ -52,7 +52,7 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
         ),
     };
     table.rows = match args.format {
-        Format::Table => properties.map(|property| for_people(property, &ontology, counts(property))).collect(),
+        Format::Text => properties.map(|property| for_people(property, &ontology, counts(property))).collect(),
         Format::Csv | Format::Json => {
             properties.map(|property| for_programs(property, &ontology, counts(property))).collect()
         }

@@ -27,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moments_are_written_as_histories_do() {
+    fn times_are_formatted_as_in_histories() {
         assert_eq!(moment("2026-11-21").as_deref(), Ok("2026-11-21T00:00:00.000Z"));
         assert_eq!(moment("2026-11-21T18:00:00+02:00").as_deref(), Ok("2026-11-21T16:00:00.000Z"));
         assert!(moment("12h").is_ok_and(|then| then.ends_with('Z') && then.starts_with("20")));

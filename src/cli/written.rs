@@ -31,8 +31,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_replaced_whole_and_nothing_is_left_beside_it() {
-        let folder = tempfile::tempdir().expect("there is room for a folder");
+    fn a_file_is_replaced_atomically_without_leftovers() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
         let file = folder.path().join("out.txt");
         let names = || -> Vec<_> {
             let entries = fs::read_dir(folder.path()).expect("the folder is there");
@@ -40,18 +40,18 @@ mod tests {
         };
         for text in ["one", "another"] {
             write(&file, text).expect("it can be written");
-            assert_eq!(fs::read_to_string(&file).expect("it is there"), text);
+            assert_eq!(fs::read_to_string(&file).expect("the file exists"), text);
             assert_eq!(names(), ["out.txt"]);
         }
         let link = folder.path().join("link");
         std::os::unix::fs::symlink(&file, &link).expect("links can be made");
         write(&link, "through the link").expect("it can be written");
-        assert_eq!(fs::read_to_string(&file).expect("it is there"), "through the link");
+        assert_eq!(fs::read_to_string(&file).expect("the file exists"), "through the link");
         assert!(write(Path::new("/dev/null"), "gone").is_ok());
         // Writing to /dev/full always fails with a full disk.
         let told = write(Path::new("/dev/full"), "too much").expect_err("nothing can be written there");
         assert!(told.iter().any(|fault| fault.code == "X007"));
-        let told = write(&folder.path().join("none").join("out.txt"), "x").expect_err("there is no such folder");
+        let told = write(&folder.path().join("none").join("out.txt"), "x").expect_err("the folder is missing");
         assert_eq!(told.len(), 1);
     }
 }

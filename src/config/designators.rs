@@ -40,7 +40,7 @@ pub(crate) struct Designators {
 }
 
 /// Reads the tables of designators: those of the paper, and any other with a single list of strings. Only the ontology
-/// can tell whether such a designator exists, so `places` keeps the span for a later check.
+/// defines which designators exist, so `places` keeps the span for a later check.
 pub(crate) fn read(
     root: &mut Table,
     library: &mut ModelLibrary,

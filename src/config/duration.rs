@@ -25,7 +25,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn people_write_durations_in_several_ways() {
+    fn durations_have_several_spellings() {
         for (text, secs) in
             [("90s", 90.0), ("10m", 600.0), ("2h", 7200.0), ("1h30m", 5400.0), ("1.5s", 1.5), (" 1 h ", 3600.0)]
         {

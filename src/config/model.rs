@@ -175,8 +175,8 @@ mod tests {
     }
 
     #[test]
-    fn a_tube_is_taken_apart_into_staves_inside_its_radius() {
-        let model = read(&Source::new("models/objects/glass.toml", GLASS)).expect("it is right");
+    fn a_tube_is_decomposed_into_staves_inside_its_radius() {
+        let model = read(&Source::new("models/objects/glass.toml", GLASS)).expect("the model is valid");
         assert_eq!((model.name.as_str(), model.category.as_str()), ("glass", "http://actions#Glass"));
         let solids = model.solids();
         assert_eq!(solids.len(), 12);

@@ -230,8 +230,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_profile_that_is_not_there_or_incomplete_is_refused() {
-        let found = read(&Files::Disk, Path::new("no/such/robot.toml")).expect_err("there is no such file");
+    fn a_missing_or_incomplete_profile_is_refused() {
+        let found = read(&Files::Disk, Path::new("no/such/robot.toml")).expect_err("the file is missing");
         assert_eq!(found.iter().map(|d| d.code).collect::<Vec<_>>(), ["W010"]);
         let source = Source::new(
             "r.toml",

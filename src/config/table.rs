@@ -396,13 +396,13 @@ mod tests {
     }
 
     #[test]
-    fn values_come_with_their_places() {
+    fn values_have_their_spans() {
         let text = "name = \"glass\"\nsize = [1, 2.5, 3]\n[part]\nround = true\n";
         let found = faults(text, |table| {
             table.require(&["name", "size"]);
             assert_eq!(table.string("name").map(|name| (name.value, name.span)), Some(("glass".to_owned(), 7..14)));
             assert_eq!(table.numbers("size", 0.0..), Some([1.0, 2.5, 3.0]));
-            let mut part = table.table("part").expect("it is there");
+            let mut part = table.table("part").expect("the table exists");
             assert_eq!(part.boolean("round"), Some(true));
             let mut none = Diagnostics::new();
             part.finish(&mut none);
@@ -412,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn each_fault_is_noted_with_its_place() {
+    fn each_fault_is_reported_with_its_place() {
         let text = "count = -1\nmass = \"x\"\nrange = [3, 1]\nfrction = 1\nbig = 99999999999999999999\nlist = []\n";
         let found = faults(text, |table| {
             table.require(&["friction"]);
@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn text_that_is_not_toml_has_its_places() {
+    fn syntax_errors_have_their_places() {
         let found = faults("a = \nb = [1,\n", |_| {});
         assert!(found.len() >= 2, "{found:?}");
         assert!(found.iter().all(|fault| fault.starts_with("C002 t.toml:")), "{found:?}");

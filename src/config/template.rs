@@ -110,7 +110,7 @@ mod tests {
     const PLAIN: CampaignTemplate<'_> = CampaignTemplate { name: "mine", ontology: false, models: false, skill: None };
 
     #[test]
-    fn every_replaced_piece_is_in_the_shipped_configuration_once() {
+    fn every_replaced_text_occurs_once_in_the_shipped_configuration() {
         let all = CampaignTemplate { skill: Some("skills/pick.py"), ..PLAIN };
         for (from, to) in replacements(&all) {
             assert_eq!(PICK.matches(from).count(), 1, "configs/pick.toml no longer has `{from}`");

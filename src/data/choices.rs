@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_gives_the_same_decisions_again() {
+    fn a_record_reproduces_its_choices() {
         let mut first = Choices::random(7, 3);
         let drawn = draw(&mut first);
         assert_eq!(draw(&mut Choices::random(7, 3)), drawn);
@@ -274,12 +274,12 @@ mod tests {
     }
 
     #[test]
-    fn what_a_record_lacks_is_nominal() {
+    fn choices_missing_in_a_record_are_nominal() {
         assert_eq!(draw(&mut Choices::recorded(&[])), (0, 0.0, 0.0));
     }
 
     #[test]
-    fn only_a_record_makes_an_exception() {
+    fn only_a_record_can_choose_an_exception() {
         assert_eq!(Choices::random(7, 3).exception("left_out", 2), 0);
         assert_eq!(Choices::recorded(&[]).exception("left_out", 2), 0);
         let said = Choice { name: "left_out".into(), kind: ChoiceKind::Index { of: 2 }, value: 1.0 };
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_has_its_spread() {
+    fn noise_has_the_given_standard_deviation() {
         let mut choices = Choices::random(1, 0);
         let values: Vec<f64> = (0..20_000).map(|_| choices.normal("n", 2.0)).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_can_leave_the_rest_to_chance() {
+    fn missing_choices_can_be_random() {
         let mut first = Choices::random(7, 3);
         let drawn = draw(&mut first);
         let scene = &first.made()[..2];
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_can_come_from_a_stream_of_its_own() {
+    fn noise_can_come_from_a_separate_stream() {
         let drawn = |mut choices: Choices| {
             let scene = choices.real("yaw", -1.0, 1.0, 0.0);
             choices.begin_noise();
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn steered_decisions_lie_at_their_quantiles_once() {
+    fn steered_choices_take_their_quantiles_once() {
         let quantiles =
             BTreeMap::from([("model".to_owned(), 0.5), ("yaw".to_owned(), 0.75), ("noise".to_owned(), 0.975)]);
         let mut choices = Choices::steered(&quantiles, 7, 3);

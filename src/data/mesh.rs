@@ -126,15 +126,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn volumes_scale_and_vertices_weld() {
+    fn volumes_scale_and_vertices_are_welded() {
         let corner = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let soup: Vec<[f64; 3]> = faces.iter().flatten().map(|idx| corner[*idx]).collect();
-        let mesh =
-            Mesh::new(soup, (0..4).map(|face| [3 * face, 3 * face + 1, 3 * face + 2]).collect()).expect("it is right");
+        let mesh = Mesh::new(soup, (0..4).map(|face| [3 * face, 3 * face + 1, 3 * face + 2]).collect())
+            .expect("the mesh is valid");
         assert_eq!(mesh.welded().vertices.len(), 4);
         assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-12);
         assert!((mesh.scaled([2.0, -1.0, 3.0]).volume() - 1.0).abs() < 1e-12);
-        assert!(Mesh::new(corner.to_vec(), vec![[0, 1, 4]]).expect_err("it is wrong").contains("triangle 1"));
+        assert!(
+            Mesh::new(corner.to_vec(), vec![[0, 1, 4]]).expect_err("the index is out of range").contains("triangle 1")
+        );
     }
 }

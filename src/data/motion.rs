@@ -1,4 +1,4 @@
-//! What the robot measured of itself and the commands of its controllers, over time.
+//! The robot's measurements of itself and the commands of its controllers, over time.
 
 use serde::{Deserialize, Serialize};
 

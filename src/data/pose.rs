@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn yaw_and_tilt_come_back() {
+    fn yaw_and_tilt_are_recovered() {
         let pose = Pose::upright([1.0, 2.0, 3.0], 0.7);
         assert!((pose.yaw() - 0.7).abs() < 1e-12);
         assert!(pose.tilt() < 1e-7);

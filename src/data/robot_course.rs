@@ -1,4 +1,4 @@
-//! What the robot itself went through during one action: joints at their limits, colliding links, held objects.
+//! Events of the robot itself during one action: joints at their limits, colliding links, held objects.
 
 use serde::{Deserialize, Serialize};
 

@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_box_around_a_lying_cylinder_is_exact() {
+    fn the_bounding_box_of_a_lying_cylinder_is_exact() {
         let lying = Isometry3::from_parts(
             Translation3::new(1.0, 0.0, 0.0),
             UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0),

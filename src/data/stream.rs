@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_depend_on_seed_and_place_alone() {
+    fn numbers_depend_only_on_seed_and_position() {
         let stream = Stream::new(7);
         let forwards: Vec<u64> = (0..100).map(|number| stream.bits(number)).collect();
         let mut backwards: Vec<u64> = (0..100).rev().map(|number| stream.bits(number)).collect();
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_has_its_spread_and_no_neighbours_that_agree() {
+    fn noise_has_the_given_spread_and_is_uncorrelated() {
         let stream = Stream::new(3);
         let values: Vec<f64> = (0..100_000).map(|number| stream.bell(number)).collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;

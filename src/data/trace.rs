@@ -54,7 +54,7 @@ pub struct ActionTrace {
     pub duration_secs: f64,
     /// Contacts that overlap the action in time.
     pub contacts: Vec<ContactEpisode>,
-    /// What perception returned, in order.
+    /// The results of perception, in order.
     pub percepts: Vec<Percept>,
     /// The interpretation of the camera's pictures, if any were taken.
     pub perceived: Option<Perceived>,

@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_has_the_fewest_digits_of_its_single() {
+    fn a_number_has_the_fewest_digits_that_identify_its_f32() {
         for (value, expected) in
             [(f64::from(0.3f32), 0.3), (-0.0, 0.0), (1e-40, 1e-40), (f64::from(f32::MAX), 3.402_823_5e38)]
         {

@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_comes_back() {
+    fn encoding_is_lossless() {
         let wild = [f32::NAN, f32::INFINITY, -0.0, f32::MIN, 1e-40, 0.1, -7.25, 3.0e38];
         let tables = [
             Vec::new(),
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_noticed_or_harmless() {
+    fn corrupt_data_is_rejected_or_decodes_without_panic() {
         let rows: Vec<Vec<f32>> = (0..50).map(|i| vec![i as f32 * 0.125, (i as f32).sin()]).collect();
         let bytes = encode(&rows);
         for end in 0..bytes.len() {
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_rounded_to_grains_takes_about_a_byte() {
+    fn rounded_values_take_about_a_byte() {
         for grain in GRAINS {
             let round = |value: f64| ((value / grain).round() * grain) as f32;
             let rows: Vec<Vec<f32>> = (0..400).map(|i| vec![round((f64::from(i) * 0.02).sin())]).collect();

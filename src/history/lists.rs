@@ -52,7 +52,16 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
     ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status .
 }";
 
-const SHRUNK: &str = "SELECT DISTINCT ?campaign WHERE { ?run act:shrunkFrom ?original ; act:campaign ?campaign }";
+/// Campaigns whose scenes were selected because they fail. The prefix is [`FAILED_AGAIN`].
+const SHRUNK: &str = "
+SELECT DISTINCT ?campaign WHERE {
+    { ?run act:shrunkFrom ?original ; act:campaign ?campaign }
+    UNION
+    { ?campaign a act:Campaign ; rdfs:label ?name FILTER(STRSTARTS(?name, 'failed runs of ')) }
+}";
+
+/// Name prefix of campaigns that ran the failed runs of another campaign again.
+pub const FAILED_AGAIN: &str = "failed runs of ";
 
 /// All judgements made after the run, with the values that distinguish them.
 const LATER: &str = "
@@ -119,7 +128,7 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
     }
 }
 
-/// Ids of the campaigns that hold a shrunk run.
+/// Ids of the campaigns that hold a shrunk run, or that ran failed runs again.
 pub(super) fn shrunk_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
     Ok(select(store, SHRUNK, Vec::new())?.iter().map(|row| id(row, 0)).collect())
 }

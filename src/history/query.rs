@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_keyword_is_behind_the_prologue() {
+    fn the_first_keyword_is_found_after_the_prologue() {
         let keyword = |text| first_keyword(text).map(|(word, _)| word);
         assert_eq!(keyword("# DELETE\nPREFIX a: <http://b#> base <http://c> SELECT *"), Some("SELECT"));
         assert_eq!(keyword("insert data {}"), Some("insert"));

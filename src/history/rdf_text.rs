@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn triples_are_written_and_what_is_none_is_left_out() {
+    fn triples_are_written_and_missing_values_omitted() {
         let (s, p) = (Term::iri("http://actions#a"), Term::iri("http://actions#b"));
         let triples = [
             [s.clone(), p.clone(), Term::string("line\n\"quoted\" \\ <tag>")],

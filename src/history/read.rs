@@ -47,22 +47,22 @@ impl Node {
         self.values.iter().map(|(property, values)| (property.as_str(), values.as_slice()))
     }
 
-    /// The first value as text: of a literal its text, else the IRI.
+    /// The first value as text: of a literal its text, else the IRI. Returns `None` if the property has no value.
     pub(super) fn text(&self, property: &str) -> Option<String> {
         self.all(property).first().map(text_of)
     }
 
-    /// The first value as a number.
+    /// The first value as a number. Returns `None` if it is missing or not a number.
     pub(super) fn number(&self, property: &str) -> Option<f64> {
         self.text(property)?.parse().ok()
     }
 
-    /// The first value as a count.
+    /// The first value as a count. Returns `None` if it is missing or not a non-negative integer.
     pub(super) fn count(&self, property: &str) -> Option<u64> {
         self.text(property)?.parse().ok()
     }
 
-    /// The first value as a Boolean.
+    /// The first value as a Boolean. Returns `None` if it is missing or not a Boolean.
     pub(super) fn boolean(&self, property: &str) -> Option<bool> {
         self.text(property)?.parse().ok()
     }

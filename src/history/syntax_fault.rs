@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_place_is_a_byte_offset() {
+    fn an_error_position_becomes_a_byte_offset() {
         assert_eq!(offset("äb\ncd", 1, 2), 2);
         assert_eq!(offset("äb\ncd", 2, 2), 5);
         assert_eq!(offset("äb\ncd", 9, 9), 6);
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn strange_errors_of_the_parser_are_still_told() {
+    fn unparsable_parser_errors_are_still_reported() {
         let text = Source::new("q", "SELECT");
         for error in
             ["no place", "error at 1:x: expected a", "error at 9:9: expected one of ", "error at 1:3: expected é"]

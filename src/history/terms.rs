@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_of_term_comes_back() {
+    fn every_kind_of_term_is_read_back() {
         let terms = [
             Term::iri("http://actions#Pick"),
             Term::Blank("b1".into()),

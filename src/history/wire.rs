@@ -226,7 +226,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_keyword_is_found_where_it_is_one() {
+    fn the_keyword_is_found_outside_of_strings_and_comments() {
         for text in
             ["SELECT * { SERVICE <http://a> {} }", "ASK{service silent ?x{}}", "ASK { FILTER(1<2) SERVICE<a>{} }"]
         {

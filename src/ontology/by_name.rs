@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_fall_into_words() {
+    fn names_are_split_into_words() {
         assert_eq!(words("coke_can_2"), ["coke", "can"]);
         assert_eq!(words("MiniCoffeeTable"), ["mini", "coffee", "table"]);
         assert_eq!(words("__7"), [""; 0]);

@@ -51,7 +51,7 @@ impl Graph {
         self.about(subject).filter(move |statement| self.means(&statement.predicate, predicate))
     }
 
-    /// The first string value of a subject's predicate.
+    /// The first string value of a subject's predicate. Returns `None` if it has none.
     pub(super) fn text(&self, subject: &str, predicate: &str) -> Option<String> {
         self.stated(subject, predicate).find_map(|statement| match &statement.object {
             Term::String(text) | Term::LangString(text, _) => Some(text.to_string()),

@@ -34,7 +34,7 @@ pub fn property_template(name: &str, action: &str, designator: &str, rules_folde
          ?text = CONCAT(STRAFTER(STR(?object), \"object/\"), \" tilted by \", STR(ROUND(?tilt * 100) / 100), \" rad, may tilt by 0.5 rad\") .\n"
     );
     let ontology_entry = format!(
-        "\nact:{name} a act:Property ;\n    rdfs:label \"{words}\" ;\n    rdfs:comment \"Describe here what must hold.\" ;\n    \
+        "\nact:{name} a act:Property ;\n    rdfs:label \"{words}\" ;\n    rdfs:comment \"Describe the requirement here.\" ;\n    \
          act:needsParameter act:{designator} ;\n    act:unit \"rad\" ;\n    act:verifiedBy <{rules_folder}{rule_file}> .\n\
          act:{action} act:successProperty act:{name} .\n"
     );
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_become_files() {
+    fn property_names_become_file_names() {
         assert_eq!(snake_case("StaysUpright"), "stays_upright");
         let template = property_template("StaysUpright", "Pick", "pickObject", "../rules/");
         assert_eq!(template.rule_file, "stays_upright.rls");

@@ -85,12 +85,18 @@ struct Typed<'a> {
 }
 
 /// The type of a message.
+///
+/// # Errors
+/// The message is not a JSON object with a `type`.
 pub fn kind_of(message: &[u8]) -> Result<String, ExternalFault> {
     let typed: Typed<'_> = serde_json::from_slice(message).map_err(|error| wrong("a message", &error, message))?;
     Ok(typed.kind.into_owned())
 }
 
 /// Parses a message of a known type.
+///
+/// # Errors
+/// The message is not JSON, or has missing, unknown or invalid fields.
 pub fn parse<'a, T: Deserialize<'a>>(kind: &str, message: &'a [u8]) -> Result<T, ExternalFault> {
     serde_json::from_slice(message).map_err(|error| wrong(&format!("a message `{kind}`"), &error, message))
 }
@@ -197,6 +203,9 @@ impl WirePose {
     }
 
     /// A pose from the wire, with its quaternion normalised.
+    ///
+    /// # Errors
+    /// The quaternion is not finite, or too short to be a rotation.
     pub fn pose(&self) -> Result<Pose, ExternalFault> {
         let length = self.quaternion_xyzw.iter().map(|part| part * part).sum::<f64>().sqrt();
         if !length.is_finite() || length < SHORTEST {

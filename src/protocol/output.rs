@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_lines_are_kept_and_none_is_too_long() {
+    fn the_last_lines_are_kept_and_shortened() {
         let mut tail = Tail::default();
         for number in 0..30 {
             tail.take(format!("line {number}\r\nand ").as_bytes());

@@ -47,7 +47,7 @@ impl<'a> Performance<'a> {
         Self { lent: programs.lend(), run, clock_secs, output: None }
     }
 
-    /// The last lines that the program printed, if its own fault ended the run.
+    /// The last lines that the program printed. Returns `None` unless its own fault ended the run.
     pub fn output(&self) -> Option<&[String]> {
         self.output.as_deref()
     }

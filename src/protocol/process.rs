@@ -126,13 +126,13 @@ impl Process {
         self.child.try_wait().ok().flatten().map(how)
     }
 
-    /// Waits briefly for a possible exit and returns how the process ended.
+    /// Waits briefly for a possible exit and returns how the process ended. Returns `None` if it is still running.
     pub fn ends_soon(&mut self) -> Option<String> {
         self.ends_within(GRACE_POLLS / 4)
     }
 
     /// Waits for the exit of a program that has closed its connection, and returns how it ended. On a busy machine, an
-    /// interpreter takes a while to exit.
+    /// interpreter takes a while to exit. Returns `None` if it is still running.
     pub fn ends_after_closing(&mut self) -> Option<String> {
         self.ends_within(3 * GRACE_POLLS)
     }

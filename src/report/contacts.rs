@@ -21,7 +21,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_many_contacts_the_strongest_are_told_as_they_began() {
+    fn the_strongest_contacts_are_shown_in_order_of_their_start() {
         let contact = |idx: u32| ContactEpisode {
             pair: ["floor".to_owned(), "mug_1".to_owned()],
             start_secs: f64::from(100 - idx),

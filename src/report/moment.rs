@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_word_is_more_than_letters() {
+    fn names_match_whole_words_only() {
         assert!(names("glass_1 is 57.5 cm from the gripper", "glass_1"));
         assert!(names("touched (glass_1)", "glass_1"));
         assert!(!names("glass_12 fell", "glass_1") && !names("a glass_1b", "glass_1") && !names("x", ""));

@@ -100,7 +100,7 @@ pub(crate) enum Literal {
 }
 
 impl Literal {
-    /// Returns the atom of a positive or negative literal.
+    /// Returns the atom of a positive or negative literal. Returns `None` for other literals.
     pub(crate) fn atom(&self) -> Option<&Atom> {
         match self {
             Self::Positive(atom) | Self::Negative(atom) => Some(atom),

@@ -76,7 +76,7 @@ pub(crate) fn variables(text: &str) -> BTreeSet<String> {
     scan(text).into_iter().filter_map(|word| word.word.strip_prefix(['?', '$']).map(str::to_owned)).collect()
 }
 
-/// Returns the offset of the first `{` outside strings, IRIs and comments.
+/// Returns the offset of the first `{` outside strings, IRIs and comments. Returns `None` if there is no such brace.
 pub(crate) fn first_group(text: &str) -> Option<usize> {
     braces(text).into_iter().find(|(_, open)| *open).map(|(at, _)| at)
 }

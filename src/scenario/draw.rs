@@ -285,7 +285,7 @@ impl<'a> SceneBuilder<'a> {
         Ok(ids)
     }
 
-    /// Chooses one of the models. Nominal: the first.
+    /// Chooses one of the models. Nominal: the first. Returns `None` if there are no models.
     pub(super) fn choose(&mut self, name: &str, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
         if models.is_empty() {
             return None;

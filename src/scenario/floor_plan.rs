@@ -1,6 +1,6 @@
 //! The robot's map of the floor.
 //!
-//! Never: contains what a scene adds to its world. The robot perceives obstacles and objects with its sensors.
+//! Never: contains objects that a scene adds to its world. The robot perceives obstacles and objects with its sensors.
 
 use nalgebra::Point3;
 
@@ -44,7 +44,8 @@ impl FloorPlan {
         }
     }
 
-    /// Returns the pose of the base at a location, or in front of a surface, by name.
+    /// Returns the pose of the base at a location, or in front of a surface, by name. Returns `None` if the map has no
+    /// such place.
     pub fn place(&self, name: &str) -> Option<[f64; 3]> {
         let location = self.locations.iter().find(|location| location.name == name).map(|location| location.at);
         location.or_else(|| self.fronts.iter().find(|(id, _)| id == name).map(|(_, at)| *at))

@@ -44,7 +44,7 @@ impl Surroundings {
         self.standing.iter().filter(|object| object.model.surface.is_some())
     }
 
-    /// The piece of furniture with this name, if it has a surface.
+    /// The piece of furniture with this name. Returns `None` if it does not exist or has no surface.
     pub(super) fn surface(&self, name: &str) -> Option<&SceneObject> {
         self.surfaces().find(|object| object.id == name)
     }

@@ -84,12 +84,12 @@ mod tests {
     fn counted(failed: u64, points: u64) -> Estimate {
         let mut sums = Weighted::default();
         (0..points).for_each(|index| sums.add(1.0, 1.0, index < failed));
-        sums.estimate().expect("there are points")
+        sums.estimate().expect("the sums have points")
     }
 
     /// For equal weights, the interval has Garwood's exact limits of a Poisson mean (table of 1936).
     #[test]
-    fn equal_weights_give_the_exact_interval_of_a_count() {
+    fn equal_weights_give_the_exact_poisson_interval() {
         for (count, low, high) in [(0, 0.0, 3.689), (1, 0.025_32, 5.572), (5, 1.623, 11.668), (10, 4.795, 18.390)] {
             let found = counted(count, 1000);
             assert!((found.low * 1000.0 - low).abs() < 2e-3, "{found:?}");
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_are_in_order_from_none_to_all() {
+    fn interval_limits_are_ordered_for_every_count() {
         for failed in 0..=40 {
             let found = counted(failed, 40);
             assert!(0.0 <= found.low && found.low <= found.rate, "{found:?}");

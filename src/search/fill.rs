@@ -102,7 +102,7 @@ mod tests {
     /// Each cell of a 4 × 4 grid over two axes has nearly equally many points; the counts of random points vary far
     /// more.
     #[test]
-    fn halton_fills_more_evenly_than_random() {
+    fn halton_points_are_more_uniform_than_random_ones() {
         let spread = |point: &dyn Fn(u64) -> Vec<f64>| {
             let mut cells = [0_i32; 16];
             for index in 0..1600 {
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sequence_is_haltons() {
+    fn the_sequence_equals_haltons() {
         let first: Vec<f64> = (1..6).map(|index| radical_inverse(index, 3)).collect();
         let known = [1.0 / 3.0, 2.0 / 3.0, 1.0 / 9.0, 4.0 / 9.0, 7.0 / 9.0];
         assert!(first.iter().zip(known).all(|(found, known)| (found - known).abs() < 1e-12), "{first:?}");

@@ -8,7 +8,7 @@
 //! unusual values (much noise, many objects), four of five of the points not chosen by margins are unusual. Failures
 //! that don't depend on these values are found as fast as before; failures that need usual values are found later.
 //!
-//! Never: depends on scenes, rules, runs or the number of workers, or decides what failed.
+//! Never: depends on scenes, rules, runs or the number of workers, or decides outcomes.
 
 mod archive;
 mod bandit;

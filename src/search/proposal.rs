@@ -198,7 +198,7 @@ mod tests {
 
     /// Samples follow the reported density: weighted by its inverse, every quarter has an equal share.
     #[test]
-    fn what_is_drawn_has_the_density() {
+    fn samples_follow_the_density() {
         for density in [skewed(), far()] {
             let mut generator = stream(3, 9, 0);
             let mut quarters = [0.0; 4];
@@ -212,7 +212,7 @@ mod tests {
 
     /// Uses a grid, because random points estimate the mean of so steep a density poorly.
     #[test]
-    fn far_numbers_have_a_density_of_mean_one() {
+    fn a_tail_density_has_mean_one() {
         for nearest in [0.0, 1.0, 2.0, 3.0] {
             let at = |cell: u32| Marginal::Far(nearest).density((f64::from(cell) + 0.5) / 1e6, &[]);
             let mean = (0..1_000_000).map(at).sum::<f64>() / 1e6;
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn proportions_that_are_none_are_uniform() {
+    fn invalid_proportions_are_uniform() {
         assert_eq!(Marginal::steps(&[0.0, 0.0]), Marginal::Steps(vec![1.0]));
         assert_eq!(Marginal::steps(&[f64::NAN, 1.0]), Marginal::Steps(vec![1.0]));
         assert_eq!(Proposal::default().density(&[0.3]), 1.0);

@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_seed_and_answers_give_the_same_points() {
+    fn the_same_seed_and_results_give_the_same_points() {
         for strategy in Strategy::ALL {
             assert_eq!(searched(strategy, 5, 12).1, searched(strategy, 5, 12).1, "{strategy:?}");
             assert_ne!(searched(strategy, 5, 12).1, searched(strategy, 6, 12).1, "{strategy:?}");
@@ -312,7 +312,7 @@ mod tests {
 
     /// Over many seeds the mean rate is the volume, nearly all intervals contain it, and weights have mean 1.
     #[test]
-    fn rates_are_unbiased_however_points_were_chosen() {
+    fn rates_are_unbiased_for_every_strategy() {
         const SEEDS: u64 = 200;
         for strategy in Strategy::ALL {
             let (mut rates, mut held, mut weights) = (0.0, 0, 0.0);
@@ -345,7 +345,7 @@ mod tests {
     /// A guided search has the plain points of a random search, at least four for each chosen point. So misleading
     /// margins cost little.
     #[test]
-    fn a_guided_search_contains_the_random_one() {
+    fn a_guided_search_includes_the_random_points() {
         let random = searched(Strategy::Random, 3, 40).1;
         for strategy in Strategy::ALL.into_iter().filter(|strategy| strategy.is_guided()) {
             let (mut plain, mut chosen) = (0, 0);
@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn without_margins_points_stay_plain() {
+    fn without_margins_points_stay_random() {
         for strategy in Strategy::ALL {
             let mut search = Search::new(space(), strategy, 1);
             for _ in 0..10 {
@@ -378,7 +378,7 @@ mod tests {
     /// Two properties fail rarely, in opposite corners: both failures are found, and the properties share the chosen
     /// points.
     #[test]
-    fn several_properties_are_all_looked_for() {
+    fn failures_of_several_properties_are_all_found() {
         for strategy in Strategy::ALL.into_iter().filter(|strategy| strategy.is_guided()) {
             let mut search = Search::new(Space::new([Dimension::Continuous; 6]), strategy, 2);
             let mut failed = [0, 0];
@@ -398,7 +398,7 @@ mod tests {
     /// One property fails if noise is large and there are many objects, 0.0027 · 2/5 of the volume; another if both are
     /// usual.
     #[test]
-    fn what_is_unusual_is_tried_early_and_rates_stay_unbiased() {
+    fn unusual_points_are_tried_early_and_rates_stay_unbiased() {
         let space = Space::new([Dimension::Normal, Dimension::Rising(5), Dimension::Continuous]);
         let fails = |point: &[f64]| {
             // Beyond three standard deviations on either side.
@@ -433,7 +433,7 @@ mod tests {
 
     /// A third of the cube is infeasible. A fifth of the rest fails.
     #[test]
-    fn stand_ins_keep_rates_unbiased() {
+    fn replacements_of_infeasible_points_keep_rates_unbiased() {
         let space = Space::new([Dimension::Normal, Dimension::Continuous]);
         let (mut rates, mut held) = (0.0, 0);
         const SEEDS: u64 = 300;
@@ -465,7 +465,7 @@ mod tests {
 
     /// The results of an interrupted generation are incomplete, so that it does not count for rates.
     #[test]
-    fn only_whole_generations_count() {
+    fn only_complete_generations_count() {
         let mut search = Search::new(space(), Strategy::Bandit, 1);
         let first = search.ask(5);
         first.iter().for_each(|ask| search.tell(vec![result(margin(&ask.point))]));
@@ -478,7 +478,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_asked_is_ignored() {
+    fn unrequested_results_are_ignored() {
         let mut search = Search::new(Space::new([]), Strategy::Boundary, 1);
         search.tell(vec![result(-1.0)]);
         assert!(search.estimates().is_empty());

@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn turns_get_longer() {
+    fn turns_of_each_kind_get_longer() {
         let kinds: Vec<usize> = (0..30).map(|number| kind_at(number, 2)).collect();
         let turns: Vec<usize> = kinds.chunk_by(|a, b| a == b).map(<[usize]>::len).collect();
         assert_eq!(turns, [2, 6, 18, 4]);
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_are_those_that_the_space_has() {
+    fn unusual_kinds_depend_on_the_space() {
         let kinds_of = |dimensions: &[Dimension]| kinds(&Space::new(dimensions.iter().copied())).len();
         assert_eq!(kinds_of(&[Dimension::Continuous, Dimension::Categorical(3)]), 0);
         assert_eq!(kinds_of(&[Dimension::Continuous, Dimension::Rising(3)]), 1);

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_best_liked_form_is_sent() {
+    fn the_preferred_media_type_is_sent() {
         for (accept, table, graph) in [
             ("", Some(WireSyntax::Json), Some(WireSyntax::Turtle)),
             ("*/*", Some(WireSyntax::Json), Some(WireSyntax::Turtle)),

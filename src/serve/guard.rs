@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_others_are_refused() {
+    fn foreign_host_names_are_refused() {
         let allowed = ["robot.lab".to_owned()];
         for (host, origin, status) in [
             (Some("localhost:7878"), None, None),

@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_that_is_shown_becomes_markup() {
+    fn shown_text_is_escaped() {
         let nasty = "\"><script>alert('1')</script>&".to_owned();
         let example = ExampleQuery {
             name: nasty.clone(),

@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn a_query_comes_in_three_ways() {
+    fn a_query_can_be_sent_in_three_ways() {
         let form = Some("application/x-www-form-urlencoded; charset=UTF-8");
         assert_eq!(asked("GET", Some("query=ASK%20%7B%7D&format=json"), None, b""), Ok("ASK {}".to_owned()));
         assert_eq!(asked("POST", None, form, b"query=ASK+%7B%7D"), Ok("ASK {}".to_owned()));

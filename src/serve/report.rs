@@ -26,6 +26,9 @@ pub(super) struct LiveReport {
 
 impl LiveReport {
     /// Returns the page. `history` is locked while it is rendered.
+    ///
+    /// # Errors
+    /// A refusal if the page can't be rendered in time, or a campaign locks the history and no page was rendered before.
     pub fn page(&self, history: &RwLock<()>) -> Result<Vec<u8>, Refusal> {
         // Concurrent requests wait for the same page.
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);

@@ -151,14 +151,14 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_of_the_tool_is_not_a_failure_of_the_robot() {
+    fn a_tool_fault_is_not_a_robot_failure() {
         assert_eq!(outcome_of(&found(false), None).0, Outcome::Failed);
         assert_eq!(outcome_of(&Err(RuleFault::BudgetSpent("rule x".into())), None).0, Outcome::Timeout);
         assert_eq!(outcome_of(&Err(RuleFault::Value("no number".into())), None).0, Outcome::Broken);
     }
 
     #[test]
-    fn words_say_how_far_it_was() {
+    fn witnesses_include_the_margin() {
         assert_eq!(outcome_of(&found(false), None).2, "no success was derived; missed by 0.016");
         assert_eq!(short(0.000_412_34), "0.0004123");
         assert_eq!(short(1234.6), "1235");

@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn every_way_to_come_again_is_told_apart() {
+    fn every_kind_of_recurrence_is_distinguished() {
         use Outcome::{Broken, Failed, Inapplicable, Passed};
         let cases: [Row; 9] = [
             (&["A"], &[("A", Failed), ("B", Passed)], Recurrence::AsBefore),

@@ -116,7 +116,7 @@ mod tests {
     ];
 
     #[test]
-    fn the_papers_table_gives_its_total() {
+    fn scores_match_the_papers_total() {
         let runs = TABLE_IV.map(|row| {
             let scores: Vec<f64> = row
                 .into_iter()
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_tested_nothing_is_no_pass() {
+    fn a_run_that_tested_nothing_is_not_passed() {
         assert_eq!(action_score([Outcome::Inapplicable, Outcome::Inapplicable]), 0.0);
         assert_eq!(action_score([Outcome::Broken, Outcome::Timeout, Outcome::Untested]), 0.0);
         assert_eq!(action_score([]), 0.0);

@@ -59,18 +59,18 @@ mod tests {
 
     /// Examples of Newcombe (1998), "Two-sided confidence intervals for the single proportion", table I, method 3.
     #[test]
-    fn published_intervals_come_out() {
+    fn intervals_match_published_values() {
         for (successes, trials, low, high) in
             [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)]
         {
-            let interval = wilson(successes, trials).expect("there are trials");
+            let interval = wilson(successes, trials).expect("the trials are not zero");
             assert!((interval.low - low).abs() < 5e-5, "{interval:?}");
             assert!((interval.high - high).abs() < 5e-5, "{interval:?}");
         }
     }
 
     #[test]
-    fn so_many_trials_make_an_interval_so_narrow() {
+    fn the_number_of_trials_for_a_width_is_sufficient() {
         for width in [0.02, 0.05, 0.1, 0.3] {
             let trials = trials_for_width(width).next_multiple_of(2);
             let spread = |trials| wilson(trials / 2, trials).map_or(1.0, |interval| interval.high - interval.low);
@@ -80,11 +80,11 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_are_whole() {
-        let all = wilson(20, 20).expect("there are trials");
+    fn extreme_counts_have_limits_of_exactly_0_and_1() {
+        let all = wilson(20, 20).expect("the trials are not zero");
         assert_eq!((all.rate, all.high), (1.0, 1.0));
         assert!((all.low - (1.0 - 0.1611)).abs() < 5e-5);
-        assert_eq!(wilson(0, 20).expect("there are trials").low, 0.0);
+        assert_eq!(wilson(0, 20).expect("the trials are not zero").low, 0.0);
         assert_eq!(wilson(0, 0), None);
         assert_eq!(wilson(3, 2), wilson(2, 2));
     }

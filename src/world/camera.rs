@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_is_everywhere_as_deep_as_it_is_far() {
+    fn a_parallel_wall_has_the_same_depth_everywhere() {
         let image = look(&[(2.5, &Cuboid::new([0.5, 5.0, 5.0].into()))]);
         assert!(image.depths.iter().all(|depth| (depth - 2.0).abs() < 1e-5));
         // The outermost pixel centres are half a pixel inside the field of view.
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearer_of_two_hides_the_other_and_range_is_limited() {
+    fn nearer_objects_occlude_and_range_is_limited() {
         let (ball, wall) = (Ball::new(0.2), Cuboid::new([0.1, 9.0, 9.0].into()));
         assert!((middle(&look(&[(3.0, &wall), (1.0, &ball)])) - 0.8).abs() < 2e-3);
         assert!((middle(&look(&[(3.0, &wall)])) - 2.9).abs() < 1e-4);

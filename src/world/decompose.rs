@@ -113,26 +113,27 @@ mod tests {
             let next = (side + 1) % 6;
             triangles.extend([[side, side + 6, next + 6], [side, next + 6, next]]);
         }
-        Mesh::new(vertices, triangles).expect("it is right")
+        Mesh::new(vertices, triangles).expect("the mesh is valid")
     }
 
     #[test]
-    fn an_angle_becomes_two_solids_and_the_same_bits_each_time() {
-        let solids = decompose(&angle()).expect("it is right");
+    fn an_l_shape_becomes_two_solids_deterministically() {
+        let solids = decompose(&angle()).expect("the mesh can be decomposed");
         assert!((2..=8).contains(&solids.len()), "{}", solids.len());
         let volume: f64 = solids.iter().map(Shape::volume).sum();
         assert!((volume - 3.0).abs() < 0.1, "{volume}");
-        assert_eq!(solids, decompose(&angle()).expect("it is right"));
+        assert_eq!(solids, decompose(&angle()).expect("the mesh can be decomposed"));
         assert_eq!(decomposition_key(&angle()), decomposition_key(&angle()));
     }
 
     #[test]
-    fn what_is_convex_is_one_solid_and_what_is_flat_is_none() {
+    fn a_convex_mesh_is_one_solid_and_a_flat_one_none() {
         let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let tetrahedron = Mesh::new(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).expect("it is right");
-        assert_eq!(decompose(&tetrahedron).expect("it is right").len(), 1);
-        let flat =
-            Mesh::new(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]).expect("it is right");
+        let tetrahedron =
+            Mesh::new(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).expect("the mesh is valid");
+        assert_eq!(decompose(&tetrahedron).expect("the mesh can be decomposed").len(), 1);
+        let flat = Mesh::new(vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])
+            .expect("the mesh is valid");
         assert!(decompose(&flat).is_err());
     }
 }

@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn owners_come_back_from_their_numbers() {
+    fn owners_are_recovered_from_their_numbers() {
         for owner in [Owner::Floor, Owner::Object(0), Owner::Object(7), Owner::Link(0), Owner::Link(12)] {
             assert_eq!(Owner::from_tag(owner.to_tag()), owner);
         }

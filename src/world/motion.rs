@@ -66,7 +66,7 @@ mod tests {
     use crate::robot::tests::lonely;
 
     #[test]
-    fn what_was_measured_and_told_comes_back() {
+    fn measurements_and_targets_are_read_back() {
         let mut world = lonely();
         world.begin_record();
         let mut command = world.hold();
@@ -79,7 +79,7 @@ mod tests {
         let observed = world.observe();
         let motion = world.end_record().robot.motion;
         let moments: Vec<_> = motion.moments().collect();
-        assert_eq!(moments.len(), 11, "ten a second, and how it began");
+        assert_eq!(moments.len(), 11, "ten per second and the first state");
         assert_eq!(motion.joints.len(), world.kinematics().joints().len());
         let (first, last) = (moments[0], moments[10]);
         assert_eq!((first.time_secs, last.time_secs), (0.0, 1.0));

@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equally_good_knowledge_counts_the_same() {
+    fn estimates_of_equal_variance_have_equal_weight() {
         let mut variance = 0.04;
         assert!((share(&mut variance, 0.2) - 0.5).abs() < 1e-12 && (variance - 0.02).abs() < 1e-12);
         let mut sure = 0.0;
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn doubt_grows_with_the_way_and_with_turning() {
+    fn uncertainty_grows_with_distance_and_turning() {
         let odometry = Odometry { drift: 0.1, heading_drift: 0.02, ..Odometry::IDEAL };
         let mut tracker = Tracker::default();
         for _ in 0..200 {

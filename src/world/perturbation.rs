@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_fallen_lies_above_the_place_where_it_stood() {
+    fn a_fallen_object_lies_above_its_former_position() {
         let standing = Pose::upright([0.3, -0.2, 0.4], 0.7);
         let fallen = lying(&standing.to_isometry(), [0.06, 0.06, 0.2]);
         assert!((Pose::from_isometry(&fallen).tilt() - std::f64::consts::FRAC_PI_2).abs() < 1e-9);

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn energy_that_is_lost_and_energy_that_the_robot_gives_are_no_gain() {
+    fn lost_energy_and_work_of_the_robot_are_not_gains() {
         let mut meter = QualityMeter::default();
         for (first, second) in
             [(Some(5.0), Some(1.0)), (Some(4.0), Some(1.5)), (Some(3.0), None), (Some(3.0), Some(9.0))]

@@ -99,7 +99,7 @@ impl<'a> Solids<'a> {
         [self.slopes[0][column], self.slopes[1][row]]
     }
 
-    /// Returns the first hit of a pixel's ray within `most` of its lengths.
+    /// Returns the first hit of a pixel's ray within `most` of its lengths. Returns `None` if the ray hits no solid.
     pub(super) fn first(&self, column: usize, row: usize, most: f64) -> Option<Hit> {
         let slopes = self.slopes(column, row);
         let square = 1.0 + slopes[0] * slopes[0] + slopes[1] * slopes[1];
@@ -310,7 +310,7 @@ mod tests {
 
     /// Every ray of many random scenes has the same hit as in a plain loop over the library's ray casts.
     #[test]
-    fn every_pixel_agrees_with_a_plain_loop() {
+    fn every_pixel_equals_that_of_a_plain_loop() {
         let shapes: [Box<dyn Shape>; 4] = [
             Box::new(Cuboid::new([0.3, 0.1, 0.5].into())),
             Box::new(Cylinder::new(0.4, 0.2)),
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn the_angle_is_that_of_the_surface_that_was_met() {
+    fn the_incidence_angle_is_that_of_the_hit_surface() {
         let stream = Stream::new(4);
         let shapes: [Box<dyn Shape>; 3] = [
             Box::new(Cuboid::new([0.3, 0.1, 0.5].into())),
@@ -363,7 +363,7 @@ mod tests {
             let [left, up] = LENS.slopes(column, row);
             let direction = Vector3::new(1.0, left, up);
             let ray = Ray::new(to_vector(&Vector3::zeros()), to_vector(&direction));
-            let met = shape.cast_ray_and_get_normal(&to_pose(&pose), &ray, 9.0, true).expect("we met it");
+            let met = shape.cast_ray_and_get_normal(&to_pose(&pose), &ray, 9.0, true).expect("the ray hits the shape");
             let sine = (from_vector(met.normal).dot(&direction) / direction.norm()).abs();
             assert!((solids.sine(column, row, hit) - sine).abs() < 2e-2, "{number}");
             n_met += 1;

@@ -326,7 +326,7 @@ pub(super) mod tests {
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         let profile =
-            Arc::new(actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is right"));
+            Arc::new(actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid"));
         let one = (1.0, 1.0);
         let scene = Scene {
             map: actcheck_data::SceneMap::default(),
@@ -354,7 +354,7 @@ pub(super) mod tests {
                 iterations: 2,
             },
         };
-        build(&scene).expect("the scene is right")
+        build(&scene).expect("the scene is valid")
     }
 
     /// A random posture within the limits.
@@ -364,7 +364,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_engine_and_our_kinematics_put_the_links_in_the_same_places() {
+    fn the_engine_and_our_kinematics_agree_on_link_poses() {
         let mut world = lonely();
         let mut choices = Choices::random(3, 0);
         for _ in 0..20 {
@@ -384,7 +384,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn inverse_kinematics_reaches_what_it_says_within_the_limits() {
+    fn inverse_kinematics_solutions_reach_their_target_within_the_limits() {
         let world = lonely();
         let mut choices = Choices::random(5, 0);
         let (kinematics, layout) = (world.kinematics(), world.layout());
@@ -411,7 +411,7 @@ pub(super) mod tests {
 
     /// A constant force on a free joint: acceleration is force over mass, up to the joint's largest speed.
     #[test]
-    fn efforts_push_as_told_and_no_faster_than_joints_may() {
+    fn commanded_efforts_accelerate_joints_up_to_their_velocity_limit() {
         let mut world = lonely();
         let base = world.layout().base.expect("it drives")[0];
         let (joint, mass) = (world.kinematics().joints()[base].clone(), world.robot.model.links[base + 1..].iter());
@@ -440,7 +440,7 @@ pub(super) mod tests {
     fn a_profile_that_names_a_missing_joint_is_refused_with_help() {
         let mut profile = lonely().robot.profile.as_ref().clone();
         profile.arm_joints[1] = "arm_flx_joint".to_owned();
-        let refused = check_robot(&profile).expect_err("there is no such joint").diagnostic();
+        let refused = check_robot(&profile).expect_err("the joint is missing").diagnostic();
         assert_eq!((refused.code, refused.help.as_deref()), ("W021", Some("did you mean `arm_flex_joint`?")));
         profile.urdf.text = "<robot".into();
         assert_eq!(check_robot(&profile).expect_err("it is not a URDF").diagnostic().code, "W020");

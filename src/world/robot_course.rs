@@ -195,7 +195,7 @@ mod tests {
 
     /// A posture with the hand inside the robot's body is detected; the home posture has no self-collision.
     #[test]
-    fn links_in_each_other_are_seen_and_joints_beyond_their_limits_too() {
+    fn self_collisions_and_exceeded_joint_limits_are_detected() {
         let mut world = lonely();
         world.begin_record();
         let hold = world.hold();

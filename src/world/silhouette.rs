@@ -99,7 +99,7 @@ mod tests {
 
     /// Points of random boxes, including boxes around the eye, are only visible in tiles that overlap the outline.
     #[test]
-    fn no_point_of_a_box_is_outside_of_its_outline() {
+    fn every_point_of_a_box_is_inside_its_outline() {
         let stream = Stream::new(3);
         let (mut n_seen, mut n_spared) = (0, 0);
         for number in 0..300u64 {

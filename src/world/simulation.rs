@@ -200,7 +200,7 @@ impl World {
         f64::from(self.steps_per_tick) / f64::from(self.steps_per_second)
     }
 
-    /// Returns the fault of the simulation, if any. A fault is permanent.
+    /// Returns the fault of the simulation, or `None` if there is none. A fault is permanent.
     pub fn fault(&self) -> Option<&Fault> {
         self.fault.as_ref()
     }

@@ -3,7 +3,7 @@
     pip install scipy statsmodels
     python tests/data/statistics.py > tests/data/statistics.json
 
-`tests/statistics.rs` holds the program to them.
+`tests/statistics.rs` compares the program with them.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Validates configurations with a JSON Schema: prints those that it refuses, one a line, with the reason.
+"""Validates configurations with a JSON Schema: prints the refused ones, one per line, with the reason.
 
 check_campaigns.py SCHEMA FOLDER"""
 

@@ -1,4 +1,4 @@
-"""Reads a dataset as a learner would, and holds its tables to its schema and to each other."""
+"""Reads a dataset as a learner would, and checks its tables against its schema and each other."""
 
 import json
 import pathlib
@@ -24,18 +24,18 @@ assert moments.n_unique() == len(moments), "one row a moment"
 assert joints.select(key).unique().sort(key).equals(moments.sort(key)), "joints have the same moments"
 assert objects.select(key).unique().sort(key).equals(moments.sort(key)), "objects too"
 
-# Each action's course begins with it and is as long as it.
+# Each action's trajectory starts at 0 and has the action's duration.
 lengths = robot.group_by(["run", "step"]).agg(pl.col("time_s").min().alias("first"), pl.col("time_s").max().alias("last"))
 both = lengths.join(actions, on=["run", "step"])
 assert len(both) == len(lengths) and (both["first"] == 0.0).all()
 assert ((both["duration_s"] - both["last"]).is_between(-0.01, 0.11)).all(), both
 
-# What was passed is what the outcomes say.
+# The counts of passed properties agree with the outcomes.
 passed = tables["outcomes"].filter(pl.col("outcome") == "passed").group_by(["run", "step"]).agg(pl.len().alias("counted"))
 both = actions.join(passed, on=["run", "step"], how="left").with_columns(pl.col("counted").fill_null(0))
 assert (both["properties_passed"] == both["counted"]).all()
 
-# Joints follow their targets, the base's by belief, and rotations are rotations.
+# Joints follow their targets (those of the base in the believed pose), and quaternions have unit length.
 still = joints.filter(~pl.col("joint").str.contains("finger"))
 assert (still["position"] - still["target"]).abs().quantile(0.5) < 0.02
 base = joints.filter(pl.col("joint") == "base_x_joint").join(robot, on=key)

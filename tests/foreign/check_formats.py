@@ -1,10 +1,10 @@
-"""Holds files of `actcheck report` to other people's validators.
+"""Checks files of `actcheck report` with external validators.
 
     check_formats.py junit FILE.xml SCHEMA.xsd
     check_formats.py jsonl FILE.jsonl SCHEMA.json
-    check_formats.py earl FILE.ttl VOCABULARY.ttl...    (prints how many assertions there are, or what contradicts)
+    check_formats.py earl FILE.ttl VOCABULARY.ttl...    (prints the number of assertions, or the contradictions)
 
-Exit code 1 where a file is not valid.
+Exit code 1 if a file is not valid.
 """
 
 import json
@@ -39,7 +39,7 @@ def earl(file, *vocabularies):
     terms = Namespace("http://www.w3.org/ns/earl#")
     assertions = len(set(graph.subjects(RDF.type, terms.Assertion)))
     DeductiveClosure(OWLRL_Semantics).expand(graph)
-    # owlrl writes what contradicts into the graph.
+    # owlrl writes contradictions into the graph.
     errors = Namespace("http://www.daml.org/2002/03/agents/agent-ont#")
     contradictions = sorted(str(text) for text in graph.objects(None, errors.error))
     if contradictions:

@@ -1,4 +1,4 @@
-"""Waits until somebody ends its action; notes each of its starts."""
+"""Performs its action until it is aborted; records each of its starts."""
 
 from wire import serve
 

@@ -1,6 +1,6 @@
-"""Goes wrong in the way that FAULT names, as long as the file FAULT_ONCE is there; without that variable, whenever the seed says so.
+"""Shows the fault that FAULT names while the file FAULT_ONCE exists; without that variable, depending on the seed.
 
-A first argument instead of the variables says what to do in every run."""
+A first argument replaces the variables and names the fault of every run."""
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ KINDS = (
 
 
 def leave_children():
-    """One in the same process group, one in a session of its own: both would stay for minutes."""
+    """Starts one child in the same process group and one in its own session: both would run for minutes."""
     for own in (False, True):
         subprocess.Popen([sys.executable, "-c", f"import time; time.sleep({FOREVER})"], start_new_session=own)
 

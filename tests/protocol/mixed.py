@@ -1,4 +1,4 @@
-"""Perceives what is truly there, for others to go by: it has to be privileged."""
+"""Reports the ground truth as its percepts, for later actions; needs `privileged`."""
 
 from wire import serve
 

@@ -1,14 +1,14 @@
-"""Says what it is told of the truth."""
+"""Reports the ids of the ground truth that it receives."""
 
 from wire import serve
 
 
 def perform(link, begin):
     observations = [begin["observation"], link.ask({"type": "command"})]
-    told = [observation.get("truth", {"objects": []})["objects"] for observation in observations]
-    names = sorted(thing["id"] for thing in told[0])
-    assert names == sorted(thing["id"] for thing in told[1])
-    message = f"told of {', '.join(names)}" if names else "told nothing"
+    truth = [observation.get("truth", {"objects": []})["objects"] for observation in observations]
+    names = sorted(thing["id"] for thing in truth[0])
+    assert names == sorted(thing["id"] for thing in truth[1])
+    message = f"received {', '.join(names)}" if names else "received nothing"
     return {"type": "end", "succeeded": True, "message": message}
 
 

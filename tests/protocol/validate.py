@@ -1,6 +1,6 @@
 """Checks logged messages against a JSON Schema: validate.py SCHEMA LOG…
 
-Knows the keywords that the protocol's schema uses, and refuses any other."""
+Supports the keywords that the protocol's schema uses, and refuses any other."""
 
 import json
 import sys
@@ -77,7 +77,7 @@ def main():
             one = {"from": "FromProgram", "to": "ToProgram"}[entry["direction"]]
             kinds.add((entry["direction"], entry["message"]["type"]))
             found += faults(entry["message"], schema["$defs"][one], schema)
-            # What is no message must not pass.
+            # An invalid message must not pass.
             broken = {**entry["message"], "type": "dance"}
             assert list(faults(broken, schema["$defs"][one], schema)), "anything would pass"
     wanted = {("to", kind) for kind in "hello reset begin observation answer bye".split()}

@@ -1,4 +1,4 @@
-"""Moves a little in every way that there is, asks for everything, and reports what it felt: nothing."""
+"""Uses every kind of command and query with small motions, and reports that it felt no contact."""
 
 import random
 

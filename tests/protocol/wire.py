@@ -1,4 +1,4 @@
-"""The skill protocol with nothing but Python's own library, for test programs."""
+"""The skill protocol with only Python's standard library, for test programs."""
 
 import json
 import os
@@ -10,7 +10,7 @@ LIMITS = {"f32": 4}
 
 
 class Link:
-    """Frames over the socket that the simulator listens at."""
+    """Frames over the simulator's socket."""
 
     def __init__(self):
         kind, path = os.environ["ACTCHECK_ADDRESS"].split(":", 1)
@@ -67,7 +67,7 @@ class Link:
 
 
 def serve(perform, actions=("Pick",), name="test"):
-    """Introduces itself and performs actions until the simulator says good-bye."""
+    """Introduces itself and performs actions until the simulator sends `bye`."""
     link = Link()
     link.hello = link.receive()
     assert link.hello["type"] == "hello"

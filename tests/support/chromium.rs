@@ -1,4 +1,4 @@
-//! A browser without a window, spoken to over two pipes (the DevTools protocol), with nothing but what Debian's package has.
+//! A headless browser, controlled over two pipes (the DevTools protocol), with only Debian's package.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -8,27 +8,27 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-/// Names that the browser goes by.
+/// Names of the browser's program.
 const NAMES: [&str; 6] =
     ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "chromium-headless-shell"];
-/// A slow machine draws in software.
+/// A slow machine renders in software.
 const PATIENCE: Duration = Duration::from_secs(90);
-/// What is asked again and again is asked so often.
+/// The polling interval.
 const PAUSE: Duration = Duration::from_millis(30);
 
-/// A browser with one page. It ends with this value.
+/// A browser with one page. Dropping it ends the browser.
 pub struct Chromium {
     child: Child,
     input: ChildStdin,
     answers: Receiver<Value>,
     session: Option<String>,
     number: u64,
-    /// Faults that the page told of.
+    /// Errors that the page reported.
     pub complaints: Vec<String>,
     _profile: tempfile::TempDir,
 }
 
-/// The browser's file: the one that `ACTCHECK_CHROMIUM` names, or one that is installed.
+/// The browser's program: the one that `ACTCHECK_CHROMIUM` names, or an installed one.
 fn program() -> PathBuf {
     if let Some(named) = std::env::var_os("ACTCHECK_CHROMIUM") {
         return named.into();
@@ -37,11 +37,11 @@ fn program() -> PathBuf {
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
     let file = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
     file.into_iter().find(|file| file.is_file()).unwrap_or_else(|| {
-        panic!("this needs the browser Chromium: `apt-get install chromium`, or name one in ACTCHECK_CHROMIUM")
+        panic!("this test needs Chromium: `apt-get install chromium`, or name one in ACTCHECK_CHROMIUM")
     })
 }
 
-/// Whether a warning is of the software that draws, about its own speed: it reads back what WebGL has drawn.
+/// Whether a warning comes from the software renderer, about its own speed in reading back WebGL's pixels.
 fn is_of_the_driver(text: &Value) -> bool {
     text.as_str().is_some_and(|text| text.contains("GPU stall due to ReadPixels"))
 }
@@ -49,7 +49,7 @@ fn is_of_the_driver(text: &Value) -> bool {
 impl Chromium {
     pub fn start() -> Self {
         let profile = tempfile::tempdir().unwrap();
-        // The browser reads from its third and writes to its fourth pipe.
+        // The browser reads from file descriptor 3 and writes to 4.
         let mut child = Command::new("sh")
             .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 0</dev/null 1>/dev/null 2>/dev/null"])
             .arg(program())
@@ -61,7 +61,7 @@ impl Chromium {
                 "--hide-scrollbars",
             ])
             .args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run", "about:blank"])
-            // Software draws the pages more quickly than software that imitates a graphics card, which WebGL alone needs.
+            // Plain software rendering of pages is faster than an emulated graphics card, which only WebGL needs.
             .arg("--disable-gpu-compositing")
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .stdin(Stdio::piped())
@@ -89,7 +89,7 @@ impl Chromium {
         browser
     }
 
-    /// Asks the browser for something.
+    /// Sends a command to the browser.
     pub fn call(&mut self, method: &str, params: Value) -> Value {
         self.asked(method, params).unwrap_or_else(|fault| panic!("{method}: {fault}"))
     }
@@ -141,7 +141,7 @@ impl Chromium {
         }
     }
 
-    /// Waits until an expression is true. Between two pages there is nothing that it could be true of.
+    /// Waits until an expression is true. While a page is loading, it counts as false.
     pub fn until(&mut self, expression: &str) {
         let start = Instant::now();
         loop {
@@ -149,7 +149,7 @@ impl Chromium {
             if found == Ok(json!(true)) {
                 return;
             }
-            assert!(start.elapsed() < PATIENCE, "it never came to {expression}: {found:?}, {:?}", self.complaints);
+            assert!(start.elapsed() < PATIENCE, "{expression} never became true: {found:?}, {:?}", self.complaints);
             std::thread::sleep(PAUSE);
         }
     }
@@ -161,13 +161,13 @@ impl Chromium {
         self.until("document.documentElement.dataset.ready");
     }
 
-    /// Width and height of the page. Unit: pixels.
+    /// Sets the size of the page. Unit: pixels.
     pub fn size(&mut self, width: u32, height: u32) {
         let asked = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
         self.call("Emulation.setDeviceMetricsOverride", asked);
     }
 
-    /// What the system prefers: `light` or `dark`.
+    /// Sets the system's preferred theme: `light` or `dark`.
     pub fn theme(&mut self, theme: &str) {
         let features = json!([{ "name": "prefers-color-scheme", "value": theme }]);
         self.call("Emulation.setEmulatedMedia", json!({ "features": features }));
@@ -180,14 +180,14 @@ impl Chromium {
         }
     }
 
-    /// What can be seen, as PNG.
+    /// A screenshot of the visible part, as PNG.
     pub fn picture(&mut self) -> Vec<u8> {
         use base64::Engine as _;
         let began = Instant::now();
         let letters = loop {
             match self.asked("Page.captureScreenshot", json!({ "format": "png" })) {
                 Ok(answer) => break answer["data"].clone(),
-                // A page that was just asked for takes the place of another one.
+                // A page that was just opened replaces another one.
                 Err(fault) if fault.contains("Not attached") && began.elapsed() < PATIENCE => {
                     std::thread::sleep(Duration::from_millis(20));
                 }
@@ -200,7 +200,7 @@ impl Chromium {
 
 impl Drop for Chromium {
     fn drop(&mut self) {
-        // It may have gone already.
+        // It may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,5 +1,5 @@
-//! Other people's tools, for tests that hold our files and our server to them. Where one is not to be had, the test says so in one
-//! line, which also a test that passes shows, and ends.
+//! External tools, for tests that check our files and our server with them. If one is not available, the test prints
+//! one line, also if it passes, and ends.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,29 +8,30 @@ use std::sync::OnceLock;
 
 use super::root;
 
-/// Says that a part of a test was left out, and why.
+/// Prints that a part of a test was skipped, and why.
 pub fn left_out(what: &str, why: &str) {
-    // The test program shows what is written to the stream itself.
+    // The test harness shows direct writes to the stream.
     let _ = writeln!(std::io::stderr(), "LEFT OUT {what}: {why}");
 }
 
-/// Python with the packages of `tests/foreign/requirements.txt`, in an environment that is kept beside what was compiled.
+/// Python with the packages of `tests/foreign/requirements.txt`, in an environment cached beside the build output.
+/// Returns `None` if it can't be created.
 pub fn python() -> Option<&'static Path> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     PYTHON
         .get_or_init(|| {
-            environment("python", "requirements.txt").map_err(|why| left_out("what needs Python's packages", &why)).ok()
+            environment("python", "requirements.txt").map_err(|why| left_out("tests of Python's packages", &why)).ok()
         })
         .as_deref()
 }
 
-/// Python with our client, installed by pip from its folder into an environment that has only what it needs and its tests need.
-/// The client is ours: where this can't be made, its tests fail, and say why.
+/// Python with our client, installed by pip from its folder into an environment with only its dependencies and those
+/// of its tests. The client is ours: if the environment can't be created, its tests fail with the reason.
 pub fn client_python() -> &'static Path {
     static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
     let made = PYTHON.get_or_init(|| {
         let python = environment("python_client", "python_client.txt")?;
-        // As it is today. What builds it is in the environment already, so that this needs no network.
+        // Installs the current state. The build backend is in the environment already, so no network is needed.
         let install = ["install", "--quiet", "--disable-pip-version-check", "--no-build-isolation", "--no-deps"];
         let client = root().join("clients/python");
         run(Command::new(&python).args(["-m", "pip"]).args(install).arg("--force-reinstall").arg(client))?;
@@ -39,7 +40,8 @@ pub fn client_python() -> &'static Path {
     made.as_deref().unwrap_or_else(|why| panic!("clients/python can't be installed for its tests: {why}"))
 }
 
-/// Python with maturin, and a folder with what the package needs from PyPI: wheels are made and installed without a network from then on.
+/// Python with maturin, and a folder with the package's dependencies from PyPI: later builds and installations of
+/// wheels need no network.
 pub fn maturin() -> Result<(PathBuf, PathBuf), String> {
     let python = environment("maturin", "../../clients/wheel/maturin.txt")?;
     let needs = Path::new(env!("CARGO_TARGET_TMPDIR")).join("package-needs");
@@ -52,7 +54,8 @@ pub fn maturin() -> Result<(PathBuf, PathBuf), String> {
     Ok((python, needs))
 }
 
-/// An environment with the packages that a file in `tests/foreign` names, kept beside what was compiled: its Python.
+/// An environment with the packages listed in a file of `tests/foreign`, cached beside the build output. Returns its
+/// Python.
 fn environment(name: &str, packages: &str) -> Result<PathBuf, String> {
     let wanted = root().join("tests/foreign").join(packages);
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -64,7 +67,8 @@ fn environment(name: &str, packages: &str) -> Result<PathBuf, String> {
     Ok(folder.join("bin/python"))
 }
 
-/// Allure's own generator from npm, as `tests/foreign/package.json` pins it, kept beside what was compiled.
+/// Allure's own generator from npm, as `tests/foreign/package.json` pins it, cached beside the build output. Returns
+/// `None` if it can't be installed.
 pub fn allure() -> Option<&'static Path> {
     static ALLURE: OnceLock<Option<PathBuf>> = OnceLock::new();
     ALLURE
@@ -77,19 +81,19 @@ pub fn allure() -> Option<&'static Path> {
                 let mut npm = Command::new("npm");
                 run(npm.args(["install", "--no-audit", "--no-fund", "--loglevel=error"]).current_dir(folder))
             })
-            .map_err(|why| left_out("what needs Allure's generator from npm", &why))
+            .map_err(|why| left_out("tests of Allure's generator from npm", &why))
             .ok()?;
             Some(folder.join("node_modules/.bin/allure"))
         })
         .as_deref()
 }
 
-/// Whether a program of the system is there.
+/// Returns `true` if a program of the system is installed.
 pub fn has(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }
 
-/// A folder that is made once for each text of what is wanted in it.
+/// A folder that is created once for each version of the `wanted` file.
 fn kept(folder: &Path, wanted: &Path, make: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), String> {
     let (text, made) = (std::fs::read_to_string(wanted).unwrap(), folder.join("made-of"));
     if std::fs::read_to_string(&made).is_ok_and(|before| before == text) {
@@ -99,7 +103,7 @@ fn kept(folder: &Path, wanted: &Path, make: impl FnOnce(&Path) -> Result<(), Str
     std::fs::write(&made, text).map_err(|error| error.to_string())
 }
 
-/// Runs a command to its end; its last line of errors if it fails.
+/// Runs a command to its end. Returns the last line of its error stream if it fails.
 pub fn run(command: &mut Command) -> Result<(), String> {
     let program = command.get_program().to_string_lossy().into_owned();
     let output = command.output().map_err(|error| format!("{program} can't be started: {error}"))?;

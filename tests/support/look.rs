@@ -1,10 +1,10 @@
-//! A campaign whose runs take a tenth of a second, for tests of what campaigns do whatever they test.
+//! A campaign whose runs take a tenth of a second, for tests that need any campaign.
 
 use tempfile::TempDir;
 
 use crate::support::{edit, project};
 
-/// A robot looks at a table with so coarse a camera that in some scenes it takes one thing for two, or misses one.
+/// A robot looks at a table with a coarse camera: in some scenes it merges two things, or misses one.
 const LOOK: &str = r#"
 tests = [["PerceivePlane"]]
 test_count = 15
@@ -33,14 +33,14 @@ localisation_noise_m = 0.005
 heading_noise_rad = 0.01
 "#;
 
-/// A project that has it as `configs/look.toml`.
+/// A project with this configuration in `configs/look.toml`.
 pub fn looking() -> TempDir {
     let project = project();
     std::fs::write(project.path().join("configs/look.toml"), LOOK).unwrap();
     project
 }
 
-/// The same where the camera is so noisy that no look finds the table where it is: every run fails.
+/// The same with a camera so noisy that no look locates the table correctly: every run fails.
 pub fn blurred() -> TempDir {
     let project = looking();
     edit(&project.path().join("configs/look.toml"), "range_noise_m = 0.0015", "range_noise_m = 0.1");

@@ -1,4 +1,4 @@
-//! Made-up runs as a history tells them, for what would take too long to simulate.
+//! Made-up runs in the form of a history's records, as a replacement for long simulations.
 
 use std::collections::BTreeMap;
 
@@ -8,10 +8,11 @@ use actcheck::history::{ActionDetail, ObjectDetail, RunDetail, RunRow, RunStatus
 
 use super::planted::Dice;
 
-/// Classes of things, and how often they are met.
+/// Classes of objects with their weights.
 pub const CLASSES: [&str; 6] = ["Bottle", "Bowl", "Box", "Can", "Glass", "Mug"];
 
-/// A run of a campaign with one target on a table and up to four things around it; `judge` says what came of each of its actions.
+/// A run of a campaign with one target on a table and up to four objects around it; `judge` gives the outcomes of
+/// each of its actions.
 pub fn run(
     campaign: &str,
     index: u64,

@@ -1,4 +1,4 @@
-//! What several tests need: the built program, and folders of their own.
+//! Shared helpers: the built program, and temporary folders.
 
 pub mod chromium;
 pub mod foreign;
@@ -20,7 +20,7 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The built program, started in a folder.
+/// Runs the built program in a folder.
 pub fn actcheck(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args(arguments)
@@ -30,23 +30,23 @@ pub fn actcheck(folder: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Sends a signal, such as `INT`, to a process. The shell's own `kill` does it: a small system has no other.
+/// Sends a signal, such as `INT`, to a process, with the shell's builtin `kill`: minimal systems have no other.
 pub fn signal(process: u32, name: &str) {
     let sent = Command::new("sh").args(["-c", &format!("kill -s {name} {process}")]).status().unwrap();
     assert!(sent.success(), "process {process} is gone");
 }
 
-/// Its output stream as text.
+/// The output stream as text.
 pub fn stdout(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
-/// Its error stream as text.
+/// The error stream as text.
 pub fn stderr(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// A copy of the shipped project, with coarse physics in its configurations: most tests are about campaigns, whatever they test.
+/// A copy of the shipped project with coarse physics in its configurations, for tests that are about campaigns.
 pub fn project() -> tempfile::TempDir {
     project_with(COARSE)
 }
@@ -62,7 +62,7 @@ pub fn project_with(physics: &str) -> tempfile::TempDir {
     folder
 }
 
-/// A copy of the shipped project: configurations, ontology, rules and models. For tests of what the robot achieves.
+/// A copy of the shipped project: configurations, ontology, rules and models. For tests of the robot's performance.
 pub fn shipped_project() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in ["configs", "ontology", "rules", "models"] {
@@ -88,37 +88,37 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Writes a file that can be run.
+/// Writes an executable file.
 pub fn script(path: &Path, text: &str) {
     std::fs::write(path, text).unwrap();
     std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
 }
 
-/// Replaces a piece of a file that must be there.
+/// Replaces a part of a file; the part must exist.
 pub fn edit(file: &Path, from: &str, to: &str) {
     let text = std::fs::read_to_string(file).unwrap();
     assert!(text.contains(from), "{} has no `{from}`", file.display());
     std::fs::write(file, text.replacen(from, to, 1)).unwrap();
 }
 
-/// Physics at a third of the price, where a test is not about physics: what the hand holds stays in it.
+/// Physics at a third of the cost, for tests that are not about physics: objects still stay in the hand.
 pub const COARSE: &str = "[physics]\nsteps_per_second = 120\niterations = 2\n";
 
-/// The coarsest physics, where it makes no difference whether the robot succeeds: a held object slips out of the hand.
+/// The coarsest physics, for tests that do not need the robot to succeed: a held object slips out of the hand.
 pub const COARSEST: &str = "[physics]\nsteps_per_second = 60\niterations = 1\n";
 
-/// A copy of a history of four runs, for one test: one process at a time can have a history open.
+/// A private copy of a history of four runs: only one process at a time may open a history.
 pub fn made_history() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     copy_made_history(folder.path());
     folder
 }
 
-/// Copies the history of four runs into a folder. The runs are made once.
+/// Copies a history of four simulated runs into a folder. The runs are made once.
 pub fn copy_made_history(to: &Path) {
     static MADE: OnceLock<PathBuf> = OnceLock::new();
     let made = MADE.get_or_init(|| {
-        // Statics are never dropped: a temporary folder would stay.
+        // Statics are never dropped: a temporary folder would not be removed.
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("made-history");
         let _ = std::fs::remove_dir_all(&folder);
         let name = folder.display().to_string();
@@ -129,17 +129,17 @@ pub fn copy_made_history(to: &Path) {
     copy(made, to);
 }
 
-/// A shipped campaign that was run as a whole.
+/// A shipped campaign that was run completely.
 pub struct Shipped {
     pub code: Option<i32>,
-    /// What was printed.
+    /// The printed output.
     pub text: String,
     /// A project with the history in `h`.
     folder: PathBuf,
 }
 
 impl Shipped {
-    /// A folder of a test's own: one process at a time may have a history open.
+    /// A private copy of the folder: only one process at a time may open a history.
     pub fn copied(&self) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         copy(&self.folder, folder.path());

@@ -1,4 +1,4 @@
-//! Pages of made-up runs: the whole way from tables to HTML without a history.
+//! Report pages of made-up runs: from tables to HTML without a history.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,10 +11,10 @@ use actcheck::history::RunDetail;
 use actcheck::report::{FindingsSummary, HTML_COLUMNS, HtmlReport, PropertyReport, PropertyWords, Replays, html};
 use actcheck::verdict::Counts;
 
-/// Chance of a false finding that is borne.
+/// The accepted false discovery rate.
 const LEVEL: f64 = 0.05;
 
-/// What analysis says of a table.
+/// The findings of a table.
 pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
     let all = judged(table);
     let property = |of| {

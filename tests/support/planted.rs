@@ -1,10 +1,10 @@
-//! Made-up runs of which it is known when they fail: what pattern mining has to find, and nothing else.
+//! Made-up runs with known failure conditions: pattern mining must find exactly these.
 
 use std::f64::consts::PI;
 
 use actcheck::analysis::{Condition, Parameter, PatternInput, Values};
 
-/// Kinds of objects with the kinds above them, the nearest first.
+/// Kinds of objects with their ancestors, the nearest first.
 pub const KINDS: [(&str, &[&str]); 8] = [
     ("Bottle", &["Container", "Graspable"]),
     ("Bowl", &["Container", "Graspable"]),
@@ -29,7 +29,7 @@ const NUMBERS: [(&str, f64, f64); 8] = [
     ("position_noise_m", 0.0, 0.03),
     ("neighbour_distance_m", 0.05, 0.9),
 ];
-/// Things around at most.
+/// The largest number of surrounding objects.
 const MOST_OTHERS: u64 = 6;
 
 pub const CATEGORY: usize = 0;
@@ -39,11 +39,11 @@ pub const FRICTION: usize = 4;
 pub const YAW: usize = 6;
 pub const X: usize = 7;
 
-/// Share of failures where nothing is planted, and where something is.
+/// Failure rates without and with a planted pattern.
 pub const ELSEWHERE: f64 = 0.08;
 pub const WITHIN: f64 = 0.6;
 
-/// Numbers that are as good as random and always the same.
+/// A deterministic pseudo-random generator.
 pub struct Dice(u64);
 
 impl Dice {
@@ -60,7 +60,7 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// From 0 to 1.
+    /// A number from 0 to 1.
     pub fn share(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -70,7 +70,7 @@ impl Dice {
     }
 }
 
-/// Runs with twelve parameters that fail more often where one of the patterns holds.
+/// Runs with twelve parameters that fail more often if one of the patterns holds.
 pub fn input(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> PatternInput {
     let mut dice = Dice::new(seed);
     let mut parameters = vec![
@@ -83,7 +83,7 @@ pub fn input(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> PatternInput
         let unit = name.rsplit_once('_').map(|(_, unit)| unit.to_owned());
         parameters.push(numbers(name, unit, (0..runs).map(|_| low + (high - low) * dice.share()).collect()));
     }
-    // Where nothing is around, nothing is near.
+    // Without surrounding objects there is no nearest distance.
     if let (Values::Numbers(others), rest) = (parameters[OTHERS].values.clone(), parameters.last_mut().unwrap()) {
         let Values::Numbers(distances) = &mut rest.values else { unreachable!("they are numbers") };
         distances
@@ -106,7 +106,7 @@ pub fn input(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> PatternInput
     input
 }
 
-/// The same runs, and which of them fail is drawn by lot.
+/// The same runs with randomly permuted failures.
 pub fn shuffled(input: &PatternInput, seed: u64) -> PatternInput {
     let mut dice = Dice::new(seed);
     let mut failed = input.failed.clone();
@@ -143,7 +143,7 @@ pub fn range(parameter: usize, low: Option<f64>, high: Option<f64>) -> Condition
     Condition::Range { parameter, low, high }
 }
 
-/// What is planted, by name: each alone, and all at once.
+/// The planted patterns, by name: each alone, and all at once.
 pub fn plantings() -> Vec<(&'static str, Vec<Vec<Condition>>)> {
     let single = vec![kind(SURFACE, "shelf")];
     let conjunction = vec![kind(CATEGORY, "Bottle"), range(FRICTION, None, Some(0.35))];

@@ -1,14 +1,14 @@
-//! A table of wrong inputs: one folder each, with what is said about it in `expected`.
+//! A table of wrong inputs: one folder each, with the diagnostics in `expected`.
 
 use std::path::Path;
 
 use actcheck::base::Files;
 
-/// Holds what is said of each input below a folder, which `say` finds out from the input's name, to its file `expected`. With
-/// `ACTCHECK_BLESS=1` those files are written.
+/// Compares the diagnostics of each input below a folder, which `say` computes from the input's name, with its file
+/// `expected`. With `ACTCHECK_BLESS=1` those files are written.
 ///
-/// Wherever something is said it ends with help, and nothing passes in silence.
-pub fn all_are_told(folder: &str, at_least: usize, say: impl Fn(&str) -> String) {
+/// Every diagnostic must end with help, and every input must have a diagnostic.
+pub fn all_are_reported(folder: &str, at_least: usize, say: impl Fn(&str) -> String) {
     let bless = std::env::var_os("ACTCHECK_BLESS").is_some();
     let cases = Files::Disk.folders(Path::new(folder));
     assert!(cases.len() >= at_least, "only {} cases", cases.len());

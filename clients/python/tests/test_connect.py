@@ -1,4 +1,4 @@
-"""One run from a notebook, with a stand-in for actcheck."""
+"""One run from a notebook, with a replacement for actcheck."""
 
 from __future__ import annotations
 

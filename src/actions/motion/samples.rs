@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn samples_are_even_end_and_depend_on_where_they_start() {
+    fn samples_are_uniform_finite_and_depend_on_the_start() {
         let draw = |start: f64| {
             let mut samples = Samples::new(start, 400);
             std::iter::from_fn(move || samples.next(7)).collect::<Vec<_>>()

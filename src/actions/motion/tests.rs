@@ -23,7 +23,7 @@ fn seen(position: [f64; 3], size_m: [f64; 3], furniture: bool) -> Sighting {
 }
 
 #[test]
-fn an_arm_goes_around_a_wall_that_it_would_otherwise_go_through() {
+fn an_arm_plans_a_path_around_a_wall() {
     let (kinematics, layout, home) = arm();
     let mut from = home.clone();
     for (idx, value) in layout.arm.iter().zip([-0.9, 0.7, 0.0, 1.59, 0.0, 0.85, 0.0]) {
@@ -54,7 +54,7 @@ fn an_arm_goes_around_a_wall_that_it_would_otherwise_go_through() {
 }
 
 #[test]
-fn an_arm_that_is_folded_into_its_own_mast_is_not_free() {
+fn an_arm_folded_into_its_own_mast_is_in_collision() {
     let (kinematics, layout, home) = arm();
     let right = [home.clone()];
     let space = ArmSpace::new(&kinematics, &layout, &[], &[], &right);

@@ -181,9 +181,9 @@ mod tests {
     }
 
     #[test]
-    fn limits_are_kept_and_the_end_is_reached() {
+    fn the_drive_keeps_its_limits_and_reaches_the_goal() {
         let poses = drive([0.0, 0.0, 2.0], &[[1.0, 0.0], [1.0, 1.0], [0.5, 1.4]], -1.0);
-        let [x, y, heading] = poses.last().copied().expect("there is a start");
+        let [x, y, heading] = poses.last().copied().expect("the drive has poses");
         assert!((x - 0.5).abs() < 1e-9 && (y - 1.4).abs() < 1e-9 && wrapped(heading + 1.0).abs() < 2.0 * THERE);
         let velocities: Vec<[f64; 3]> =
             poses.windows(2).map(|pair| [0, 1, 2].map(|axis| (pair[1][axis] - pair[0][axis]) / TICK)).collect();
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_takes_no_longer_than_it_must() {
+    fn a_stop_takes_the_shortest_time() {
         let mut follower = Follower::new([0.0; 3], vec![[3.0, 0.0]], 0.0);
         (0..120).for_each(|_| follower.advance(&LIMITS, TICK, false));
         let from = follower.at()[0];
@@ -217,10 +217,10 @@ mod tests {
     }
 
     #[test]
-    fn a_way_of_no_length_is_a_turn() {
+    fn a_route_of_zero_length_is_a_turn() {
         let poses = drive([0.5, 0.5, 3.0], &[[0.5, 0.5]], -3.0);
         // The short way round.
         assert!(poses.iter().all(|pose| pose[2] >= 3.0 - 1e-9) && poses.len() < 90);
-        assert!((poses.last().expect("there is one")[2] - (std::f64::consts::TAU - 3.0)).abs() < 2.0 * THERE);
+        assert!((poses.last().expect("the drive has poses")[2] - (std::f64::consts::TAU - 3.0)).abs() < 2.0 * THERE);
     }
 }

@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn points_and_cells_belong_together() {
+    fn points_and_cells_convert_into_each_other() {
         let grid = hall();
         for cell in [0, 17, grid.n_cells() - 1] {
             assert_eq!(grid.cell(grid.middle(cell)), Some(cell));
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn the_map_takes_furniture_and_what_is_outside_of_rooms() {
+    fn the_map_blocks_furniture_and_the_outside_of_rooms() {
         let grid = hall();
         let mapped = |at: [f64; 2]| grid.mapped_m()[grid.cell(at).expect("it is on the grid")];
         assert_eq!(mapped([1.0, 0.0]), 0.0);
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_to_what_was_seen_are_exact() {
+    fn distances_to_seen_obstacles_are_exact() {
         let mut grid = hall();
         assert!(grid.seen_m().iter().all(|distance| distance.is_infinite()));
         let taken = [[0.0, 0.0], [0.6, -0.4], [-1.2, 0.7]].map(|at| grid.cell(at).expect("it is on the grid"));
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_takes_nothing_and_floor_gives_back() {
+    fn noise_does_not_block_cells_and_seen_floor_frees_them() {
         let mut grid = hall();
         let cell = grid.cell([0.0, 0.0]).expect("it is on the grid");
         let picture = |things: u16, floor: u16| {
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_seen_on_the_floor_is_known_on_the_next_drive_but_not_what_is_on_the_map() {
+    fn only_unmapped_obstacles_are_remembered_for_the_next_drive() {
         let mut grid = hall();
         let cells = [[0.0, 0.0], [1.25, 0.0]].map(|at| grid.cell(at).expect("it is on the grid"));
         let mut evidence = Evidence::default();

@@ -67,13 +67,13 @@ mod tests {
     }
 
     #[test]
-    fn a_free_way_is_one_leg_and_a_door_is_found() {
+    fn a_free_route_is_one_leg_and_a_door_is_found() {
         let grid = two_rooms();
         let from = [-1.33, -0.97];
         let terrain = Terrain::new(&grid, 0.3, from);
         let straight = way(&terrain, from, [-1.1, 1.0]).expect("nothing is in the way");
         assert_eq!(straight, [[-1.1, 1.0]]);
-        let around = way(&terrain, from, [1.0, -0.5]).expect("there is a door");
+        let around = way(&terrain, from, [1.0, -0.5]).expect("a route leads through the door");
         assert_eq!(around.last(), Some(&[1.0, -0.5]));
         // Through the middle of the door it would be 5.1 m; clearance at corners makes it longer.
         assert!((5.1..5.8).contains(&total(from, &around)), "{around:?}");
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wide_base_has_no_way_and_no_way_leads_into_walls() {
+    fn routes_need_space_for_the_base_and_never_end_in_walls() {
         let grid = two_rooms();
         let wide = Terrain::new(&grid, 0.5, [-1.0, 0.0]);
         assert_eq!(way(&wide, [-1.0, 0.0], [1.0, 0.0]), None);
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn who_stands_too_near_gets_away() {
+    fn a_base_too_near_a_wall_can_move_away() {
         let grid = two_rooms();
         let from = [-0.2, 0.0];
         let terrain = Terrain::new(&grid, 0.3, from);

@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pixels_become_points_where_the_camera_stands() {
+    fn pixels_become_points_in_the_world_frame() {
         // One row of two pixels, a metre away, half a metre to either side; the camera looks along y.
         let image = DepthImage { width: 2, height: 1, focal_px: 1.0, depths: vec![1.0, 0.0] };
         let camera = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::z() * std::f64::consts::FRAC_PI_2);
@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_keeps_the_mean_of_its_points() {
+    fn a_voxel_keeps_the_mean_of_its_points() {
         let points = [[0.1, 0.1, 0.1], [1.5, 0.5, 0.5], [0.3, 0.5, 0.7], [-0.1, 0.1, 0.1]].map(Point3::from);
         let kept = thinned(&points, 1.0);
         let expected = [[-0.1, 0.1, 0.1], [0.2, 0.3, 0.4], [1.5, 0.5, 0.5]].map(Point3::from);

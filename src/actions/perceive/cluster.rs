@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_wider_than_the_reach_parts_two_things() {
+    fn a_gap_wider_than_the_limit_separates_two_clusters() {
         let near = [line(0.0, 0.1, 0.005, 0.0), line(0.119, 0.2, 0.005, 0.0)].concat();
         assert_eq!(clusters(&near, 0.02).len(), 1);
         let apart = [line(0.0, 0.1, 0.005, 0.0), line(0.121, 0.2, 0.005, 0.0)].concat();
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn every_point_is_in_one_cluster() {
+    fn every_point_is_in_exactly_one_cluster() {
         let stream = actcheck_data::Stream::new(2);
         let points: Vec<Point3<f64>> =
             (0..600).map(|i| Point3::new(stream.unit(3 * i), stream.unit(3 * i + 1), stream.unit(3 * i + 2))).collect();

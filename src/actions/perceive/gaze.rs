@@ -78,7 +78,7 @@ mod tests {
     /// Regression: a head turned far to the right could not look ahead again, because the short way crosses a joint
     /// limit of the neck.
     #[test]
-    fn the_head_finds_a_point_before_it_wherever_it_looked() {
+    fn the_head_can_look_ahead_from_any_posture() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         let profile = actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
         let start = RobotStart { profile: Arc::new(profile), base: [0.0; 3], knows: Arc::new([]) };

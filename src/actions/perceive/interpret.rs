@@ -45,7 +45,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The largest level surface among points.
+    /// The largest level surface among points. Returns `None` if no level plane is found or the largest surface is too
+    /// small.
     pub fn find(points: &[Point3<f64>]) -> Option<Self> {
         let (plane, inliers) = find(points, &PRIOR, SEED)?;
         let inliers: Vec<Point3<f64>> = inliers.into_iter().map(|idx| points[idx]).collect();
@@ -184,8 +185,8 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_has_its_height_outline_and_tilt() {
-        let surface = Surface::find(&thinned(&table(), GRID_M)).expect("there is one");
+    fn a_surface_has_the_true_height_outline_and_tilt() {
+        let surface = Surface::find(&thinned(&table(), GRID_M)).expect("a surface is found");
         let seen = surface.perceived();
         // The mean of a cube's points is at most half its edge from the outermost of them.
         assert!(off(seen.pose.position[0], 0.1) < GRID_M && off(seen.pose.position[1], 0.0) < GRID_M, "{seen:?}");
@@ -195,12 +196,12 @@ mod tests {
     }
 
     #[test]
-    fn things_have_their_poses_sizes_and_kinds() {
+    fn objects_have_the_true_poses_sizes_and_kinds() {
         let mut points = table();
         points.extend(block([0.0, 0.1], 0.5, [0.1, 0.06, 0.15], |_| true));
         points.extend(block([0.25, -0.1], 0.1, [0.2, 0.12, 0.05], |_| true));
         let points = thinned(&points, GRID_M);
-        let surface = Surface::find(&points).expect("there is one");
+        let surface = Surface::find(&points).expect("a surface is found");
         let things = surface.things(&points, &EYE, &kinds());
         assert_eq!(things.len(), 2, "{things:?}");
         let [first, second] = [&things[0], &things[1]];
@@ -215,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_hidden_is_completed_by_what_is_known() {
+    fn hidden_parts_are_completed_with_the_known_size() {
         // Only the front half of a can-sized block is seen, from the negative x side.
         let size = [0.066, 0.066, 0.115];
         let mut points = table();
@@ -229,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn things_that_stand_close_are_one_to_a_camera() {
+    fn objects_close_together_are_seen_as_one() {
         let mut points = table();
         points.extend(block([0.0, 0.0], 0.0, [0.06, 0.06, 0.1], |_| true));
         points.extend(block([0.0, 0.075], 0.0, [0.06, 0.06, 0.1], |_| true));
@@ -242,7 +243,7 @@ mod tests {
         let far = table().into_iter().map(|point| point + Vector3::new(1.5, 0.0, 0.0));
         let near = table().into_iter().filter(|point| point.x < 0.0);
         let points = thinned(&near.chain(far).collect::<Vec<_>>(), GRID_M);
-        let seen = Surface::find(&points).expect("there are two").perceived();
+        let seen = Surface::find(&points).expect("a surface is found").perceived();
         assert!(off(seen.pose.position[0], 1.6) < 0.01, "{seen:?}");
     }
 }

@@ -23,7 +23,8 @@ pub struct Fit<'a> {
     pub miss: f64,
 }
 
-/// The best match, if any. Unit: metres. The first two sides are horizontal and in any order.
+/// The best match. Returns `None` if no kind is similar enough. Unit: metres. The first two sides are horizontal and in
+/// any order.
 pub fn recognise(size_m: [f64; 3], kinds: &[KnownKind]) -> Option<Fit<'_>> {
     let fits = kinds.iter().flat_map(|kind| {
         [false, true].map(|crosswise| {
@@ -60,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_size_wins_and_a_strange_one_is_of_no_kind() {
+    fn the_kind_of_the_nearest_size_is_chosen_and_an_unknown_size_has_none() {
         assert_eq!(name_of([0.088, 0.086, 0.144]), Some(("glass".to_owned(), false)));
         assert_eq!(name_of([0.06, 0.1, 0.15]), Some(("box".to_owned(), true)));
         assert_eq!(name_of([0.101, 0.058, 0.152]), Some(("box".to_owned(), false)));

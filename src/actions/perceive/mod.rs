@@ -5,7 +5,7 @@
 //! combines these steps. [`gaze`] computes head postures, and only [`sight`] moves the head: for [`skill`], which looks
 //! for any surface, and for [`survey`], which looks again at a known one.
 //!
-//! Never: uses anything but pictures and joint positions, or knows what is in the scene.
+//! Never: uses anything but pictures and joint positions, or reads the contents of the scene.
 
 mod cloud;
 mod cluster;

@@ -69,7 +69,8 @@ impl Plane {
     }
 }
 
-/// The plane with the most inliers, and their indices. The same seed makes the same guesses.
+/// The plane with the most inliers, and their indices. Returns `None` if there are too few points or inliers, or the
+/// plane is tilted too far. The same seed makes the same guesses.
 pub fn find(points: &[Point3<f64>], prior: &Prior, seed: u64) -> Option<(Plane, Vec<usize>)> {
     let (low, high) = prior.heights_m;
     let within: Vec<usize> = (0..points.len()).filter(|idx| (low..=high).contains(&points[*idx].z)).collect();
@@ -130,10 +131,10 @@ mod tests {
     }
 
     #[test]
-    fn a_noisy_plane_among_other_points_is_found_to_a_fraction_of_its_noise() {
+    fn a_noisy_plane_among_outliers_is_found_to_a_fraction_of_its_noise() {
         for seed in 0..5 {
             let (points, truth) = scattered(seed);
-            let (plane, inliers) = find(&points, &PRIOR, seed).expect("there is a plane");
+            let (plane, inliers) = find(&points, &PRIOR, seed).expect("a plane is found");
             assert!(plane.above(&truth.point).abs() < 3e-4, "{} m off", plane.above(&truth.point));
             assert!(plane.normal.angle(&truth.normal) < 1e-3, "{} rad off", plane.normal.angle(&truth.normal));
             assert_eq!(inliers.len(), 2000);
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn walls_and_the_floor_are_no_level_plane() {
+    fn walls_and_the_floor_are_not_level_surfaces() {
         let stream = Stream::new(1);
         let wall = |n: u64| Point3::new(2.0, stream.unit(2 * n), 1.2 * stream.unit(2 * n + 1));
         let floor = |n: u64| Point3::new(stream.unit(2 * n), stream.unit(2 * n + 1), 0.0);

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_turned_rectangle_comes_back() {
+    fn a_rotated_rectangle_is_recovered() {
         for (yaw, size) in [(0.3, [0.8, 0.5]), (-0.7, [0.2, 0.6]), (0.0, [1.0, 1.0])] {
             let truth = Rectangle { centre: Point2::new(1.0, -2.0), yaw, size_m: size };
             let [a, b, c, d] = truth.corners();
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn few_points_have_flat_rectangles() {
+    fn few_points_have_degenerate_rectangles() {
         assert_eq!(smallest_around(&[]), None);
         let one = smallest_around(&[Point2::new(1.0, 2.0)]).expect("a point");
         assert_eq!((one.centre, one.size_m), (Point2::new(1.0, 2.0), [0.0, 0.0]));
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn headings_are_brought_into_a_quarter() {
+    fn headings_are_reduced_to_a_quarter_turn() {
         for (heading, expected) in [(0.1, 0.1), (1.7, 0.129_203_673), (-3.0, 0.141_592_653), (0.8, -0.770_796_326)] {
             assert!((quarter(heading) - expected).abs() < 1e-8, "{heading}");
         }

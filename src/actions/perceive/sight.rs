@@ -74,7 +74,7 @@ impl Sight {
         Ok(surface)
     }
 
-    /// A corner of the surface that is not well inside the borders of any picture.
+    /// A corner of the surface that is not well inside the borders of any picture. Returns `None` if all corners are.
     pub(super) fn unseen(&self, surface: &Surface) -> Option<Point3<f64>> {
         surface.corners().into_iter().find(|corner| !self.views.iter().any(|view| view.shows(corner)))
     }

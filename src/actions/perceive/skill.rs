@@ -76,7 +76,7 @@ fn is_of_size(surface: &Surface, expected: &Sighting) -> bool {
     seen.iter().zip(known).all(|(seen, known)| (seen - known).abs() <= SIZE_OFF_M)
 }
 
-/// The designated surface according to the floor plan, if it is within sight. The camera decides what is really there.
+/// The designated surface according to the floor plan, if it is within sight. The camera decides whether it is there.
 fn expected(call: &ActionCall, robot: &Operator<'_>) -> Option<Sighting> {
     let id = call.value(SURFACE)?;
     let base = robot.base().translation.vector;

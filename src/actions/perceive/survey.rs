@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_beside_a_table_or_far_below_its_top_is_no_part_of_it() {
+    fn points_beside_or_far_below_a_table_top_are_not_part_of_it() {
         let pose = Pose::upright([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
         let table = Sighting { id: "t".to_owned(), pose, size_m: [1.2, 0.8, 0.74], furniture: true };
         // Turned by 90 degrees, it is 0.8 m long along x and 1.2 m along y.

@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_base_stands_before_each_side_and_faces_it() {
+    fn the_base_poses_face_each_side_of_the_table() {
         let pose = Pose::upright([2.0, 1.0, 0.0], std::f64::consts::FRAC_PI_2);
         let shelf = Sighting { id: "s".to_owned(), pose, size_m: [0.4, 1.0, 0.8], furniture: true };
         for ([x, y, heading], across) in stands(&shelf).into_iter().zip([0.4, 1.0, 1.0, 0.4]) {

@@ -107,7 +107,7 @@ pub fn heightened(things: &[Sighting], held: &Held) -> Vec<Sighting> {
     things.iter().map(higher).collect()
 }
 
-/// The spot nearest to this position of the hand.
+/// The spot nearest to this position of the hand. Returns `None` if there are no spots.
 pub fn nearest(spots: &[Point3<f64>], to: &Point2<f64>) -> Option<Point3<f64>> {
     let far = |spot: &Point3<f64>| length(spot.x - to.x, spot.y - to.y);
     spots.iter().min_by(|a, b| far(a).total_cmp(&far(b))).copied()
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn spots_are_clear_of_the_edge_and_of_what_stands_there() {
+    fn spots_keep_clear_of_the_edge_and_of_other_objects() {
         let others = [thing([1.0, 0.5, 0.7], [0.1, 0.1, 0.1]), thing([1.15, 0.6, 0.7], [0.2, 0.05, 0.1])];
         let found = spots(&table(), &others, 0.045, &Point3::new(0.0, 0.0, 0.0));
         assert!(!found.is_empty() && found.len() <= N_SPOTS);
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hand_keeps_what_it_holds_upright_wherever_it_goes() {
+    fn the_held_object_stays_upright_at_every_spot() {
         let foot = Pose::upright([0.0, 0.0, 0.7], 0.3).to_isometry();
         let grasp = Pose::upright([0.0, 0.0, 0.77], 1.0).to_isometry();
         let grasp_from_foot = foot.inverse() * grasp;

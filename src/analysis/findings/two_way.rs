@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_round_and_hold_everything() {
+    fn steps_are_round_and_cover_all_values() {
         let expected = [-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6];
         let found = bounds(&[-0.599, 0.598, f64::NAN]);
         assert_eq!(found.len(), expected.len());

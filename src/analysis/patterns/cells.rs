@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kind_above_stands_for_all_below_it_and_is_named_by_the_nearest() {
+    fn equal_superclasses_are_merged_under_the_most_specific_one() {
         let names = strings(&["Bottle", "Fork", "Glass", "Mug"]);
         let above = [
             strings(&["Container", "Graspable"]),
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_have_as_many_values_each_and_ranges_come_back() {
+    fn cells_have_equal_counts_and_ranges_are_recovered() {
         let numbers: Vec<f64> = (0..80).map(|i| f64::from(i) / 80.0).chain([f64::NAN]).collect();
         let parameter = Parameter { name: "x".into(), unit: None, values: Values::Numbers(numbers) };
         let axis = axis(0, &parameter, &[true; 81], 4).expect("it varies");

@@ -41,6 +41,9 @@ impl Rows {
     }
 
     /// Converts the rows to a data frame.
+    ///
+    /// # Errors
+    /// The columns have different lengths.
     pub fn frame(mut self) -> Result<DataFrame, PolarsError> {
         self.cells.resize_with(columns().len(), Vec::new);
         let series = columns().iter().zip(self.cells).map(|(column, cells)| series(column.name, column.kind, cells));

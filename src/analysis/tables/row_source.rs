@@ -62,19 +62,21 @@ impl<'a> ActionScene<'a> {
         Self { target, surface, neighbour, obstacle_distance_m }
     }
 
-    /// Returns the target's position relative to the robot's base. Unit: metres. Shape: ahead, to the left.
+    /// Returns the target's position relative to the robot's base. `None` if the run has no target. Unit: metres.
+    /// Shape: ahead, to the left.
     pub fn target_from_base(&self, base: [f64; 3]) -> Option<[f64; 2]> {
         self.target.map(|target| turned([target.x - base[0], target.y - base[1]], -base[2]))
     }
 
-    /// Returns the target's position relative to the centre of its surface, along the surface's axes. Unit: metres.
+    /// Returns the target's position relative to the centre of its surface, along the surface's axes. `None` if the run
+    /// has no target or no surface. Unit: metres.
     pub fn target_on_surface(&self) -> Option<[f64; 2]> {
         let (target, surface) = (self.target?, self.surface?);
         Some(turned([target.x - surface.x, target.y - surface.y], -surface.yaw))
     }
 
     /// Returns the direction from the target to its neighbour: 0 is towards the robot's base, positive is
-    /// counter-clockwise from above. Unit: radians, in [-π, π).
+    /// counter-clockwise from above. Unit: radians, in [-π, π). `None` if the target has no neighbour.
     pub fn neighbour_direction(&self, base: [f64; 3]) -> Option<f64> {
         let (target, (neighbour, _)) = (self.target?, self.neighbour?);
         let to_robot = libm::atan2(base[1] - target.y, base[0] - target.x);
@@ -110,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn angles_and_distances_are_as_on_paper() {
+    fn angles_and_distances_match_a_calculation_by_hand() {
         assert_eq!(angle(1.5 * PI), -0.5 * PI);
         assert_eq!(angle(PI), -PI);
         assert_eq!(angle(-0.0), 0.0);

@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_has_a_name_of_its_own_and_something_that_goes_wrong() {
+    fn every_fault_has_a_unique_name_and_an_effect() {
         for (idx, fault) in FAULTS.iter().enumerate() {
             assert_ne!(fault.sabotage, NONE, "{}", fault.name);
             assert!(FAULTS[..idx].iter().all(|other| other.name != fault.name && other.sabotage != fault.sabotage));

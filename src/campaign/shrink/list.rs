@@ -27,7 +27,7 @@ pub(super) fn is_nominal(choice: &Choice) -> bool {
     choice.value == choice.kind.nominal()
 }
 
-/// Returns the choice with an id.
+/// Returns the choice with an id. Returns `None` if the list has no such choice.
 pub(super) fn find<'a>(list: &'a [Choice], id: &Id) -> Option<&'a Choice> {
     list.iter().filter(|choice| choice.name == id.name).nth(id.nth)
 }

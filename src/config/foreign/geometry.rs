@@ -47,7 +47,7 @@ impl Shapes<'_> {
         self.mesh(uri, xml::text(uri), scale, reader)
     }
 
-    /// Reads the shape of a URDF `<geometry>`.
+    /// Reads the shape of a URDF `<geometry>`. Returns `None` after it has reported a fault.
     pub(crate) fn urdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
         let kind = kind_of(geometry, reader)?;
         if kind.tag_name().name() != "mesh" {

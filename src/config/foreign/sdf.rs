@@ -80,7 +80,7 @@ pub(crate) fn check_version(root: Node, reader: &mut Reader) -> Option<()> {
 
 /// Reads the pose of an element; the identity if it has none.
 ///
-/// Only poses in the frame of the parent element are supported (W035).
+/// Only poses in the frame of the parent element are supported (W035). Returns `None` after it has reported a fault.
 pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     let Some(written) = xml::child(node, "pose") else { return Some(Isometry3::identity()) };
     let relative_to = written.attribute("relative_to").or_else(|| written.attribute("frame")).unwrap_or("");

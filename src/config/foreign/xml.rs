@@ -65,7 +65,7 @@ pub(crate) fn span(node: Node) -> Span {
     start..start + 1 + node.tag_name().name().len()
 }
 
-/// Returns the first child element with this name.
+/// Returns the first child element with this name. Returns `None` if there is no such child.
 pub(crate) fn child<'a>(node: Node<'a>, name: &str) -> Option<Node<'a>> {
     children(node, name).next()
 }
@@ -102,7 +102,7 @@ impl<'a> Reader<'a> {
         self.found.push(Diagnostic::warning(code, message).at(self.source, span(node)).help(help));
     }
 
-    /// Returns a required child (W033).
+    /// Returns a required child; reports W033 and returns `None` if it is missing.
     pub(crate) fn required<'n>(&mut self, node: Node<'n>, name: &str) -> Option<Node<'n>> {
         let found = child(node, name);
         if found.is_none() {
@@ -112,7 +112,7 @@ impl<'a> Reader<'a> {
         found
     }
 
-    /// Returns a required attribute (W033).
+    /// Returns a required attribute; reports W033 and returns `None` if it is missing.
     pub(crate) fn attribute<'n>(&mut self, node: Node<'n>, name: &str) -> Option<&'n str> {
         let found = node.attribute(name).map(str::trim);
         if found.is_none() {
@@ -122,7 +122,7 @@ impl<'a> Reader<'a> {
         found
     }
 
-    /// Parses exactly `N` numbers from a text of an element (W034).
+    /// Parses exactly `N` numbers from a text of an element; reports W034 and returns `None` if they are invalid.
     pub(crate) fn numbers<const N: usize>(&mut self, node: Node, text: &str, bound: Bound) -> Option<[f64; N]> {
         let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
         let expected = if N == 1 { "a number".to_owned() } else { format!("{N} numbers") };
@@ -140,12 +140,12 @@ impl<'a> Reader<'a> {
         None
     }
 
-    /// Parses one number from an element's text (W034).
+    /// Parses one number from an element's text; reports W034 and returns `None` if it is invalid.
     pub(crate) fn number(&mut self, node: Node, bound: Bound) -> Option<f64> {
         self.numbers::<1>(node, text(node), bound).map(|[number]| number)
     }
 
-    /// Parses a boolean from an element's text (W034).
+    /// Parses a boolean from an element's text; reports W034 and returns `None` if it is invalid.
     pub(crate) fn boolean(&mut self, node: Node) -> Option<bool> {
         match text(node) {
             "true" | "1" => Some(true),

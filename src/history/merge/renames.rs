@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_campaign_of_that_id_is_renamed() {
+    fn only_the_campaign_with_the_id_is_renamed() {
         let renames = Renames::new([("k".to_owned(), "m".to_owned()), ("a".to_owned(), "a".to_owned())]);
         let run = |rest: &str| format!("{}{rest}", names::RUN);
         assert_eq!(renames.iri(&run("k-1/state/0")), run("m-1/state/0"));

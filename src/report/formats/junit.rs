@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_model_says_can_not_become_markup() {
+    fn texts_of_models_are_escaped() {
         assert_eq!(text("a<b>&\u{1}\r\n"), "a&lt;b&gt;&amp;\u{fffd}&#13;\n");
         assert_eq!(attribute("\"'\n]]>"), "&quot;'&#10;]]&gt;");
     }

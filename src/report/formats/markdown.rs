@@ -193,12 +193,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn witnesses_can_not_become_markup() {
+    fn witnesses_are_escaped() {
         assert_eq!(plain("a|b\n<img> @all [x](y) *z*"), "a\\|b &lt;img&gt; &#64;all \\[x\\](y) \\*z\\*");
     }
 
     #[test]
-    fn nothing_is_never_a_success() {
+    fn an_empty_report_is_not_a_success() {
         assert!(markdown(&MarkdownReport::new()).starts_with("## actcheck: nothing was judged"));
     }
 }

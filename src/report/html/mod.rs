@@ -4,7 +4,7 @@
 //! `web/`, the 3D library and its licence in `vendor/`. All text from models, rules and messages is in the packed data,
 //! and the scripts only insert it as text nodes; the page's content security policy forbids all other scripts.
 //!
-//! Never: reads a history or a file, chooses what is judged, or writes user text into markup.
+//! Never: reads a history or a file, chooses the judged properties, or writes user text into markup.
 
 mod columns;
 mod events;

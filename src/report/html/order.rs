@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_queue_has_its_turn_and_nothing_comes_twice() {
+    fn queues_take_turns_without_duplicates() {
         let queues = [vec!["a", "b", "c"], vec!["b", "d"], vec!["e"]];
         assert_eq!(in_turn(&queues), ["a", "b", "e", "c", "d"]);
         assert!(in_turn(&[]).is_empty());

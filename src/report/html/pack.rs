@@ -112,10 +112,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_told_within_half_a_step() {
+    fn packed_numbers_are_exact_to_half_a_step() {
         let mut pack = Pack::default();
         let values = [0.5, -1.5, f64::NAN, 3.25];
-        let column = pack.numbers(&values).expect("there are numbers");
+        let column = pack.numbers(&values).expect("the values are not empty");
         let (low, step) = (column["low"].as_f64().unwrap_or_default(), column["step"].as_f64().unwrap_or_default());
         for (value, code) in values.iter().zip(pack.body.chunks(2)) {
             let code = u16::from_le_bytes([code[0], code[1]]);
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn no_letter_of_a_pack_means_anything_in_markup() {
+    fn packed_text_has_no_markup_characters() {
         let mut pack = Pack::default();
         pack.set("name", "</script><img src=x onerror=alert(1)>");
         let text = pack.finish();

@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_course_is_told_to_a_tenth_of_a_millimetre() {
+    fn trajectories_are_exact_to_a_tenth_of_a_millimetre() {
         let rows: Vec<Vec<f32>> =
             (0..50).map(|at| vec![at as f32 * 0.02 - 3.0, 1.5, f32::NAN, 0.0, 0.0, -0.6, 0.8]).collect();
         let (columns, low, grain) = columns(&rows, &[0]);

@@ -65,7 +65,7 @@ mod tests {
     ];
 
     #[test]
-    fn no_script_makes_markup_of_text() {
+    fn scripts_never_parse_text_as_markup() {
         for script in SCRIPT {
             for parser in PARSERS {
                 assert!(!script.contains(parser), "{parser} in {}", script.lines().next().unwrap_or_default());
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_names_no_other_host() {
+    fn the_page_has_no_external_addresses() {
         for text in SCRIPT.iter().chain(&STYLE).chain([&SHELL]) {
             let hosts: Vec<&str> =
                 text.split("://").skip(1).map(|rest| rest.split(['/', '"']).next().unwrap_or_default()).collect();
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn the_library_comes_with_its_licence() {
+    fn the_library_has_its_licence() {
         let licence = include_str!("vendor/three/LICENSE");
         assert!(licence.contains("MIT License") && licence.contains("three.js authors"));
         assert!(THREE.iter().all(|(_, text)| text.contains("SPDX-License-Identifier: MIT")));

@@ -124,7 +124,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_carried_fonts_have_letters_of_some_width() {
+    fn the_embedded_fonts_have_glyphs_with_a_width() {
         for bold in [false, true] {
             assert!(face(bold).is_some());
             // The widest letter, relative to the size: 0.97 regular and 1.04 bold.
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn text_is_wrapped_and_nothing_of_it_is_lost() {
+    fn wrapped_text_is_complete() {
         let text = "the fingers did not close on glass_1 averyveryverylongwordthatfitsnowhere ok";
         for most in [5.0, 60.0, 200.0, 5000.0] {
             let lines = wrapped(text, 12.0, false, most);

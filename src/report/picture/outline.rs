@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hull_leaves_out_what_is_inside_and_on_sides() {
+    fn a_hull_omits_points_inside_and_on_edges() {
         let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
         let inside = [[1.0, 1.0], [1.0, 0.0], [0.5, 1.5], [2.0, 2.0]];
         assert_eq!(hull(square.into_iter().chain(inside).collect()), square);
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_reach_as_far_as_the_shape() {
+    fn corners_span_the_extent_of_the_shape() {
         let reach = |shape: &Shape| corners(shape).iter().map(|point| point.coords.abs().max()).fold(0.0, f64::max);
         let expected = [
             (Shape::Box { size: [0.2, 0.4, 0.6] }, 0.3),

@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn points_in_a_plane_make_its_two_sides_and_those_on_a_line_none() {
+    fn coplanar_points_give_two_faces_and_collinear_ones_none() {
         let flat: Vec<[f64; 3]> = corners([1.0, 1.0, 0.0])[..4].to_vec();
         let two_sides = faces(&flat);
         let (volume, area) = measured(&two_sides);

@@ -211,7 +211,8 @@ impl CampaignSummary {
         mean(self.runs.iter().filter(|run| run.status != RunStatus::Broken).map(|run| run.score))
     }
 
-    /// Proportion of runs in which everything passed, among the runs that are not broken.
+    /// Proportion of runs in which everything passed, among the runs that are not broken. Returns `None` if all runs
+    /// are broken.
     pub fn pass_rate(&self) -> Option<Proportion> {
         let judged = self.runs.iter().filter(|run| run.status != RunStatus::Broken).count() as u64;
         let passed = self.runs.iter().filter(|run| run.passed()).count() as u64;
@@ -329,7 +330,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_broken_run_is_no_failure_and_no_pass() {
+    fn a_broken_run_is_neither_passed_nor_failed() {
         use Outcome::{Broken, Failed, Inapplicable, Passed};
         let broken = run(0, RunStatus::Broken, &[Broken, Broken]);
         assert!(!broken.passed() && !broken.failed());

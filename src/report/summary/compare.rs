@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_are_told_with_their_table_and_without_comments() {
+    fn settings_are_shown_with_their_table_and_without_comments() {
         let first = settings("seed = 7 # any\n[sensing]\nyaw = 0.1\n\n# nothing\nsize = 1");
         let second = settings("seed = 7\n[sensing]\nyaw = 0.2\nsize = 1\n");
         assert_eq!(without(&first, &second), ["[sensing] yaw = 0.1"]);

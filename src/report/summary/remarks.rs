@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_says_less_than_it_seems_to_is_told() {
+    fn uninformative_outcomes_are_reported() {
         use Outcome::{Broken, Failed, Passed};
         let never = |of, warning| vec![(Oddity::NeverPassed, of, of, true), (Oddity::NeverFailed, of, of, warning)];
         assert_eq!(kinds(15, [Passed, Failed], None), never(15, false));

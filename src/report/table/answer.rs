@@ -52,7 +52,7 @@ mod tests {
     use crate::TableFormat;
 
     #[test]
-    fn programs_get_whole_iris_and_people_short_ones() {
+    fn people_get_short_iris_and_programs_full_ones() {
         let answer = QueryAnswer::Table {
             columns: vec!["run".into(), "n".into()],
             rows: vec![vec![Some(Term::iri("https://w3id.org/actcheck/run/k7f3-1")), None]],

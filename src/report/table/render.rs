@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_table_in_three_formats() {
+    fn a_table_is_written_in_three_formats() {
         let mut table = Table::new(["run", "score", "note"]);
         table.rows.push(vec!["k-1".into(), 0.8.into(), Value::Null]);
         table.rows.push(vec!["k-2".into(), 1.0.into(), "a, \"b\"".into()]);

@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_a_run_has_each_action_s_score_and_the_last_the_means() {
+    fn the_table_has_a_score_per_action_and_run_and_a_line_of_means() {
         use Outcome::{Failed, Passed};
         let runs = vec![two(0, [Passed, Passed], [Passed, Failed]), two(1, [Passed, Failed], [Failed, Failed])];
         let summary = campaign(runs);

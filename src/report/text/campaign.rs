@@ -216,7 +216,7 @@ mod tests {
     use actcheck_history::RunStatus;
 
     #[test]
-    fn a_failed_property_is_told_in_words_with_the_command_that_shows_more() {
+    fn a_failed_property_is_described_with_a_command_for_details() {
         let summary = campaign(vec![
             run(0, RunStatus::Completed, &[Outcome::Passed, Outcome::Failed]),
             run(1, RunStatus::Broken, &[Outcome::Broken, Outcome::Broken]),
@@ -226,6 +226,6 @@ mod tests {
         assert!(text.contains("actcheck show k7f3-1 --history configs/.actcheck"), "{text}");
         assert!(text.contains("T = 0.2500 over 2 runs (without broken runs 0.5000); 1 did not complete"), "{text}");
         assert!(text.contains("broken: body left the world"), "{text}");
-        assert!(!text.contains('\u{1b}'), "no colours where none were asked for");
+        assert!(!text.contains('\u{1b}'), "no colours unless requested");
     }
 }

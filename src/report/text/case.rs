@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_corpus_is_told_in_one_line() {
+    fn a_corpus_is_summarised_in_one_line() {
         let cases = [
             case("a.toml", &["A"], Recurrence::AsBefore),
             case("b.toml", &["A"], Recurrence::NoLonger),

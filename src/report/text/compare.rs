@@ -208,7 +208,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn digests_are_told_by_their_first_letters() {
+    fn digests_are_abbreviated() {
         let digest = "4f6afc3d00112233445566778899aabb";
         assert_eq!(shortened(digest), "4f6afc3d");
         assert_eq!(shortened(&format!("0.1.0 ({digest})")), "0.1.0 (4f6afc3d)");

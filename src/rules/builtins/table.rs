@@ -136,7 +136,7 @@ pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> + Clone {
     BUILTINS.iter().map(|b| b.name)
 }
 
-/// Finds a built-in by the exact name that [`builtin_names`] returns.
+/// Finds a built-in by the exact name that [`builtin_names`] returns. Returns `None` if there is no such built-in.
 pub(crate) fn builtin_in_words(name: &str) -> Option<&'static Builtin> {
     BUILTINS.iter().find(|b| b.name == name)
 }

@@ -170,7 +170,7 @@ impl Program {
         Ok(Closure { terms, tables })
     }
 
-    /// Parses a statement to its predicate and arguments; `None` stands for `_`.
+    /// Parses a statement to its predicate and arguments; `None` means `_`.
     pub(crate) fn pattern(&self, statement: &str) -> Result<(String, Vec<Option<Term>>), String> {
         let prefixes: String =
             self.syntax.prefixes.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
