@@ -87,7 +87,7 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
         scenes.values().map(|runs| runs.iter().map(|run| number(run)).collect()).collect()
     };
     let shares: Vec<[u64; 2]> = counts.iter().map(|scene| [scene.passed, scene.of]).collect();
-    let told = runs.iter().all(|run| run.margin.is_some_and(f64::is_finite));
+    let all_measured = runs.iter().all(|run| run.margin.is_some_and(f64::is_finite));
     Consistency {
         always_passed: several().filter(|scene| scene.passed == scene.of).count() as u64,
         always_failed: several().filter(|scene| scene.passed == 0).count() as u64,
@@ -96,7 +96,7 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
             .filter_map(|k| pass_power(&counts, k))
             .collect(),
         outcome: outcome_variance(&shares),
-        margin: told.then(|| variance(&numbers(&|run| run.margin.unwrap_or_default()))).flatten(),
+        margin: all_measured.then(|| variance(&numbers(&|run| run.margin.unwrap_or_default()))).flatten(),
         rate: share_of_scenes(&shares),
     }
 }
@@ -248,15 +248,15 @@ mod tests {
     #[test]
     fn pass_powers_are_shares_of_all_subsets_of_runs() {
         let found = consistency(&runs(&[&[1, 1, 1], &[0, 0, 0], &[1, 0, 1], &[1, 1]]));
-        let told: Vec<(u64, u64, f64)> =
+        let found: Vec<(u64, u64, f64)> =
             found.pass_powers.iter().map(|power| (power.k, power.scenes, power.probability.rate)).collect();
         let expected =
             [(1, 4, (1.0 + 0.0 + 2.0 / 3.0 + 1.0) / 4.0), (2, 4, (1.0 + 1.0 / 3.0 + 1.0) / 4.0), (3, 3, 1.0 / 3.0)];
-        for (told, expected) in told.iter().zip(expected) {
-            assert_eq!((told.0, told.1), (expected.0, expected.1));
-            assert!((told.2 - expected.2).abs() < 1e-12, "{told:?}");
+        for (found, expected) in found.iter().zip(expected) {
+            assert_eq!((found.0, found.1), (expected.0, expected.1));
+            assert!((found.2 - expected.2).abs() < 1e-12, "{found:?}");
         }
-        assert_eq!(told.len(), 3);
+        assert_eq!(found.len(), 3);
     }
 
     /// Kutner, Nachtsheim, Neter and Li, "Applied Linear Statistical Models", table 25.1: ratings by five officers of
@@ -325,10 +325,10 @@ mod tests {
     #[test]
     fn margins_are_used_if_every_run_has_one() {
         let run = |scene, margin| Repeated { scene, passed: true, margin };
-        let mut told = vec![run(0, Some(1.0)), run(0, Some(3.0)), run(1, Some(5.0)), run(1, Some(7.0))];
+        let mut runs = vec![run(0, Some(1.0)), run(0, Some(3.0)), run(1, Some(5.0)), run(1, Some(7.0))];
         // Within: 2 each. Between the means 2 and 6: 2 · (4 + 4) / 1 = 16; minus 2, divided by 2.
-        assert_eq!(consistency(&told).margin, Some(Variance { noise: 2.0, scene: 7.0 }));
-        told.push(run(1, None));
-        assert_eq!(consistency(&told).margin, None);
+        assert_eq!(consistency(&runs).margin, Some(Variance { noise: 2.0, scene: 7.0 }));
+        runs.push(run(1, None));
+        assert_eq!(consistency(&runs).margin, None);
     }
 }

@@ -123,8 +123,8 @@ fn compare(was: &Moment<'_>, is: &Moment<'_>) -> Option<TraceDifference> {
                 body: known.body.clone(),
                 quantity: known.quantity.clone(),
                 unit: known.unit,
-                was: words(one),
-                is: words(other),
+                was: value_text(one),
+                is: value_text(other),
                 by: one.zip(other).and_then(|(one, other)| one.value.distance(&other.value)),
                 others: 0,
             });
@@ -176,7 +176,7 @@ impl Value {
     }
 }
 
-fn words(reading: Option<&Reading>) -> String {
+fn value_text(reading: Option<&Reading>) -> String {
     match reading.map(|reading| &reading.value) {
         Some(Value::Exact(number) | Value::Rounded(number)) => number.to_string(),
         Some(Value::Words(text)) => text.clone(),

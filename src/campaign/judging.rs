@@ -30,7 +30,7 @@ pub(super) fn judge_action(
     let findings = match (&fate, facts) {
         (Fate::Completed, Some(facts)) => {
             let asked: Vec<String> = action.success_properties.iter().chain(&action.preconditions).cloned().collect();
-            whole(rules.judge(&facts, &asked, budget))?
+            uninterrupted(rules.judge(&facts, &asked, budget))?
         }
         _ => BTreeMap::new(),
     };
@@ -44,7 +44,7 @@ pub(super) fn judge_action(
 type Found = BTreeMap<String, Result<Findings, RuleFault>>;
 
 /// Returns the findings, or [`Failure::Interrupted`] if an evaluation was interrupted.
-fn whole(found: Found) -> Result<Found, Failure> {
+fn uninterrupted(found: Found) -> Result<Found, Failure> {
     let interrupted = found.values().any(|found| *found == Err(RuleFault::Interrupted));
     if interrupted { Err(Failure::Interrupted) } else { Ok(found) }
 }
@@ -64,7 +64,7 @@ fn note_held_before(
     if asked.is_empty() {
         return Ok(());
     }
-    let before = whole(rules.held_before(facts, &asked, budget))?;
+    let before = uninterrupted(rules.held_before(facts, &asked, budget))?;
     for judgement in judgements {
         // `held_before` stays unset if the state before the action could not be judged.
         if let Some(Ok(found)) = before.get(&judgement.property) {

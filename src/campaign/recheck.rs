@@ -62,7 +62,7 @@ pub fn recheck<'a>(
     let mut end = RecheckEnd { ending: Ending::Finished, judged: 0, faults: Diagnostics::new() };
     let pool = match workers(options.jobs) {
         Ok(pool) => pool,
-        Err(fault) => return RecheckEnd { ending: Ending::Stopped(fault.into()), ..end },
+        Err(faults) => return RecheckEnd { ending: Ending::Stopped(faults), ..end },
     };
     let stopped = || stop.load(Ordering::Relaxed);
     let judge = |run: &RunRow| (!stopped()).then(|| judge_run(history, run, rules_of(run)));

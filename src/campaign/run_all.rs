@@ -87,8 +87,8 @@ pub fn resume_all(
     let time_up_at = env.campaign.limits.time_secs.map_or(f64::INFINITY, |limit| began_secs + limit);
     let pool = match workers(jobs) {
         Ok(pool) => pool,
-        Err(fault) => {
-            writer.stop(fault.into());
+        Err(faults) => {
+            writer.stop(faults);
             return writer.end;
         }
     };
@@ -168,7 +168,7 @@ fn conduct(
             ordered += 1;
         }
         if let Some(making) = early.remove(&kept) {
-            if writer.keep(making).is_break() {
+            if writer.write(making).is_break() {
                 return;
             }
             kept += 1;
@@ -231,7 +231,7 @@ impl<'a> RunWriter<'a> {
     }
 
     /// Stores the next run of the schedule. Breaks if it is the last one.
-    fn keep(&mut self, making: Making) -> ControlFlow<()> {
+    fn write(&mut self, making: Making) -> ControlFlow<()> {
         match making {
             Making::Run(made) => {
                 let record = made.into_record(self.campaign, (self.clock.secs)() - self.began_secs);

@@ -2,13 +2,13 @@
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use actcheck_base::Diagnostic;
+use actcheck_base::{Diagnostic, Diagnostics};
 
 /// Starts `jobs` workers, at least one.
 ///
 /// # Errors
 /// `X010` if they can't be started.
-pub(super) fn workers(jobs: usize) -> Result<ThreadPool, Diagnostic> {
+pub(super) fn workers(jobs: usize) -> Result<ThreadPool, Diagnostics> {
     let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build();
-    pool.map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))
+    pool.map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")).into())
 }

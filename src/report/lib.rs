@@ -28,9 +28,10 @@ pub use picture::{Caption, Drawing, patterns_picture, run_picture};
 #[cfg(feature = "rerun")]
 pub use recording::{RecordingFault, Recordings};
 pub use summary::{
-    ActionSummary, CampaignSummary, CaseSummary, CompareSummary, ComparedSide, EndedBy, FindingsSummary, GuidedSearch,
-    HealthSummary, Oddity, OracleSummary, PropertyLine, PropertyReport, Proportion, RecheckChange, RecheckLine,
-    RecheckSummary, Remark, RepeatedProperty, RunSummary, ShrunkChoice, ShrunkSummary, SideChange, WeightedLine, Why,
+    ActionSummary, CampaignSummary, CaseSummary, ChangeReason, CompareSummary, ComparedSide, EndedBy, FindingsSummary,
+    GuidedSearch, HealthSummary, Oddity, OracleSummary, PropertyLine, PropertyReport, Proportion, RecheckChange,
+    RecheckLine, RecheckSummary, Remark, RepeatedProperty, RunSummary, ShrunkChoice, ShrunkSummary, SideChange,
+    WeightedLine,
 };
 pub use table::{
     Table, TableFormat, answer_table, campaign_table, compare_table, findings_table, health_table, maps_table,

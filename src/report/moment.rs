@@ -37,8 +37,12 @@ pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -
         touches.map(|contact| (contact.start_secs, contact.end_secs)).collect()
     };
     let touched = by_robot(&others).into_iter().map(|(start, _)| start).min_by(f64::total_cmp);
-    let moved =
-        || others.iter().filter_map(|id| moved(trace, id, start - run_begin, end - run_begin)).min_by(f64::total_cmp);
+    let moved = || {
+        others
+            .iter()
+            .filter_map(|id| first_movement(trace, id, start - run_begin, end - run_begin))
+            .min_by(f64::total_cmp)
+    };
     let lost = || match by_robot(&named).into_iter().map(|(_, end)| end).max_by(f64::total_cmp) {
         Some(last) => (start + last < end - LOST_SECS).then_some(last),
         None => nearest(trace, &named, start - run_begin, end - run_begin),
@@ -77,7 +81,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// When an object had moved, since the action began. Returns `None` if it did not. Unit: seconds; `start` and `end`
 /// since the run began.
-fn moved(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
+fn first_movement(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
     let slot = trace.frames.names.iter().position(|name| name == id)?;
     let mut track = positions(trace, slot, start, end);
     let (_, place) = track.next()?;

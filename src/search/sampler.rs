@@ -413,9 +413,9 @@ mod tests {
             for wanted in [GENERATION, GENERATION, 7, GENERATION] {
                 for ask in search.ask(wanted) {
                     assert!(ask.weight > 0.0 && ask.weight <= ask.largest_weight, "{ask:?}");
-                    let told = fails(&ask.point);
-                    (0..2).for_each(|property| failed[property] += usize::from(told[property]));
-                    search.tell(told.map(|failed| PropertyResult { failed, margin: None }).to_vec());
+                    let failures = fails(&ask.point);
+                    (0..2).for_each(|property| failed[property] += usize::from(failures[property]));
+                    search.tell(failures.map(|failed| PropertyResult { failed, margin: None }).to_vec());
                 }
             }
             found += failed[0];

@@ -25,9 +25,9 @@ impl Sheets {
         let name = || Cell::text(&run.row.run);
         for (step, action) in (1usize..).zip(&trace.actions) {
             let seen = action.percepts.iter().map(|seen| ("detector", Some(&seen.id), None, &seen.pose, seen.size_m));
-            let told = action.perceived.iter().flat_map(|perceived| &perceived.things);
-            let told = told.map(|thing| ("reported", None, thing.category.as_ref(), &thing.pose, thing.size_m));
-            for (number, (source, id, category, pose, size_m)) in (1usize..).zip(seen.chain(told)) {
+            let reported = action.perceived.iter().flat_map(|perceived| &perceived.things);
+            let reported = reported.map(|thing| ("reported", None, thing.category.as_ref(), &thing.pose, thing.size_m));
+            for (number, (source, id, category, pose, size_m)) in (1usize..).zip(seen.chain(reported)) {
                 let row = [name(), Cell::count(step), Cell::count(number), Cell::text(source)];
                 let named = [Cell::Text(id.cloned()), Cell::Text(category.cloned())];
                 let numbers = pose.position.into_iter().chain(pose.rotation).chain(size_m).map(Cell::number);

@@ -210,7 +210,7 @@ mod tests {
             strings(&["Cup", "Container", "Graspable"]),
         ];
         let found = kinds(&names, &above);
-        let told: Vec<(&str, &[usize])> = found.iter().map(|(name, of)| (name.as_str(), of.as_slice())).collect();
+        let pairs: Vec<(&str, &[usize])> = found.iter().map(|(name, of)| (name.as_str(), of.as_slice())).collect();
         let expected: [(&str, &[usize]); 6] = [
             ("Bottle", &[1]),
             ("Fork", &[2]),
@@ -219,7 +219,7 @@ mod tests {
             ("Container", &[1, 3, 4]),
             ("Cup", &[3, 4]),
         ];
-        assert_eq!(told, expected, "Cutlery is Fork here, and Graspable everything");
+        assert_eq!(pairs, expected, "Cutlery is Fork here, and Graspable everything");
     }
 
     #[test]

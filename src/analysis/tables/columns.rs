@@ -20,6 +20,7 @@ pub enum ColumnKind {
     /// An integer.
     Count,
     /// True or false.
+    #[serde(rename = "truth")]
     Bool,
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _};
 
-use crate::tables::columns::columns;
+use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::frames::Rows;
 use actcheck_base::{Diagnostic, Diagnostics, digest_of};
 use actcheck_history::{History, RunDetail};
@@ -206,11 +206,23 @@ fn runs_of(file: &Path) -> Result<BTreeSet<String>, PolarsError> {
     Ok(runs)
 }
 
+/// Name of a kind in the digest. A new name would make all existing tables outdated.
+fn kind(kind: ColumnKind) -> &'static str {
+    match kind {
+        ColumnKind::Text => "Text",
+        ColumnKind::Number => "Number",
+        ColumnKind::Count => "Count",
+        ColumnKind::Bool => "Truth",
+    }
+}
+
 /// Digest of the columns, to detect tables written by versions with different columns.
 fn schema_digest() -> String {
-    let told: Vec<String> =
-        columns().iter().map(|column| format!("{} {:?} {}", column.name, column.kind, column.description)).collect();
-    digest_of(&told.join("\n"))
+    let definitions: Vec<String> = columns()
+        .iter()
+        .map(|column| format!("{} {} {}", column.name, kind(column.kind), column.description))
+        .collect();
+    digest_of(&definitions.join("\n"))
 }
 
 /// Removes all files of a mirror.

@@ -88,7 +88,7 @@ pub fn explain(search: &mut TrialSearch<'_>, list: &[Choice], plan: &ShrinkPlan<
             bracket.learn(point, fails);
         }
     }
-    brackets.iter().for_each(|bracket| bracket.tell(&mut influences[bracket.of]));
+    brackets.iter().for_each(|bracket| bracket.apply_to(&mut influences[bracket.of]));
     let neighbour = neighbour(&influences);
     Explained { influences, neighbour }
 }
@@ -147,7 +147,7 @@ impl Bracket {
         }
     }
 
-    fn tell(&self, influence: &mut Influence) {
+    fn apply_to(&self, influence: &mut Influence) {
         let (low, high) = influence.fails;
         influence.fails = (low.min(self.fails), high.max(self.fails));
         if let Some(passes) = self.passes {

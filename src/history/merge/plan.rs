@@ -124,7 +124,7 @@ fn check_parts(all: &[Found]) -> Diagnostics {
     for found in all.iter().filter(|found| !found.record.shards.is_empty()) {
         let record = &found.record;
         let first = first_of.entry((&record.config_digest, record.seed, record.planned_runs)).or_insert(found);
-        if first.whole() != found.whole() {
+        if first.inputs_digest() != found.inputs_digest() {
             faults.push(conflict::other_ingredients(first, found));
         }
     }
@@ -142,11 +142,11 @@ enum Identity {
 
 fn identity(found: &Found) -> Identity {
     if !found.record.shards.is_empty() {
-        return Identity::Parts(found.whole());
+        return Identity::Parts(found.inputs_digest());
     }
     Identity::Whole {
         first_id: found.first_id.clone(),
-        whole: found.whole(),
+        whole: found.inputs_digest(),
         // Shrunk runs of several parts can have the same id.
         content: found.shrunk.then(|| found.runs.values().map(|run| run.content.as_str()).collect()),
     }

@@ -45,7 +45,7 @@ impl Found {
     }
 
     /// Digest over everything that its results depend on.
-    pub(super) fn whole(&self) -> String {
+    pub(super) fn inputs_digest(&self) -> String {
         let record = &self.record;
         let mut digest = Digest::new();
         let program = [&record.program_version, &record.program_digest];

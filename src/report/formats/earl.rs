@@ -36,14 +36,14 @@ impl EarlReport {
         self.link(&node, "rdf:type", "act:Run");
         self.link(&node, "act:campaign", &campaign);
         self.link(&node, "prov:wasAssociatedWith", &agent);
-        self.say(&node, "prov:startedAtTime", time(&run.row.started));
+        self.add_triple(&node, "prov:startedAtTime", time(&run.row.started));
         if let Some(ended) = ended(run) {
-            self.say(&node, "prov:endedAtTime", time(&ended));
+            self.add_triple(&node, "prov:endedAtTime", time(&ended));
         }
-        self.say(&node, "act:test", Term::string(&run.row.test));
-        self.say(&node, "act:index", Term::Integer(i64::try_from(run.row.index).unwrap_or(i64::MAX)));
-        self.say(&node, "act:status", Term::string(run.row.status.word()));
-        self.say(&node, "act:score", Term::Double(run.row.score));
+        self.add_triple(&node, "act:test", Term::string(&run.row.test));
+        self.add_triple(&node, "act:index", Term::Integer(i64::try_from(run.row.index).unwrap_or(i64::MAX)));
+        self.add_triple(&node, "act:status", Term::string(run.row.status.word()));
+        self.add_triple(&node, "act:score", Term::Double(run.row.score));
         for action in &run.actions {
             self.execution(&node, &agent, run, action);
         }
@@ -55,7 +55,7 @@ impl EarlReport {
         self.link(&node, "rdf:type", "act:ActionExecution");
         self.link(&node, "act:ofRun", run);
         self.link(&node, "act:action", &action.action);
-        self.say(&node, "act:step", Term::Integer(action.step.into()));
+        self.add_triple(&node, "act:step", Term::Integer(action.step.into()));
         for judgement in &action.judgements {
             self.assertion(run, &node, agent, of, judgement);
         }
@@ -74,16 +74,16 @@ impl EarlReport {
         self.link(&node, "earl:result", &result);
         self.link(&node, "prov:wasGeneratedBy", run);
         self.link(&node, "prov:wasAttributedTo", agent);
-        self.say(&node, "prov:generatedAtTime", time(&of.row.started));
+        self.add_triple(&node, "prov:generatedAtTime", time(&of.row.started));
         self.link(&result, "rdf:type", "earl:TestResult");
         self.link(&result, "earl:outcome", &format!("earl:{}", judgement.outcome.earl()));
-        self.say(&result, "act:outcome", Term::string(judgement.outcome.word()));
-        self.say(&result, "earl:info", Term::string(&judgement.witness));
+        self.add_triple(&result, "act:outcome", Term::string(judgement.outcome.word()));
+        self.add_triple(&result, "earl:info", Term::string(&judgement.witness));
         if let Some(margin) = judgement.margin {
-            self.say(&result, "act:margin", Term::Double(margin));
+            self.add_triple(&result, "act:margin", Term::Double(margin));
         }
         if !judgement.rule_digest.is_empty() {
-            self.say(&result, "act:ruleDigest", Term::string(&judgement.rule_digest));
+            self.add_triple(&result, "act:ruleDigest", Term::string(&judgement.rule_digest));
         }
     }
 
@@ -91,13 +91,13 @@ impl EarlReport {
     pub fn text(mut self, campaigns: &[CampaignRow]) -> String {
         for property in std::mem::take(&mut self.properties) {
             self.link(&property, "rdf:type", "earl:TestCase");
-            self.say(&property, "rdfs:label", Term::string(names::local(&property)));
+            self.add_triple(&property, "rdfs:label", Term::string(names::local(&property)));
         }
         for version in std::mem::take(&mut self.programs) {
             let agent = format!("{PROGRAM}{version}");
             self.link(&agent, "rdf:type", "earl:Software");
             self.link(&agent, "rdf:type", "prov:SoftwareAgent");
-            self.say(&agent, "rdfs:label", Term::string(format!("actcheck {version}")));
+            self.add_triple(&agent, "rdfs:label", Term::string(format!("actcheck {version}")));
         }
         let met = std::mem::take(&mut self.campaigns);
         for row in campaigns {
@@ -106,10 +106,10 @@ impl EarlReport {
             self.link(&node, "rdf:type", "prov:Activity");
             self.link(&node, "rdf:type", "act:Campaign");
             self.link(&node, "prov:wasAssociatedWith", agent);
-            self.say(&node, "rdfs:label", Term::string(&row.name));
-            self.say(&node, "prov:startedAtTime", time(&row.started));
+            self.add_triple(&node, "rdfs:label", Term::string(&row.name));
+            self.add_triple(&node, "prov:startedAtTime", time(&row.started));
             if let Some(ended) = &row.ended {
-                self.say(&node, "prov:endedAtTime", time(ended));
+                self.add_triple(&node, "prov:endedAtTime", time(ended));
             }
         }
         self.triples.sort();
@@ -125,17 +125,17 @@ impl EarlReport {
         agent
     }
 
-    fn say(&mut self, subject: &str, property: &str, value: Term) {
-        self.triples.push([Term::iri(subject), Term::iri(whole(property)), value]);
+    fn add_triple(&mut self, subject: &str, property: &str, value: Term) {
+        self.triples.push([Term::iri(subject), Term::iri(full_iri(property)), value]);
     }
 
     fn link(&mut self, subject: &str, property: &str, object: &str) {
-        self.say(subject, property, Term::iri(whole(object)));
+        self.add_triple(subject, property, Term::iri(full_iri(object)));
     }
 }
 
 /// Expands a prefixed name to an IRI. Other texts are returned unchanged.
-fn whole(name: &str) -> String {
+fn full_iri(name: &str) -> String {
     let found = name.split_once(':').and_then(|(prefix, local)| {
         let (_, namespace) = names::PREFIXES.iter().find(|(known, _)| *known == prefix)?;
         Some(format!("{namespace}{local}"))

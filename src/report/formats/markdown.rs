@@ -80,8 +80,8 @@ pub fn markdown(report: &MarkdownReport) -> String {
     let _ = writeln!(
         out,
         "{runs} {} of {} {}: {}. Outcomes: {}.",
-        word(runs, "run", "runs"),
-        word(report.campaigns.len() as u64, "campaign", "campaigns"),
+        plural(runs, "run", "runs"),
+        plural(report.campaigns.len() as u64, "campaign", "campaigns"),
         report.campaigns.iter().map(|id| code(id)).collect::<Vec<String>>().join(", "),
         listed(report.statuses.iter().map(|(status, count)| (status.word(), *count))),
         listed(Outcome::ALL.map(|outcome| (outcome.word(), report.counts.get(outcome)))),
@@ -118,8 +118,8 @@ fn headline(report: &MarkdownReport) -> String {
         (0, unknown, _) => format!("actcheck: no property failed, {unknown} could not be judged"),
         (failed, _, _) => {
             let runs = report.scores.len() as u64;
-            let failures = word(failed, "failure", "failures");
-            format!("actcheck: {failed} {failures} in {} of {runs} {}", report.failed_runs, word(runs, "run", "runs"))
+            let failures = plural(failed, "failure", "failures");
+            format!("actcheck: {failed} {failures} in {} of {runs} {}", report.failed_runs, plural(runs, "run", "runs"))
         }
     }
 }
@@ -132,7 +132,7 @@ fn failures(report: &MarkdownReport, out: &mut String) {
     report.failures.iter().for_each(|failure| out.push_str(failure));
     let left_out = report.failed_runs - report.failures.len() as u64;
     if left_out > 0 {
-        let _ = writeln!(out, "- {left_out} more {}", word(left_out, "run", "runs"));
+        let _ = writeln!(out, "- {left_out} more {}", plural(left_out, "run", "runs"));
     }
     out.push_str("\n</details>\n");
 }
@@ -160,7 +160,7 @@ fn listed<'a>(counts: impl IntoIterator<Item = (&'a str, u64)>) -> String {
     counts.into_iter().map(|(word, count)| format!("{count} {word}")).collect::<Vec<String>>().join(", ")
 }
 
-fn word<'a>(count: u64, one: &'a str, several: &'a str) -> &'a str {
+fn plural<'a>(count: u64, one: &'a str, several: &'a str) -> &'a str {
     if count == 1 { one } else { several }
 }
 

@@ -44,15 +44,15 @@ fn events(packed: &mut Value, trace: &Trace, idx: usize) {
         json!([a, b, contact.start_secs, contact.end_secs, contact.max_force_n])
     });
     packed["contacts"] = contacts.collect();
-    let asked = action.percepts.iter().map(|percept| seen(&percept.id, &percept.pose, percept.size_m));
+    let asked = action.percepts.iter().map(|seen| percept(&seen.id, &seen.pose, seen.size_m));
     let things = action.perceived.iter().flat_map(|perceived| &perceived.things);
     let things =
-        things.map(|thing| seen(thing.category.as_deref().map_or("?", names::local), &thing.pose, thing.size_m));
+        things.map(|thing| percept(thing.category.as_deref().map_or("?", names::local), &thing.pose, thing.size_m));
     packed["seen"] = asked.chain(things).collect();
 }
 
 /// A perceived object: the pose of its bottom centre, and its size.
-fn seen(name: &str, pose: &Pose, size_m: [f64; 3]) -> Value {
+fn percept(name: &str, pose: &Pose, size_m: [f64; 3]) -> Value {
     let at: Vec<f64> = pose.position.iter().chain(&pose.rotation).copied().collect();
     json!({ "name": name, "at": at, "size": size_m })
 }

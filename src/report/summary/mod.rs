@@ -26,7 +26,7 @@ pub use health::HealthSummary;
 pub use oracles::OracleSummary;
 pub(crate) use oracles::notice_word;
 pub(crate) use recheck::reason_text;
-pub use recheck::{RecheckChange, RecheckLine, RecheckSummary, Why};
+pub use recheck::{ChangeReason, RecheckChange, RecheckLine, RecheckSummary};
 pub use remarks::{Oddity, Remark};
 pub use repeated::RepeatedProperty;
 pub use shrunk::{ShrunkChoice, ShrunkSummary};

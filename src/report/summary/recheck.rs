@@ -8,7 +8,7 @@ use actcheck_verdict::Counts;
 
 /// Why an outcome changed or is new.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Why {
+pub enum ChangeReason {
     /// The property was never judged in this run.
     NewProperty,
     /// Its rules changed: digests of the rule file including its libraries, before and now.
@@ -31,7 +31,7 @@ pub struct RecheckChange {
     /// The new judgement.
     pub now: Judgement,
     /// Reason for the change.
-    pub why: Why,
+    pub why: ChangeReason,
 }
 
 /// One property over all rechecked runs.
@@ -106,22 +106,22 @@ impl RecheckSummary {
     }
 }
 
-fn why(before: Option<&Judgement>, now: &Judgement) -> Why {
+fn why(before: Option<&Judgement>, now: &Judgement) -> ChangeReason {
     match before {
-        None => Why::NewProperty,
+        None => ChangeReason::NewProperty,
         Some(before) if before.rule_digest != now.rule_digest => {
-            Why::RuleChanged(before.rule_digest.clone(), now.rule_digest.clone())
+            ChangeReason::RuleChanged(before.rule_digest.clone(), now.rule_digest.clone())
         }
-        Some(_) => Why::SameRule,
+        Some(_) => ChangeReason::SameRule,
     }
 }
 
 /// Describes the reason, with digests shortened to `letters` characters.
-pub(crate) fn reason_text(why: &Why, letters: usize) -> String {
+pub(crate) fn reason_text(why: &ChangeReason, letters: usize) -> String {
     let short = |digest: &str| digest.get(..letters).unwrap_or(digest).to_owned();
     match why {
-        Why::NewProperty => "property is new".to_owned(),
-        Why::RuleChanged(before, now) => format!("rule changed {} → {}", short(before), short(now)),
-        Why::SameRule => "same rule, different ontology or program".to_owned(),
+        ChangeReason::NewProperty => "property is new".to_owned(),
+        ChangeReason::RuleChanged(before, now) => format!("rule changed {} → {}", short(before), short(now)),
+        ChangeReason::SameRule => "same rule, different ontology or program".to_owned(),
     }
 }

@@ -126,7 +126,7 @@ fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
     for (number, pattern) in patterns.confirmed().enumerate() {
         let _ = writeln!(out, "  {}. {}", number + 1, report.sentence(pattern));
         evidence(out, report, pattern);
-        more(out, report, pattern, (number + 1, summary));
+        more_scenes(out, report, pattern, summary, number + 1);
     }
     let confirmed = patterns.confirmed().count();
     if confirmed == 0 {
@@ -188,7 +188,7 @@ fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
 }
 
 /// Writes the command that generates more scenes of a pattern.
-fn more(out: &mut String, report: &PropertyReport, pattern: &Pattern, (number, summary): (usize, &FindingsSummary)) {
+fn more_scenes(out: &mut String, report: &PropertyReport, pattern: &Pattern, summary: &FindingsSummary, number: usize) {
     let parameters = &report.findings.input.parameters;
     if scene_rule(&pattern.conditions, parameters, "").is_ok() {
         let _ = writeln!(
