@@ -79,7 +79,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
         mirror(&history);
         summary.failure_modes = failure_modes(&history, id)?;
     }
-    // If the history failed, only that fault is reported. Failed runs are no sample whose health could be examined.
+    // If the history failed, only that fault is reported: the health of incomplete data can't be examined.
     let health =
         if finished.is_ok() && failed.is_none() { Some(health::examine(&history, &summary.campaign)?) } else { None };
     let results = Results { summary: &summary, health: health.as_ref(), format: args.format };
