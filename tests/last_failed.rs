@@ -20,7 +20,7 @@ fn column<'a>(rows: &'a [Value], name: &str) -> Vec<&'a str> {
     rows.iter().map(|row| row[name].as_str().unwrap()).collect()
 }
 
-/// The arguments are refused with this text.
+/// Checks that the arguments are refused with this text.
 fn refused(folder: &Path, arguments: &[&str], text: &str) {
     let output = actcheck(folder, arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}");

@@ -245,7 +245,7 @@ fn only_a_wheel_needs_python() {
         let asked = machine.installed();
         assert!(asked.ends_with("install -y -qq --no-install-recommends python3 python3-venv\n"), "{asked}");
         let expected = "installing from the system: python3 python3-venv\nactcheck needs python3 python3-venv: 'python3 python3-venv' is \
-                        installed, and still python3 can't make environments with venv\n";
+                        installed, but python3 can't make environments with venv\n";
         assert_eq!((code, printed.as_str()), (2, expected));
     }
     machine.command("python3", "exit 0");

@@ -139,7 +139,7 @@ pub enum Command {
     /// Without a code, lists all codes by area.
     #[command(after_help = "Examples:\n  actcheck explain C003\n  actcheck explain    (lists all codes)")]
     Explain(crate::explain::ExplainArgs),
-    /// Explain why a property holds in a run, or how close it came and what was missing
+    /// Explain why a property holds in a run, or how close it came and which facts were missing
     ///
     /// Uses the current rules: those that the ontology links now.
     #[command(after_help = "Example:\n  actcheck why k7f3-3 MovedObject    (a run id from `actcheck list`)")]

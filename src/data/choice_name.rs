@@ -288,7 +288,7 @@ impl fmt::Display for ChoiceName {
 impl FromStr for ChoiceName {
     type Err = Infallible;
 
-    /// Reads the written form. Any text is a name: if it is no other, it is a designator's.
+    /// Reads the written form. Any text is a name: if no other kind matches, it is a designator's.
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(Self::read(text).unwrap_or_else(|| Self::Designator(text.to_owned())))
     }

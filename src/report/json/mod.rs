@@ -1,6 +1,6 @@
 //! Whole reports as one JSON object each, one file for each summary. Their keys are an interface for other programs.
 //!
-//! Never: computes what it prints (see `summary`), or writes to a stream.
+//! Never: computes the printed values (see `summary`), or writes to a stream.
 
 mod campaign;
 mod case;

@@ -1,6 +1,6 @@
 //! Flat tables with one record a row, for CSV, JSON and the terminal; one file for each summary.
 //!
-//! Never: computes what it prints (see `summary`), or writes to a stream.
+//! Never: computes the printed values (see `summary`), or writes to a stream.
 
 mod answer;
 mod campaign;

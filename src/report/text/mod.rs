@@ -1,6 +1,6 @@
 //! Reports for the terminal, one file for each summary; and rules for scenes, which are text too.
 //!
-//! Never: computes what it prints (see `summary`), or writes to a stream.
+//! Never: computes the printed values (see `summary`), or writes to a stream.
 
 mod by_action;
 mod campaign;
