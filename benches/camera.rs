@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use actcheck::base::{Digest, Source};
 use actcheck::campaign::Env;
 use actcheck::config::Overrides;
-use actcheck::data::{Choice, ChoiceKind, Choices, Scene, Shape};
+use actcheck::data::{Choice, ChoiceKind, ChoiceName, Choices, Scene, Shape};
 use actcheck::world::{DepthImage, World};
 use actcheck::{scenario, world};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -90,7 +90,7 @@ fn digest(images: &[DepthImage]) -> String {
 /// Choices of one image, with this noise seed.
 fn frame(number: u32) -> Choices {
     let kind = ChoiceKind::Index { of: 1 << 32 };
-    Choices::recorded(&[Choice { name: "sense.camera.frame".to_owned(), kind, value: f64::from(number) }])
+    Choices::recorded(&[Choice { name: ChoiceName::CameraFrame, kind, value: f64::from(number) }])
 }
 
 fn per_second<T>(pictures: u32, mut take: impl FnMut() -> T) -> f64 {

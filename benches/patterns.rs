@@ -11,8 +11,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use actcheck::analysis::{
-    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternOptions, Subject, TableFilter, Values, cascades, columns,
-    judged, mine, property_findings, table_failure_modes, trend,
+    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternInput, PatternOptions, TableFilter, Values, cascades,
+    columns, judged, mine, property_findings, table_failure_modes, trend,
 };
 use actcheck::base::Outcome;
 use support::{made_up, planted};
@@ -46,9 +46,9 @@ fn planted_patterns() {
     println!("{RUNS} runs, 12 parameters, up to 3 conditions");
     println!("{:20} {:>8} {:>10} {:>14}  found", "planted", "secs", "patterns", "tried");
     for (name, planted) in planted::plantings() {
-        let subject = planted::subject(RUNS, 1, &planted);
+        let input = planted::input(RUNS, 1, &planted);
         let start = Instant::now();
-        let found = mine(&subject, &PatternOptions::default());
+        let found = mine(&input, &PatternOptions::default());
         let secs = start.elapsed().as_secs_f64();
         let told: Vec<String> = found.confirmed().map(|pattern| format!("{:?}", pattern.conditions)).collect();
         println!("{name:20} {secs:>8.3} {:>10} {:>14}  {}", found.patterns.len(), found.tried, told.join(" "));
@@ -56,10 +56,10 @@ fn planted_patterns() {
 }
 
 fn by_lot() {
-    let subject = planted::subject(RUNS, 1, &planted::plantings().remove(5).1);
+    let input = planted::input(RUNS, 1, &planted::plantings().remove(5).1);
     let start = Instant::now();
     let alarms = (0..SHUFFLES)
-        .filter(|seed| !mine(&planted::shuffled(&subject, *seed), &PatternOptions::default()).patterns.is_empty())
+        .filter(|seed| !mine(&planted::shuffled(&input, *seed), &PatternOptions::default()).patterns.is_empty())
         .count();
     println!("shuffled failures: patterns in {alarms} of {SHUFFLES} ({:.1} s)", start.elapsed().as_secs_f64());
 }
@@ -119,20 +119,20 @@ fn most_memory_mb() -> u64 {
 fn write_tables(folder: &Path) {
     std::fs::create_dir_all(folder).expect("the folder can be created");
     for (name, planted) in planted::plantings() {
-        let subject = planted::subject(RUNS, 1, &planted);
+        let input = planted::input(RUNS, 1, &planted);
         let start = Instant::now();
-        let found = mine(&subject, &PatternOptions::default());
+        let found = mine(&input, &PatternOptions::default());
         let secs = start.elapsed().as_secs_f64();
         println!("{name}\t{secs}\t{}", found.confirmed().count());
         let file = folder.join(format!("{}.csv", name.replace(' ', "_")));
-        std::fs::write(file, text(&subject)).expect("the table can be written");
+        std::fs::write(file, text(&input)).expect("the table can be written");
     }
 }
 
 /// A CSV table with a column for each parameter and each superclass; the last column is the failure.
-fn text(subject: &Subject) -> String {
+fn text(input: &PatternInput) -> String {
     let mut columns: Vec<(String, Vec<String>)> = Vec::new();
-    for parameter in &subject.parameters {
+    for parameter in &input.parameters {
         match &parameter.values {
             Values::Numbers(numbers) => {
                 columns.push((parameter.name.clone(), numbers.iter().map(|number| format!("{number}")).collect()));
@@ -150,9 +150,9 @@ fn text(subject: &Subject) -> String {
             }
         }
     }
-    columns.push(("failed".to_owned(), subject.failed.iter().map(|failed| u8::from(*failed).to_string()).collect()));
+    columns.push(("failed".to_owned(), input.failed.iter().map(|failed| u8::from(*failed).to_string()).collect()));
     let header: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-    let rows = (0..subject.len())
+    let rows = (0..input.len())
         .map(|run| columns.iter().map(|(_, values)| values[run].as_str()).collect::<Vec<&str>>().join(","));
     std::iter::once(header.join(",")).chain(rows).map(|line| line + "\n").collect()
 }

@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use std::time::Instant;
 
 use actcheck::actions::{self, ActionCall};
-use actcheck::campaign::{Clock, Env, Manner, run_line};
+use actcheck::campaign::{Clock, Env, RunContext, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use actcheck::history::{CampaignEnd, History};
@@ -70,8 +70,8 @@ fn main() {
         let Some(secs) = by_stage(&env, index, &mut costs) else { continue };
         simulated_secs += secs;
         made += 1;
-        let manner = Manner { clock, disturb: None };
-        let record = run_line(&kept, "bench", index, Choices::random(kept.campaign.seed, index), &manner);
+        let context = RunContext { clock, disturb: None };
+        let record = run_line(&kept, "bench", index, Choices::random(kept.campaign.seed, index), &context);
         let record = record.expect("the same scene can be built again");
         costs.time("history", || history.commit(&record)).expect("room on the disk");
     }

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use actcheck::actions::{self, ActionCall};
-use actcheck::campaign::{Clock, Env, Manner, Options, run_all, run_line};
+use actcheck::campaign::{CampaignOptions, Clock, Env, RunContext, run_all, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use actcheck::history::History;
@@ -27,7 +27,7 @@ use support::{thread_secs, wall_secs};
 /// Default number of runs.
 const RUNS: u32 = 12;
 const CLOCK: Clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: wall_secs };
-const MANNER: Manner = Manner { clock: CLOCK, disturb: None };
+const CONTEXT: RunContext = RunContext { clock: CLOCK, disturb: None };
 
 /// Total time of each stage, in the order of execution. Unit: seconds.
 #[derive(Default)]
@@ -82,7 +82,7 @@ fn by_stage(env: &Env, runs: u32) {
         made += 1;
         processor_secs += thread_secs() - start;
         let choices = Choices::random(env.campaign.seed, index);
-        let record = run_line(env, "bench", index, choices, &MANNER).expect("the same scene can be built again");
+        let record = run_line(env, "bench", index, choices, &CONTEXT).expect("the same scene can be built again");
         costs.time("history", || history.commit(&record)).expect("room on the disk");
     }
     let total: f64 = costs.stages.iter().map(|(_, secs)| secs).sum();
@@ -139,7 +139,7 @@ fn by_workers(env: &Env, runs: u32) {
         let history = History::open(folder.path()).expect("a fresh history");
         history.begin_campaign(&env.record("bench".into(), "bench".into(), (CLOCK.now)())).expect("a fresh history");
         let (wall, processors) = (wall_secs(), process_secs());
-        run_all(env, &history, "bench", &Options { jobs, manner: MANNER }, &AtomicBool::new(false), |_| {});
+        run_all(env, &history, "bench", &CampaignOptions { jobs, context: CONTEXT }, &AtomicBool::new(false), |_| {});
         (wall_secs() - wall, process_secs() - processors)
     });
     println!("{runs} runs with one worker: {:.2} s wall time, {:.2} s CPU time", one.0, one.1);

@@ -19,7 +19,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use actcheck::base::Source;
-use actcheck::campaign::{Clock, Env, Manner, run_line};
+use actcheck::campaign::{Clock, Env, RunContext, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use serde_json::json;
@@ -102,9 +102,9 @@ fn secs(launcher: &str, more: &str, ticks: u32) -> Option<f64> {
     let env = env.unwrap_or_else(|faults| panic!("{faults}"));
     let clock = Clock { now: String::new, secs: now };
     let times = (0..REPEATS).map(|_| {
-        let manner = Manner { clock, disturb: None };
+        let context = RunContext { clock, disturb: None };
         let began = thread_secs();
-        let run = run_line(&env, "bench", 0, Choices::recorded(&[]), &manner).expect("the nominal scene settles");
+        let run = run_line(&env, "bench", 0, Choices::recorded(&[]), &context).expect("the nominal scene settles");
         let action = &run.trace.actions[0];
         let simulator = thread_secs() - began;
         action.report.as_ref().and_then(|report| report.message.parse::<f64>().ok()).map(|program| program + simulator)

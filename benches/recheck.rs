@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use actcheck::base::Files;
-use actcheck::campaign::{Clock, Ending, Env, Manner, RecheckOptions, RuleSet, recheck, run_line};
+use actcheck::campaign::{Clock, Ending, Env, RecheckOptions, RuleSet, RunContext, recheck, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use actcheck::history::{History, RunFilter};
@@ -57,15 +57,16 @@ fn fill(dir: &Path) -> f64 {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/pick.toml");
     let overrides = Overrides { history: Some(dir.to_owned()), runs: Some(2_000), ..Overrides::default() };
     let env = Env::prepare(&config, &overrides).expect("the shipped configuration is sound");
-    let manner = Manner { clock: Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 }, disturb: None };
+    let context =
+        RunContext { clock: Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 }, disturb: None };
     let start = Instant::now();
     let records: Vec<_> = (0..SIMULATED)
-        .filter_map(|index| run_line(&env, "bench", index, Choices::random(env.campaign.seed, index), &manner).ok())
+        .filter_map(|index| run_line(&env, "bench", index, Choices::random(env.campaign.seed, index), &context).ok())
         .collect();
     let per_sec = records.len() as f64 / start.elapsed().as_secs_f64();
     let history = History::open(dir).expect("a fresh history");
     history
-        .begin_campaign(&env.record("bench".into(), "bench".into(), (manner.clock.now)()))
+        .begin_campaign(&env.record("bench".into(), "bench".into(), (context.clock.now)()))
         .expect("room on the disk");
     for (index, record) in (0..STORED).zip(records.iter().cycle()) {
         let mut record = record.clone();

@@ -6,7 +6,7 @@
 //! `cargo bench --bench search -- 200` for 200 seeds; the default is 60. `-- points` prints values of the functions,
 //! with which the script checks its own.
 
-use actcheck::search::{Dimension, GENERATION, Search, Space, Strategy, Told};
+use actcheck::search::{Dimension, GENERATION, PropertyResult, Search, Space, Strategy};
 
 const WIDTH: usize = 8;
 
@@ -128,7 +128,7 @@ fn search(planted: Planted, strategy: Strategy) -> Outcome {
                 first.get_or_insert(samples);
                 seen[region] |= samples <= RATE_SAMPLES;
             }
-            search.tell(vec![Told { failed: margin < 0.0, margin: Some(margin) }]);
+            search.tell(vec![PropertyResult { failed: margin < 0.0, margin: Some(margin) }]);
         }
         if samples == RATE_SAMPLES {
             let estimate = search.estimates()[0].expect("the search has results");

@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use actcheck::base::{Outcome, names};
-use actcheck::campaign::{Clock, Env, Failure, Manner, Planned, Told, run_line, schedule_of};
+use actcheck::campaign::{Clock, Env, Failure, Planned, RunContext, RunResult, run_line, schedule_of};
 use actcheck::config::Overrides;
 use actcheck::search::Strategy;
 use rand_chacha::ChaCha8Rng;
@@ -30,7 +30,7 @@ const RESAMPLED: usize = 2_000;
 type Signature = BTreeSet<String>;
 
 /// Results of the runs of one seed, by scene number and the bits of the steered quantiles, which determine the run.
-type Known = BTreeMap<(u64, Vec<u64>), Told>;
+type Known = BTreeMap<(u64, Vec<u64>), RunResult>;
 
 fn argument(name: &str) -> Option<String> {
     let mut arguments = std::env::args().skip_while(|argument| argument != name);
@@ -41,17 +41,17 @@ fn number(name: &str, default: u32) -> u32 {
     argument(name).and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-fn signature(told: &Told) -> Signature {
+fn signature(told: &RunResult) -> Signature {
     let failed = told.outcomes.iter().filter(|outcome| outcome.outcome == Outcome::Failed);
     failed.map(|outcome| names::local(&outcome.property).to_owned()).collect()
 }
 
-fn make(env: &Env, planned: &Planned) -> Told {
+fn make(env: &Env, planned: &Planned) -> RunResult {
     let clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
-    let manner = Manner { clock, disturb: None };
+    let context = RunContext { clock, disturb: None };
     for attempt in 0.. {
-        match run_line(env, "k", planned.index, planned.choices(env.campaign.seed, attempt), &manner) {
-            Ok(record) => return Told { discards: attempt, ..Told::of(&record) },
+        match run_line(env, "k", planned.index, planned.choices(env.campaign.seed, attempt), &context) {
+            Ok(record) => return RunResult { discards: attempt, ..RunResult::of(&record) },
             Err(Failure::Discard(_)) => {}
             Err(failure) => panic!("the benchmark is never interrupted: {failure}"),
         }
@@ -76,7 +76,7 @@ fn campaign(
     };
     let env = Env::prepare(config, &overrides).expect("the configuration is sound");
     let mut schedule = schedule_of(&env);
-    let (mut signatures, mut told): (Vec<Signature>, Vec<Told>) = (Vec::new(), Vec::new());
+    let (mut signatures, mut told): (Vec<Signature>, Vec<RunResult>) = (Vec::new(), Vec::new());
     loop {
         let batch = schedule.next_batch(&told);
         if batch.is_empty() {

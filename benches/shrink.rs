@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use actcheck::base::{Outcome, names};
 use actcheck::campaign::shrink::{ShrinkOptions, Shrunk, shrink};
-use actcheck::campaign::{Clock, Env, Manner, run_line};
+use actcheck::campaign::{Clock, Env, RunContext, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::{Choices, Role};
 use actcheck::history::RunRecord;
@@ -43,7 +43,7 @@ fn main() {
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/clutter.toml");
     let env = Env::prepare(&config, &Overrides::default()).expect("the shipped configuration is sound");
     let clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
-    let manner = Manner { clock, disturb: None };
+    let context = RunContext { clock, disturb: None };
     let mut modes: BTreeMap<Signature, usize> = BTreeMap::new();
     let mut lines = Vec::new();
     let (mut drawn, mut discarded) = (0u64, 0u64);
@@ -54,7 +54,7 @@ fn main() {
     while lines.len() < wanted && drawn < SCENES {
         let index = drawn;
         drawn += 1;
-        let Ok(record) = run_line(&env, "bench", index, Choices::random(env.campaign.seed, index), &manner) else {
+        let Ok(record) = run_line(&env, "bench", index, Choices::random(env.campaign.seed, index), &context) else {
             discarded += 1;
             continue;
         };
@@ -64,19 +64,19 @@ fn main() {
             continue;
         }
         *seen += 1;
-        let line = shrunk_line(&env, &record, mode, &manner, pictures.as_deref());
+        let line = shrunk_line(&env, &record, mode, &context, pictures.as_deref());
         print_line(&line);
         lines.push(line);
     }
     print_summary(&lines, drawn, discarded);
 }
 
-fn shrunk_line(env: &Env, record: &RunRecord, mode: Signature, manner: &Manner, pictures: Option<&Path>) -> Line {
+fn shrunk_line(env: &Env, record: &RunRecord, mode: Signature, context: &RunContext, pictures: Option<&Path>) -> Line {
     let stop = || false;
-    let options = ShrinkOptions { property: None, trials: 200, jobs: 2, repeat: None, manner: *manner, stop: &stop };
+    let options = ShrinkOptions { property: None, trials: 200, jobs: 2, repeat: None, context: *context, stop: &stop };
     let shrunk = shrink(env, record.index, &record.choices, &options, &mut |_| {}).expect("it has just failed");
     let again =
-        run_line(env, "bench", record.index, Choices::recorded(&shrunk.choices), manner).expect("it was made before");
+        run_line(env, "bench", record.index, Choices::recorded(&shrunk.choices), context).expect("it was made before");
     if let Some(folder) = pictures {
         draw(&again, &mode, folder);
     }

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use actcheck::base::{Diagnostics, Files, Source, Term, digest_of};
-use actcheck::ontology::{self, Property, RuleFile, RuleLanguage};
+use actcheck::base::{Diagnostics, Files, Source, Term};
+use actcheck::ontology::{self, Property, RuleFile};
 use actcheck::rules::standalone::{Engine, Program};
 use actcheck::rules::{Budget, RuleBook};
 
@@ -19,13 +19,7 @@ fn program(text: &str) -> Result<Program, Diagnostics> {
 fn property(text: &str) -> Result<RuleBook, Diagnostics> {
     let mut ontology = ontology::load(&Files::Shipped, Path::new("ontology/actions.ttl")).unwrap();
     let property = ontology.properties.values_mut().next().unwrap();
-    property.rule = RuleFile {
-        source: Source::new("p.rls", text),
-        language: RuleLanguage::Datalog,
-        path: "p.rls".into(),
-        digest: digest_of(text),
-        linked_at: None,
-    };
+    property.rule = RuleFile::new(Source::new("p.rls", text));
     let property: Property = property.clone();
     ontology.properties = [(property.iri.clone(), property)].into();
     RuleBook::prepare(&ontology)

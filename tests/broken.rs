@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use actcheck::base::Outcome;
-use actcheck::campaign::{Clock, Ending, Env, Manner, Options, run_all};
+use actcheck::campaign::{CampaignOptions, Clock, Ending, Env, RunContext, run_all};
 use actcheck::config::Overrides;
 use actcheck::history::{History, RunFilter, RunStatus};
 use actcheck::report::RunSummary;
@@ -30,7 +30,7 @@ fn simulation_faults_break_single_runs_and_the_campaign_continues() {
     let history = History::open(&env.campaign.history).unwrap();
     let clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
     history.begin_campaign(&env.record("test".into(), "pick".into(), (clock.now)())).unwrap();
-    let options = Options { jobs: 2, manner: Manner { clock, disturb: Some(disturb) } };
+    let options = CampaignOptions { jobs: 2, context: RunContext { clock, disturb: Some(disturb) } };
     let mut runs = Vec::new();
     let end = run_all(&env, &history, "test", &options, &AtomicBool::new(false), |record| {
         runs.push(RunSummary::of(record));

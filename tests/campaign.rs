@@ -313,12 +313,13 @@ fn a_campaign_is_recalled_with_its_original_configuration() {
     let after = folder.path().join("after");
     std::fs::rename(&before, &after).unwrap();
     let history = History::open(&after.join(".actcheck")).unwrap();
-    let (again, recalled) = Env::recall(&history, "k7f3", None).unwrap();
+    let (again, recalled) = Env::from_history(&history, "k7f3", None).unwrap();
     assert_eq!(recalled, record);
     assert_eq!((again.campaign.seed, again.planned_runs()), (9, 2));
     assert_eq!(again.campaign.candidates["pickObject"], ["glass"]);
-    let edited = Env::recall(&history, "k7f3", Some(&after.join("small.toml"))).unwrap().0;
+    let edited = Env::from_history(&history, "k7f3", Some(&after.join("small.toml"))).unwrap().0;
     assert_eq!(edited.campaign.candidates["pickObject"], ["mug"]);
-    let fault = Env::recall(&history, "k7f4", None).err().expect("no such campaign exists").into_iter().next().unwrap();
+    let fault =
+        Env::from_history(&history, "k7f4", None).err().expect("no such campaign exists").into_iter().next().unwrap();
     assert_eq!((fault.code, fault.help.as_deref()), ("H014", Some("did you mean `k7f3`?")));
 }

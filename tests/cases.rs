@@ -70,6 +70,29 @@ fn an_exported_run_reproduces_inside_and_outside_the_project() {
     assert_eq!(from(&stdout(&second)), from(&text));
 }
 
+/// Cases of pick-and-place runs had indices of the surfaces: with another surface before its own in the list, the case
+/// ran on that one, without a warning.
+#[test]
+fn a_case_keeps_its_surface_when_another_one_is_put_before_it() {
+    let project = project();
+    let config = project.path().join("configs/pick_and_place.toml");
+    edit(&config, "[\"empty_room\", \"apartment\", \"kitchen\"]", "[\"apartment\"]");
+    let arguments = ["run", "configs/pick_and_place.toml", "--runs", "1", "--history", "h", "--format", "json"];
+    let output = actcheck(project.path(), &arguments);
+    let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+    export(project.path(), &format!("{}-1", json["campaign"].as_str().unwrap()), "case.toml");
+    let file = project.path().join("case.toml");
+    for list in ["\nobject_surfaces = [", "\nplace_object_surfaces = ["] {
+        edit(&file, list, &format!("{list}\"dining_table\", \"side_table\", "));
+    }
+    let (_, case) = run_case(project.path(), "case.toml");
+    assert_eq!(case["same_trace"], true, "{case:#}");
+    let text = std::fs::read_to_string(&file).unwrap();
+    for choice in ["surface.name", "location.name", "place.name"] {
+        assert!(text.contains(&format!("\n{choice} = \"")), "{choice} is named: {text}");
+    }
+}
+
 #[test]
 fn a_case_is_readable_and_its_values_have_names_units_and_bounds() {
     let project = project();

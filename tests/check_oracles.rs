@@ -6,14 +6,14 @@ use std::sync::atomic::AtomicBool;
 use actcheck::actions::{Sabotage, Saboteur};
 use actcheck::analysis::{Notice, OracleGap, OracleMatrix, OracleTrial, oracle_matrix};
 use actcheck::campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
-use actcheck::campaign::{Clock, Env, Manner, run_line, run_sabotaged};
+use actcheck::campaign::{Clock, Env, RunContext, RunInput, run_line, run_sabotaged};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use serde_json::Value;
 
 use crate::support::{COARSE, COARSEST, actcheck, edit, project, root, stderr, stdout};
 
-const MANNER: Manner = Manner { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
+const CONTEXT: RunContext = RunContext { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
 
 fn env(folder: &Path, runs: u32) -> Env {
     let overrides = Overrides { runs: Some(runs), ..Overrides::default() };
@@ -25,7 +25,7 @@ fn named(names: &[&str]) -> Vec<Fault> {
 }
 
 fn trials(env: &Env, faults: &[Fault], jobs: usize) -> Vec<Trial> {
-    try_faults(env, faults, &TrialOptions { jobs, manner: MANNER }, &AtomicBool::new(false), || {}).unwrap()
+    try_faults(env, faults, &TrialOptions { jobs, context: CONTEXT }, &AtomicBool::new(false), || {}).unwrap()
 }
 
 /// The matrix restricted to some of the properties.
@@ -210,9 +210,10 @@ fn too_few_scenes_are_reported_as_inconclusive() {
 fn false_reports_do_not_change_the_physics() {
     let env = env(root(), 2);
     let choices = || Choices::random(env.campaign.seed, 0);
-    let sound = run_line(&env, "k", 0, choices(), &MANNER).unwrap();
+    let sound = run_line(&env, "k", 0, choices(), &CONTEXT).unwrap();
     let mut saboteur = Saboteur::new(Sabotage { action: None, robot: None, world: None, report: Some(false) });
-    let lied = run_sabotaged(&env, "k", (0, choices()), &MANNER, &mut saboteur).unwrap();
+    let lied =
+        run_sabotaged(&env, RunInput { campaign: "k", index: 0, choices: choices() }, &CONTEXT, &mut saboteur).unwrap();
     assert_eq!(lied.trace.hash, sound.trace.hash);
     assert_eq!(lied.choices, sound.choices);
     let reported = |record: &actcheck::history::RunRecord| record.trace.actions[0].report.clone().unwrap().succeeded;

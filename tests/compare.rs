@@ -43,7 +43,7 @@ fn flipped(choices: &mut Choices, scenes: u64, rates: &[f64]) -> Vec<ComparedRun
             step: 1,
             action: "Pick".to_owned(),
             property: format!("p{property}"),
-            outcome: if choices.real("flip", 0.0, 1.0, 0.0) < *rate { Outcome::Passed } else { Outcome::Failed },
+            outcome: if choices.real("flip".into(), 0.0, 1.0, 0.0) < *rate { Outcome::Passed } else { Outcome::Failed },
             margin: None,
         }));
     }

@@ -11,7 +11,7 @@ use actcheck::facts::extract;
 
 /// A number in single precision, as the physics engine has it.
 fn single(choices: &mut Choices, low: f64, high: f64) -> f64 {
-    f64::from(choices.real("x", low, high, 0.0) as f32)
+    f64::from(choices.real("x".into(), low, high, 0.0) as f32)
 }
 
 fn three(choices: &mut Choices, low: f64, high: f64) -> [f64; 3] {

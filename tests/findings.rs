@@ -67,7 +67,7 @@ fn a_pattern_is_reported_with_its_runs() {
     let parameters: Vec<&str> = patterns[0]
         .conditions
         .iter()
-        .map(|condition| found.subject.parameters[condition.parameter()].name.as_str())
+        .map(|condition| found.input.parameters[condition.parameter()].name.as_str())
         .collect();
     assert_eq!(parameters, ["target_category", "target_friction"]);
     for run in &patterns[0].runs {
@@ -81,12 +81,12 @@ fn a_pattern_is_reported_with_its_runs() {
     let never = property_findings(&table, &judged[1], &hierarchy(), &PatternOptions::default());
     assert_eq!((never.counts.passed, never.patterns.patterns.len()), (3_000, 0));
     let undecided = property_findings(&table, &judged[3], &hierarchy(), &PatternOptions::default());
-    assert_eq!((undecided.failing, undecided.counts.inapplicable, undecided.subject.len()), (None, 3_000, 0));
-    let map = two_way(&found.subject, &["target_category", "target_friction"]).unwrap();
+    assert_eq!((undecided.failing, undecided.counts.inapplicable, undecided.input.len()), (None, 3_000, 0));
+    let map = two_way(&found.input, &["target_category", "target_friction"]).unwrap();
     assert_eq!(map.cells.iter().flatten().map(|cell| cell.runs).sum::<u64>(), 3_000);
     assert_eq!(map.down[0], "Bottle");
     assert!(map.cells[0][0].failing.unwrap().rate > 0.6 && map.cells[0].last().unwrap().failing.unwrap().rate < 0.3);
-    assert!(two_way(&found.subject, &["nothing"]).is_none());
+    assert!(two_way(&found.input, &["nothing"]).is_none());
 }
 
 /// The summary of one property, as `actcheck analyse` makes it.
@@ -125,8 +125,8 @@ fn a_pattern_is_drawn_with_its_sentence_and_every_run_in_its_colour() {
     let findings = &found.properties[0].findings;
     let pattern = findings.patterns.confirmed().next().unwrap();
     let kind = pattern.conditions.iter().find(|condition| matches!(condition, Condition::Kind { .. })).unwrap();
-    let holds = kind.holds(&findings.subject);
-    let failed = holds.iter().zip(&findings.subject.failed).filter(|(holds, failed)| **holds && **failed).count();
+    let holds = kind.holds(&findings.input);
+    let failed = holds.iter().zip(&findings.input.failed).filter(|(holds, failed)| **holds && **failed).count();
     let strokes = svg.lines().map(|line| line.matches('M').count()).filter(|count| *count == 2 * failed).count();
     assert!(failed > 50 && strokes >= 1, "{failed} failed, {svg}");
     // A property that never fails has no pattern, and without a pattern there is no picture.
@@ -169,7 +169,7 @@ fn equal_runs_count_once() {
     let table = table(all, &TableFilter::default());
     let judged = judged(&table);
     let found = property_findings(&table, &judged[0], &hierarchy(), &PatternOptions::default());
-    assert_eq!((found.twins, found.repeated, found.subject.len()), (1, 6, 53));
+    assert_eq!((found.twins, found.repeated, found.input.len()), (1, 6, 53));
     assert!(!found.examples.iter().any(|example| example.run == "k-11"), "of two equal runs the newer one counts");
     let (flaky, scenes) = flaky_scenes(&table, &judged[0]);
     assert_eq!(scenes, 3);

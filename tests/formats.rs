@@ -388,7 +388,7 @@ fn report_writes_the_requested_formats() {
     let (code, printed, _) = report(&["--junit", "-", "--property", "MovedObject"]);
     assert!(code == Some(0) && printed.contains("tests=\"2\""), "{printed}");
     for (wrong, fault) in [
-        (vec!["--junit", "-", "--markdown"], "X051"),
+        (vec!["--junit", "-", "--markdown"], "X058"),
         (vec!["--markdown", "--property", "MovedObjekt"], "X045"),
         (vec!["--markdown", "--since", "2999-01-01"], "X044"),
         (vec!["--markdown", "--campaign", "none"], "H014"),

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use actcheck::analysis::{Ailment, Coverage, Health, HealthMeter};
-use actcheck::campaign::{Clock, Ending, Env, Manner, Options, run_all};
+use actcheck::analysis::{Coverage, Health, HealthMeter, HealthProblem};
+use actcheck::campaign::{CampaignOptions, Clock, Ending, Env, RunContext, run_all};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use actcheck::history::{History, RunFilter};
@@ -17,14 +17,14 @@ use crate::support::{actcheck, edit, project, root, shipped, stderr, stdout};
 const STILL: Clock = Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 };
 
 /// Runs a campaign of a configuration into a history of its own and examines it.
-fn health(config: &Path, runs: u32, manner: Manner) -> Health {
+fn health(config: &Path, runs: u32, context: RunContext) -> Health {
     let folder = tempfile::tempdir().unwrap();
     let overrides = Overrides { runs: Some(runs), history: Some(folder.path().join("h")), ..Overrides::default() };
     let env = Env::prepare(config, &overrides).unwrap();
     let history = History::open(&env.campaign.history).unwrap();
-    history.begin_campaign(&env.record("k".into(), "test".into(), (manner.clock.now)())).unwrap();
+    history.begin_campaign(&env.record("k".into(), "test".into(), (context.clock.now)())).unwrap();
     // One worker, so that its clock is that of all runs.
-    let options = Options { jobs: 1, manner };
+    let options = CampaignOptions { jobs: 1, context };
     let end = run_all(&env, &history, "k", &options, &AtomicBool::new(false), |_| {});
     assert!(matches!(end.ending, Ending::Finished), "{:?}", end.ending);
     examined(&history, "k")
@@ -45,13 +45,13 @@ fn the_shipped_campaigns_are_healthy() {
     };
     let begun = |config| {
         let path = root().join(format!("configs/{config}.toml"));
-        health(&path, 15, Manner { clock: STILL, disturb: None })
+        health(&path, 15, RunContext { clock: STILL, disturb: None })
     };
     let all = [("pick", made("pick")), ("lone_glass", made("lone_glass")), ("clutter", begun("clutter"))];
     for (config, mut health) in all {
         // The duration of runs depends on the machine as well.
-        health.ailments.retain(|ailment| !matches!(ailment, Ailment::Slow(..)));
-        assert_eq!(health.ailments, [], "{config}");
+        health.problems.retain(|problem| !matches!(problem, HealthProblem::Slow(..)));
+        assert_eq!(health.problems, [], "{config}");
         assert!(health.runs >= 15 && !health.parameters.is_empty(), "{config}: {health:?}");
         let depth = health.deepest.unwrap().0;
         assert!(depth > 0.0, "{config}: bodies in contact penetrate a little");
@@ -130,8 +130,8 @@ fn a_run_far_longer_than_the_others_is_reported() {
         LATER_SECS.fetch_add(if index == 3 { 500 } else { 2 }, Ordering::Relaxed);
     };
     let config = root().join("configs/lone_glass.toml");
-    let health = health(&config, 6, Manner { clock, disturb: Some(disturb) });
-    assert_eq!(health.ailments, [Ailment::Slow("k-4".into(), 500.0, 2.0)]);
+    let health = health(&config, 6, RunContext { clock, disturb: Some(disturb) });
+    assert_eq!(health.problems, [HealthProblem::Slow("k-4".into(), 500.0, 2.0)]);
 }
 
 /// A solid body is moved into another after everything came to rest.
@@ -146,8 +146,10 @@ fn bad_simulation_quality_is_reported() {
         }
     };
     let config = root().join("configs/clutter.toml");
-    let health = health(&config, 2, Manner { clock: STILL, disturb: Some(disturb) });
-    let Some(Ailment::Penetration(deep, metres)) = health.ailments.first() else { panic!("{:?}", health.ailments) };
+    let health = health(&config, 2, RunContext { clock: STILL, disturb: Some(disturb) });
+    let Some(HealthProblem::Penetration(deep, metres)) = health.problems.first() else {
+        panic!("{:?}", health.problems)
+    };
     assert_eq!(deep, "k-2");
     assert!(*metres > 0.02, "{metres} m");
 }

@@ -9,16 +9,85 @@ use crate::support::{actcheck, foreign, root, stderr, stdout};
 /// The commands that the program's help lists.
 fn commands() -> Vec<String> {
     let help = stdout(&actcheck(root(), &["-h"]));
-    let list = help.split("Commands:\n").nth(1).and_then(|rest| rest.split("\n\n").next()).expect("there is a list");
+    let list = help.split("Run:\n").nth(1).and_then(|rest| rest.split("Options:").next()).expect("there is a list");
     let first =
         |line: &str| line.strip_prefix("  ")?.split(' ').next().filter(|word| !word.is_empty()).map(str::to_owned);
     list.lines().filter_map(first).collect()
 }
 
 #[test]
+fn commands_are_listed_in_groups_and_run_comes_first() {
+    for option in ["-h", "--help"] {
+        let help = stdout(&actcheck(root(), &[option]));
+        let headings: Vec<&str> = help
+            .lines()
+            .filter(|line| line.ends_with(':') && !line.starts_with(' '))
+            .map(|line| line.trim_end_matches(':'))
+            .collect();
+        assert_eq!(headings, ["Run", "Look", "Judge", "Exchange", "Options", "Example"], "{help}");
+        assert!(help.lines().all(|line| line.chars().count() <= 100), "{help}");
+    }
+    assert_eq!(commands()[0], "run");
+    let page = stdout(&actcheck(root(), &["man"]));
+    let sections: Vec<String> = page
+        .lines()
+        .filter_map(|line| Some(line.strip_prefix(".SH \"actcheck ")?.trim_end_matches('"').replace("\\-", "-")))
+        .collect();
+    let expected: Vec<String> = commands()
+        .into_iter()
+        .flat_map(|command| match command.as_str() {
+            "new" => vec!["new campaign".to_owned(), "new property".to_owned()],
+            _ => vec![command],
+        })
+        .collect();
+    assert_eq!(sections, expected, "the manual has the same order");
+}
+
+#[test]
+fn explain_knows_every_code_and_suggests_the_nearest() {
+    let known = stdout(&actcheck(root(), &["explain", "c003"]));
+    assert!(known.starts_with("C003: ") && known.contains("way out"), "{known}");
+    let json = |arguments: &[&str]| -> Vec<serde_json::Value> {
+        serde_json::from_str(&stdout(&actcheck(root(), arguments))).expect("a JSON array")
+    };
+    assert_eq!(json(&["explain", "C003", "--format", "json"]).len(), 1);
+    let all = json(&["explain", "--format", "json"]);
+    assert!(all.len() > 200, "{}", all.len());
+    let list = stdout(&actcheck(root(), &["explain"]));
+    for code in &all {
+        assert!(list.contains(&format!("\n  {}  ", code["code"].as_str().unwrap())), "{code}");
+    }
+    assert!(stdout(&actcheck(root(), &["explain", "--format", "csv"])).starts_with("code,area,meaning,cause,remedy\n"));
+    let page = stdout(&actcheck(root(), &["explain", "--format", "markdown"]));
+    assert_eq!(page, std::fs::read_to_string(root().join("src/codes.md")).unwrap(), "src/codes.md is out of date");
+    for (wrong, help) in
+        [("C0003", "did you mean `C003`"), ("R999", "did you mean `R091`"), ("oops", "a letter and three digits")]
+    {
+        let output = actcheck(root(), &["explain", wrong]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(stderr(&output).contains("X017") && stderr(&output).contains(help), "{wrong}: {}", stderr(&output));
+    }
+}
+
+/// The value of `--format` and the durations have one spelling in the help of every command.
+#[test]
+fn options_have_one_spelling_in_every_command() {
+    for command in commands() {
+        let help = stdout(&actcheck(root(), &[&command, "-h"]));
+        assert!(!help.contains("SECONDS") && !help.contains("-secs"), "{command}: {help}");
+        if let Some((_, rest)) = help.split_once("--format <FORMAT>") {
+            let values = rest.split_once("[possible values: ").map(|(_, values)| values.replace("\n", " "));
+            let values = values.unwrap_or_else(|| panic!("{command}: {help}"));
+            let values: Vec<&str> = values.split(']').next().unwrap().split(',').map(str::trim).collect();
+            assert_eq!(values[..3], ["text", "csv", "json"], "{command}: {help}");
+        }
+    }
+}
+
+#[test]
 fn the_help_of_every_command_ends_with_an_example() {
     let commands = commands();
-    assert!(commands.len() >= 23, "{commands:?}");
+    assert!(commands.len() >= 24, "{commands:?}");
     let below = ["campaign", "property"].map(|kind| vec!["new", kind]);
     for mut arguments in commands.iter().map(|command| vec![command.as_str()]).chain(below) {
         let example = format!("actcheck {}", arguments.join(" "));

@@ -135,7 +135,7 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
         score,
         action_scores: vec![score],
         discards: (0..index % 2).map(|_| "found no free place for `plate`".to_owned()).collect(),
-        choices: vec![Choice { name: "target.yaw".to_owned(), kind: ChoiceKind::Normal { sigma: 0.1 }, value: 0.07 }],
+        choices: vec![Choice { name: "target.yaw".into(), kind: ChoiceKind::Normal { sigma: 0.1 }, value: 0.07 }],
         scene: scene(),
         facts: extract(&trace),
         trace,
@@ -222,6 +222,20 @@ fn a_stored_run_keeps_its_facts_trace_and_choices() {
     assert_eq!((&facts.snapshots, &facts.during), (&record.facts.snapshots, &record.facts.during));
     assert_eq!(facts.parameters, record.facts.parameters);
     assert_eq!(facts_as_terms(&facts), facts_as_terms(&record.facts));
+}
+
+/// Version 3 of the trace files has the indices of candidates without their names.
+#[test]
+fn traces_of_the_previous_version_are_read() {
+    let (folder, history) = filled();
+    let file = folder.path().join("history/traces/z2-4.trace");
+    let mut bytes = std::fs::read(&file).unwrap();
+    assert_eq!(&bytes[..8], b"actrace4");
+    bytes[7] = b'3';
+    std::fs::write(&file, bytes).unwrap();
+    let record = sample_run("z2", 3);
+    assert_eq!(history.trace("z2-4").unwrap(), record.trace);
+    assert_eq!(history.choices("z2-4").unwrap(), record.choices);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use actcheck::analysis::{Column, ColumnKind, Condition, Parameter, Values, columns};
-use actcheck::campaign::{Clock, Env, Failure, Manner, run_line};
+use actcheck::campaign::{Clock, Env, Failure, RunContext, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use actcheck::report::scene_rule;
@@ -12,7 +12,7 @@ use actcheck::report::scene_rule;
 use crate::support::planted::{kind, range};
 use crate::support::{actcheck, project, stderr};
 
-const MANNER: Manner = Manner { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
+const CONTEXT: RunContext = RunContext { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
 
 /// Objects move less than this while they settle, in metres and radians.
 const SETTLED: f64 = 0.01;
@@ -89,7 +89,7 @@ fn rules_have_every_parameter_of_the_tables() {
         let rule = scene_rule(conditions, parameters, "made up").unwrap();
         std::fs::write(folder.join("configs/more.rls"), rule).unwrap();
         let env = Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"));
-        run_line(&env, "k", 0, Choices::random(3, 0), &MANNER)
+        run_line(&env, "k", 0, Choices::random(3, 0), &CONTEXT)
     };
     let mut held = Vec::new();
     let mut parameters = Vec::new();
@@ -127,6 +127,6 @@ fn a_rule_can_request_scenes_without_objects() {
         let rule = scene_rule(&conditions, &names.map(parameter), "made up").unwrap();
         std::fs::write(project.path().join("configs/more.rls"), rule).unwrap();
         let env = Env::prepare(&config, &Overrides::default()).unwrap_or_else(|faults| panic!("{faults}"));
-        assert_eq!(run_line(&env, "k", 0, Choices::random(3, 0), &MANNER).is_ok(), stands);
+        assert_eq!(run_line(&env, "k", 0, Choices::random(3, 0), &CONTEXT).is_ok(), stands);
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use actcheck::base::Outcome;
 use actcheck::campaign::{Disturbance, Env};
 use actcheck::config::Overrides;
-use actcheck::data::{ActionReport, Choices, Pose};
+use actcheck::data::{ActionReport, ChoiceName, ChoiceValue, Choices, Pose};
 use actcheck::history::RunRecord;
 use actcheck::world::{Poison, World};
 
@@ -27,8 +27,8 @@ fn env(before: &str, tables: &str) -> Env {
 
 /// The nominal scene with some given choices, and no noise.
 fn nominal(env: &Env, choices: &[(&str, f64)], disturb: Option<Disturbance>) -> RunRecord {
-    let values: BTreeMap<String, Vec<f64>> =
-        choices.iter().map(|(name, value)| ((*name).to_owned(), vec![*value])).collect();
+    let values: BTreeMap<ChoiceName, Vec<ChoiceValue>> =
+        choices.iter().map(|(name, value)| ((*name).into(), vec![ChoiceValue::Number(*value)])).collect();
     run(env, Choices::named(&values), disturb)
 }
 
@@ -174,7 +174,8 @@ fn every_run_is_the_same_with_one_and_two_workers_and_differs_without_noise() {
     let first = run(&env, Choices::random(env.campaign.seed, 0), None);
     let again = run(&env, Choices::recorded(&first.choices), None);
     assert_eq!(first.trace, again.trace);
-    let quiet: Vec<_> = first.choices.iter().filter(|c| !c.name.starts_with("sense.odometry")).cloned().collect();
+    let of_odometry = |name: &ChoiceName| matches!(name, ChoiceName::Odometry(_) | ChoiceName::Landmark(_));
+    let quiet: Vec<_> = first.choices.iter().filter(|c| !of_odometry(&c.name)).cloned().collect();
     assert!(quiet.len() < first.choices.len());
     assert_ne!(run(&env, Choices::recorded(&quiet), None).trace.hash, first.trace.hash);
 }

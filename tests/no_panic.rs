@@ -24,17 +24,17 @@ fn garbled(text: &str, number: u64) -> String {
     const STRANGE: [&str; 12] = ["\"", "[", "]", "<", ">", ".", "\n", "\u{0}", "é🦀", "\u{feff}", "#", "&"];
     let mut choices = Choices::random(number, 0);
     let mut chars: Vec<char> = text.chars().collect();
-    for _ in 0..=choices.index("edits", 3) {
-        let at = choices.index("at", chars.len().max(1)).min(chars.len());
-        let length = choices.index("length", 40).min(chars.len() - at);
-        match choices.index("how", 4) {
+    for _ in 0..=choices.index("edits".into(), 3) {
+        let at = choices.index("at".into(), chars.len().max(1)).min(chars.len());
+        let length = choices.index("length".into(), 40).min(chars.len() - at);
+        match choices.index("how".into(), 4) {
             0 => drop(chars.drain(at..at + length)),
             1 => chars.truncate(at),
             2 => {
                 let copy: Vec<char> = chars[at..at + length].to_vec();
                 chars.splice(at..at, copy);
             }
-            _ => drop(chars.splice(at..at, STRANGE[choices.index("strange", STRANGE.len())].chars())),
+            _ => drop(chars.splice(at..at, STRANGE[choices.index("strange".into(), STRANGE.len())].chars())),
         }
     }
     chars.into_iter().collect()

@@ -161,7 +161,8 @@ fn checked(
                     return Err(format!("{pattern} is not absent"));
                 }
             }
-            Premise::Computed(_) => {}
+            // Computed values.
+            _ => {}
         }
     }
     above.pop();

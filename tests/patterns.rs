@@ -1,8 +1,8 @@
 //! Patterns: planted ones are found, and none is found without a planted one.
 
-use actcheck::analysis::{Condition, Pattern, PatternOptions, Patterns, Subject, mine};
+use actcheck::analysis::{Condition, Pattern, PatternInput, PatternOptions, Patterns, mine};
 
-use crate::support::planted::{kind, plantings, range, shuffled, subject};
+use crate::support::planted::{input, kind, plantings, range, shuffled};
 
 /// One step of the cuts is a seventh of a bound's range; the bound itself must be much nearer.
 const NEAR: f64 = 0.02;
@@ -34,7 +34,7 @@ fn conditions(found: &Patterns) -> Vec<&Vec<Condition>> {
 fn only_planted_patterns_are_found_in_ten_thousand_runs() {
     for (name, planted) in plantings() {
         for seed in 1..=3 {
-            let found = mine(&subject(10_000, seed, &planted), &PatternOptions::default());
+            let found = mine(&input(10_000, seed, &planted), &PatternOptions::default());
             for wanted in &planted {
                 let confirmed = found.confirmed().any(|pattern| is(pattern, wanted));
                 assert!(confirmed, "{name}, seed {seed}: {wanted:?} is not in {:#?}", conditions(&found));
@@ -47,13 +47,13 @@ fn only_planted_patterns_are_found_in_ten_thousand_runs() {
 #[test]
 fn the_figures_of_a_pattern_agree_with_the_runs() {
     let planted = vec![vec![kind(0, "Bottle"), range(4, None, Some(0.35))]];
-    let subject = subject(10_000, 5, &planted);
-    let found = mine(&subject, &PatternOptions::default());
+    let input = input(10_000, 5, &planted);
+    let found = mine(&input, &PatternOptions::default());
     let pattern = &found.patterns[0];
-    let holds: Vec<Vec<bool>> = pattern.conditions.iter().map(|condition| condition.holds(&subject)).collect();
-    let runs: Vec<usize> = (0..subject.len()).filter(|run| holds.iter().all(|holds| holds[*run])).collect();
+    let holds: Vec<Vec<bool>> = pattern.conditions.iter().map(|condition| condition.holds(&input)).collect();
+    let runs: Vec<usize> = (0..input.len()).filter(|run| holds.iter().all(|holds| holds[*run])).collect();
     assert_eq!(pattern.runs, runs);
-    let failed = runs.iter().filter(|run| subject.failed[**run]).count() as u64;
+    let failed = runs.iter().filter(|run| input.failed[**run]).count() as u64;
     assert_eq!((pattern.all.failed_in, pattern.all.passed_in), (failed, runs.len() as u64 - failed));
     assert_eq!(pattern.all.failed_in + pattern.all.failed_out, found.failed);
     let overall = found.failed as f64 / 10_000.0;
@@ -63,7 +63,7 @@ fn the_figures_of_a_pattern_agree_with_the_runs() {
     let searched = pattern.searched;
     let looked_at = searched.failed_in + searched.passed_in + searched.failed_out + searched.passed_out;
     assert_eq!(looked_at, 10_000 - found.held_out, "the first pattern is searched in all runs that are not held out");
-    let kept = (0..subject.len()).filter(|run| subject.held_out[*run] && pattern.runs.contains(run));
+    let kept = (0..input.len()).filter(|run| input.held_out[*run] && pattern.runs.contains(run));
     assert_eq!(pattern.held_out.failed_in + pattern.held_out.passed_in, kept.count() as u64);
     assert!((3_200..3_500).contains(&found.held_out), "{}", found.held_out);
 }
@@ -72,9 +72,9 @@ fn the_figures_of_a_pattern_agree_with_the_runs() {
 fn shuffled_failures_have_no_pattern() {
     let planted = plantings().pop().unwrap().1;
     for runs in [300, 1_000, 4_000] {
-        let subject = subject(runs, 9, &planted);
+        let input = input(runs, 9, &planted);
         let alarms = (0..100)
-            .filter(|seed| !mine(&shuffled(&subject, *seed), &PatternOptions::default()).patterns.is_empty())
+            .filter(|seed| !mine(&shuffled(&input, *seed), &PatternOptions::default()).patterns.is_empty())
             .count();
         assert!(alarms <= 5, "{alarms} of 100 with {runs} runs");
     }
@@ -82,15 +82,15 @@ fn shuffled_failures_have_no_pattern() {
 
 #[test]
 fn too_few_runs_are_not_an_error() {
-    let empty = mine(&Subject::default(), &PatternOptions::default());
+    let empty = mine(&PatternInput::default(), &PatternOptions::default());
     assert_eq!((empty.runs, empty.patterns.len(), empty.tried), (0, 0, 0));
     for runs in [1, 2, 7, 30] {
-        let mut subject = subject(runs, 1, &[]);
+        let mut input = input(runs, 1, &[]);
         for failed in [true, false] {
-            subject.failed.fill(failed);
-            assert!(mine(&subject, &PatternOptions::default()).patterns.is_empty());
+            input.failed.fill(failed);
+            assert!(mine(&input, &PatternOptions::default()).patterns.is_empty());
         }
-        subject.parameters.clear();
-        assert!(mine(&subject, &PatternOptions::default()).patterns.is_empty());
+        input.parameters.clear();
+        assert!(mine(&input, &PatternOptions::default()).patterns.is_empty());
     }
 }

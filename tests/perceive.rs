@@ -2,7 +2,7 @@
 
 use actcheck::base::Outcome;
 use actcheck::campaign::Env;
-use actcheck::data::{Choice, Choices, PerceivedThing, Pose};
+use actcheck::data::{Choice, ChoiceName, Choices, PerceivedThing, Pose};
 use actcheck::history::RunRecord;
 use actcheck::world::{Poison, World};
 
@@ -121,12 +121,12 @@ fn the_same_choices_give_the_same_pictures_and_percepts() {
     let first = run(&env, Choices::random(3, 0), None);
     let again = run(&env, Choices::recorded(&first.choices), None);
     assert_eq!(first.trace, again.trace);
-    // One choice for each picture; without it the picture has no noise.
-    let frames: Vec<&Choice> = first.choices.iter().filter(|choice| choice.name == "sense.camera.frame").collect();
+    // One choice a picture, and without it the picture has no noise.
+    let frames: Vec<&Choice> = first.choices.iter().filter(|choice| choice.name == ChoiceName::CameraFrame).collect();
     let looks = first.trace.actions[0].phases.iter().filter(|phase| phase.name.starts_with("look")).count();
     assert_eq!(frames.len(), looks);
     let rest: Vec<Choice> =
-        first.choices.iter().filter(|choice| choice.name != "sense.camera.frame").cloned().collect();
+        first.choices.iter().filter(|choice| choice.name != ChoiceName::CameraFrame).cloned().collect();
     let clean = run(&env, Choices::recorded(&rest), None);
     assert_ne!(first.trace.actions[0].perceived, clean.trace.actions[0].perceived);
 }

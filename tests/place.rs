@@ -2,7 +2,7 @@
 
 use actcheck::base::Outcome;
 use actcheck::campaign::{Disturbance, Env};
-use actcheck::data::{Choices, Pose};
+use actcheck::data::{ChoiceName, Choices, ObjectAxis, PlacedObject, Pose};
 use actcheck::history::RunRecord;
 use actcheck::world::{Perturbation, Poison, World};
 use serde_json::Value;
@@ -21,7 +21,7 @@ fn env(actions: &str, more: &str) -> Env {
 /// The nominal scene with a given target model, by its index.
 fn with_target(env: &Env, model: usize) -> RunRecord {
     let mut choices = Choices::recorded(&[]);
-    choices.index("target.model", 2);
+    choices.index(ChoiceName::Object(PlacedObject::Target, ObjectAxis::Model), 2);
     let mut made = choices.into_made();
     made[0].value = model as f64;
     run(env, Choices::recorded(&made), None)
@@ -130,7 +130,7 @@ fn a_camera_replaces_the_abstract_detector() {
     let noise = "[sensing]\nposition_noise_m = 0.4\nheight_noise_m = 0.4\nyaw_noise_rad = 1.5\nsize_noise_m = 0.4\n";
     let noisy = of(index, noise);
     let ids = || quiet.scene.objects.iter().map(|object| format!("sense.{}.", object.id));
-    let asked: Vec<&str> = noisy.choices.iter().map(|choice| choice.name.as_str()).collect();
+    let asked: Vec<String> = noisy.choices.iter().map(|choice| choice.name.to_string()).collect();
     assert!(!asked.iter().any(|name| ids().any(|id| name.starts_with(&id))), "{asked:?}");
     assert_eq!(quiet.trace.hash, noisy.trace.hash);
     let percepts = quiet.trace.actions.iter().flat_map(|action| &action.percepts);

@@ -352,10 +352,10 @@ impl Case {
             }
             Support::Cut if proved.contains(&proof.statement) => 1,
             Support::Cut => return Err(format!("{} has no proof in the tree", proof.statement)),
-            Support::Aggregate { .. } => return Err("no shipped property aggregates".to_owned()),
             Support::Rule { rule: cited, premises } => {
                 1 + self.check_step(&statement, &values, &cited.text, premises, proved)?
             }
+            other => return Err(format!("no shipped property has the support {other:?}")),
         };
         proved.push(proof.statement.clone());
         Ok(steps)
@@ -457,26 +457,26 @@ fn spoiled(proof: &Proof) -> Vec<Proof> {
         Ok(number) => format!("{head}{joint}{})", number + 0.5),
         Err(_) => format!("{head}{joint}obj:nothing)"),
     };
-    all.push(Proof { statement: wrong, support: proof.support.clone() });
+    let mut copy = proof.clone();
+    copy.statement = wrong;
+    all.push(copy);
     if let Support::Rule { rule, premises } = &proof.support {
         for (idx, premise) in premises.iter().enumerate() {
             let Premise::Proof(inner) = premise else { continue };
             for inner in spoiled(inner) {
                 let mut premises = premises.clone();
                 premises[idx] = Premise::Proof(inner);
-                all.push(Proof {
-                    statement: proof.statement.clone(),
-                    support: Support::Rule { rule: rule.clone(), premises },
-                });
+                let mut copy = proof.clone();
+                copy.support = Support::Rule { rule: rule.clone(), premises };
+                all.push(copy);
             }
         }
         for idx in 0..premises.len() {
             let mut premises = premises.clone();
             premises.remove(idx);
-            all.push(Proof {
-                statement: proof.statement.clone(),
-                support: Support::Rule { rule: rule.clone(), premises },
-            });
+            let mut copy = proof.clone();
+            copy.support = Support::Rule { rule: rule.clone(), premises };
+            all.push(copy);
         }
     }
     all

@@ -143,7 +143,7 @@ fn impossible_rechecks_are_refused_without_writes() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?} {text}");
         wanted.iter().for_each(|wanted| assert!(text.contains(wanted), "no `{wanted}` in {text}"));
     };
-    fails(&["MovedObjekt", "Banana", "--history", "h"], &["X030", "did you mean `MovedObject`?", "`Banana`"]);
+    fails(&["MovedObjekt", "Banana", "--history", "h"], &["X037", "did you mean `MovedObject`?", "`Banana`"]);
     fails(&["--campaign", "kk", "--history", "h"], &["X033", "did you mean `k`?"]);
     fails(&["--as-of-rules", "models", "--history", "h"], &["X032", "models"]);
     edit(&folder.join("rules/close_object.rls"), "success(", "success((");

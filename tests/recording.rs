@@ -16,7 +16,7 @@ fn a_program_without_recordings_explains_how_to_enable_them() {
     assert!(said(&refused).contains("X055") && said(&refused).contains(build), "{}", stderr(&refused));
     assert_eq!(std::fs::read_dir(here).unwrap().count(), 0, "nothing is written");
     let both = actcheck(here, &["report", "--rrd", "-", "--markdown"]);
-    assert!(said(&both).contains("X051") && said(&both).contains("X055"), "all faults at once: {}", stderr(&both));
+    assert!(said(&both).contains("X058") && said(&both).contains("X055"), "all faults at once: {}", stderr(&both));
     let help = stdout(&actcheck(here, &["report", "--help"])).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(help.contains("--rrd <FILE.rrd>") && help.contains(build), "{help}");
 }

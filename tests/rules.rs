@@ -8,8 +8,8 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use actcheck::base::{ActionFacts, Files, Findings, RuleFault, RunFacts, Source, Term, digest_of, names};
-use actcheck::ontology::{self, Ontology, Property, RuleFile, RuleLanguage};
+use actcheck::base::{ActionFacts, Files, Findings, RuleFault, RunFacts, Source, Term, names};
+use actcheck::ontology::{self, Ontology, Property, RuleFile};
 use actcheck::rules::{Budget, RuleBook, explain::Support, owl_closure, standalone::Program};
 
 use crate::support::expected::assert_expected;
@@ -24,14 +24,7 @@ fn root() -> PathBuf {
 fn rule_file(path: &Path) -> RuleFile {
     let text = std::fs::read_to_string(path).unwrap();
     let name = path.file_name().unwrap().to_string_lossy().into_owned();
-    let language = if name.ends_with(".rq") { RuleLanguage::Sparql } else { RuleLanguage::Datalog };
-    RuleFile {
-        digest: digest_of(&text),
-        source: Source::new(name.clone(), text),
-        language,
-        path: name,
-        linked_at: None,
-    }
+    RuleFile::new(Source::new(name, text))
 }
 
 /// The shipped ontology with its properties replaced by the case's single property.
@@ -67,15 +60,9 @@ fn shipped_ontology() -> Ontology {
 
 /// The property that a rule decides, with the unit of its margin.
 fn tested(rule: RuleFile, unit: Option<String>) -> std::collections::BTreeMap<String, Property> {
-    let property = Property {
-        iri: TESTED.into(),
-        name: "Tested".into(),
-        label: "the tested property".into(),
-        comment: None,
-        rule,
-        needs: Default::default(),
-        unit,
-    };
+    let mut property = Property::new(TESTED, rule);
+    property.label = "the tested property".into();
+    property.unit = unit;
     [(TESTED.to_owned(), property)].into()
 }
 
@@ -301,13 +288,8 @@ fn every_example_of_the_readme_runs() {
     let mut counts = std::collections::BTreeMap::new();
     for (words, text) in examples() {
         *counts.entry(words.clone()).or_insert(0) += 1;
-        let file = |name: &str| RuleFile {
-            source: Source::new(name, text.clone()),
-            language: if words.starts_with("sparql") { RuleLanguage::Sparql } else { RuleLanguage::Datalog },
-            path: name.to_owned(),
-            digest: digest_of(&text),
-            linked_at: None,
-        };
+        let ending = if words.starts_with("sparql") { "rq" } else { "rls" };
+        let file = |name: &str| RuleFile::new(Source::new(format!("{name}.{ending}"), text.clone()));
         let mut ontology = shipped_ontology();
         match words.as_str() {
             "prolog property" | "sparql property" => {

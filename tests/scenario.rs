@@ -231,7 +231,7 @@ fn a_full_surface_gives_a_discard_that_names_the_unplaced_object() {
     assert_eq!((discard.model.as_str(), discard.tries), ("plate", 50));
     assert_eq!(discard.to_string(), format!("found no free place for `plate` ({}) in 50 tries", discard.name));
     // Every try is recorded.
-    let tries = choices.made().iter().filter(|choice| choice.name == format!("{}.x", discard.name)).count();
+    let tries = choices.made().iter().filter(|choice| choice.name.to_string() == format!("{}.x", discard.name)).count();
     assert_eq!(tries, 50);
 }
 

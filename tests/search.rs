@@ -8,9 +8,9 @@ use std::time::Duration;
 use serde_json::Value;
 
 use actcheck::base::Outcome;
-use actcheck::campaign::{Env, Planned, Schedule, Told, ToldOutcome, schedule_of};
+use actcheck::campaign::{Env, Planned, PropertyOutcome, RunResult, Schedule, schedule_of};
 use actcheck::config::Overrides;
-use actcheck::data::{Choice, ChoiceKind};
+use actcheck::data::{Choice, ChoiceKind, ChoiceName, StartAxis};
 use actcheck::scenario;
 use actcheck::search::{GENERATION, Strategy};
 
@@ -31,8 +31,9 @@ fn pick(runs: u32, seed: u64, repeat: u32, strategy: Strategy) -> Env {
 
 /// The quantile of a recorded choice in its range.
 fn quantile(choice: &Choice) -> f64 {
-    match choice.kind {
-        ChoiceKind::Index { of } => (choice.value + 0.5) / of as f64,
+    match &choice.kind {
+        ChoiceKind::Index { of } => (choice.value + 0.5) / *of as f64,
+        ChoiceKind::Candidate { names } => (choice.value + 0.5) / names.len() as f64,
         ChoiceKind::Real { low, high, .. } => (choice.value - low) / (high - low),
         ChoiceKind::Normal { sigma } => choice.value / sigma,
     }
@@ -40,21 +41,21 @@ fn quantile(choice: &Choice) -> f64 {
 
 /// The result of a made-up robot in a planned run: it fails in the most crowded fifth of the scenes with the base in
 /// the nearer quarter. If the base is far to one side, the scene can't be built and is not simulated.
-fn made_up(env: &Env, planned: &Planned) -> Told {
+fn made_up(env: &Env, planned: &Planned) -> RunResult {
     for attempt in 0.. {
         let mut choices = planned.choices(env.campaign.seed, attempt);
         if scenario::draw(&env.space, 0, &mut choices).is_err() {
             continue;
         }
-        let at = |name: &str| quantile(choices.made().iter().find(|choice| choice.name == name).unwrap());
-        if at("robot.side") > 0.7 {
+        let at = |name: ChoiceName| quantile(choices.made().iter().find(|choice| choice.name == name).unwrap());
+        if at(ChoiceName::Robot(StartAxis::Side)) > 0.7 {
             continue;
         }
-        let margin = (0.8 - at("other.count")).max(at("robot.gap") - 0.25);
+        let margin = (0.8 - at(ChoiceName::OtherCount)).max(at(ChoiceName::Robot(StartAxis::Gap)) - 0.25);
         let outcome = if margin < 0.0 { Outcome::Failed } else { Outcome::Passed };
-        let said = |property: &str| ToldOutcome { property: property.to_owned(), outcome, margin: Some(margin) };
+        let said = |property: &str| PropertyOutcome { property: property.to_owned(), outcome, margin: Some(margin) };
         let outcomes = ["CloseObject", "MovedObject"].map(|name| said(&format!("http://actions#{name}")));
-        return Told { index: planned.index, discards: attempt, outcomes: outcomes.to_vec() };
+        return RunResult { index: planned.index, discards: attempt, outcomes: outcomes.to_vec() };
     }
     unreachable!("some scenes can be built")
 }
@@ -143,7 +144,7 @@ fn repetitions_of_a_searched_scene_share_it_and_differ_in_noise() {
     for scene in planned.chunks(3) {
         let steering = scene[0].steering.as_ref().unwrap();
         assert!(scene.iter().all(|run| run.steering.as_ref().unwrap() == steering));
-        assert!(steering.quantiles.keys().all(|name| !name.starts_with("sense.")), "{steering:?}");
+        assert!(steering.quantiles.keys().all(|name| !name.is_noise()), "{steering:?}");
         assert_eq!(scene.iter().map(|run| run.repetition).collect::<Vec<_>>(), [Some(0), Some(1), Some(2)]);
     }
     // Counts scenes, not runs.

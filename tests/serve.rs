@@ -119,7 +119,7 @@ impl Reply {
 
 /// A server with narrow limits.
 fn limited() -> Server {
-    Server::alone(&["--max-secs", "3", "--max-rows", "1000", "--max-queries", "64"])
+    Server::alone(&["--max-time", "3s", "--max-rows", "1000", "--max-queries", "64"])
 }
 
 const RUNS: &str = "SELECT ?run ?index { ?run a act:Run ; act:index ?index } ORDER BY ?index";
@@ -447,7 +447,9 @@ fn servers_that_cannot_start_report_the_reason() {
         (vec!["serve", "--history", "nowhere"], "H003"),
         (vec!["serve", "--history", &history, "--port", &server.port.to_string()], "X053"),
         (vec!["serve", "--history", &history, "--bind", "192.0.2.1", "--port", "0"], "X053"),
-        (vec!["serve", "--history", &history, "--max-secs", "0"], "seconds"),
+        (vec!["serve", "--history", &history, "--max-secs", "0"], "above zero"),
+        (vec!["serve", "--history", &history, "--max-time", "25h"], "at most a day"),
+        (vec!["serve", "--history", &history, "--max-time", "soon"], "not a duration"),
         (vec!["serve", "--history", &history, "--bind", "localhost"], "invalid"),
     ] {
         let output = actcheck(folder.path(), &arguments);

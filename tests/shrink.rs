@@ -2,34 +2,34 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use actcheck::campaign::shrink::{Limits, Plan, Search, Tried, explain, reduce};
-use actcheck::data::{Choice, ChoiceKind, Choices};
+use actcheck::campaign::shrink::{ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
+use actcheck::data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices};
 
 /// Objects in the initial list.
 const THINGS: usize = 12;
 
 fn removal(thing: usize) -> Choice {
-    Choice { name: format!("thing.{thing}.left_out"), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
+    Choice { name: format!("thing.{thing}.left_out").into(), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
 }
 
 /// The draws of a test function: which things exist, two numbers for each, and one number of noise.
 fn draw(choices: &mut Choices) -> (Vec<(usize, f64, f64)>, f64) {
     let mut things = Vec::new();
     for thing in 0..THINGS {
-        if choices.exception(&format!("thing.{thing}.left_out"), 2) == 0 {
-            let x = choices.real(&format!("thing.{thing}.x"), -1.0, 1.0, 0.0);
-            things.push((thing, x, choices.real(&format!("thing.{thing}.mass"), 0.5, 1.5, 1.0)));
+        if choices.exception(format!("thing.{thing}.left_out").into(), 2) == 0 {
+            let x = choices.real(format!("thing.{thing}.x").into(), -1.0, 1.0, 0.0);
+            things.push((thing, x, choices.real(format!("thing.{thing}.mass").into(), 0.5, 1.5, 1.0)));
         }
     }
-    (things, choices.normal("noise", 0.1))
+    (things, choices.normal("noise".into(), 0.1))
 }
 
-fn group(_: &[Choice], name: &str) -> Option<u8> {
-    match name {
-        "noise" => Some(0),
-        _ if name.ends_with("left_out") => None,
-        _ if name.ends_with("mass") => Some(1),
-        _ => Some(2),
+fn group(_: &[Choice], name: &ChoiceName) -> Option<ChoiceGroup> {
+    match name.to_string().rsplit('.').next() {
+        Some("noise") => Some(ChoiceGroup::Noise),
+        Some("left_out") => None,
+        Some("mass") => Some(ChoiceGroup::Physics),
+        _ => Some(ChoiceGroup::OtherPoses),
     }
 }
 
@@ -68,14 +68,14 @@ fn shrunk(fails: Fails, jobs: usize, simulations: u64) -> (Vec<Choice>, bool, u6
         Tried { made: fails(&things, noise).then(|| choices.into_made()), simulations: 1 }
     };
     let never = || false;
-    let mut search = Search::new(&test, Limits { simulations, jobs, stop: &never });
-    let plan = Plan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
+    let mut search = TrialSearch::new(&test, TrialLimits { simulations, jobs, stop: &never });
+    let plan = ShrinkPlan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
     let (list, minimal) = reduce(&mut search, failing(fails), &plan, &mut |_| {});
     (list, minimal, search.simulations())
 }
 
 fn things(list: &[Choice]) -> usize {
-    THINGS - list.iter().filter(|choice| choice.name.ends_with("left_out") && choice.value == 1.0).count()
+    THINGS - list.iter().filter(|choice| choice.name.to_string().ends_with("left_out") && choice.value == 1.0).count()
 }
 
 fn special(list: &[Choice]) -> usize {
@@ -115,9 +115,9 @@ fn a_limit_ends_shrinking_with_the_best_so_far() {
     let asked = AtomicBool::new(true);
     let stop = || asked.load(Ordering::Relaxed);
     let test = |list: &[Choice]| Tried { made: Some(list.to_vec()), simulations: 1 };
-    let mut search = Search::new(&test, Limits { simulations: 100, jobs: 1, stop: &stop });
+    let mut search = TrialSearch::new(&test, TrialLimits { simulations: 100, jobs: 1, stop: &stop });
     let start = failing(|_, _| true);
-    let plan = Plan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
+    let plan = ShrinkPlan { removals: (0..THINGS).map(removal).collect(), ends: Vec::new(), group: &group };
     assert_eq!(reduce(&mut search, start.clone(), &plan, &mut |_| {}), (start, false));
     assert_eq!(search.simulations(), 0);
 }
@@ -131,11 +131,11 @@ fn the_range_of_a_failure_and_its_nearest_pass_are_found() {
         Tried { made: fails(&things, noise).then(|| list.to_vec()), simulations: 1 }
     };
     let never = || false;
-    let mut search = Search::new(&test, Limits { simulations: 100, jobs: 2, stop: &never });
-    let plan = Plan { removals: Vec::new(), ends: Vec::new(), group: &group };
+    let mut search = TrialSearch::new(&test, TrialLimits { simulations: 100, jobs: 2, stop: &never });
+    let plan = ShrinkPlan { removals: Vec::new(), ends: Vec::new(), group: &group };
     let explained = explain(&mut search, &list, &plan);
     let [influence] = explained.influences.as_slice() else { panic!("{explained:?}") };
-    assert_eq!((influence.id.name.as_str(), influence.matters), ("thing.7.x", Some(true)));
+    assert_eq!((influence.id.name.to_string().as_str(), influence.matters), ("thing.7.x", Some(true)));
     let (below, above) = (influence.passes.0.unwrap(), influence.passes.1.unwrap());
     assert!(below < 0.2 && 0.2 <= influence.fails.0 && influence.fails.1 < 0.6 && 0.6 <= above, "{influence:?}");
     assert!(influence.fails.0 - below < 0.1 && above - influence.fails.1 < 0.1, "{influence:?}");

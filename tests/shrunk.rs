@@ -83,18 +83,18 @@ fn the_shrunk_run_is_stored_fails_the_same_and_can_be_drawn() {
 fn limits_and_repetitions_are_respected() {
     let project = blurred();
     let (run, failing) = campaign(project.path(), LOOK).remove(0);
-    let short = json(project.path(), &["shrink", &run, "--time", "0.001"]);
+    let short = json(project.path(), &["shrink", &run, "--time", "1ms"]);
     assert_eq!((&short["minimal"], &short["simulations"]), (&false.into(), &0.into()), "{short:#}");
     assert_eq!(short["others"], short["others_before"]);
     let few = json(project.path(), &["shrink", &run, "--trials", "5", "--jobs", "1"]);
     assert!(few["simulations"].as_u64().unwrap() + few["explaining_simulations"].as_u64().unwrap() <= 5, "{few:#}");
-    let noisy = json(project.path(), &["shrink", &run, "--repeat", "2/3", "--trials", "15"]);
+    let noisy = json(project.path(), &["shrink", &run, "--must-fail", "2/3", "--trials", "15"]);
     assert_eq!(noisy["fresh_noise"]["of"], 3, "{noisy:#}");
     assert_eq!(failed_of(project.path(), noisy["run"].as_str().unwrap()), failing);
     if noisy["noise_kept"] == false {
         assert!(noisy["fresh_noise"]["failed"].as_u64().unwrap() >= 2, "confirmed in 2 of 3: {noisy:#}");
     }
-    for wrong in [["--repeat", "4/3"], ["--time", "0"], ["--trials", "0"]] {
+    for wrong in [["--must-fail", "4/3"], ["--repeat", "5"], ["--time", "0"], ["--time", "soon"], ["--trials", "0"]] {
         let output = actcheck(project.path(), &["shrink", &run, wrong[0], wrong[1], "--history", "h"]);
         assert_eq!(output.status.code(), Some(2), "{wrong:?}");
     }

@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use actcheck::base::{Files, Findings, RuleFault, RunFacts, Source, digest_of};
-use actcheck::campaign::{Clock, Env, Failure, Manner, run_line};
+use actcheck::campaign::{Clock, Env, Failure, RunContext, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use actcheck::ontology::{self, RuleLanguage};
@@ -87,8 +87,8 @@ fn book(file: &str, text: &str) -> (RuleBook, String) {
     (RuleBook::prepare(&ontology).unwrap_or_else(|faults| panic!("{faults}")), iri)
 }
 
-const MANNER: Manner =
-    Manner { clock: Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 }, disturb: None };
+const CONTEXT: RunContext =
+    RunContext { clock: Clock { now: || "2026-01-01T00:00:00Z".to_owned(), secs: || 0.0 }, disturb: None };
 
 fn env(budget: Budget) -> Env {
     Env::prepare_within(&root().join("configs/pick.toml"), &Overrides::default(), budget).unwrap()
@@ -97,7 +97,7 @@ fn env(budget: Budget) -> Env {
 /// Choices of a scene that can be built.
 fn choices() -> Choices {
     static STREAM: OnceLock<u64> = OnceLock::new();
-    let made = |env: &Env, stream| run_line(env, "c", 0, Choices::random(1, stream), &MANNER).is_ok();
+    let made = |env: &Env, stream| run_line(env, "c", 0, Choices::random(1, stream), &CONTEXT).is_ok();
     let stream = STREAM.get_or_init(|| {
         let env = env(Budget::default());
         (0..50).find(|stream| made(&env, *stream)).unwrap()
@@ -108,7 +108,7 @@ fn choices() -> Choices {
 /// Facts of a simulated pick.
 fn facts() -> &'static RunFacts {
     static FACTS: OnceLock<RunFacts> = OnceLock::new();
-    FACTS.get_or_init(|| run_line(&env(Budget::default()), "c", 0, choices(), &MANNER).unwrap().facts)
+    FACTS.get_or_init(|| run_line(&env(Budget::default()), "c", 0, choices(), &CONTEXT).unwrap().facts)
 }
 
 fn judged(file: &str, text: &str, facts: &RunFacts, budget: &Budget) -> Result<Findings, RuleFault> {
@@ -146,7 +146,7 @@ fn a_query_that_joins_its_patterns_stays_in_a_small_budget() {
 #[test]
 fn a_run_in_flight_is_judged_whole_unless_its_rules_take_long() {
     let env = env(Budget::default());
-    let made = |env: &Env| run_line(env, "c", 0, choices(), &MANNER).map(|run| run.score);
+    let made = |env: &Env| run_line(env, "c", 0, choices(), &CONTEXT).map(|run| run.score);
     env.rule_budget.stop.store(true, Ordering::Relaxed);
     assert!(made(&env).is_ok());
     let (file, text) = &multiplying()[0];

@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
-use actcheck::base::{Diagnostics, Files, RuleFault, RunFacts, Source, Term, Terms, digest_of, names};
+use actcheck::base::{Diagnostics, Files, RuleFault, RunFacts, Source, Term, Terms, names};
 use actcheck::ontology::{self, Ontology, Property, RuleFile, RuleLanguage};
 use actcheck::rules::standalone::{Engine, Program};
 use actcheck::rules::{Budget, RuleBook, parse as parse_rules};
@@ -114,22 +114,10 @@ fn with_property(text: &str, language: RuleLanguage) -> Ontology {
         ontology.triples.clear();
         ontology
     });
-    let rule = RuleFile {
-        source: Source::new("fuzz.rls", text),
-        language,
-        path: "fuzz.rls".into(),
-        digest: digest_of(text),
-        linked_at: None,
-    };
-    let property = Property {
-        iri: TESTED.into(),
-        name: "Tested".into(),
-        label: "the tested property".into(),
-        comment: None,
-        rule,
-        needs: Default::default(),
-        unit: Some("m".into()),
-    };
+    let name = if language == RuleLanguage::Sparql { "fuzz.rq" } else { "fuzz.rls" };
+    let mut property = Property::new(TESTED, RuleFile::new(Source::new(name, text)));
+    property.label = "the tested property".into();
+    property.unit = Some("m".into());
     let mut ontology = shipped.clone();
     ontology.properties = [(TESTED.to_owned(), property)].into();
     ontology

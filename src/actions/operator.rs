@@ -7,7 +7,7 @@ use crate::grip::GripWatch;
 use crate::memory::{Held, Memory, Standing};
 use crate::sabotage::IDLE_SECS;
 use crate::{Cut, ExternalFault, Saboteur};
-use actcheck_data::{ActionReport, Choices, KnownKind, Perceived, Percept, Phase, RobotProfile};
+use actcheck_data::{ActionReport, ChoiceName, Choices, KnownKind, Perceived, Percept, Phase, RobotProfile};
 use actcheck_scenario::FloorPlan;
 use actcheck_world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
 
@@ -179,7 +179,7 @@ impl<'a> Operator<'a> {
 
     /// Selects the sequence of postures that an arm planner samples: a number from 0 to 1, recorded like every choice.
     pub fn choose_samples(&mut self) -> f64 {
-        self.choices.real("motion.samples", 0.0, 1.0, 0.5)
+        self.choices.simple(ChoiceName::MotionSamples, 0.0, 1.0)
     }
 
     /// Knowledge from earlier actions of the run.

@@ -28,7 +28,7 @@ impl UnknownSkill {
     /// This error as a diagnostic with a suggestion for the user.
     pub fn diagnostic(&self) -> Diagnostic {
         let help = did_you_mean(&self.action, reference_skills());
-        Diagnostic::error("W030", self.to_string()).help(help)
+        Diagnostic::error("S010", self.to_string()).help(help)
     }
 }
 

@@ -24,7 +24,7 @@ pub struct Consistency {
     /// Number of scenes with at least two decided runs, all failed.
     pub always_failed: u64,
     /// The other scenes with at least two decided runs, sorted by number.
-    pub flaky: Vec<Flaky>,
+    pub flaky: Vec<SceneCounts>,
     /// pass^k for k from 1 to the most decided runs of a scene.
     pub pass_powers: Vec<PassPower>,
     /// Variance of the outcome: 1 for passed, 0 for failed.
@@ -37,7 +37,7 @@ pub struct Consistency {
 
 /// A scene with its number of passed runs. In [`Consistency::flaky`], a scene with different outcomes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Flaky {
+pub struct SceneCounts {
     /// Number of the scene.
     pub scene: u64,
     /// Number of passed runs.
@@ -81,7 +81,7 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
     for run in runs {
         scenes.entry(run.scene).or_default().push(run);
     }
-    let counts: Vec<Flaky> = scenes.iter().map(|(scene, runs)| count(*scene, runs)).collect();
+    let counts: Vec<SceneCounts> = scenes.iter().map(|(scene, runs)| count(*scene, runs)).collect();
     let several = || counts.iter().filter(|scene| scene.of >= 2);
     let numbers = |number: &dyn Fn(&Repeated) -> f64| -> Vec<Vec<f64>> {
         scenes.values().map(|runs| runs.iter().map(|run| number(run)).collect()).collect()
@@ -101,13 +101,13 @@ pub fn consistency(runs: &[Repeated]) -> Consistency {
     }
 }
 
-fn count(scene: u64, runs: &[&Repeated]) -> Flaky {
-    Flaky { scene, passed: runs.iter().filter(|run| run.passed).count() as u64, of: runs.len() as u64 }
+fn count(scene: u64, runs: &[&Repeated]) -> SceneCounts {
+    SceneCounts { scene, passed: runs.iter().filter(|run| run.passed).count() as u64, of: runs.len() as u64 }
 }
 
 /// Returns the mean over scenes of C(passed, k) / C(runs, k), an unbiased estimate for any distribution of the scenes'
 /// probabilities.
-fn pass_power(counts: &[Flaky], k: u64) -> Option<PassPower> {
+fn pass_power(counts: &[SceneCounts], k: u64) -> Option<PassPower> {
     let enough: Vec<f64> = counts
         .iter()
         .filter(|scene| scene.of >= k)
@@ -238,7 +238,7 @@ mod tests {
         assert_eq!((found.always_passed, found.always_failed), (1, 1));
         assert_eq!(
             found.flaky,
-            [Flaky { scene: 2, passed: 2, of: 3 }, Flaky { scene: 4, passed: 1, of: 2 }],
+            [SceneCounts { scene: 2, passed: 2, of: 3 }, SceneCounts { scene: 4, passed: 1, of: 2 }],
             "a scene of one run is neither"
         );
         assert_eq!(consistency(&[]), Consistency::default());

@@ -16,9 +16,6 @@ const BINS: usize = 5;
 const MOST_BINS: usize = 1000;
 /// Probability that any bin of an unbiased campaign is called neglected.
 const LEVEL: f64 = 1e-3;
-/// Name prefix of noise choices. They are independent errors of the robot and its sensors, so that their pairs are not
-/// counted.
-const NOISE: &str = "sense.";
 /// A pair of parameters is called neglected if less than this share of the expected cells was hit,
 const PAIR_SHARE: f64 = 0.75;
 /// … and the shortfall exceeds this many standard deviations.
@@ -75,6 +72,7 @@ struct Binned {
     /// Its object, if it belongs to one of several.
     owner: Option<String>,
     name: String,
+    noise: bool,
     bins: usize,
     bin: usize,
 }
@@ -82,9 +80,9 @@ struct Binned {
 impl Coverage {
     /// Counts the choices of one run. Of repeated choices only the last one counts, because the scene uses it.
     pub fn add(&mut self, choices: &[Choice]) {
-        let mut last: BTreeMap<&str, &Choice> = BTreeMap::new();
+        let mut last: BTreeMap<String, &Choice> = BTreeMap::new();
         for choice in choices {
-            last.insert(&choice.name, choice);
+            last.insert(choice.name.to_string(), choice);
         }
         let binned: Vec<Binned> = last.values().filter_map(|choice| binned(choice)).collect();
         for one in &binned {
@@ -98,10 +96,10 @@ impl Coverage {
         }
     }
 
-    /// Counts a pair of choices if both are about the whole scene or about the same object.
+    /// Counts a pair of choices if both are about the whole scene or about the same object. Noise choices are independent
+    /// errors of the robot and its sensors, so that their pairs are not counted.
     fn add_pair(&mut self, first: &Binned, second: &Binned) {
-        let noise = first.name.starts_with(NOISE) || second.name.starts_with(NOISE);
-        if noise || first.owner != second.owner {
+        if first.noise || second.noise || first.owner != second.owner {
             return;
         }
         let key = [(first.name.clone(), first.bins), (second.name.clone(), second.bins)];
@@ -170,56 +168,41 @@ fn occupied(cells: usize, draws: u64) -> (f64, f64) {
 /// Returns a choice with its bin, or `None` if it had only one option.
 fn binned(choice: &Choice) -> Option<Binned> {
     let share = |share: f64| (BINS, ((share * BINS as f64).max(0.0) as usize).min(BINS - 1));
-    let (bins, bin) = match choice.kind {
-        ChoiceKind::Index { of } if of > MOST_BINS => share(choice.value / of as f64),
-        ChoiceKind::Index { of } if of > 1 => (of, (choice.value.max(0.0) as usize).min(of - 1)),
-        ChoiceKind::Real { low, high, .. } if high > low => share((choice.value - low) / (high - low)),
-        ChoiceKind::Normal { sigma } if sigma > 0.0 => {
+    let option = |of: usize| (of, (choice.value.max(0.0) as usize).min(of - 1));
+    let (bins, bin) = match &choice.kind {
+        &ChoiceKind::Index { of } if of > MOST_BINS => share(choice.value / of as f64),
+        &ChoiceKind::Index { of } if of > 1 => option(of),
+        ChoiceKind::Candidate { names } if names.len() > 1 => option(names.len()),
+        &ChoiceKind::Real { low, high, .. } if high > low => share((choice.value - low) / (high - low)),
+        &ChoiceKind::Normal { sigma } if sigma > 0.0 => {
             share(0.5 * libm::erfc(-choice.value / sigma / std::f64::consts::SQRT_2))
         }
         _ => return None,
     };
-    let (owner, name) = pooled(&choice.name);
-    Some(Binned { owner, name, bins, bin })
-}
-
-/// Returns the object in a name, if it is one of several, and the name with `*` in its place.
-fn pooled(name: &str) -> (Option<String>, String) {
-    let parts: Vec<&str> = name.split('.').collect();
-    match parts.as_slice() {
-        // The localisation error of the base belongs to no object.
-        [_, "localisation", ..] => (None, name.to_owned()),
-        [head, owner, rest @ ..] if !rest.is_empty() && (is_number(owner) || name.starts_with(NOISE)) => {
-            (Some(format!("{head}.{owner}")), format!("{head}.*.{}", rest.join(".")))
-        }
-        _ => (None, name.to_owned()),
-    }
-}
-
-fn is_number(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+    let (owner, name) = choice.name.pooled();
+    Some(Binned { owner, name, noise: choice.name.is_noise(), bins, bin })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use actcheck_data::Choices;
+    use actcheck_data::{ChoiceName, Choices};
 
     /// Choices of a scene with two objects. `lean` is the number of times that the colour is redrawn if it is the last
     /// one.
     fn scene(index: u64, lean: u32) -> Vec<Choice> {
         let mut choices = Choices::random(5, index);
         for name in ["other.1", "other.2"] {
-            choices.real(&format!("{name}.x"), -1.0, 1.0, 0.0);
-            choices.index(&format!("{name}.model"), 4);
+            choices.real(format!("{name}.x").into(), -1.0, 1.0, 0.0);
+            choices.index(format!("{name}.model").into(), 4);
         }
         for _ in 0..=lean {
-            if choices.index("colour", 5) < 4 {
+            if choices.index("colour".into(), 5) < 4 {
                 break;
             }
         }
-        choices.real("fixed", 1.0, 1.0, 1.0);
-        choices.normal("sense.mug_1.x", 0.1);
+        choices.real("fixed".into(), 1.0, 1.0, 1.0);
+        choices.normal("sense.mug_1.x".into(), 0.1);
         choices.into_made()
     }
 
@@ -227,7 +210,7 @@ mod tests {
     #[test]
     fn a_choice_among_very_many_values_is_counted_as_a_number() {
         let mut choices = Choices::random(5, 0);
-        choices.index("sense.camera.frame", 1 << 32);
+        choices.index(ChoiceName::CameraFrame, 1 << 32);
         let mut coverage = Coverage::default();
         coverage.add(&choices.into_made());
         assert_eq!(coverage.parameters()[0].counts.len(), BINS);
@@ -261,7 +244,7 @@ mod tests {
     fn the_number_of_hit_bins_matches_its_expectation() {
         let mean = (0..200u64).map(|seed| {
             let mut choices = Choices::random(seed, 1);
-            let hit: std::collections::BTreeSet<usize> = (0..8).map(|_| choices.index("x", 10)).collect();
+            let hit: std::collections::BTreeSet<usize> = (0..8).map(|_| choices.index("x".into(), 10)).collect();
             hit.len() as f64
         });
         let mean = mean.sum::<f64>() / 200.0;
@@ -284,7 +267,7 @@ mod tests {
         let mut coverage = Coverage::default();
         for index in 0..200 {
             let mut choices = Choices::random(5, index);
-            let value = choices.real("a", 0.0, 1.0, 0.0);
+            let value = choices.real("a".into(), 0.0, 1.0, 0.0);
             let mut made = choices.into_made();
             made.push(Choice { name: "b".into(), value, ..made[0].clone() });
             coverage.add(&made);

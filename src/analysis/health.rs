@@ -28,7 +28,7 @@ const MOST_ENERGY_J: f64 = 0.2;
 #[derive(Debug, Clone, Default)]
 pub struct HealthMeter {
     coverage: Coverage,
-    steered: bool,
+    is_weighted: bool,
     runs: u64,
     discards: u64,
     first_discard: Option<(u64, String)>,
@@ -60,12 +60,12 @@ pub struct Health {
     /// The largest unphysical energy gain and its run. Unit: joules.
     pub energy: Option<(f64, String)>,
     /// The problems found.
-    pub ailments: Vec<Ailment>,
+    pub problems: Vec<HealthProblem>,
 }
 
 /// A problem that weakens the conclusions of a campaign.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Ailment {
+pub enum HealthProblem {
     /// Too many scenes were discarded: number of discarded scenes, number of drawn scenes, run of the first discard
     /// (from 1) and its reason.
     Discards(u64, u64, u64, String),
@@ -93,7 +93,7 @@ impl HealthMeter {
         if let (None, Some(reason)) = (&self.first_discard, run.discards.first()) {
             self.first_discard = Some((run.index + 1, reason.clone()));
         }
-        self.steered |= run.steered;
+        self.is_weighted |= run.is_weighted;
         // Repetitions of a scene count once.
         if run.repetition == 0 {
             self.coverage.add(&run.choices);
@@ -122,9 +122,9 @@ impl HealthMeter {
             slowest: self.wall.last().cloned(),
             deepest: self.deepest.clone(),
             energy: self.energy.clone(),
-            ailments: Vec::new(),
+            problems: Vec::new(),
         };
-        let ailments = [
+        let problems = [
             self.discarded(),
             inapplicable(outcomes),
             self.neglected(&health),
@@ -132,34 +132,35 @@ impl HealthMeter {
             slow(&health, self.wall.len()),
             badly_simulated(&health),
         ];
-        health.ailments = ailments.into_iter().flatten().collect();
+        health.problems = problems.into_iter().flatten().collect();
         health
     }
 
-    fn discarded(&self) -> Vec<Ailment> {
+    fn discarded(&self) -> Vec<HealthProblem> {
         let drawn = self.runs + self.discards;
         match &self.first_discard {
             Some((run, reason)) if self.discards as f64 > MOST_DISCARDS * drawn as f64 => {
-                vec![Ailment::Discards(self.discards, drawn, *run, reason.clone())]
+                vec![HealthProblem::Discards(self.discards, drawn, *run, reason.clone())]
             }
             _ => Vec::new(),
         }
     }
 
     /// Rarely tried parameters. A guided search is biased on purpose, so that it is exempt.
-    fn neglected(&self, health: &Health) -> Vec<Ailment> {
-        if self.steered {
+    fn neglected(&self, health: &Health) -> Vec<HealthProblem> {
+        if self.is_weighted {
             return Vec::new();
         }
         let singles = health.parameters.iter().filter(|parameter| parameter.neglected.is_some());
         let pairs = health.pairs.iter().filter(|pair| pair.neglected);
-        singles.cloned().map(Ailment::Neglected).chain(pairs.cloned().map(Ailment::PairNeglected)).collect()
+        singles.cloned().map(HealthProblem::Neglected).chain(pairs.cloned().map(HealthProblem::PairNeglected)).collect()
     }
 
-    fn repeated(&self) -> Vec<Ailment> {
+    fn repeated(&self) -> Vec<HealthProblem> {
         let first = self.duplicates.first();
-        let ailment = first.map(|(run, of)| Ailment::Duplicates(self.duplicates.len() as u64, run.clone(), of.clone()));
-        ailment.into_iter().collect()
+        let problem =
+            first.map(|(run, of)| HealthProblem::Duplicates(self.duplicates.len() as u64, run.clone(), of.clone()));
+        problem.into_iter().collect()
     }
 }
 
@@ -167,7 +168,7 @@ impl HealthMeter {
 fn digest(run: &RunVitals) -> String {
     let mut digest = Digest::new();
     for choice in &run.choices {
-        digest.update(choice.name.as_bytes());
+        digest.update(choice.name.to_string().as_bytes());
         digest.update(&[0]);
         digest.update(&choice.value.to_bits().to_le_bytes());
     }
@@ -183,7 +184,7 @@ fn larger(largest: &mut Option<(f64, String)>, value: Option<f64>, run: &str) {
 }
 
 /// Finds the properties that were nearly always inapplicable, sorted by IRI.
-fn inapplicable(outcomes: &[OutcomeRow]) -> Vec<Ailment> {
+fn inapplicable(outcomes: &[OutcomeRow]) -> Vec<HealthProblem> {
     let mut counts: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
     for row in outcomes {
         let (not, all) = counts.entry(&row.property).or_default();
@@ -193,26 +194,26 @@ fn inapplicable(outcomes: &[OutcomeRow]) -> Vec<Ailment> {
     counts
         .into_iter()
         .filter(|(_, (not, all))| *all >= LEAST_JUDGED && *not as f64 >= MOST_INAPPLICABLE * *all as f64)
-        .map(|(property, (not, all))| Ailment::Inapplicable(property.to_owned(), not, all))
+        .map(|(property, (not, all))| HealthProblem::Inapplicable(property.to_owned(), not, all))
         .collect()
 }
 
-fn slow(health: &Health, runs: usize) -> Vec<Ailment> {
+fn slow(health: &Health, runs: usize) -> Vec<HealthProblem> {
     match (&health.slowest, health.median_secs) {
         (Some((secs, run)), Some(median))
             if runs >= LEAST_TIMED && *secs > SLOW_FACTOR * median && secs - median > SLOW_SECS =>
         {
-            vec![Ailment::Slow(run.clone(), *secs, median)]
+            vec![HealthProblem::Slow(run.clone(), *secs, median)]
         }
         _ => Vec::new(),
     }
 }
 
-fn badly_simulated(health: &Health) -> Vec<Ailment> {
+fn badly_simulated(health: &Health) -> Vec<HealthProblem> {
     let deep = health.deepest.iter().filter(|(depth, _)| *depth > DEEPEST_M);
     let hot = health.energy.iter().filter(|(energy, _)| *energy > MOST_ENERGY_J);
-    deep.map(|(depth, run)| Ailment::Penetration(run.clone(), *depth))
-        .chain(hot.map(|(energy, run)| Ailment::Energy(run.clone(), *energy)))
+    deep.map(|(depth, run)| HealthProblem::Penetration(run.clone(), *depth))
+        .chain(hot.map(|(energy, run)| HealthProblem::Energy(run.clone(), *energy)))
         .collect()
 }
 
@@ -223,13 +224,13 @@ mod tests {
 
     fn run(index: u64) -> RunVitals {
         let mut choices = Choices::random(7, index);
-        choices.real("x", 0.0, 1.0, 0.0);
+        choices.real("x".into(), 0.0, 1.0, 0.0);
         RunVitals {
             run: format!("k-{}", index + 1),
             index,
             choices: choices.into_made(),
             discards: Vec::new(),
-            steered: false,
+            is_weighted: false,
             repetition: 0,
             wall_secs: 1.0 + index as f64 / 10.0,
             deepest_penetration_m: Some(1e-3),
@@ -237,36 +238,36 @@ mod tests {
         }
     }
 
-    fn ailments(change: impl Fn(&mut RunVitals)) -> Vec<Ailment> {
+    fn problems(change: impl Fn(&mut RunVitals)) -> Vec<HealthProblem> {
         let mut meter = HealthMeter::default();
         for index in 0..20 {
             let mut run = run(index);
             change(&mut run);
             meter.add(&run);
         }
-        meter.finish(&[]).ailments
+        meter.finish(&[]).problems
     }
 
     #[test]
     fn a_healthy_campaign_has_no_warning() {
-        assert_eq!(ailments(|_| ()), []);
+        assert_eq!(problems(|_| ()), []);
         // Histories of older versions have no simulation data.
-        assert_eq!(ailments(|run| (run.deepest_penetration_m, run.energy_gain_j) = (None, None)), []);
+        assert_eq!(problems(|run| (run.deepest_penetration_m, run.energy_gain_j) = (None, None)), []);
     }
 
     #[test]
     fn each_warning_names_its_run() {
         let third = |run: &RunVitals| run.index == 2;
-        let slow = ailments(|run| run.wall_secs += if third(run) { 60.0 } else { 0.0 });
-        assert_eq!(slow, [Ailment::Slow("k-3".into(), 61.2, 2.1)]);
-        let same = ailments(|run| run.choices = self::run(run.index.min(17)).choices);
-        assert_eq!(same, [Ailment::Duplicates(2, "k-19".into(), "k-18".into())]);
-        let deep = ailments(|run| run.deepest_penetration_m = Some(if third(run) { 0.03 } else { 0.0 }));
-        assert_eq!(deep, [Ailment::Penetration("k-3".into(), 0.03)]);
-        let hot = ailments(|run| run.energy_gain_j = Some(if third(run) { 2.0 } else { 0.0 }));
-        assert_eq!(hot, [Ailment::Energy("k-3".into(), 2.0)]);
-        let crowded = ailments(|run| run.discards = vec!["no place".to_owned(); usize::from(run.index % 4 == 1)]);
-        assert_eq!(crowded, [Ailment::Discards(5, 25, 2, "no place".into())]);
+        let slow = problems(|run| run.wall_secs += if third(run) { 60.0 } else { 0.0 });
+        assert_eq!(slow, [HealthProblem::Slow("k-3".into(), 61.2, 2.1)]);
+        let same = problems(|run| run.choices = self::run(run.index.min(17)).choices);
+        assert_eq!(same, [HealthProblem::Duplicates(2, "k-19".into(), "k-18".into())]);
+        let deep = problems(|run| run.deepest_penetration_m = Some(if third(run) { 0.03 } else { 0.0 }));
+        assert_eq!(deep, [HealthProblem::Penetration("k-3".into(), 0.03)]);
+        let hot = problems(|run| run.energy_gain_j = Some(if third(run) { 2.0 } else { 0.0 }));
+        assert_eq!(hot, [HealthProblem::Energy("k-3".into(), 2.0)]);
+        let crowded = problems(|run| run.discards = vec!["no place".to_owned(); usize::from(run.index % 4 == 1)]);
+        assert_eq!(crowded, [HealthProblem::Discards(5, 25, 2, "no place".into())]);
     }
 
     #[test]
@@ -285,7 +286,7 @@ mod tests {
         let rows = |applies: u64, all: u64| -> Vec<OutcomeRow> {
             (0..all).map(|i| row(i, if i < applies { Outcome::Passed } else { Outcome::Inapplicable })).collect()
         };
-        assert_eq!(inapplicable(&rows(1, 10)), [Ailment::Inapplicable("p".into(), 9, 10)]);
+        assert_eq!(inapplicable(&rows(1, 10)), [HealthProblem::Inapplicable("p".into(), 9, 10)]);
         assert_eq!(inapplicable(&rows(2, 10)), []);
         assert_eq!(inapplicable(&rows(0, 9)), []);
     }

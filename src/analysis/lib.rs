@@ -20,7 +20,7 @@ mod score_interval;
 mod tables;
 
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
-pub use consistency::{Consistency, Flaky, PassPower, Repeated, SceneRuns, Variance, consistency};
+pub use consistency::{Consistency, PassPower, Repeated, SceneCounts, SceneRuns, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
 pub use dataset::{Dataset, export_dataset};
 pub use failure_modes::{FailureMode, failure_modes};
@@ -31,11 +31,13 @@ pub use findings::{
     table_failure_modes, trend, two_way,
 };
 pub use fisher::{FisherTest, TwoByTwo};
-pub use health::{Ailment, Health, HealthMeter};
+pub use health::{Health, HealthMeter, HealthProblem};
 pub use holm::holm;
 pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
 pub use paired::{Difference, PairedTable, PairedTest};
-pub use patterns::{Condition, Parameter, Pattern, PatternOptions, Patterns, Subject, Values, mine, simplest_between};
+pub use patterns::{
+    Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Values, mine, simplest_between,
+};
 pub use property_rates::{PropertyRate, property_rates};
 pub use score_interval::score_interval;
 pub use tables::{

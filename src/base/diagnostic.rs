@@ -17,7 +17,8 @@ pub enum Severity {
 ///
 /// Messages are lower-case sentences without a full stop. Codes are stable: a letter for the
 /// stage (`C` config, `O` ontology, `S` scenario, `W` world and models, `R` rules, `H` history,
-/// `A` analysis, `X` command line) and three digits.
+/// `A` analysis, `X` command line) and three digits. `actcheck explain` explains each; a new code
+/// needs its explanation in `src/cli/codes`.
 #[derive(Debug, Clone)]
 pub struct Diagnostic {
     /// Stable code, such as `C003`.

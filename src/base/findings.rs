@@ -1,6 +1,8 @@
 //! The findings of a rule about one property in one action.
 
-use crate::Term;
+use std::fmt;
+
+use crate::{Outcome, Term};
 
 /// Result of a property's rule file over the facts of one action.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +24,15 @@ pub struct Findings {
 impl Findings {
     /// Maximum number of tuples kept as witness; the rest are only counted.
     pub const WITNESS_LIMIT: usize = 8;
+
+    /// Returns the outcome: `Inapplicable`, `Passed` or `Failed`.
+    pub fn outcome(&self) -> Outcome {
+        match (self.applicable, self.holds) {
+            (false, _) => Outcome::Inapplicable,
+            (true, true) => Outcome::Passed,
+            (true, false) => Outcome::Failed,
+        }
+    }
 }
 
 /// One tuple with the argument names of the rule's head.
@@ -33,8 +44,22 @@ pub struct WitnessRow {
     pub values: Vec<(String, Term)>,
 }
 
+impl fmt::Display for WitnessRow {
+    /// Writes the tuple with the names of its arguments: `violation(object = obj:cup_1)`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}(", self.predicate)?;
+        for (idx, (name, term)) in self.values.iter().enumerate() {
+            let comma = if idx == 0 { "" } else { ", " };
+            let equals = if name.is_empty() { "" } else { " = " };
+            write!(f, "{comma}{name}{equals}{term}")?;
+        }
+        f.write_str(")")
+    }
+}
+
 /// Why a property could not be decided.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RuleFault {
     /// The evaluation exceeded its budget of time or tuples.
     #[error("evaluation stopped at its budget: {0}")]
@@ -45,4 +70,23 @@ pub enum RuleFault {
     /// The caller requested a stop (the `stop` flag of its budget).
     #[error("interrupted")]
     Interrupted,
+}
+
+impl RuleFault {
+    /// Returns the outcome of a property that could not be decided: `Timeout`, `Broken` or `Untested`.
+    pub fn outcome(&self) -> Outcome {
+        match self {
+            Self::BudgetSpent(_) => Outcome::Timeout,
+            Self::Value(_) => Outcome::Broken,
+            Self::Interrupted => Outcome::Untested,
+        }
+    }
+
+    /// Returns the reason without the kind of the fault.
+    pub fn reason(&self) -> &str {
+        match self {
+            Self::BudgetSpent(reason) | Self::Value(reason) => reason,
+            Self::Interrupted => "interrupted",
+        }
+    }
 }

@@ -2,11 +2,10 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
-
 /// Outcome of one property in one action execution. The six outcomes are never reduced to pass and fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum Outcome {
     /// The property holds.
     Passed,
@@ -63,7 +62,8 @@ impl fmt::Display for Outcome {
 }
 
 /// Outcome of one property with its evidence.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Judgement {
     /// IRI of the property.
     pub property: String,
@@ -79,7 +79,7 @@ pub struct Judgement {
     ///
     /// `None` if this was not checked: if the property did not pass, or if it states that something must not happen,
     /// which is always the case before an action.
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub held_before: Option<bool>,
 }
 

@@ -1,146 +1,29 @@
-//! Cases: configurations with one fixed scene. Checks that the scene can be built as written, and runs it.
+//! Checks that the scene of a case, a configuration with one fixed scene, can be built as written.
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-
-use crate::make_run::cut_of;
-use crate::replay::again;
-use crate::{Env, Manner};
-use actcheck_base::{Diagnostic, Diagnostics, Outcome, nearest};
+use actcheck_base::{Diagnostic, Diagnostics, nearest};
 use actcheck_config::{Campaign, Case};
-use actcheck_data::{Choice, ChoiceKind, Choices, Scene};
-use actcheck_history::{CampaignEnd, History, RunRecord, RunStatus};
+use actcheck_data::{Choice, ChoiceKind, ChoiceName, ChoiceValue, Choices, ObjectAxis, Scene, SightingAxis};
 use actcheck_scenario as scenario;
 use actcheck_scenario::Space;
-use actcheck_verdict::{Counts, Recurrence};
-
-/// Names of the choices that are made only during a run: sensor noise, and the seeds of planner and skill. The choices
-/// of single objects are in `SENSES_OF_OBJECT`.
-const SENSES: [&str; 14] = [
-    "sense.localisation.x",
-    "sense.localisation.y",
-    "sense.localisation.heading",
-    "sense.gripper",
-    "sense.camera.frame",
-    "sense.odometry.along",
-    "sense.odometry.across",
-    "sense.odometry.turning",
-    "sense.odometry.veering",
-    "sense.odometry.landmark.x",
-    "sense.odometry.landmark.y",
-    "sense.odometry.landmark.heading",
-    "motion.samples",
-    "skill.seed",
-];
-/// Sensor noise of one object.
-const SENSES_OF_OBJECT: [&str; 7] = ["x", "y", "z", "yaw", "width", "depth", "height"];
-
-/// The result of a case.
-#[derive(Debug, Clone)]
-pub struct CaseRun {
-    /// The run.
-    pub record: RunRecord,
-    /// Whether it fails as the case expects.
-    pub recurrence: Recurrence,
-    /// Whether all states are bitwise identical; `None` if the case has no trace digest.
-    pub same_trace: Option<bool>,
-}
-
-/// Runs cases on several workers and stores each run as a campaign of its own with the case's name. Calls `on_case` for
-/// each in the order of `cases`, with its position.
-///
-/// # Errors
-/// `S064` if a scene can't be built or does not settle, `X010` if workers can't be started; or writing failed.
-pub fn run_cases(
-    cases: &[(String, Env)],
-    history: &History,
-    jobs: usize,
-    manner: &Manner,
-    on_case: &mut dyn FnMut(usize, CaseRun),
-) -> Result<(), Diagnostics> {
-    let jobs = jobs.clamp(1, cases.len().max(1));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(jobs)
-        .build()
-        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
-    let mut faults = Diagnostics::new();
-    // At most one trace for each worker is in memory.
-    for (number, some) in cases.chunks(jobs).enumerate() {
-        let made: Vec<_> = pool.install(|| some.par_iter().map(|(_, env)| make(env, manner)).collect());
-        for (at, ((name, env), made)) in some.iter().zip(made).enumerate() {
-            match made {
-                Ok(record) => on_case(number * jobs + at, keep(env, history, name, record, manner)?),
-                Err(found) => faults.extend(found),
-            }
-        }
-    }
-    faults.or(())
-}
-
-fn make(env: &Env, manner: &Manner) -> Result<RunRecord, Diagnostics> {
-    let none = BTreeMap::new();
-    let choices = env.campaign.case.as_ref().map_or(&none, |case| &case.choices);
-    again(env, "case", (0, &|| Choices::named(choices)), manner, cut_of(env, manner)).map_err(|why| {
-        env.campaign
-            .fault("S064", "case", format!("the scene of this case can't be built: {why}"))
-            .help("models, robot or program may have changed, or a value was edited: move the objects in the way")
-            .into()
-    })
-}
-
-fn keep(
-    env: &Env,
-    history: &History,
-    name: &str,
-    mut record: RunRecord,
-    manner: &Manner,
-) -> Result<CaseRun, Diagnostics> {
-    let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
-    record.id = format!("{id}-1");
-    record.campaign.clone_from(&id);
-    // The record of a crash has no start time.
-    let started = if record.started.is_empty() { (manner.clock.now)() } else { record.started.clone() };
-    let mut campaign = env.record(id.clone(), name.to_owned(), started);
-    campaign.planned_runs = 1;
-    history.begin_campaign(&campaign)?;
-    history.commit(&record)?;
-    history.finish_campaign(&id, &end_of(&record, (manner.clock.now)()))?;
-    let case = env.campaign.case.clone().unwrap_or_default();
-    let recurrence = Recurrence::of(&case.expect.into_iter().collect(), record.judgements.iter().flatten());
-    let same_trace = case.trace.map(|trace| trace == record.trace.hash);
-    Ok(CaseRun { record, recurrence, same_trace })
-}
-
-/// The end of a campaign of one run.
-pub(super) fn end_of(record: &RunRecord, ended: String) -> CampaignEnd {
-    let counts = Counts::of(record.judgements.iter().flatten().map(|judgement| judgement.outcome));
-    CampaignEnd {
-        ended,
-        score: Some(record.score),
-        score_without_broken: (record.status != RunStatus::Broken).then_some(record.score),
-        outcomes: Outcome::ALL.into_iter().map(|outcome| (outcome, counts.get(outcome))).collect(),
-        discards: 0,
-        ended_by: None,
-        interrupted: false,
-    }
-}
 
 /// Finds the choices of a case that can't have their written values: S061 the scene has no such choice, S062 the value
-/// is out of bounds, S063 another object is in the way, S060 the scene can't be built at all.
+/// is out of bounds, S063 another object is in the way, S060 the scene can't be built at all. Warns of an index that
+/// may mean another candidate when candidates are added (S066).
 pub(super) fn check_case(campaign: &Campaign, space: &Space) -> Diagnostics {
     let mut found = Diagnostics::new();
     let Some(case) = &campaign.case else { return found };
     let mut choices = Choices::named(&case.choices);
     let drawn = scenario::draw(space, 0, &mut choices);
-    let mut made: BTreeMap<&str, Vec<&Choice>> = BTreeMap::new();
+    let mut made: BTreeMap<&ChoiceName, Vec<&Choice>> = BTreeMap::new();
     for choice in choices.made() {
         made.entry(&choice.name).or_default().push(choice);
     }
     for (name, values) in &case.choices {
-        let fault = match made.get(name.as_str()) {
-            Some(made) => misplaced(campaign, name, values, made),
-            None if is_of_senses(name, drawn.as_ref().ok()) || is_of_left_out(name, case) => None,
+        let fault = match made.get(name) {
+            Some(made) => misplaced(campaign, name, values, made).or_else(|| ambiguous(campaign, name, values, made)),
+            None if is_of_run(name, drawn.as_ref().ok()) || is_of_left_out(name, case) => None,
             None => Some(unknown(campaign, name, drawn.as_ref().ok(), made.keys().copied())),
         };
         fault.into_iter().for_each(|fault| found.push(fault));
@@ -153,18 +36,10 @@ pub(super) fn check_case(campaign: &Campaign, space: &Space) -> Diagnostics {
 }
 
 /// Returns the fault of a choice whose value differs from the written one, or whose values are too many or too few.
-fn misplaced(campaign: &Campaign, name: &str, written: &[f64], made: &[&Choice]) -> Option<Diagnostic> {
+fn misplaced(campaign: &Campaign, name: &ChoiceName, written: &[ChoiceValue], made: &[&Choice]) -> Option<Diagnostic> {
     let place = Case::place_of(name);
-    let moved = written.iter().zip(made).find(|(written, made)| written.to_bits() != made.value.to_bits());
-    if let Some((written, made)) = moved {
-        let (is, bounds) = match made.kind {
-            ChoiceKind::Index { .. } if let Some((least, most)) = campaign.other_counts.of_choice(name) => {
-                (format!("{}", written + f64::from(least)), format!("{least} to {most}"))
-            }
-            ChoiceKind::Index { of } => (format!("{written}"), format!("whole numbers from 0 to {}", of - 1)),
-            ChoiceKind::Real { low, high, .. } => (format!("{written}"), format!("{low} to {high}")),
-            ChoiceKind::Normal { .. } => return None,
-        };
+    if let Some((written, made)) = written.iter().zip(made).find(|(written, made)| !is_as_written(written, made)) {
+        let (is, bounds) = shown(campaign, written, made)?;
         let message = format!("`{name}` is {is}, which is out of bounds here");
         return Some(campaign.fault("S062", &place, message).help(format!("allowed: {bounds}")));
     }
@@ -172,44 +47,87 @@ fn misplaced(campaign: &Campaign, name: &str, written: &[f64], made: &[&Choice])
         let message = format!("`{name}` has {} values, but the scene needs {}", written.len(), made.len());
         return Some(campaign.fault("S061", &place, message).help("remove the extra values"));
     }
-    let thing = name.strip_suffix(".x")?;
+    let ChoiceName::Object(object, ObjectAxis::X) = name else { return None };
     (made.len() > written.len()).then(|| {
         campaign
-            .fault("S063", &place, format!("`{thing}` can't be placed there: another object is in the way"))
+            .fault("S063", &place, format!("`{object}` can't be placed there: another object is in the way"))
             .help("move one of the two, or remove one")
     })
 }
 
-/// Whether a choice is made only during the run of this scene.
-fn is_of_senses(name: &str, scene: Option<&Scene>) -> bool {
-    let of_object = |rest: &str| {
-        let (id, what) = rest.rsplit_once('.')?;
-        let is_there = scene.is_none_or(|scene| scene.objects.iter().any(|object| object.id == id));
-        Some(is_there && SENSES_OF_OBJECT.contains(&what))
+fn is_as_written(written: &ChoiceValue, made: &Choice) -> bool {
+    match written {
+        ChoiceValue::Number(value) => value.to_bits() == made.value.to_bits(),
+        ChoiceValue::Candidate(name) => made.candidate() == Some(name.as_str()),
+    }
+}
+
+/// Formats a written value and the allowed ones; `None` for noise, which is clamped only to its farthest values.
+fn shown(campaign: &Campaign, written: &ChoiceValue, made: &Choice) -> Option<(String, String)> {
+    let value = match written {
+        ChoiceValue::Number(value) => *value,
+        ChoiceValue::Candidate(name) => {
+            let ChoiceKind::Candidate { names } = &made.kind else { return None };
+            return Some((format!("`{name}`"), names.join(", ")));
+        }
     };
-    SENSES.contains(&name) || name.strip_prefix("sense.").and_then(of_object).unwrap_or(false)
+    Some(match &made.kind {
+        ChoiceKind::Index { .. } if let Some((least, most)) = campaign.other_counts.of_choice(&made.name) => {
+            (format!("{}", value + f64::from(least)), format!("{least} to {most}"))
+        }
+        ChoiceKind::Index { of } => (format!("{value}"), format!("whole numbers from 0 to {}", of - 1)),
+        ChoiceKind::Candidate { names } => (format!("{value}"), names.join(", ")),
+        ChoiceKind::Real { low, high, .. } => (format!("{value}"), format!("{low} to {high}")),
+        ChoiceKind::Normal { .. } => return None,
+    })
+}
+
+/// Returns a warning if a candidate is written as its index, as in old cases, and there are several.
+fn ambiguous(campaign: &Campaign, name: &ChoiceName, written: &[ChoiceValue], made: &[&Choice]) -> Option<Diagnostic> {
+    let by_index = |(written, made): &(&ChoiceValue, &&Choice)| {
+        let several = matches!(&made.kind, ChoiceKind::Candidate { names } if names.len() > 1);
+        several && matches!(written, ChoiceValue::Number(_))
+    };
+    let (_, made) = written.iter().zip(made).find(by_index)?;
+    let candidate = made.candidate()?;
+    let message = format!("`{name}` is an index, so that it means another candidate if candidates are added before it");
+    let help = format!("now it means `{candidate}`: write `{name} = \"{candidate}\"`");
+    Some(campaign.warning("S066", &Case::place_of(name), message).help(help))
+}
+
+/// Whether a choice is made only during the run of this scene.
+fn is_of_run(name: &ChoiceName, scene: Option<&Scene>) -> bool {
+    match name {
+        ChoiceName::Sighting { id, .. } => {
+            scene.is_none_or(|scene| scene.objects.iter().any(|object| object.id == *id))
+        }
+        ChoiceName::Designator(_) => false,
+        _ => name.is_of_run(),
+    }
 }
 
 /// Whether a choice belongs to an object that the case leaves out.
-fn is_of_left_out(name: &str, case: &Case) -> bool {
-    let of = name.rsplit_once('.').and_then(|(of, _)| case.choices.get(&format!("{of}.left_out")));
-    of.is_some_and(|left_out| left_out.first().is_some_and(|value| *value != 0.0))
+fn is_of_left_out(name: &ChoiceName, case: &Case) -> bool {
+    let left_out = |object| case.choices.get(&ChoiceName::Object(object, ObjectAxis::LeftOut));
+    let values = name.numbered_object().and_then(left_out);
+    values.is_some_and(|values| values.first().is_some_and(|value| *value != ChoiceValue::Number(0.0)))
 }
 
 fn unknown<'a>(
     campaign: &Campaign,
-    name: &str,
+    name: &ChoiceName,
     scene: Option<&'a Scene>,
-    made: impl Iterator<Item = &'a str>,
+    made: impl Iterator<Item = &'a ChoiceName>,
 ) -> Diagnostic {
     let objects = scene.map_or(&[][..], |scene| &scene.objects);
     let of_objects =
-        objects.iter().flat_map(|object| SENSES_OF_OBJECT.map(|what| format!("sense.{}.{what}", object.id)));
-    let known: Vec<String> = made.map(str::to_owned).chain(SENSES.map(str::to_owned)).chain(of_objects).collect();
+        objects.iter().flat_map(|object| SightingAxis::ALL.map(|axis| ChoiceName::sighting(&object.id, axis)));
+    let known = made.cloned().chain(ChoiceName::of_runs()).chain(of_objects);
+    let known: Vec<String> = known.map(String::from).collect();
     campaign
         .fault("S061", &Case::place_of(name), format!("the scene of this case has no choice `{name}`"))
         // There are too many choices to list.
-        .help(match nearest(name, known.iter().map(String::as_str)) {
+        .help(match nearest(&name.to_string(), known.iter().map(String::as_str)) {
             Some(found) => format!("did you mean `{found}`?"),
             None => "remove it; `actcheck export` writes a case with every choice of its scene".to_owned(),
         })

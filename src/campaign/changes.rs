@@ -6,7 +6,7 @@ use actcheck_history::CampaignRecord;
 
 /// An input that changed since a campaign ran.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Change {
+pub struct InputChange {
     /// Its kind.
     pub kind: ChangeKind,
     /// Name of the model, robot, rule file or configuration.
@@ -50,8 +50,8 @@ impl ChangeKind {
 
 /// Returns the differences between the records of two campaigns, sorted by kind and name. Ontology and rules are
 /// included: they change outcomes, though not traces.
-pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<Change> {
-    let single = |kind, name: &str, was: &str, is: &str| Change {
+pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<InputChange> {
+    let single = |kind, name: &str, was: &str, is: &str| InputChange {
         kind,
         name: name.to_owned(),
         was: Some(was.to_owned()),
@@ -88,13 +88,13 @@ fn programs(was: &CampaignRecord, is: &CampaignRecord) -> [String; 2] {
 }
 
 /// One entry for each name on either side.
-fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String, String>) -> Vec<Change> {
+fn named(kind: ChangeKind, was: &BTreeMap<String, String>, is: &BTreeMap<String, String>) -> Vec<InputChange> {
     let mut names: Vec<&String> = was.keys().chain(is.keys()).collect();
     names.sort();
     names.dedup();
     names
         .into_iter()
-        .map(|name| Change { kind, name: name.clone(), was: was.get(name).cloned(), is: is.get(name).cloned() })
+        .map(|name| InputChange { kind, name: name.clone(), was: was.get(name).cloned(), is: is.get(name).cloned() })
         .collect()
 }
 

@@ -11,7 +11,7 @@ const PARTS: [&str; 4] = ["qx", "qy", "qz", "qw"];
 
 /// The first quantity in which two traces differ.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Difference {
+pub struct TraceDifference {
     /// Simulated time since the scene was built. Unit: seconds.
     ///
     /// A trace keeps exact states at the start and end of every action, and frames in between, every tenth of a second
@@ -39,18 +39,18 @@ pub struct Difference {
 ///
 /// Of several differences at the same moment, body parameters come before poses, and poses before velocities, because
 /// the earlier ones are likelier causes.
-pub fn first_difference(was: &Trace, is: &Trace) -> Option<Difference> {
+pub fn first_difference(was: &Trace, is: &Trace) -> Option<TraceDifference> {
     let (was, is) = (moments(was), moments(is));
     for (one, other) in was.iter().zip(&is) {
         if one.time_secs.to_bits() != other.time_secs.to_bits() {
-            return Some(parted(Some(one), Some(other)));
+            return Some(end_difference(Some(one), Some(other)));
         }
         if let Some(found) = compare(one, other) {
             return Some(found);
         }
     }
     let shorter = was.len().min(is.len());
-    (was.len() != is.len()).then(|| parted(was.get(shorter), is.get(shorter)))
+    (was.len() != is.len()).then(|| end_difference(was.get(shorter), is.get(shorter)))
 }
 
 /// The stored data of one moment.
@@ -87,14 +87,14 @@ fn moments(trace: &Trace) -> Vec<Moment<'_>> {
 }
 
 /// The difference if an action, or the whole trace, is longer than its counterpart.
-fn parted(was: Option<&Moment<'_>>, is: Option<&Moment<'_>>) -> Difference {
+fn end_difference(was: Option<&Moment<'_>>, is: Option<&Moment<'_>>) -> TraceDifference {
     let words = |moment: Option<&Moment<'_>>| match moment {
         Some(Moment { time_secs, known: Known::State(_), .. }) => format!("ended at {time_secs:.3} s"),
         Some(Moment { time_secs, .. }) => format!("still running at {time_secs:.3} s"),
         None => "not reached".to_owned(),
     };
     let first = [was, is].into_iter().flatten().min_by(|a, b| a.time_secs.total_cmp(&b.time_secs));
-    Difference {
+    TraceDifference {
         time_secs: first.map_or(0.0, |moment| moment.time_secs),
         step: first.map_or(0, |moment| moment.step),
         body: "robot".to_owned(),
@@ -108,16 +108,16 @@ fn parted(was: Option<&Moment<'_>>, is: Option<&Moment<'_>>) -> Difference {
 }
 
 /// Compares the readings of two moments in the order of the first one. Readings of the second one alone come last.
-fn compare(was: &Moment<'_>, is: &Moment<'_>) -> Option<Difference> {
+fn compare(was: &Moment<'_>, is: &Moment<'_>) -> Option<TraceDifference> {
     let was_readings = readings(was);
     let mut rest: BTreeMap<(String, String), Reading> =
         readings(is).into_iter().map(|reading| ((reading.body.clone(), reading.quantity.clone()), reading)).collect();
-    let mut found: Option<Difference> = None;
+    let mut found: Option<TraceDifference> = None;
     let mut note = |one: Option<&Reading>, other: Option<&Reading>| {
         if let Some(found) = &mut found {
             found.others += 1;
         } else if let Some(known) = one.or(other) {
-            found = Some(Difference {
+            found = Some(TraceDifference {
                 time_secs: was.time_secs,
                 step: was.step,
                 body: known.body.clone(),

@@ -3,16 +3,15 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::budget::ceiling;
+use crate::budget::runs_per_test;
 use crate::case::check_case;
-use crate::line::TEST_LEFT_OUT;
 use crate::requirement::Requirement;
 use crate::solids;
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
 use actcheck_config as config;
 use actcheck_config::{Campaign, Launcher, Overrides};
-use actcheck_data::Choice;
+use actcheck_data::{Choice, ChoiceName};
 use actcheck_history::{CampaignRecord, History, SkillRecord};
 use actcheck_ontology as ontology;
 use actcheck_ontology::Ontology;
@@ -56,7 +55,7 @@ impl Env {
     /// As [`Env::prepare`], or if the budget is spent.
     pub fn prepare_within(config: &Path, overrides: &Overrides, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let mut campaign = config::load(config, overrides)?;
-        campaign.test_count = ceiling(overrides).unwrap_or(campaign.test_count);
+        campaign.test_count = runs_per_test(overrides).unwrap_or(campaign.test_count);
         Self::of(campaign, rule_budget)
     }
 
@@ -65,13 +64,13 @@ impl Env {
     ///
     /// # Errors
     /// `H014` if the history has no such campaign; else as [`Env::prepare`].
-    pub fn recall(
+    pub fn from_history(
         history: &History,
         campaign: &str,
         config: Option<&Path>,
     ) -> Result<(Self, CampaignRecord), Diagnostics> {
         let record = history.campaign(campaign)?;
-        let overrides = asked_for(history, &record);
+        let overrides = recorded_overrides(history, &record);
         let loaded = match config {
             Some(config) => config::load(config, &overrides),
             None => {
@@ -106,7 +105,8 @@ impl Env {
     /// # Errors
     /// `S040` if the configuration has no such test.
     pub fn index_of(&self, performed: &str, choices: &[Choice]) -> Result<u64, Diagnostics> {
-        let left_out = choices.iter().find(|choice| choice.name == TEST_LEFT_OUT).map_or(0.0, |choice| choice.value);
+        let left_out = choices.iter().find(|choice| choice.name == ChoiceName::ActionsLeftOut);
+        let left_out = left_out.map_or(0.0, |choice| choice.value);
         let fits = |test: &Vec<String>| {
             let done = test.len().checked_sub(left_out as usize);
             done.is_some_and(|done| test[..done].join(" ") == performed)
@@ -132,7 +132,7 @@ impl Env {
         let ontology = ontology::load(files, path)?;
         let mut faults = Diagnostics::new();
         categorise(&mut campaign, &ontology);
-        solids::take_apart(&mut campaign, &mut faults);
+        solids::decompose_meshes(&mut campaign, &mut faults);
         check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
         if let Err(error) = world::check_robot(&campaign.robot) {
@@ -144,7 +144,12 @@ impl Env {
         let requirement = requirement.map_err(|found| faults.extend(found)).ok().flatten();
         match (space, rules) {
             (Some(space), Some(rules)) if !faults.has_errors() => {
-                faults.extend(check_case(&campaign, &space));
+                let of_case = check_case(&campaign, &space);
+                if of_case.has_errors() {
+                    faults.extend(of_case);
+                } else {
+                    campaign.warnings.extend(of_case);
+                }
                 let programs = programs(&campaign);
                 faults.or(Self { campaign, ontology, space, rules, rule_budget, requirement, programs })
             }
@@ -238,7 +243,7 @@ impl Env {
 }
 
 /// The command-line overrides with which a campaign of a history began, except the number of runs.
-pub(super) fn asked_for(history: &History, record: &CampaignRecord) -> Overrides {
+pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> Overrides {
     // A campaign merged from several shards is treated as a whole, so its missing shards belong to it too.
     let shard = match record.shards.as_slice() {
         [only] => Some(*only),

@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::line::TEST_LEFT_OUT;
-use crate::shrink::{accepted_places, unit_of};
-use crate::{Env, Recalled};
+use crate::shrink::drop_rejected_tries;
+use crate::{Env, StoredCampaign};
 use actcheck_base::{Diagnostics, Outcome, Source, names};
 use actcheck_config as config;
 use actcheck_config::{CaseText, Launcher, Overrides};
-use actcheck_data::Choice;
+use actcheck_data::{Choice, ChoiceKind, ChoiceName, Choices};
 use actcheck_history::{CampaignRecord, History, RunDetail};
+use actcheck_scenario as scenario;
 
 /// Name of the folder in which a project keeps its cases.
 const REGRESSIONS: &str = "regressions";
@@ -25,17 +25,18 @@ const REGRESSIONS: &str = "regressions";
 /// The trace can't be read, `S040` the configuration no longer has the test, or it is no longer valid TOML.
 pub fn export(
     history: &History,
-    (env, record): &Recalled,
+    (env, record): &StoredCampaign,
     run: &RunDetail,
     folder: &Path,
 ) -> Result<String, Diagnostics> {
     let (choices, trace) = (history.choices(&run.row.run)?, history.trace(&run.row.run)?);
-    let test = &env.campaign.tests[env.test_of(env.index_of(&run.row.test, &choices)?)];
+    let index = env.index_of(&run.row.test, &choices)?;
+    let test = &env.campaign.tests[env.test_of(index)];
     let performed = run.actions.len().min(test.len());
-    // Only performed actions are written, so `test.left_out` is not needed. Of each placement, only the accepted try is
-    // kept.
-    let choices: Vec<Choice> =
-        accepted_places(&choices).into_iter().filter(|choice| choice.name != TEST_LEFT_OUT).collect();
+    // Only performed actions are written, so the number of those left out is not needed. Of each placement, only the
+    // accepted try is kept.
+    let choices = drop_rejected_tries(&with_candidates(env, index, choices));
+    let choices: Vec<Choice> = choices.into_iter().filter(|choice| choice.name != ChoiceName::ActionsLeftOut).collect();
     let failed = failed(run);
     let folder = absolute(folder);
     let mut case = CaseText {
@@ -44,7 +45,6 @@ pub fn export(
         failed: &failed,
         trace: &trace.hash,
         choices: &choices,
-        unit: unit_of,
         paths: [None, None, None],
         skill: skill_seen_from(&folder, env),
     };
@@ -59,6 +59,23 @@ pub fn export(
     }
     case.paths = written.map(|path| path.map(|path| seen_from(&folder, &absolute(&home.join(path)))));
     config::case_text(&env.campaign, &case)
+}
+
+/// Adds the candidates' names to choices of an old history, which has only their indices: those of the scene that the
+/// choices give now.
+fn with_candidates(env: &Env, index: u64, mut choices: Vec<Choice>) -> Vec<Choice> {
+    let mut again = Choices::recorded(&choices);
+    // If the scene can't be built any more, the choices up to there are enough to name their candidates.
+    let _ = scenario::draw(&env.space, env.test_of(index), &mut again);
+    for choice in &mut choices {
+        let same = again.made().iter().find(|made| made.name == choice.name && made.value == choice.value);
+        if let (ChoiceKind::Index { of }, Some(made)) = (&choice.kind, same)
+            && matches!(&made.kind, ChoiceKind::Candidate { names } if names.len() == *of)
+        {
+            choice.kind = made.kind.clone();
+        }
+    }
+    choices
 }
 
 /// The program that performs actions and its working folder, as a configuration in `folder` names them.

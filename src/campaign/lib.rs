@@ -2,43 +2,50 @@
 //!
 //! Never: prints, reads the command line or a system clock, or depends on the internals of a stage.
 
-mod replay;
-
+mod attempt;
 mod budget;
 mod case;
 mod changes;
 mod difference;
 mod environment;
 mod export;
+mod failure;
+mod finished_run;
 mod judging;
+mod last_failed;
 mod line;
 mod make_run;
 pub mod oracles;
 mod outcome;
 mod recheck;
+mod replay;
 mod requirement;
 mod resume;
 mod rule_set;
 mod run_all;
+mod run_cases;
 mod scene_facts;
 mod schedule;
 mod search_space;
 mod searching;
 pub mod shrink;
 mod solids;
+mod tally;
+mod workers;
 
-pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Recalled, Replay, replay_all};
-
-pub use budget::Spent;
-pub use case::{CaseRun, run_cases};
-pub use changes::{Change, ChangeKind, changes};
-pub use difference::{Difference, first_difference};
+pub use budget::ExhaustedBudget;
+pub use changes::{ChangeKind, InputChange, changes};
+pub use difference::{TraceDifference, first_difference};
 pub use environment::Env;
 pub use export::{export, regressions_folder};
-pub use line::{Clock, Disturbance, Failure, Manner, run_line, run_sabotaged};
-pub use outcome::{CampaignEnd, Ending, WeightedRate};
+pub use failure::Failure;
+pub use last_failed::LastFailed;
+pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
+pub use outcome::{CampaignResult, Ending, WeightedRate};
 pub use recheck::{RecheckEnd, RecheckOptions, recheck};
-pub use resume::{Kept, unfinished};
+pub use replay::{Fit, Misfit, MisfitKind, OutcomeChange, Replay, ReplayOptions, StoredCampaign, replay_all};
+pub use resume::{StoredRuns, unfinished};
 pub use rule_set::RuleSet;
-pub use run_all::{Options, resume_all, run_all};
-pub use schedule::{Planned, Schedule, Steering, Told, ToldOutcome, schedule_of};
+pub use run_all::{CampaignOptions, resume_all, run_all};
+pub use run_cases::{CaseRun, run_cases};
+pub use schedule::{Planned, PropertyOutcome, RunResult, Schedule, Steering, schedule_of};

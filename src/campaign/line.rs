@@ -1,11 +1,12 @@
 //! One run from start to end: choices → scene → world → trace → facts → findings → verdict.
 
-use crate::Env;
+use crate::finished_run::{FinishedRun, RunPlace};
 use crate::judging::judge_action;
+use crate::{Env, Failure};
 use actcheck_actions as actions;
-use actcheck_actions::{ActionCall, Cut, ExternalSkill, Interference, Saboteur};
+use actcheck_actions::{ActionCall, ExternalSkill, Interference, Saboteur};
 use actcheck_base::{Judgement, RunFacts};
-use actcheck_data::{ActionEnd, Choices, Quality, Scene, Trace};
+use actcheck_data::{ActionEnd, ChoiceName, Choices, Quality, Scene, Trace};
 use actcheck_facts as facts;
 use actcheck_history::{RunRecord, RunStatus};
 use actcheck_protocol::{Performance, RunName};
@@ -28,22 +29,38 @@ pub type Disturbance = fn(u64, &mut World);
 
 /// How runs are made, apart from their choices.
 #[derive(Debug, Clone, Copy)]
-pub struct Manner {
+pub struct RunContext {
     /// The caller's clock.
     pub clock: Clock,
     /// A fault to inject into worlds.
     pub disturb: Option<Disturbance>,
 }
 
-/// The reason why a scene gave no run.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Failure {
-    /// The scene could not be generated or did not settle; another one may.
-    #[error("{0}")]
-    Discard(String),
-    /// The run was interrupted while rules were evaluated.
-    #[error("interrupted")]
-    Interrupted,
+impl Clock {
+    /// The present as the start of a run.
+    pub(super) fn start(&self) -> Start {
+        Start { now: (self.now)(), secs: (self.secs)() }
+    }
+}
+
+/// The start of a run.
+#[derive(Debug, Clone)]
+pub(super) struct Start {
+    /// RFC 3339.
+    now: String,
+    /// On the caller's clock.
+    secs: f64,
+}
+
+/// A run to make.
+#[derive(Debug)]
+pub struct RunInput<'a> {
+    /// Id of its campaign.
+    pub campaign: &'a str,
+    /// Position in the campaign, from 0.
+    pub index: u64,
+    /// The choices of its scene and of its noise.
+    pub choices: Choices,
 }
 
 /// Makes one run, from choices to verdict.
@@ -58,23 +75,11 @@ pub fn run_line(
     campaign: &str,
     index: u64,
     choices: Choices,
-    manner: &Manner,
+    context: &RunContext,
 ) -> Result<RunRecord, Failure> {
-    run_line_with(env, campaign, (index, choices), manner, Interference::default())
-}
-
-/// As [`run_line`], but the run ends at `cut`.
-///
-/// # Errors
-/// As [`run_line`].
-pub(super) fn run_line_until(
-    env: &Env,
-    campaign: &str,
-    run: (u64, Choices),
-    manner: &Manner,
-    cut: Cut,
-) -> Result<RunRecord, Failure> {
-    run_line_with(env, campaign, run, manner, Interference { cut, ..Interference::default() })
+    let input = RunInput { campaign, index, choices };
+    let run = simulate(env, input, context, context.clock.start(), Interference::default())?;
+    Ok(run.into_record(RunPlace::alone(campaign)))
 }
 
 /// As [`run_line`], with a fault injected on purpose.
@@ -85,116 +90,122 @@ pub(super) fn run_line_until(
 /// As [`run_line`].
 pub fn run_sabotaged(
     env: &Env,
-    campaign: &str,
-    run: (u64, Choices),
-    manner: &Manner,
+    input: RunInput<'_>,
+    context: &RunContext,
     saboteur: &mut Saboteur,
 ) -> Result<RunRecord, Failure> {
-    run_line_with(env, campaign, run, manner, Interference { saboteur: Some(saboteur), ..Interference::default() })
+    let place = RunPlace::alone(input.campaign);
+    let interference = Interference { saboteur: Some(saboteur), ..Interference::default() };
+    Ok(simulate(env, input, context, context.clock.start(), interference)?.into_record(place))
 }
 
-fn run_line_with(
+/// Makes one run as [`run_line`] does, with interference. `start` is its start on the context's clock.
+///
+/// # Errors
+/// As [`run_line`].
+pub(super) fn simulate(
     env: &Env,
-    campaign: &str,
-    (index, mut choices): (u64, Choices),
-    manner: &Manner,
+    input: RunInput<'_>,
+    context: &RunContext,
+    start: Start,
     interference: Interference<'_>,
-) -> Result<RunRecord, Failure> {
-    let (started, start_secs) = ((manner.clock.now)(), (manner.clock.secs)());
+) -> Result<FinishedRun, Failure> {
+    let RunInput { campaign, index, mut choices } = input;
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices)
         .map_err(|discard| Failure::Discard(discard.to_string()))?;
     let test = test_to_perform(env, index, &mut choices);
     let disturb = |world: &mut World| {
-        if let Some(disturb) = manner.disturb {
+        if let Some(disturb) = context.disturb {
             disturb(index, world);
         }
     };
     choices.begin_noise();
     let mut program = env.programs.as_ref().map(|programs| {
-        let seed = choices.index(SKILL_SEED, SEEDS) as u64;
+        let seed = choices.index(ChoiceName::SkillSeed, SEEDS) as u64;
         let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
-        Performance::new(programs, run, manner.clock.secs)
+        Performance::new(programs, run, context.clock.secs)
     });
     let outside = program.as_mut().map(|program| program as &mut dyn ExternalSkill);
     let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, outside };
-    let (mut trace, quality) = perform((env, interference), test, &scene, &mut choices, disturb)?;
-    trace.map = scene.map.clone();
-    let mut record = record(env, campaign, index, scene, trace)?;
-    record.choices = choices.into_made();
-    record.quality = quality;
-    record.program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
-    record.started = started;
-    record.wall_secs = (manner.clock.secs)() - start_secs;
-    Ok(record)
+    let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
+    let program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
+    finish(env, Simulated { index, scene, trace, quality, choices, program_output }, context, start)
 }
 
-/// The choice that seeds all randomness of a program, and the number of seeds: every language can represent them.
-const SKILL_SEED: &str = "skill.seed";
+/// Number of seeds of a program: every language can represent them.
 const SEEDS: usize = 1 << 32;
-
-/// The choice of how many of the last actions are left out.
-pub(super) const TEST_LEFT_OUT: &str = "test.left_out";
 
 /// The actions of a run. Only shrunk runs leave the last ones out.
 fn test_to_perform<'a>(env: &'a Env, index: u64, choices: &mut Choices) -> &'a [String] {
     let test = &env.campaign.tests[env.test_of(index)];
-    let left_out = choices.exception(TEST_LEFT_OUT, test.len());
+    let left_out = choices.exception(ChoiceName::ActionsLeftOut, test.len());
     &test[..test.len() - left_out]
 }
 
-/// Returns the record of a run whose simulation crashed: every property is `broken`, for the given reason.
+/// Returns a run whose simulation crashed: every property is `broken`, for the given reason.
 ///
 /// Returns `None` if the scene can't be drawn again.
-pub(super) fn crashed(env: &Env, campaign: &str, index: u64, mut choices: Choices, reason: &str) -> Option<RunRecord> {
+pub(super) fn crashed(
+    env: &Env,
+    input: RunInput<'_>,
+    context: &RunContext,
+    start: Start,
+    reason: &str,
+) -> Option<FinishedRun> {
+    let RunInput { index, mut choices, .. } = input;
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices).ok()?;
     let trace = never_performed(test_to_perform(env, index, &mut choices), &scene, reason);
-    let mut record = record(env, campaign, index, scene, trace).ok()?;
-    record.choices = choices.into_made();
-    Some(record)
+    let simulated = Simulated { index, scene, trace, quality: None, choices, program_output: None };
+    finish(env, simulated, context, start).ok()
 }
 
-/// Computes facts, findings, verdicts and scores of a trace. The caller sets choices and times.
-fn record(env: &Env, campaign: &str, index: u64, scene: Scene, trace: Trace) -> Result<RunRecord, Failure> {
+/// A simulated run that is not judged yet.
+struct Simulated {
+    index: u64,
+    scene: Scene,
+    trace: Trace,
+    quality: Option<Quality>,
+    choices: Choices,
+    program_output: Option<String>,
+}
+
+/// Computes facts, findings, verdicts and scores of a simulated run.
+fn finish(env: &Env, simulated: Simulated, context: &RunContext, start: Start) -> Result<FinishedRun, Failure> {
+    let Simulated { index, scene, trace, quality, choices, program_output } = simulated;
     let facts = facts::extract(&trace);
     let judgements = judge_all(env, &trace, &facts)?;
     let action_scores: Vec<f64> = judgements.iter().map(|list| action_score(list.iter().map(|j| j.outcome))).collect();
     let (status, reason) = status_of(&trace);
-    Ok(RunRecord {
-        id: format!("{campaign}-{}", index + 1),
-        campaign: campaign.to_owned(),
-        shrunk_from: None,
+    Ok(FinishedRun {
         index,
-        repetition: None,
-        weight: None,
         test: trace.actions.iter().map(|action| action.action.as_str()).collect::<Vec<_>>().join(" "),
         seed: env.campaign.seed,
         status,
         reason,
-        program_output: None,
+        program_output,
         score: run_score(&action_scores),
         action_scores,
-        discards: Vec::new(),
-        choices: Vec::new(),
+        choices: choices.into_made(),
         scene,
         actions: trace.actions.iter().map(|action| env.ontology.actions[&action.action].iri.clone()).collect(),
         trace,
         facts,
         judgements,
-        quality: None,
-        started: String::new(),
-        wall_secs: 0.0,
-        elapsed_secs: 0.0,
+        quality,
+        started: start.now,
+        wall_secs: (context.clock.secs)() - start.secs,
     })
 }
 
 /// Builds the scene, lets it settle and performs the test in it. Returns the trace, and the simulation's quality
 /// figures if a world could be built.
 fn perform(
-    (env, interference): (&Env, Interference<'_>),
+    env: &Env,
     test: &[String],
     scene: &Scene,
     choices: &mut Choices,
     disturb: impl FnOnce(&mut World),
+    interference: Interference<'_>,
 ) -> Result<(Trace, Option<Quality>), Failure> {
     let mut world = match world::build(scene) {
         Ok(world) => world,
@@ -213,7 +224,7 @@ fn perform(
     disturb(&mut world);
     let calls = calls(test, scene);
     let trace = actions::perform_with(&calls, &mut world, choices, &env.campaign.budget, interference);
-    Ok((trace, Some(world.quality())))
+    Ok((Trace { map: scene.map.clone(), ..trace }, Some(world.quality())))
 }
 
 fn calls(test: &[String], scene: &Scene) -> Vec<ActionCall> {

@@ -1,10 +1,8 @@
-//! Makes one planned run: draws scenes until one can be built, and records simulation crashes.
+//! Makes one planned run: draws scenes until one can be built.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-use crate::line::{crashed, run_line_until};
-use crate::{Env, Failure, Manner, Planned, Told};
-use actcheck_actions::Cut;
+use crate::attempt::{Attempt, AttemptFault, time_limit};
+use crate::finished_run::{FinishedRun, RunPlace};
+use crate::{Env, Failure, Planned, RunContext, RunResult};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::RunRecord;
 
@@ -13,12 +11,19 @@ use actcheck_history::RunRecord;
 /// If one scene in five of a space can be built, one run in 70,000 is left without a scene.
 const SCENES_PER_RUN: u64 = 50;
 
+/// A new run, and why each scene that was drawn before was discarded.
+pub(super) struct MadeRun {
+    planned: Planned,
+    run: FinishedRun,
+    discards: Vec<String>,
+}
+
 /// The result of a planned run.
 pub(super) enum Making {
-    /// The run, with its discards.
-    Run(Box<RunRecord>),
+    /// The run, which is not stored yet.
+    Run(Box<MadeRun>),
     /// The run is in the history already: the campaign was resumed.
-    Stored(Told),
+    Stored(RunResult),
     /// The campaign was interrupted.
     Interrupted,
     /// The run can't be made, with the reason.
@@ -26,46 +31,38 @@ pub(super) enum Making {
 }
 
 /// Makes a planned run. Draws scenes until one can be built.
-pub(super) fn make_run(env: &Env, campaign: &str, planned: &Planned, manner: &Manner) -> Making {
+pub(super) fn make_run(env: &Env, campaign: &str, planned: Planned, context: &RunContext) -> Making {
     let mut discards = Vec::new();
-    for attempt in 0..SCENES_PER_RUN {
-        let index = planned.index;
-        let choices = || planned.choices(env.campaign.seed, attempt);
-        let cut = cut_of(env, manner);
-        let made = catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, choices()), manner, cut)));
-        let record = match made {
-            Ok(Ok(record)) => Ok(record),
-            Ok(Err(Failure::Interrupted)) => return Making::Interrupted,
-            Ok(Err(Failure::Discard(reason))) => {
-                discards.push(reason);
-                continue;
+    for number in 0..SCENES_PER_RUN {
+        let choices = || planned.choices(env.campaign.seed, number);
+        let cut = time_limit(env, context);
+        let attempt = Attempt { campaign, index: planned.index, choices: &choices, cut };
+        match attempt.make(env, context) {
+            Ok(run) => return Making::Run(Box::new(MadeRun { planned, run, discards })),
+            Err(AttemptFault::Failure(Failure::Interrupted)) => return Making::Interrupted,
+            Err(AttemptFault::Failure(Failure::Discard(reason))) => discards.push(reason),
+            Err(AttemptFault::Crash(reason)) => {
+                return Making::Impossible(Diagnostic::error("S031", reason).into());
             }
-            Err(panic) => {
-                let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
-                let redone = catch_unwind(AssertUnwindSafe(|| crashed(env, campaign, index, choices(), &reason)));
-                redone.ok().flatten().ok_or(reason)
-            }
-        };
-        return match record {
-            Ok(record) => Making::Run(Box::new(kept(planned, record, discards))),
-            Err(reason) => Making::Impossible(Diagnostic::error("S031", reason).into()),
-        };
+        }
     }
-    Making::Impossible(no_scene(env, planned, discards.last()).into())
+    Making::Impossible(no_scene(env, &planned, discards.last()).into())
 }
 
-/// Adds repetition and weight from the plan, and the discards, which only the first run of a scene has.
-fn kept(planned: &Planned, record: RunRecord, discards: Vec<String>) -> RunRecord {
-    let first = planned.repetition.is_none_or(|number| number == 0);
-    let weight = planned.steering.as_ref().and_then(|steering| steering.weight);
-    let discards = if first { discards } else { Vec::new() };
-    RunRecord { discards, repetition: planned.repetition(), weight, ..record }
-}
-
-/// The time limit of a run that starts now.
-pub(super) fn cut_of(env: &Env, manner: &Manner) -> Cut {
-    let secs = manner.clock.secs;
-    env.campaign.limits.run_secs.map_or(Cut::Never, |limit| Cut::Clock { secs, at_secs: secs() + limit })
+impl MadeRun {
+    /// The record of the run, with repetition and weight from its plan. Only the first run of a scene has the discards.
+    pub(super) fn into_record(self, campaign: &str, elapsed_secs: f64) -> RunRecord {
+        let planned = self.planned;
+        let is_first = planned.repetition.is_none_or(|number| number == 0);
+        self.run.into_record(RunPlace {
+            campaign: campaign.to_owned(),
+            shrunk_from: None,
+            repetition: planned.repetition(),
+            weight: planned.steering.as_ref().and_then(|steering| steering.weight),
+            discards: if is_first { self.discards } else { Vec::new() },
+            elapsed_secs,
+        })
+    }
 }
 
 fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {
@@ -79,13 +76,4 @@ fn no_scene(env: &Env, planned: &Planned, last: Option<&String>) -> Diagnostic {
     )
     .at(&env.campaign.source, 0..0)
     .help("put fewer objects on the surface (`[surfaceObjects] count`), smaller ones, or a larger surface")
-}
-
-/// The message of a panic.
-pub(super) fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
-    panic
-        .downcast_ref::<&str>()
-        .map(|text| (*text).to_owned())
-        .or_else(|| panic.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "no message".to_owned())
 }

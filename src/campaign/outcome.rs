@@ -1,12 +1,12 @@
 //! How a campaign ended.
 
-use crate::Spent;
+use crate::ExhaustedBudget;
 use actcheck_base::Diagnostics;
 use actcheck_search::Estimate;
 
 /// The result of a campaign.
 #[derive(Debug)]
-pub struct CampaignEnd {
+pub struct CampaignResult {
     /// Why it ended.
     pub ending: Ending,
     /// Number of runs in the history.
@@ -37,7 +37,7 @@ pub enum Ending {
     /// Every planned run was made.
     Finished,
     /// A budget was spent; the runs up to then are in the history.
-    Budget(Spent),
+    Budget(ExhaustedBudget),
     /// It was interrupted.
     Interrupted,
     /// An error stopped it, for example a history that could not be written, or a scene that could not be built.

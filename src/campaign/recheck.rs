@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use crate::judging::judge_action;
+use crate::workers::workers;
 use crate::{Ending, RuleSet};
 use actcheck_base::{Diagnostic, Diagnostics, RunFacts};
 use actcheck_data::{ActionEnd, ActionTrace};
@@ -61,7 +62,7 @@ pub fn recheck<'a>(
     let mut end = RecheckEnd { ending: Ending::Finished, judged: 0, faults: Diagnostics::new() };
     let pool = match workers(options.jobs) {
         Ok(pool) => pool,
-        Err(faults) => return RecheckEnd { ending: Ending::Stopped(faults), ..end },
+        Err(fault) => return RecheckEnd { ending: Ending::Stopped(fault.into()), ..end },
     };
     let stopped = || stop.load(Ordering::Relaxed);
     let judge = |run: &RunRow| (!stopped()).then(|| judge_run(history, run, rules_of(run)));
@@ -88,7 +89,7 @@ pub fn recheck<'a>(
             on_batch(taken, &batch);
         }
         judged = fresh.map(|batch| {
-            let (rechecks, faults) = parted(batch);
+            let (rechecks, faults) = split_results(batch);
             taken = rechecks.len() as u64;
             end.faults.extend(faults);
             rechecks.into_iter().flatten().collect()
@@ -102,12 +103,7 @@ pub fn recheck<'a>(
     end
 }
 
-fn workers(jobs: usize) -> Result<rayon::ThreadPool, Diagnostics> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.max(1)).build();
-    pool.map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")).into())
-}
-
-fn parted(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
+fn split_results(batch: Judged) -> (Vec<Vec<Recheck>>, Diagnostics) {
     let mut faults = Diagnostics::new();
     let mut rechecks = Vec::with_capacity(batch.len());
     for run in batch {

@@ -1,31 +1,42 @@
 //! Runs a stored run again from its recorded choices, and compares the two.
 
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use rayon::prelude::*;
 
-use crate::line::{crashed, run_line_until};
-use crate::make_run::panic_text;
-use crate::{Change, Difference, Env, Failure, Manner, changes, first_difference};
+use crate::attempt::{Attempt, AttemptFault};
+use crate::finished_run::FinishedRun;
+use crate::workers::workers;
+use crate::{Env, Failure, InputChange, RunContext, TraceDifference, changes, first_difference};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_data::{ActionEnd, Choice, Choices, Trace};
-use actcheck_history::{CampaignRecord, History, RunDetail, RunRecord};
+use actcheck_data::{ActionEnd, Choice, ChoiceKind, Choices, Trace};
+use actcheck_history::{CampaignRecord, History, RunDetail};
 
 /// Maximum number of choices named in a message.
 const MOST_NAMED: usize = 8;
 
 /// A run's campaign as prepared today, and its record.
-pub type Recalled = (Env, CampaignRecord);
+pub type StoredCampaign = (Env, CampaignRecord);
 
 /// How exactly the recorded choices must fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fit {
-    /// Every choice must be recorded and of the same kind, and none may be left over.
+    /// Every choice must be recorded and of the same kind, and none may be left over. Candidates may be added.
     Exact,
     /// Values are clamped to their bounds, and missing choices are nominal.
     Nearest,
+}
+
+/// Options of [`replay_all`]. Neither the number of workers nor the clock changes the results.
+#[derive(Debug, Clone, Copy)]
+pub struct ReplayOptions {
+    /// How exactly the recorded choices must fit.
+    pub fit: Fit,
+    /// Workers, one simulation each.
+    pub jobs: usize,
+    /// How each run is made.
+    pub context: RunContext,
 }
 
 /// The result of replaying a run.
@@ -44,13 +55,13 @@ pub struct Replay {
     /// Reasons why it did not complete, then and now.
     pub reasons: [Option<String>; 2],
     /// The first difference of the traces; `None` if they are identical or differ by less than the stored precision.
-    pub difference: Option<Difference>,
+    pub difference: Option<TraceDifference>,
     /// Recorded choices that did not fit.
     pub misfits: Vec<Misfit>,
     /// Outcomes that differ under the present rules.
     pub outcomes: Vec<OutcomeChange>,
     /// Inputs that changed since.
-    pub changes: Vec<Change>,
+    pub changes: Vec<InputChange>,
 }
 
 /// A recorded choice that did not fit.
@@ -69,8 +80,15 @@ pub enum MisfitKind {
     Missing,
     /// It is recorded but not needed.
     LeftOver,
-    /// Its kind changed: other bounds, another number of candidates, or another standard deviation.
+    /// Its kind changed: other bounds, another number of options, or another standard deviation.
     OtherKind,
+    /// Its candidate was removed.
+    Replaced {
+        /// The recorded candidate.
+        was: String,
+        /// The candidate that was used.
+        is: String,
+    },
     /// Its value was changed.
     Moved {
         /// The recorded value.
@@ -101,19 +119,15 @@ pub struct OutcomeChange {
 /// `X010` if the workers can't be started. Each result has the faults of its own replay.
 pub fn replay_all(
     history: &History,
-    campaigns: &BTreeMap<String, Recalled>,
+    campaigns: &BTreeMap<String, StoredCampaign>,
     runs: &[RunDetail],
-    (fit, jobs): (Fit, usize),
-    manner: &Manner,
+    options: &ReplayOptions,
     on_done: impl Fn() + Sync,
 ) -> Result<Vec<Result<Replay, Diagnostics>>, Diagnostics> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(jobs.max(1))
-        .build()
-        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
+    let pool = workers(options.jobs)?;
     let one = |detail: &RunDetail| {
         let replayed = match campaigns.get(&detail.row.campaign) {
-            Some(recalled) => replay(history, recalled, detail, fit, manner),
+            Some(stored) => replay(history, stored, detail, options),
             None => Err(refused(detail, "its campaign is not known").into()),
         };
         on_done();
@@ -129,10 +143,9 @@ pub fn replay_all(
 /// fit exactly and do not; or the stored trace can't be read.
 fn replay(
     history: &History,
-    (env, record): &Recalled,
+    (env, record): &StoredCampaign,
     detail: &RunDetail,
-    fit: Fit,
-    manner: &Manner,
+    options: &ReplayOptions,
 ) -> Result<Replay, Diagnostics> {
     let run = &detail.row.run;
     let (choices, was) = (history.choices(run)?, history.trace(run)?);
@@ -140,11 +153,12 @@ fn replay(
     // The wall clock is not part of a run's choices: the replay is cut off at the same simulated time.
     let cut_secs = cut_secs(&was);
     let cut = cut_secs.map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs });
-    let is = again(env, &record.id, (index, &|| Choices::recorded(&choices)), manner, cut).map_err(|why| {
+    let attempt = Attempt { campaign: &record.id, index, choices: &|| Choices::recorded(&choices), cut };
+    let is = rerun(env, &attempt, &options.context).map_err(|why| {
         refused(detail, &why).help("a model, the configuration or the program changed: see the digests in the history")
     })?;
     let misfits = misfits(&choices, &is.choices);
-    if fit == Fit::Exact && !misfits.is_empty() {
+    if options.fit == Fit::Exact && !misfits.is_empty() {
         return Err(unfit(detail, &misfits).into());
     }
     let (now, difference) =
@@ -173,59 +187,57 @@ fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
     Diagnostic::error("S041", format!("run {} can't be run again: {why}", detail.row.run))
 }
 
-/// Makes the run again. A simulation crash counts as a run too.
-pub(super) fn again(
-    env: &Env,
-    campaign: &str,
-    (index, recorded): (u64, &dyn Fn() -> Choices),
-    manner: &Manner,
-    cut: Cut,
-) -> Result<RunRecord, String> {
-    match catch_unwind(AssertUnwindSafe(|| run_line_until(env, campaign, (index, recorded()), manner, cut))) {
-        Ok(Ok(record)) => Ok(record),
-        Ok(Err(Failure::Interrupted)) => Err(Failure::Interrupted.to_string()),
-        Ok(Err(Failure::Discard(reason))) => Err(format!("its scene can no longer be built: {reason}")),
-        Err(panic) => {
-            let reason = format!("simulation crashed: {}", panic_text(panic.as_ref()));
-            let redone = catch_unwind(AssertUnwindSafe(|| crashed(env, campaign, index, recorded(), &reason)));
-            redone.ok().flatten().ok_or(reason)
-        }
-    }
+/// Makes a run again. A simulation crash counts as a run too.
+///
+/// # Errors
+/// The reason why there is no run, in words.
+pub(super) fn rerun(env: &Env, attempt: &Attempt<'_>, context: &RunContext) -> Result<FinishedRun, String> {
+    attempt.make(env, context).map_err(|fault| match fault {
+        AttemptFault::Failure(Failure::Interrupted) => Failure::Interrupted.to_string(),
+        AttemptFault::Failure(Failure::Discard(reason)) => format!("its scene can no longer be built: {reason}"),
+        AttemptFault::Crash(reason) => reason,
+    })
 }
 
 /// Compares the recorded choices with those made from them.
 fn misfits(recorded: &[Choice], made: &[Choice]) -> Vec<Misfit> {
-    let (recorded, made) = (by_name(recorded), by_name(made));
-    let mut names: Vec<&str> = recorded.keys().chain(made.keys()).copied().collect();
-    names.sort_unstable();
-    names.dedup();
+    let mut pairs: BTreeMap<String, [Vec<&Choice>; 2]> = BTreeMap::new();
+    for (side, choices) in [recorded, made].into_iter().enumerate() {
+        for choice in choices {
+            pairs.entry(choice.name.to_string()).or_default()[side].push(choice);
+        }
+    }
     let mut found = Vec::new();
-    for name in names {
-        let none = Vec::new();
-        let (was, is) = (recorded.get(name).unwrap_or(&none), made.get(name).unwrap_or(&none));
+    for (name, [was, is]) in pairs {
         for number in 0..was.len().max(is.len()) {
             let kind = match (was.get(number), is.get(number)) {
-                (None, _) => MisfitKind::Missing,
-                (_, None) => MisfitKind::LeftOver,
-                (Some(was), Some(is)) if was.value.to_bits() != is.value.to_bits() => {
-                    MisfitKind::Moved { was: was.value, is: is.value }
-                }
-                (Some(was), Some(is)) if was.kind != is.kind => MisfitKind::OtherKind,
-                _ => continue,
+                (None, _) => Some(MisfitKind::Missing),
+                (_, None) => Some(MisfitKind::LeftOver),
+                (Some(was), Some(is)) => misfit(was, is),
             };
-            let name = if number == 0 { name.to_owned() } else { format!("{name} ({})", number + 1) };
-            found.push(Misfit { name, kind });
+            let name = if number == 0 { name.clone() } else { format!("{name} ({})", number + 1) };
+            found.extend(kind.map(|kind| Misfit { name, kind }));
         }
     }
     found
 }
 
-fn by_name(choices: &[Choice]) -> BTreeMap<&str, Vec<&Choice>> {
-    let mut names: BTreeMap<&str, Vec<&Choice>> = BTreeMap::new();
-    for choice in choices {
-        names.entry(choice.name.as_str()).or_default().push(choice);
+/// Compares a recorded choice with the one made from it; `None` if they are the same.
+fn misfit(was: &Choice, is: &Choice) -> Option<MisfitKind> {
+    match (was.candidate(), is.candidate()) {
+        (Some(was), Some(is)) => (was != is).then(|| MisfitKind::Replaced { was: was.to_owned(), is: is.to_owned() }),
+        _ if was.value.to_bits() != is.value.to_bits() => Some(MisfitKind::Moved { was: was.value, is: is.value }),
+        _ if is_same_kind(&was.kind, &is.kind) => None,
+        _ => Some(MisfitKind::OtherKind),
     }
-    names
+}
+
+/// Whether two kinds have the same values. Old histories have the number of candidates, without their names.
+fn is_same_kind(was: &ChoiceKind, is: &ChoiceKind) -> bool {
+    match (was, is) {
+        (ChoiceKind::Index { of }, ChoiceKind::Candidate { names }) => names.len() == *of,
+        _ => was == is,
+    }
 }
 
 fn unfit(detail: &RunDetail, misfits: &[Misfit]) -> Diagnostic {
@@ -242,17 +254,18 @@ fn unfit(detail: &RunDetail, misfits: &[Misfit]) -> Diagnostic {
 impl std::fmt::Display for Misfit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let name = &self.name;
-        match self.kind {
+        match &self.kind {
             MisfitKind::Missing => write!(f, "`{name}` is missing"),
             MisfitKind::LeftOver => write!(f, "`{name}` is no longer needed"),
             MisfitKind::OtherKind => write!(f, "`{name}` has another kind or range now"),
+            MisfitKind::Replaced { was, is } => write!(f, "`{name}` was `{was}`, which it can't be now, is `{is}`"),
             MisfitKind::Moved { was, is } => write!(f, "`{name}` was {was}, is {is}"),
         }
     }
 }
 
 /// Changed outcomes, sorted by action and property.
-fn outcome_changes(was: &RunDetail, is: &RunRecord) -> Vec<OutcomeChange> {
+fn outcome_changes(was: &RunDetail, is: &FinishedRun) -> Vec<OutcomeChange> {
     let mut both: BTreeMap<(usize, &str), [Option<&'static str>; 2]> = BTreeMap::new();
     for (idx, action) in was.actions.iter().enumerate() {
         for judgement in &action.judgements {
@@ -278,7 +291,7 @@ fn outcome_changes(was: &RunDetail, is: &RunRecord) -> Vec<OutcomeChange> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use actcheck_data::ChoiceKind;
+    use actcheck_data::ChoiceName;
 
     fn real(name: &str, high: f64, value: f64) -> Choice {
         Choice { name: name.into(), kind: ChoiceKind::Real { low: 0.0, high, nominal: 0.0 }, value }
@@ -299,5 +312,22 @@ mod tests {
             ]
         );
         assert!(misfits(&recorded, &recorded).is_empty());
+    }
+
+    fn candidate(names: &[&str], value: f64) -> Choice {
+        let names = names.iter().map(|name| (*name).to_owned()).collect();
+        Choice { name: ChoiceName::SurfaceName, kind: ChoiceKind::Candidate { names }, value }
+    }
+
+    #[test]
+    fn candidates_may_be_added_but_not_removed() {
+        let told = |was: Choice, is: Choice| misfits(&[was], &[is]).first().map(Misfit::to_string);
+        assert_eq!(told(candidate(&["a"], 0.0), candidate(&["b", "a"], 1.0)), None);
+        let gone = told(candidate(&["a"], 0.0), candidate(&["b"], 0.0));
+        assert_eq!(gone.as_deref(), Some("`surface.name` was `a`, which it can't be now, is `b`"));
+        let old = |of| Choice { kind: ChoiceKind::Index { of }, ..candidate(&[], 0.0) };
+        assert_eq!(told(old(1), candidate(&["a"], 0.0)), None);
+        let grown = told(old(1), candidate(&["b", "a"], 0.0));
+        assert_eq!(grown.as_deref(), Some("`surface.name` has another kind or range now"));
     }
 }

@@ -1,11 +1,11 @@
 //! A rule file of the configuration that scenes must satisfy before a run begins.
 
 use crate::{Failure, scene_facts};
-use actcheck_base::{ActionFacts, Diagnostics, RuleFault, digest_of, names};
+use actcheck_base::{ActionFacts, Diagnostics, RuleFault, names};
 use actcheck_config::Campaign;
 use actcheck_data::{ActionTrace, Frames, Scene, Trace};
 use actcheck_facts as facts;
-use actcheck_ontology::{Ontology, Property, RuleFile, RuleLanguage};
+use actcheck_ontology::{Ontology, Property, RuleFile};
 use actcheck_rules::{Budget, RuleBook};
 use actcheck_world::World;
 
@@ -32,22 +32,10 @@ impl Requirement {
         let Some(source) = &campaign.scene_rule else { return Ok(None) };
         let iri = names::act("SceneRequirement");
         let path = source.name.to_string();
-        let property = Property {
-            iri: iri.clone(),
-            name: "SceneRequirement".to_owned(),
-            label: "the scene's requirement".to_owned(),
-            comment: None,
-            rule: RuleFile {
-                source: source.clone(),
-                language: if path.ends_with(".rq") { RuleLanguage::Sparql } else { RuleLanguage::Datalog },
-                path: path.clone(),
-                digest: digest_of(&source.text),
-                linked_at: None,
-            },
-            // The rules may use everything that scene generation sets.
-            needs: ontology.designators.clone(),
-            unit: None,
-        };
+        let mut property = Property::new(iri.clone(), RuleFile::new(source.clone()));
+        property.label = "the scene's requirement".to_owned();
+        // The rules may use everything that scene generation sets.
+        property.needs = ontology.designators.clone();
         let mut alone = ontology.clone();
         alone.properties = [(iri.clone(), property)].into();
         alone.vocabulary.terms.extend(scene_facts::vocabulary());

@@ -6,31 +6,31 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::environment::asked_for;
+use crate::environment::recorded_overrides;
 use crate::shrink::SHRUNK;
-use crate::{Change, Env, Told, changes};
+use crate::{Env, InputChange, RunResult, changes};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config as config;
-use actcheck_history::{CampaignRecord, CampaignRow, History, RunDetail};
+use actcheck_history::{CampaignRecord, CampaignRow, FAILED_AGAIN, History, RunDetail};
 use actcheck_rules::Budget;
 
 /// The stored part of a resumed campaign.
 #[derive(Debug, Clone, Default)]
-pub struct Kept {
+pub struct StoredRuns {
     /// Runs by index.
-    pub(super) runs: BTreeMap<u64, Told>,
+    pub(super) runs: BTreeMap<u64, RunResult>,
     /// Scenes discarded for them: index of the run, and the reason.
     pub(super) discards: Vec<(u64, String)>,
     /// Wall-clock time that the campaign has taken so far. Unit: seconds.
     pub(super) elapsed_secs: f64,
 }
 
-impl Kept {
+impl StoredRuns {
     /// Creates it from the runs of the history.
     pub fn of(runs: &[RunDetail]) -> Self {
         let discards = runs.iter().flat_map(|run| run.discards.iter().map(|reason| (run.row.index, reason.clone())));
         Self {
-            runs: runs.iter().map(|run| (run.row.index, Told::again(run))).collect(),
+            runs: runs.iter().map(|run| (run.row.index, RunResult::from_stored(run))).collect(),
             discards: discards.collect(),
             elapsed_secs: runs.iter().map(|run| run.elapsed_secs).fold(0.0, f64::max),
         }
@@ -45,10 +45,14 @@ pub fn unfinished(history: &History, id: Option<&str>, config: Option<&Path>) ->
     if let Some(id) = id {
         let record = history.campaign(id)?;
         let finished = history.campaigns()?.iter().any(|row| row.id == id && is_finished(row));
-        return if finished { Err(finished_already(id)) } else { Ok(record) };
+        return match finished {
+            true => Err(finished_already(id)),
+            false if record.name.starts_with(FAILED_AGAIN) => Err(not_resumable(id)),
+            false => Ok(record),
+        };
     }
     for row in history.campaigns()?.iter().rev() {
-        if is_finished(row) || row.name.starts_with(SHRUNK) {
+        if is_finished(row) || row.name.starts_with(SHRUNK) || row.name.starts_with(FAILED_AGAIN) {
             continue;
         }
         let record = history.campaign(&row.id)?;
@@ -72,12 +76,19 @@ fn finished_already(id: &str) -> Diagnostics {
         .into()
 }
 
+/// X050: the campaign ran failed runs again, whose schedule is not in its record.
+fn not_resumable(id: &str) -> Diagnostics {
+    Diagnostic::error("X050", format!("campaign {id} ran failed runs again and can't be resumed"))
+        .help("run all failed runs again: `actcheck run CONFIG --last-failed`")
+        .into()
+}
+
 /// The path of a campaign's configuration.
-fn config_of(history: &History, record: &CampaignRecord) -> PathBuf {
+pub(super) fn config_of(history: &History, record: &CampaignRecord) -> PathBuf {
     config::resolve_path(history.dir(), &record.config_path)
 }
 
-fn is_same_file(one: &Path, other: &Path) -> bool {
+pub(super) fn is_same_file(one: &Path, other: &Path) -> bool {
     match (std::fs::canonicalize(one), std::fs::canonicalize(other)) {
         (Ok(one), Ok(other)) => one == other,
         _ => one == other,
@@ -91,7 +102,7 @@ impl Env {
     /// # Errors
     /// As [`Env::prepare`]; `X051` if an input has changed since the campaign began.
     pub fn resume(history: &History, record: &CampaignRecord, rule_budget: Budget) -> Result<Self, Diagnostics> {
-        let mut campaign = config::load(&config_of(history, record), &asked_for(history, record))?;
+        let mut campaign = config::load(&config_of(history, record), &recorded_overrides(history, record))?;
         campaign.test_count = Self::scenes_of_a_test(&campaign, record);
         let env = Self::of(campaign, rule_budget)?;
         let now = env.record(record.id.clone(), record.name.clone(), record.started.clone());
@@ -102,7 +113,7 @@ impl Env {
     }
 }
 
-fn changed_since(record: &CampaignRecord, changed: &[Change]) -> Diagnostics {
+fn changed_since(record: &CampaignRecord, changed: &[InputChange]) -> Diagnostics {
     let mut faults = Diagnostics::new();
     let gone = |digest: &Option<String>| digest.clone().unwrap_or_else(|| "not there".to_owned());
     for change in changed {

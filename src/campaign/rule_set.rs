@@ -31,7 +31,7 @@ impl RuleSet {
     /// Restricts it to some properties, given by local name or IRI. An empty list means all.
     ///
     /// # Errors
-    /// `X030` for every name that is not a success property of any action.
+    /// `X037` for every name that is not a success property of any action.
     pub fn only(mut self, properties: &[String]) -> Result<Self, Diagnostics> {
         if properties.is_empty() {
             return Ok(self);
@@ -43,7 +43,7 @@ impl RuleSet {
         for name in properties {
             if !all.iter().any(|iri| name == iri || name == names::local(iri)) {
                 faults.push(
-                    Diagnostic::error("X030", format!("no action has a success property `{name}`"))
+                    Diagnostic::error("X037", format!("no action has a success property `{name}`"))
                         .help(did_you_mean(name, all.iter().map(|iri| names::local(iri)))),
                 );
             }

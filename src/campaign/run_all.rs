@@ -6,9 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 
-use crate::budget::Tally;
 use crate::make_run::{Making, make_run};
-use crate::{CampaignEnd, Ending, Env, Kept, Manner, Planned, Schedule, Spent, Told, schedule_of};
+use crate::tally::Tally;
+use crate::workers::workers;
+use crate::{
+    CampaignResult, Clock, Ending, Env, ExhaustedBudget, Planned, RunContext, RunResult, Schedule, StoredRuns,
+    schedule_of,
+};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config::Launcher;
 use actcheck_history::{History, RunRecord};
@@ -21,22 +25,28 @@ const AHEAD: usize = 4;
 
 /// Options of [`run_all`]. Neither the number of workers nor the clock changes the runs.
 #[derive(Debug, Clone, Copy)]
-pub struct Options {
+pub struct CampaignOptions {
     /// Workers, one simulation each.
     pub jobs: usize,
     /// How each run is made.
-    pub manner: Manner,
+    pub context: RunContext,
 }
 
 /// A planned run and its position in the schedule, from 0.
 struct Order {
-    place: u64,
+    position: u64,
     planned: Planned,
+}
+
+/// The channels to and from the workers.
+struct Channels {
+    orders: Sender<Order>,
+    made: Receiver<Made>,
 }
 
 /// The result of an order.
 struct Made {
-    place: u64,
+    position: u64,
     making: Making,
 }
 
@@ -50,78 +60,79 @@ pub fn run_all(
     env: &Env,
     history: &History,
     campaign: &str,
-    options: &Options,
+    options: &CampaignOptions,
     stop: &AtomicBool,
     on_run: impl FnMut(&RunRecord),
-) -> CampaignEnd {
-    resume_all(env, (history, Kept::default()), campaign, options, stop, on_run)
+) -> CampaignResult {
+    resume_all(env, history, campaign, StoredRuns::default(), options, stop, on_run)
 }
 
 /// As [`run_all`], for a campaign with runs in the history: these count, but are neither made nor passed to `on_run`
 /// again.
 pub fn resume_all(
     env: &Env,
-    (history, mut kept): (&History, Kept),
+    history: &History,
     campaign: &str,
-    options: &Options,
+    stored: StoredRuns,
+    options: &CampaignOptions,
     stop: &AtomicBool,
     mut on_run: impl FnMut(&RunRecord),
-) -> CampaignEnd {
+) -> CampaignResult {
     let jobs = options.jobs.max(1);
     let halt = AtomicBool::new(false);
-    let secs = options.manner.clock.secs;
-    let began_secs = secs() - kept.elapsed_secs;
-    let mut keeper = Keeper::new(env, history, (options.manner, began_secs), &mut on_run);
-    keeper.end.discards = std::mem::take(&mut kept.discards);
+    let clock = options.context.clock;
+    let began_secs = (clock.secs)() - stored.elapsed_secs;
+    let mut writer = RunWriter::new(env, history, campaign, clock, began_secs, &mut on_run);
+    writer.end.discards = stored.discards;
     let time_up_at = env.campaign.limits.time_secs.map_or(f64::INFINITY, |limit| began_secs + limit);
-    let pool = match rayon::ThreadPoolBuilder::new().num_threads(jobs).build() {
+    let pool = match workers(jobs) {
         Ok(pool) => pool,
-        Err(error) => {
-            keeper.stop(Diagnostic::error("X010", format!("workers can't be started: {error}")).into());
-            return keeper.end;
+        Err(fault) => {
+            writer.stop(fault.into());
+            return writer.end;
         }
     };
     let mut schedule = schedule_of(env);
     let (orders, taken) = channel();
     let (give, made) = channel();
-    let taken = Mutex::new(taken);
+    let (channels, taken) = (Channels { orders, made }, Mutex::new(taken));
     pool.in_place_scope(|scope| {
         for _ in 0..jobs {
             let (give, taken, halt) = (give.clone(), &taken, &halt);
             scope.spawn(move |_| {
-                work(env, campaign, &options.manner, taken, &give, &|| {
-                    stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed) || secs() >= time_up_at
+                work(env, campaign, &options.context, taken, &give, &|| {
+                    stop.load(Ordering::Relaxed) || halt.load(Ordering::Relaxed) || (clock.secs)() >= time_up_at
                 });
             });
         }
-        conduct((&mut *schedule, kept.runs), &mut keeper, (&orders, &made), jobs * AHEAD);
+        conduct(&mut *schedule, stored.runs, &mut writer, &channels, jobs * AHEAD);
         if let (Ending::Interrupted, Some(limit), false) =
-            (&keeper.end.ending, env.campaign.limits.time_secs, stop.load(Ordering::Relaxed))
+            (&writer.end.ending, env.campaign.limits.time_secs, stop.load(Ordering::Relaxed))
         {
-            keeper.end.ending = Ending::Budget(Spent::Time(limit));
+            writer.end.ending = Ending::Budget(ExhaustedBudget::Time(limit));
         }
         // Runs still being made are no longer needed. Workers end when the channel of orders is closed.
         halt.store(true, Ordering::Relaxed);
-        drop(orders);
+        drop(channels);
     });
-    keeper.end.rates = schedule.rates();
-    keeper.finish()
+    writer.end.rates = schedule.rates();
+    writer.finish()
 }
 
 /// One worker: processes orders until the channel is closed.
 fn work(
     env: &Env,
     campaign: &str,
-    manner: &Manner,
+    context: &RunContext,
     orders: &Mutex<Receiver<Order>>,
     give: &Sender<Made>,
     stopped: &dyn Fn() -> bool,
 ) {
     loop {
         let order = orders.lock().unwrap_or_else(PoisonError::into_inner).recv();
-        let Ok(Order { place, planned }) = order else { return };
-        let making = if stopped() { Making::Interrupted } else { make_run(env, campaign, &planned, manner) };
-        if give.send(Made { place, making }).is_err() {
+        let Ok(Order { position, planned }) = order else { return };
+        let making = if stopped() { Making::Interrupted } else { make_run(env, campaign, planned, context) };
+        if give.send(Made { position, making }).is_err() {
             return;
         }
     }
@@ -129,9 +140,10 @@ fn work(
 
 /// Sends the planned runs to the workers and stores the results in order. `stored` are the runs in the history already.
 fn conduct(
-    (schedule, mut stored): (&mut dyn Schedule, BTreeMap<u64, Told>),
-    keeper: &mut Keeper<'_>,
-    (orders, made): (&Sender<Order>, &Receiver<Made>),
+    schedule: &mut dyn Schedule,
+    mut stored: BTreeMap<u64, RunResult>,
+    writer: &mut RunWriter<'_>,
+    channels: &Channels,
     ahead: usize,
 ) {
     let mut batch = VecDeque::new();
@@ -140,7 +152,7 @@ fn conduct(
     let (mut ordered, mut kept) = (0, 0);
     loop {
         if batch.is_empty() && ordered == kept {
-            batch = schedule.next_batch(&std::mem::take(&mut keeper.told)).into();
+            batch = schedule.next_batch(&std::mem::take(&mut writer.results)).into();
             if batch.is_empty() {
                 return;
             }
@@ -148,52 +160,56 @@ fn conduct(
         while ordered - kept < ahead as u64
             && let Some(planned) = batch.pop_front()
         {
-            if let Some(told) = stored.remove(&planned.index) {
-                early.insert(ordered, Making::Stored(told));
-            } else if orders.send(Order { place: ordered, planned }).is_err() {
+            if let Some(result) = stored.remove(&planned.index) {
+                early.insert(ordered, Making::Stored(result));
+            } else if channels.orders.send(Order { position: ordered, planned }).is_err() {
                 return;
             }
             ordered += 1;
         }
         if let Some(making) = early.remove(&kept) {
-            if keeper.keep(making).is_break() {
+            if writer.keep(making).is_break() {
                 return;
             }
             kept += 1;
             continue;
         }
-        let Ok(Made { place, making }) = made.recv() else { return };
-        early.insert(place, making);
+        let Ok(Made { position, making }) = channels.made.recv() else { return };
+        early.insert(position, making);
     }
 }
 
 /// Writes the runs; nothing else does.
-struct Keeper<'a> {
+struct RunWriter<'a> {
     history: &'a History,
-    manner: Manner,
-    /// Start of the campaign on the manner's clock, less the time taken before it was interrupted.
+    /// Id of the campaign.
+    campaign: &'a str,
+    clock: Clock,
+    /// Start of the campaign on that clock, less the time taken before it was interrupted.
     began_secs: f64,
     on_run: &'a mut dyn FnMut(&RunRecord),
-    end: CampaignEnd,
+    end: CampaignResult,
     tally: Tally,
     /// Number of latest runs in a row that the program broke by a fault of its own.
     broken_in_a_row: u64,
     /// Limit on `broken_in_a_row`.
     most_broken: Option<u64>,
     /// Summaries of the batch's runs for the schedule.
-    told: Vec<Told>,
+    results: Vec<RunResult>,
     flushed_at: f64,
 }
 
-impl<'a> Keeper<'a> {
+impl<'a> RunWriter<'a> {
     fn new(
         env: &Env,
         history: &'a History,
-        (manner, began_secs): (Manner, f64),
+        campaign: &'a str,
+        clock: Clock,
+        began_secs: f64,
         on_run: &'a mut dyn FnMut(&RunRecord),
     ) -> Self {
-        let end = CampaignEnd { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
-        let flushed_at = (manner.clock.secs)();
+        let end = CampaignResult { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
+        let flushed_at = (clock.secs)();
         let most_broken = match &env.campaign.launcher {
             Launcher::Reference => None,
             Launcher::Program(skill) => Some(skill.max_broken),
@@ -201,14 +217,15 @@ impl<'a> Keeper<'a> {
         let tally = Tally::new(env);
         Self {
             history,
-            manner,
+            campaign,
+            clock,
             began_secs,
             on_run,
             end,
             tally,
             broken_in_a_row: 0,
             most_broken,
-            told: Vec::new(),
+            results: Vec::new(),
             flushed_at,
         }
     }
@@ -216,18 +233,18 @@ impl<'a> Keeper<'a> {
     /// Stores the next run of the schedule. Breaks if it is the last one.
     fn keep(&mut self, making: Making) -> ControlFlow<()> {
         match making {
-            Making::Run(mut record) => {
-                record.elapsed_secs = (self.manner.clock.secs)() - self.began_secs;
+            Making::Run(made) => {
+                let record = made.into_record(self.campaign, (self.clock.secs)() - self.began_secs);
                 if let Err(faults) = self.commit(&record) {
                     self.stop(faults);
                     return ControlFlow::Break(());
                 }
                 self.end.discards.extend(record.discards.iter().map(|reason| (record.index, reason.clone())));
                 (self.on_run)(&record);
-                self.count(Told::of(&record))?;
-                self.bear(&record)
+                self.count(RunResult::of(&record))?;
+                self.check_broken_in_a_row(&record)
             }
-            Making::Stored(told) => self.count(told),
+            Making::Stored(result) => self.count(result),
             Making::Interrupted => {
                 self.end.ending = Ending::Interrupted;
                 ControlFlow::Break(())
@@ -242,11 +259,11 @@ impl<'a> Keeper<'a> {
     /// Stops the campaign if the program has broken too many runs in a row. Runs are counted in the order of the
     /// schedule, so that the last one is the same whatever the number of workers. A resumed campaign starts counting
     /// from 0.
-    fn bear(&mut self, record: &RunRecord) -> ControlFlow<()> {
+    fn check_broken_in_a_row(&mut self, record: &RunRecord) -> ControlFlow<()> {
         self.broken_in_a_row = if record.program_output.is_some() { self.broken_in_a_row + 1 } else { 0 };
         match self.most_broken {
             Some(most) if self.broken_in_a_row >= most => {
-                self.stop(hopeless(most, record).into());
+                self.stop(too_many_broken(most, record).into());
                 ControlFlow::Break(())
             }
             _ => ControlFlow::Continue(()),
@@ -254,10 +271,10 @@ impl<'a> Keeper<'a> {
     }
 
     /// Counts a run that is in the history.
-    fn count(&mut self, told: Told) -> ControlFlow<()> {
+    fn count(&mut self, result: RunResult) -> ControlFlow<()> {
         self.end.committed += 1;
-        let spent = self.tally.count(&told);
-        self.told.push(told);
+        let spent = self.tally.count(&result);
+        self.results.push(result);
         match spent {
             Some(spent) => {
                 self.end.ending = Ending::Budget(spent);
@@ -269,7 +286,7 @@ impl<'a> Keeper<'a> {
 
     fn commit(&mut self, record: &RunRecord) -> Result<(), Diagnostics> {
         self.history.commit(record)?;
-        let now = (self.manner.clock.secs)();
+        let now = (self.clock.secs)();
         if now - self.flushed_at >= FLUSH_SECS {
             self.flushed_at = now;
             self.history.flush()?;
@@ -281,7 +298,7 @@ impl<'a> Keeper<'a> {
         self.end.ending = Ending::Stopped(faults);
     }
 
-    fn finish(mut self) -> CampaignEnd {
+    fn finish(mut self) -> CampaignResult {
         if let Err(faults) = self.history.flush()
             && !matches!(self.end.ending, Ending::Stopped(_))
         {
@@ -293,7 +310,7 @@ impl<'a> Keeper<'a> {
 }
 
 /// The error of a campaign whose program broke `most` runs in a row.
-fn hopeless(most: u64, last: &RunRecord) -> Diagnostic {
+fn too_many_broken(most: u64, last: &RunRecord) -> Diagnostic {
     let reason = last.reason.as_deref().unwrap_or_default();
     let runs = if most == 1 { "a run was".to_owned() } else { format!("{most} runs in a row were") };
     let message = format!("{runs} broken by the program that performs actions; the last one, {}: {reason}", last.id);

@@ -14,8 +14,7 @@ const NAMED: [&str; 3] = ["role", "model", "worldName"];
 
 /// The terms of these facts for rules; all are in the namespace `act:`.
 pub(super) fn vocabulary() -> BTreeMap<String, VocabularyTerm> {
-    let term = || VocabularyTerm { is_property: true, ..VocabularyTerm::default() };
-    NAMED.into_iter().chain(history::NOISE_TERMS).map(|local| (names::act(local), term())).collect()
+    NAMED.into_iter().chain(history::NOISE_TERMS).map(|local| (names::act(local), VocabularyTerm::property())).collect()
 }
 
 /// Adds the facts to the first state: role and model of each object, world and noise of the robot.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::searching::Searching;
 use crate::{Env, WeightedRate};
 use actcheck_base::{Judgement, Outcome, Shard};
-use actcheck_data::Choices;
+use actcheck_data::{ChoiceName, Choices};
 use actcheck_history::{Repetition, RunDetail, RunRecord};
 use actcheck_search::Strategy;
 
@@ -37,7 +37,7 @@ pub struct Planned {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steering {
     /// Quantiles of choices by name.
-    pub quantiles: BTreeMap<String, f64>,
+    pub quantiles: BTreeMap<ChoiceName, f64>,
     /// Importance weight of the scene, if scenes are not drawn from the configuration's distribution.
     pub weight: Option<f64>,
 }
@@ -68,18 +68,18 @@ impl Planned {
 
 /// Summary of a stored run for the schedule.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Told {
+pub struct RunResult {
     /// Position in the campaign, from 0.
     pub index: u64,
     /// Number of scenes discarded before the one of the run.
     pub discards: u64,
     /// Outcome of each property of each action.
-    pub outcomes: Vec<ToldOutcome>,
+    pub outcomes: Vec<PropertyOutcome>,
 }
 
 /// Outcome of a property in a run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ToldOutcome {
+pub struct PropertyOutcome {
     /// IRI of the property.
     pub property: String,
     /// The outcome.
@@ -88,21 +88,21 @@ pub struct ToldOutcome {
     pub margin: Option<f64>,
 }
 
-impl Told {
+impl RunResult {
     /// Summarises a new run.
     pub fn of(record: &RunRecord) -> Self {
-        let outcomes = record.judgements.iter().flatten().map(ToldOutcome::of);
+        let outcomes = record.judgements.iter().flatten().map(PropertyOutcome::of);
         Self { index: record.index, discards: record.discards.len() as u64, outcomes: outcomes.collect() }
     }
 
     /// Summarises a run of the history.
-    pub fn again(run: &RunDetail) -> Self {
-        let outcomes = run.actions.iter().flat_map(|action| &action.judgements).map(ToldOutcome::of);
+    pub fn from_stored(run: &RunDetail) -> Self {
+        let outcomes = run.actions.iter().flat_map(|action| &action.judgements).map(PropertyOutcome::of);
         Self { index: run.row.index, discards: run.discards.len() as u64, outcomes: outcomes.collect() }
     }
 }
 
-impl ToldOutcome {
+impl PropertyOutcome {
     fn of(judgement: &Judgement) -> Self {
         Self { property: judgement.property.clone(), outcome: judgement.outcome, margin: judgement.margin }
     }
@@ -112,8 +112,8 @@ impl ToldOutcome {
 pub trait Schedule {
     /// Returns the next runs, in the order in which they are stored; empty if the schedule is finished.
     ///
-    /// It is called when all runs of the previous batch are in the history; `told` has these runs, in the same order.
-    fn next_batch(&mut self, told: &[Told]) -> Vec<Planned>;
+    /// It is called when all runs of the previous batch are in the history; `results` has these runs, in the same order.
+    fn next_batch(&mut self, results: &[RunResult]) -> Vec<Planned>;
 
     /// Failure rates of properties, if the raw counts of runs are biased. They cover the complete batches so far.
     fn rates(&self) -> Vec<WeightedRate> {
@@ -159,7 +159,7 @@ impl InTurns {
 }
 
 impl Schedule for InTurns {
-    fn next_batch(&mut self, _told: &[Told]) -> Vec<Planned> {
+    fn next_batch(&mut self, _results: &[RunResult]) -> Vec<Planned> {
         let planned = self.tests * self.scenes * self.repeat;
         let batch: Vec<Planned> = (self.made..planned).take(BATCH).map(|place| self.planned(place)).collect();
         self.made += batch.len() as u64;
@@ -174,7 +174,7 @@ struct OneShard {
 }
 
 impl Schedule for OneShard {
-    fn next_batch(&mut self, _told: &[Told]) -> Vec<Planned> {
+    fn next_batch(&mut self, _results: &[RunResult]) -> Vec<Planned> {
         loop {
             // The results of one shard would mislead a schedule that uses them.
             let mut batch = self.all.next_batch(&[]);
@@ -221,9 +221,9 @@ mod tests {
     fn repetitions_differ_only_in_noise() {
         let drawn = |scene, repetition| {
             let mut choices = Planned { index: 0, scene, repetition, steering: None }.choices(7, 0);
-            let yaw = choices.real("yaw", 0.0, 1.0, 0.0).to_bits();
+            let yaw = choices.real("yaw".into(), 0.0, 1.0, 0.0).to_bits();
             choices.begin_noise();
-            (yaw, choices.normal("sense.x", 1.0).to_bits())
+            (yaw, choices.normal("sense.x".into(), 1.0).to_bits())
         };
         assert_eq!(drawn(1, Some(0)).0, drawn(1, Some(1)).0);
         assert_eq!(drawn(1, Some(0)).0, drawn(1, None).0);
@@ -254,7 +254,7 @@ mod tests {
         let first = |index, attempt| {
             Planned { index, scene: index, repetition: None, steering: None }
                 .choices(7, attempt)
-                .real("x", 0.0, 1.0, 0.0)
+                .real("x".into(), 0.0, 1.0, 0.0)
                 .to_bits()
         };
         assert_eq!(first(1, 0), first(1, 0));

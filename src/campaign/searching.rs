@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::search_space::SearchSpace;
-use crate::{Env, Planned, Schedule, Steering, Told, WeightedRate};
+use crate::{Env, Planned, RunResult, Schedule, Steering, WeightedRate};
 use actcheck_base::Outcome;
-use actcheck_search::{Ask, Search, Told as ToldOfOne};
+use actcheck_search::{Ask, PropertyResult, Search};
 
 /// Asks the searches of the tests in turn for a generation of scenes, and returns the results to them.
 ///
@@ -72,9 +72,9 @@ impl Searching {
 }
 
 impl Schedule for Searching {
-    fn next_batch(&mut self, told: &[Told]) -> Vec<Planned> {
+    fn next_batch(&mut self, results: &[RunResult]) -> Vec<Planned> {
         if self.asked {
-            self.tests[self.turn].tell(told, self.repeat);
+            self.tests[self.turn].tell(results, self.repeat);
             self.turn = (self.turn + 1) % self.tests.len();
         }
         let (turn, scenes) = (self.turn, self.scenes);
@@ -95,14 +95,15 @@ impl Schedule for Searching {
 
 impl SearchedTest {
     /// Passes the first run of each scene to the search: an estimate must count each scene once, not its repetitions.
-    fn tell(&mut self, told: &[Told], repeat: u64) {
-        for run in told.iter().filter(|run| run.index % repeat == 0) {
-            let said: Vec<ToldOfOne> = self.properties.iter().map(|property| said(run, property)).collect();
+    fn tell(&mut self, results: &[RunResult], repeat: u64) {
+        for run in results.iter().filter(|run| run.index % repeat == 0) {
+            let results: Vec<PropertyResult> =
+                self.properties.iter().map(|property| worst_result(run, property)).collect();
             if run.discards == 0 {
-                self.search.tell(said);
+                self.search.tell(results);
             } else {
                 // The requested scene could not be built: the run has a random scene instead.
-                self.search.tell_stand_in(&said);
+                self.search.tell_replacement(&results);
             }
         }
     }
@@ -122,9 +123,9 @@ impl SearchedTest {
 }
 
 /// The worst result of a property over all actions of a run.
-fn said(run: &Told, property: &str) -> ToldOfOne {
+fn worst_result(run: &RunResult, property: &str) -> PropertyResult {
     let own = || run.outcomes.iter().filter(|outcome| outcome.property == property);
     let decided = own().filter(|outcome| matches!(outcome.outcome, Outcome::Passed | Outcome::Failed));
     let margin = decided.filter_map(|outcome| outcome.margin).reduce(f64::min);
-    ToldOfOne { failed: own().any(|outcome| outcome.outcome == Outcome::Failed), margin }
+    PropertyResult { failed: own().any(|outcome| outcome.outcome == Outcome::Failed), margin }
 }

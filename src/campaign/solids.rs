@@ -16,7 +16,7 @@ const FOLDER: &str = "hulls";
 const TITLE: &str = "actcheck hulls 1";
 
 /// Convex decompositions by the key of their mesh, cached in memory and on disk.
-struct Kept {
+struct HullCache {
     folder: PathBuf,
     known: BTreeMap<String, Result<Vec<Shape>, String>>,
 }
@@ -24,13 +24,13 @@ struct Kept {
 /// Replaces the meshes of the robot and of all models that the campaign uses by convex hulls.
 ///
 /// Adds a fault (W037) for each mesh without a convex decomposition.
-pub(super) fn take_apart(campaign: &mut Campaign, faults: &mut Diagnostics) {
-    let mut kept = Kept { folder: campaign.history.join(FOLDER), known: BTreeMap::new() };
+pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics) {
+    let mut cache = HullCache { folder: campaign.history.join(FOLDER), known: BTreeMap::new() };
     let used = campaign.used_models();
     for (name, model) in &mut campaign.models {
         let has_mesh = model.parts.iter().any(|part| matches!(part.shape, Shape::Mesh { .. }));
         if has_mesh && used.contains(name) {
-            match solid_parts(model, &mut kept) {
+            match solid_parts(model, &mut cache) {
                 Ok(parts) => Arc::make_mut(model).parts = parts,
                 Err(reason) => faults.push(unusable(&format!("a mesh of the model `{name}`"), &reason)),
             }
@@ -38,7 +38,7 @@ pub(super) fn take_apart(campaign: &mut Campaign, faults: &mut Diagnostics) {
     }
     let robot = Arc::make_mut(&mut campaign.robot);
     for (file, shapes) in &mut robot.meshes {
-        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| kept.solids(shape)).collect();
+        let apart: Result<Vec<Vec<Shape>>, String> = shapes.iter().map(|shape| cache.solids(shape)).collect();
         match apart {
             Ok(apart) => *shapes = apart.concat(),
             Err(reason) => faults.push(unusable(&format!("the robot's mesh {file}"), &reason)),
@@ -51,15 +51,15 @@ fn unusable(what: &str, reason: &str) -> Diagnostic {
         .help("a collision mesh is a closed surface around something solid")
 }
 
-fn solid_parts(model: &ObjectModel, kept: &mut Kept) -> Result<Vec<Part>, String> {
+fn solid_parts(model: &ObjectModel, cache: &mut HullCache) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for part in &model.parts {
-        parts.extend(kept.solids(&part.shape)?.into_iter().map(|shape| Part { pose: part.pose, shape }));
+        parts.extend(cache.solids(&part.shape)?.into_iter().map(|shape| Part { pose: part.pose, shape }));
     }
     Ok(parts)
 }
 
-impl Kept {
+impl HullCache {
     /// Returns the convex hulls of a mesh, or any other shape unchanged.
     fn solids(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
         let Shape::Mesh { mesh } = shape else { return Ok(vec![shape.clone()]) };
@@ -67,12 +67,12 @@ impl Kept {
         if let Some(known) = self.known.get(&key) {
             return known.clone();
         }
-        let solids = self.kept_or_anew(&key, mesh);
+        let solids = self.cached_or_new(&key, mesh);
         self.known.insert(key, solids.clone());
         solids
     }
 
-    fn kept_or_anew(&self, key: &str, mesh: &Mesh) -> Result<Vec<Shape>, String> {
+    fn cached_or_new(&self, key: &str, mesh: &Mesh) -> Result<Vec<Shape>, String> {
         let path = self.folder.join(format!("{key}.hulls"));
         if let Some(solids) = read(&path) {
             return Ok(solids);

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::args::Format;
 use crate::chosen::{self, ChosenRuns, is_meant};
+use crate::options::Format;
 use crate::output;
 use crate::picture::Picture;
 use actcheck_analysis::{
@@ -84,7 +84,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         property: &args.property,
         by: &args.by,
         // In a text about all properties they would be too long.
-        usual_maps: !args.property.is_empty() || args.format != Format::Table,
+        usual_maps: !args.property.is_empty() || args.format != Format::Text,
         depth: args.depth,
         level: args.level,
     };
@@ -100,7 +100,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         return Ok(());
     }
     output::print(&match args.format {
-        Format::Table => findings_text(&summary),
+        Format::Text => findings_text(&summary),
         Format::Csv if !args.by.is_empty() => maps_table(&summary).render(args.format.into()),
         Format::Csv => findings_table(&summary).render(args.format.into()),
         Format::Json => format!("{:#}\n", findings_json(&summary)),
@@ -207,7 +207,7 @@ fn report(
         (true, true) => USUAL_MAPS.iter().map(<[&str; 2]>::as_slice).collect(),
     };
     PropertyReport {
-        maps: maps.into_iter().filter_map(|by| two_way(&findings.subject, by)).collect(),
+        maps: maps.into_iter().filter_map(|by| two_way(&findings.input, by)).collect(),
         unit: ontology.properties.get(&of.property).and_then(|property| property.unit.clone()),
         trend: trend(table, of, asked.level),
         flaky,
@@ -236,7 +236,7 @@ fn rule(summary: &FindingsSummary, number: usize) -> Result<String, Diagnostics>
             .help("`actcheck analyse` with the same options lists them with their numbers")
             .into());
     };
-    scene_rule(&pattern.conditions, &report.findings.subject.parameters, &report.sentence(pattern)).map_err(|unknown| {
+    scene_rule(&pattern.conditions, &report.findings.input.parameters, &report.sentence(pattern)).map_err(|unknown| {
         let message = format!("a scene rule can't constrain {}", unknown.join(", "));
         Diagnostic::error("X049", message).help("narrow the configuration's own ranges and lists instead").into()
     })

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use serde_json::json;
 
-use crate::args::{Format, RunArgs};
-use crate::run::quietly;
+use crate::options::Format;
+use crate::run_args::RunArgs;
+use crate::work::quietly;
 use crate::{clock, output, show};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_campaign::{CaseRun, Env, Manner, run_cases};
+use actcheck_campaign::{CaseRun, Env, RunContext, run_cases};
 use actcheck_history::History;
 use actcheck_report::{CaseSummary, case_json, case_text, run_json, run_text};
 
@@ -20,17 +21,17 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     let stem = Path::new(&file).file_stem();
     let name = stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     let cases = [(name, env)];
-    let manner = Manner { clock: clock::system(), disturb: None };
+    let context = RunContext { clock: clock::system(), disturb: None };
     let mut summary = None;
     quietly(|| {
-        run_cases(&cases, &history, 1, &manner, &mut |_, made| {
+        run_cases(&cases, &history, 1, &context, &mut |_, made| {
             summary = Some(summarise(&file, &cases[0].1, made));
         })
     })?;
     let Some(summary) = summary else { return Ok(2) };
     let run = history.run(&summary.run)?;
     match args.format {
-        Format::Table => output::print(&format!("{}\n{}", run_text(&run), case_text(&summary))),
+        Format::Text => output::print(&format!("{}\n{}", run_text(&run), case_text(&summary))),
         Format::Json => output::print(&format!("{:#}\n", json!({"case": case_json(&summary), "run": run_json(&run)}))),
         Format::Csv => {
             output::print(&show::outcomes(&run).render(Format::Csv.into()));
@@ -64,6 +65,7 @@ fn refuse_campaign_options(args: &RunArgs, file: &str) -> Result<(), Diagnostics
         ("--repeat", args.repeat.is_some()),
         ("--shard", args.shard.is_some()),
         ("--shrink", args.shrink),
+        ("--last-failed", args.last_failed),
     ];
     let mut found = Diagnostics::new();
     for (option, _) in given.into_iter().filter(|(_, given)| *given) {

@@ -1,15 +1,23 @@
 //! `actcheck check`
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::args::CheckArgs;
+use clap::Args;
+
 use crate::{configurations, output, regressions};
 use actcheck_base::Diagnostics;
 use actcheck_campaign::Env;
 use actcheck_config::Overrides;
 use actcheck_rules::Budget;
+
+/// `actcheck check`
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The campaign's configuration (TOML) [default: configs/pick.toml]
+    pub config: Option<PathBuf>,
+}
 
 /// Prints the parts that a campaign would use, or returns all its faults. `stop` interrupts it.
 pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {

@@ -7,13 +7,13 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-use crate::args::Format;
-use crate::run::{all_cores, quietly};
+use crate::options::Format;
+use crate::work::{all_cores, quietly};
 use crate::{clock, output, stop};
 use actcheck_analysis::{OracleTrial, oracle_matrix};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::oracles::{FAULTS, Fault, Trial, TrialOptions, try_faults};
-use actcheck_campaign::{Env, Manner};
+use actcheck_campaign::{Env, RunContext};
 use actcheck_config::Overrides;
 use actcheck_report::{OracleSummary, oracles_json, oracles_table, oracles_text};
 use actcheck_rules::Budget;
@@ -49,8 +49,8 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     let faults: Vec<Fault> = FAULTS.into_iter().filter(concerns).collect();
     let steps = env.planned_runs() * (faults.len() as u64 + 1);
     let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
-    let manner = Manner { clock: clock::system(), disturb: None };
-    let options = TrialOptions { jobs: args.jobs.map_or_else(all_cores, usize::from), manner };
+    let context = RunContext { clock: clock::system(), disturb: None };
+    let options = TrialOptions { jobs: args.jobs.map_or_else(all_cores, usize::from), context };
     let trials = quietly(|| try_faults(&env, &faults, &options, &stop, || bar.inc(1)))?;
     bar.finish_and_clear();
     if stop.load(Ordering::Relaxed) {
@@ -63,7 +63,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     }
     let summary = summarise(args, &env, &faults, &trials);
     output::print(&match args.format {
-        Format::Table => oracles_text(&summary),
+        Format::Text => oracles_text(&summary),
         Format::Csv => oracles_table(&summary).render(Format::Csv.into()),
         Format::Json => format!("{:#}\n", oracles_json(&summary)),
     });

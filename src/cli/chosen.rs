@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::args::HistoryArgs;
+use crate::options::HistoryArgs;
 use crate::{history_dir, since, why};
 use actcheck_analysis::{Hierarchy, TableFilter};
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean, names};
@@ -17,7 +17,8 @@ use actcheck_ontology::Ontology;
 /// Runs of a history, and the ontology that explains them.
 #[derive(Debug, Args)]
 pub struct ChosenRuns {
-    /// Only runs of this campaign (may be given several times) [default: all but shrunk runs]
+    /// Only runs of this campaign (may be given several times) [default: all but shrunk and repeated failed
+    /// runs]
     #[arg(long, value_name = "ID")]
     pub campaign: Vec<String>,
     /// Only runs since this time, such as 2026-11-21, 2026-11-21T18:00:00Z, or 12h for 12 hours ago

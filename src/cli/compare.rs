@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::args::{Format, HistoryArgs};
+use crate::options::{Format, HistoryArgs};
 use crate::{history_dir, output};
 use actcheck_analysis::{Comparison, compare as compare_runs, compared_runs};
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -66,7 +66,7 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     let sides = [first.summary(), second.summary()];
     let summary = CompareSummary { sides, comparison, changes, level: args.fail_if_worse };
     output::print(&match args.format {
-        Format::Table => compare_text(&summary),
+        Format::Text => compare_text(&summary),
         Format::Csv => compare_table(&summary).render(args.format.into()),
         Format::Json => format!("{:#}\n", compare_json(&summary)),
     });

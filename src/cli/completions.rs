@@ -1,10 +1,9 @@
 //! `actcheck completions`
 
-use clap::{Args, ValueEnum};
+use clap::{Args, Command, ValueEnum};
 use clap_complete::generate;
 use clap_complete::shells;
 
-use crate::command_tree::command_tree;
 use crate::output;
 
 /// `actcheck completions`
@@ -26,10 +25,9 @@ pub enum Shell {
     Fish,
 }
 
-/// Prints the script for a shell.
-pub fn completions(args: &CompletionsArgs) {
+/// Prints the script for a shell. `commands` is the program with all commands.
+pub fn completions(args: &CompletionsArgs, mut commands: Command) {
     let mut script = Vec::new();
-    let mut commands = command_tree();
     match args.shell {
         Shell::Bash => generate(shells::Bash, &mut commands, "actcheck", &mut script),
         Shell::Zsh => generate(shells::Zsh, &mut commands, "actcheck", &mut script),

@@ -1,19 +1,43 @@
 //! `actcheck datalog`
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::args::{DatalogArgs, ProofFormat};
-use crate::output;
+use clap::Args;
+
+use crate::options::{ProofFormat, duration};
+use crate::{explanations, output};
 use actcheck_base::{Diagnostic, Diagnostics, Files};
-use actcheck_report::Table;
+use actcheck_report::{Table, TableFormat};
+use actcheck_rules::Budget;
 use actcheck_rules::standalone::{self, Program};
-use actcheck_rules::{Budget, explain::Explanation};
+
+/// `actcheck datalog`
+#[derive(Debug, Args)]
+pub struct DatalogArgs {
+    /// The program (.rls)
+    pub file: PathBuf,
+    /// Folder for the exported files
+    #[arg(short = 'D', long = "export-dir", value_name = "DIR", default_value = "results")]
+    pub output: PathBuf,
+    /// Explain why this fact holds or does not, such as 'p(1, _)', instead of exporting
+    #[arg(long, value_name = "FACT")]
+    pub trace: Option<String>,
+    /// How the number of tuples of each predicate is printed, or with --trace the explanation (dot: only explanations)
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: ProofFormat,
+    /// Stop after this many derived tuples
+    #[arg(long, value_name = "N", default_value_t = 100_000_000)]
+    pub max_tuples: usize,
+    /// Stop after this time, such as 90s, 10m or 2h
+    #[arg(long, alias = "max-secs", value_name = "DURATION", default_value = "10m", value_parser = duration)]
+    pub max_time: f64,
+}
 
 /// Runs a standalone program, or explains why one of its facts holds or does not.
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
-    let budget = Budget { tuples: args.max_tuples, secs: args.max_secs, stop: Arc::clone(stop) };
+    let budget = Budget { tuples: args.max_tuples, secs: args.max_time, stop: Arc::clone(stop) };
     if let Some(statement) = &args.trace {
         let source = Files::Disk.read(&args.file).map_err(|why| {
             Diagnostic::error("X005", format!("{}: {why}", args.file.display())).help("name a file with rules (.rls)")
@@ -22,27 +46,38 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnos
         let program = Program::load_until(&source, folder, stop)?;
         let explained = program.explain(statement, &budget);
         let explained = explained.map_err(|fault| Diagnostic::error("X008", fault.to_string()).in_source(&source))?;
-        output::print(&rendered(&explained, args.format));
+        output::print(&match args.format {
+            ProofFormat::Text => explained.to_text(),
+            ProofFormat::Csv => {
+                let mut table = Table::new(["fact", "holds", "margin", "explanation"]);
+                table.rows.push(explanations::row(&[statement], &explained));
+                table.render(TableFormat::Csv)
+            }
+            ProofFormat::Json => format!("{:#}\n", explained.to_json()),
+            ProofFormat::Dot => explained.to_dot(),
+        });
         return Ok(());
     }
+    let format = match args.format {
+        ProofFormat::Text => TableFormat::Table,
+        ProofFormat::Csv => TableFormat::Csv,
+        ProofFormat::Json => TableFormat::Json,
+        ProofFormat::Dot => {
+            return Err(Diagnostic::error("X004", "`--format dot` draws an explanation, but none was requested")
+                .help("add the fact to explain, such as `--trace 'p(1, _)'`, or use `--format text`, `csv` or `json`")
+                .into());
+        }
+    };
     let summary = standalone::run(&args.file, &args.output, &budget)?;
     output::print_diagnostics(&summary.warnings);
     let mut table = Table::new(["predicate", "tuples"]);
     for (predicate, tuples) in summary.tuples {
         table.rows.push(vec![predicate.into(), tuples.into()]);
     }
-    output::print(&table.render(actcheck_report::TableFormat::Table));
-    for (file, lines) in summary.written {
-        output::print(&format!("{}: {lines} lines\n", file.display()));
-    }
+    output::print(&table.render(format));
+    let written: Vec<String> =
+        summary.written.iter().map(|(file, lines)| format!("{}: {lines} lines", file.display())).collect();
+    // CSV and JSON are one document.
+    output::tell(&written, format != TableFormat::Table);
     Ok(())
-}
-
-/// Renders an explanation in a format.
-pub(super) fn rendered(explanation: &Explanation, format: ProofFormat) -> String {
-    match format {
-        ProofFormat::Text => explanation.to_text(),
-        ProofFormat::Json => format!("{:#}\n", explanation.to_json()),
-        ProofFormat::Dot => explanation.to_dot(),
-    }
 }

@@ -2,12 +2,12 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::FromArgMatches as _;
 
 use crate::args::{Arguments, Command};
 use crate::{
-    check, check_oracles, completions, datalog, export, list, man, new, output, query, recheck, rules, show, shrink,
-    stop, why,
+    check, check_oracles, completions, datalog, explain, export, groups, list, man, new, output, query, recheck, rules,
+    show, shrink, stop, why,
 };
 use actcheck_base::name_program;
 use actcheck_config::SCHEMA;
@@ -19,7 +19,8 @@ use actcheck_config::SCHEMA;
 pub fn run(sources_digest: &'static str) -> ExitCode {
     name_program(sources_digest);
     // clap prints help, version and usage errors itself; after a usage error it exits with 2.
-    let arguments = Arguments::parse();
+    let matches = groups::program().get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let done = match arguments.command {
         Command::Analyse(args) => crate::analyse::analyse(&args).map(|()| 0),
         Command::Report(args) => crate::report::report(&args).map(|()| 0),
@@ -28,6 +29,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),
         Command::Compare(args) => crate::compare::compare(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
+        Command::Explain(args) => explain::explain(&args).map(|()| 0),
         Command::Export(args) => export::export(&args).map(|()| 0),
         Command::Health(args) => crate::health::health(&args),
         Command::List(args) => list::list(&args).map(|()| 0),
@@ -47,10 +49,10 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
             Ok(0)
         }
         Command::Completions(args) => {
-            completions::completions(&args);
+            completions::completions(&args, groups::command_tree());
             Ok(0)
         }
-        Command::Man(args) => man::man(&args).map(|()| 0),
+        Command::Man(args) => man::man(&args, groups::command_tree()).map(|()| 0),
     };
     match done {
         Ok(code) => ExitCode::from(code),

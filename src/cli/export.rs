@@ -117,7 +117,7 @@ fn print_dataset(dataset: &Dataset) {
 /// Writes a stored run as a configuration.
 fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Diagnostics> {
     let run = history.run(run)?;
-    let recalled = Env::recall(history, &run.row.campaign, args.config.as_deref())?;
+    let recalled = Env::from_history(history, &run.row.campaign, args.config.as_deref())?;
     let file = match &args.output {
         Some(file) => file.clone(),
         None if args.regression => new_regression(&recalled.0, &run.row.run)?,

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::args::{Format, HistoryArgs};
+use crate::options::{Format, HistoryArgs};
 use crate::{compare, history_dir, output};
 use actcheck_analysis::HealthMeter;
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -31,12 +31,12 @@ pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
     };
     let summary = examine(&history, &campaign)?;
     if summary.health.runs == 0 {
-        return Err(Diagnostic::error("X041", format!("campaign {campaign} has no runs to examine"))
+        return Err(Diagnostic::error("X057", format!("campaign {campaign} has no runs to examine"))
             .help("`actcheck list` shows the runs of all campaigns")
             .into());
     }
     output::print(&match args.format {
-        Format::Table => health_text(&summary),
+        Format::Text => health_text(&summary),
         Format::Csv => health_table(&summary).render(Format::Csv.into()),
         Format::Json => format!("{:#}\n", health_json(&summary)),
     });

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::args::HistoryArgs;
+use crate::options::HistoryArgs;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::History;
 

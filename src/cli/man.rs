@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Command};
 use clap_mangen::Man;
 
-use crate::command_tree::command_tree;
 use crate::{output, written};
 use actcheck_base::{Diagnostic, Diagnostics};
 
@@ -19,9 +18,8 @@ pub struct ManArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Prints the manual, or writes its pages.
-pub fn man(args: &ManArgs) -> Result<(), Diagnostics> {
-    let mut root = command_tree();
+/// Prints the manual, or writes its pages. `root` is the program with all commands.
+pub fn man(args: &ManArgs, mut root: Command) -> Result<(), Diagnostics> {
     // Gives every command its full name.
     root.build();
     match &args.out {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::args::Format;
+use crate::options::Format;
 use crate::progress::Progress;
 use crate::{output, stop};
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -14,7 +14,7 @@ use actcheck_history::merge::{MergeOptions, MergePlan, PlannedMerge, carry_out, 
 use actcheck_report::Table;
 
 /// Maximum number of run numbers in a message; the JSON table has all.
-const TOLD: usize = 10;
+const MAX_LISTED: usize = 10;
 
 /// `actcheck merge`
 #[derive(Debug, Args)]
@@ -126,8 +126,8 @@ fn campaign_json(campaign: &PlannedMerge) -> Value {
 /// Returns a warning if no part of a campaign has some of its runs.
 fn lacking(campaign: &PlannedMerge) -> Option<Diagnostic> {
     let missing = &campaign.missing;
-    let mut numbers: Vec<String> = missing.iter().take(TOLD).map(|index| (index + 1).to_string()).collect();
-    if missing.len() > TOLD {
+    let mut numbers: Vec<String> = missing.iter().take(MAX_LISTED).map(|index| (index + 1).to_string()).collect();
+    if missing.len() > MAX_LISTED {
         numbers.push("…".to_owned());
     }
     let message = format!(

@@ -23,6 +23,17 @@ pub fn print_bytes(results: &[u8]) {
     }
 }
 
+/// Prints messages: to the error stream if results go to standard output (`printed`).
+pub fn tell(lines: &[String], printed: bool) {
+    let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
+    if printed {
+        // If the error stream itself fails, there is nowhere left to report it.
+        let _ = std::io::stderr().lock().write_all(text.as_bytes());
+    } else {
+        print(&text);
+    }
+}
+
 /// Whether results may be coloured.
 pub fn colour() -> bool {
     std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
@@ -42,6 +53,10 @@ pub fn print_diagnostics(faults: &Diagnostics) {
     let errors = faults.iter().filter(|fault| fault.severity == Severity::Error).count();
     if errors > 1 {
         text.push_str(&format!("{errors} errors\n"));
+    }
+    // For people only; programs read the codes.
+    if let (true, Some(first)) = (std::io::stderr().is_terminal(), faults.iter().next()) {
+        text.push_str(&format!("`actcheck explain {}` prints usual causes and the way out\n", first.code));
     }
     // If the error stream itself fails, there is nowhere left to report it.
     let _ = std::io::stderr().lock().write_all(text.as_bytes());

@@ -1,12 +1,39 @@
 //! `actcheck query`
 
 use std::io::Read as _;
+use std::path::PathBuf;
 
-use crate::args::{QueryArgs, QueryFormat};
+use clap::Args;
+
+use crate::options::{HistoryArgs, QueryFormat};
 use crate::{history_dir, named_queries, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Term, names};
 use actcheck_history::{Cancel, QueryAnswer};
 use actcheck_report::{Table, TableFormat, answer_table};
+
+/// `actcheck query`
+#[derive(Debug, Args)]
+pub struct QueryArgs {
+    /// The query's text
+    #[arg(value_name = "SPARQL", required_unless_present_any = ["file", "named", "list_named"])]
+    #[arg(conflicts_with_all = ["file", "named", "list_named"])]
+    pub text: Option<String>,
+    /// A file with the query
+    #[arg(short, long, value_name = "FILE", conflicts_with_all = ["named", "list_named"])]
+    pub file: Option<PathBuf>,
+    /// Name of a query: a shipped one, or `ontology/queries/NAME.rq` here
+    #[arg(long, value_name = "NAME", conflicts_with = "list_named")]
+    pub named: Option<String>,
+    /// List the named queries with their descriptions
+    #[arg(long)]
+    pub list_named: bool,
+    /// The folder of the history.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How the answer is printed (turtle: for CONSTRUCT and DESCRIBE)
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: QueryFormat,
+}
 
 /// Runs a query and prints its answer. Ctrl-C stops a long query.
 pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
@@ -26,10 +53,10 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
         }
         (QueryFormat::Turtle, _) => {
             return Err(Diagnostic::error("X004", "this query's answer is a table, but Turtle is for graphs")
-                .help("use CONSTRUCT or DESCRIBE, or `--format table`, `csv` or `json`")
+                .help("use CONSTRUCT or DESCRIBE, or `--format text`, `csv` or `json`")
                 .into());
         }
-        (QueryFormat::Table, _) => TableFormat::Table,
+        (QueryFormat::Text, _) => TableFormat::Table,
         (QueryFormat::Csv, _) => TableFormat::Csv,
         (QueryFormat::Json, _) => TableFormat::Json,
     };
@@ -40,12 +67,12 @@ pub fn query(args: &QueryArgs) -> Result<(), Diagnostics> {
 /// Prints the named queries. Needs no history.
 fn list_named(format: QueryFormat) -> Result<(), Diagnostics> {
     let format = match format {
-        QueryFormat::Table => TableFormat::Table,
+        QueryFormat::Text => TableFormat::Table,
         QueryFormat::Csv => TableFormat::Csv,
         QueryFormat::Json => TableFormat::Json,
         QueryFormat::Turtle => {
             return Err(Diagnostic::error("X004", "the list of queries is a table, but Turtle is for graphs")
-                .help("use `--format table`, `csv` or `json`")
+                .help("use `--format text`, `csv` or `json`")
                 .into());
         }
     };

@@ -1,13 +1,13 @@
 //! `actcheck recheck`
 
-use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::args::{Format, HistoryArgs};
+use crate::options::{Format, HistoryArgs};
 use crate::progress::Progress;
 use crate::why::ontology_file;
+use crate::work::all_cores;
 use crate::{clock, history_dir, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean};
 use actcheck_campaign::{Ending, RecheckOptions, RuleSet, recheck as judge_anew};
@@ -15,7 +15,7 @@ use actcheck_history::{History, RunFilter, RunRow};
 use actcheck_report::{RecheckSummary, recheck_json, recheck_table, recheck_text};
 
 /// Maximum number of faults that are reported; the rest are counted.
-const TOLD: usize = 5;
+const MAX_LISTED: usize = 5;
 
 /// `actcheck recheck`
 #[derive(Debug, Args)]
@@ -73,7 +73,7 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     );
     progress.finish();
     output::print(&match args.format {
-        Format::Table => recheck_text(&summary),
+        Format::Text => recheck_text(&summary),
         Format::Csv => recheck_table(&summary).render(args.format.into()),
         Format::Json => format!("{:#}\n", recheck_json(&summary)),
     });
@@ -121,14 +121,10 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
     Ok(runs)
 }
 
-fn all_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, NonZero::get)
-}
-
 fn first_of(faults: Diagnostics) -> Diagnostics {
-    let left_out = faults.len().saturating_sub(TOLD);
+    let left_out = faults.len().saturating_sub(MAX_LISTED);
     let mut told = Diagnostics::new();
-    faults.into_iter().take(TOLD).for_each(|fault| told.push(fault));
+    faults.into_iter().take(MAX_LISTED).for_each(|fault| told.push(fault));
     if left_out > 0 {
         told.push(Diagnostic::error("X035", format!("{left_out} more runs could not be judged")));
     }

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::run::quietly;
+use crate::work::quietly;
 use crate::{case, clock};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign as campaign;
-use actcheck_campaign::{Env, Manner, run_cases};
+use actcheck_campaign::{Env, RunContext, run_cases};
 use actcheck_config::Overrides;
 use actcheck_history::History;
 use actcheck_report::CaseSummary;
@@ -62,10 +62,10 @@ fn name_of(file: &Path) -> String {
 /// # Errors
 /// A scene can no longer be generated, or writing failed.
 pub fn run(cases: &[(String, Env)], history: &History, jobs: usize) -> Result<Vec<CaseSummary>, Diagnostics> {
-    let manner = Manner { clock: clock::system(), disturb: None };
+    let context = RunContext { clock: clock::system(), disturb: None };
     let mut done = Vec::new();
     quietly(|| {
-        run_cases(cases, history, jobs, &manner, &mut |at, made| {
+        run_cases(cases, history, jobs, &context, &mut |at, made| {
             let (file, env) = &cases[at];
             done.push(case::summarise(file, env, made));
         })

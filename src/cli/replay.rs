@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
-use crate::args::{Format, HistoryArgs};
+use crate::options::{Format, HistoryArgs};
 use crate::replay_text::{replay_json, replay_table, replay_text};
-use crate::run::{all_cores, quietly};
+use crate::work::{all_cores, quietly};
 use crate::{clock, history_dir, output};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_campaign::{Env, Fit, Manner, Recalled, Replay, replay_all};
+use actcheck_campaign::{Env, Fit, Replay, ReplayOptions, RunContext, StoredCampaign, replay_all};
 use actcheck_data::Choices;
 use actcheck_history::{History, RunDetail, RunFilter};
 
@@ -58,8 +58,8 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
     let bar = ProgressBar::with_draw_target(Some(runs.len() as u64), ProgressDrawTarget::stderr());
     let fit = if args.exact { Fit::Exact } else { Fit::Nearest };
     let jobs = args.jobs.map_or_else(all_cores, usize::from);
-    let manner = Manner { clock: clock::system(), disturb: None };
-    let replayed = quietly(|| replay_all(&history, &campaigns, &runs, (fit, jobs), &manner, || bar.inc(1)));
+    let options = ReplayOptions { fit, jobs, context: RunContext { clock: clock::system(), disturb: None } };
+    let replayed = quietly(|| replay_all(&history, &campaigns, &runs, &options, || bar.inc(1)));
     bar.finish_and_clear();
     let (mut done, mut faults) = (Vec::new(), Diagnostics::new());
     for one in replayed? {
@@ -69,7 +69,7 @@ pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
         }
     }
     output::print(&match args.format {
-        Format::Table => replay_text(&done, faults.len()),
+        Format::Text => replay_text(&done, faults.len()),
         Format::Json => format!("{:#}\n", replay_json(&done)),
         Format::Csv => replay_table(&done).render(Format::Csv.into()),
     });
@@ -100,7 +100,7 @@ fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnost
         }
     }
     if runs.is_empty() {
-        return Err(Diagnostic::error("X030", "there is no run to replay")
+        return Err(Diagnostic::error("X036", "there is no run to replay")
             .help("the campaign has no runs; `actcheck list` shows those of all campaigns")
             .into());
     }
@@ -111,18 +111,22 @@ fn runs(history: &History, args: &ReplayArgs) -> Result<Vec<RunDetail>, Diagnost
 fn sample(mut runs: Vec<String>, size: usize, seed: u64) -> Vec<String> {
     let mut choices = Choices::random(seed, 0);
     while runs.len() > size {
-        runs.remove(choices.index("sample", runs.len()));
+        runs.remove(choices.index("sample".into(), runs.len()));
     }
     runs
 }
 
 /// The campaigns of the runs, as they are now and as they were.
-fn recall(history: &History, runs: &[RunDetail], args: &ReplayArgs) -> Result<BTreeMap<String, Recalled>, Diagnostics> {
+fn recall(
+    history: &History,
+    runs: &[RunDetail],
+    args: &ReplayArgs,
+) -> Result<BTreeMap<String, StoredCampaign>, Diagnostics> {
     let mut campaigns = BTreeMap::new();
     for run in runs {
         let id = &run.row.campaign;
         if !campaigns.contains_key(id) {
-            campaigns.insert(id.clone(), Env::recall(history, id, args.config.as_deref())?);
+            campaigns.insert(id.clone(), Env::from_history(history, id, args.config.as_deref())?);
         }
     }
     Ok(campaigns)

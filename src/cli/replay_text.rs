@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use actcheck_base::names;
-use actcheck_campaign::{Difference, Replay};
+use actcheck_campaign::{Replay, TraceDifference};
 use actcheck_report::Table;
 
 /// Maximum number of lines of one kind below a run; the rest are counted.
@@ -75,7 +75,7 @@ fn difference_text(replay: &Replay) -> String {
             false => format!("it ended differently: was {was}, is {is}"),
         };
     };
-    let Difference { time_secs, step, body, quantity, unit, was, is, by, others } = found;
+    let TraceDifference { time_secs, step, body, quantity, unit, was, is, by, others } = found;
     let place = if *step == 0 { "before the first action".to_owned() } else { format!("in action {step}") };
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     let by = by.map_or_else(String::new, |by| format!(", by {by:.3e}{unit}"));
@@ -88,7 +88,7 @@ pub fn replay_table(replays: &[Replay]) -> Table {
     let columns = ["run", "same", "time_secs", "step", "body", "quantity", "unit", "was", "is", "by", "changed"];
     let mut table = Table::new(columns);
     for replay in replays {
-        let of = |value: fn(&Difference) -> Value| replay.difference.as_ref().map_or(Value::Null, value);
+        let of = |value: fn(&TraceDifference) -> Value| replay.difference.as_ref().map_or(Value::Null, value);
         let changed: Vec<String> =
             replay.changes.iter().map(|change| format!("{} {}", change.kind.word(), change.name)).collect();
         table.rows.push(vec![

@@ -71,7 +71,7 @@ impl ReportArgs {
     /// Whether a report goes to standard output.
     ///
     /// # Errors
-    /// X051: several reports would go there. X055: a report needs a feature that this program was built without.
+    /// X058: several reports would go there. X055: a report needs a feature that this program was built without.
     fn prints(&self) -> Result<bool, Diagnostics> {
         let mut faults = Diagnostics::new();
         let printed = |file: &Option<PathBuf>| file.as_deref().is_some_and(|file| file.as_os_str() == "-");
@@ -79,7 +79,7 @@ impl ReportArgs {
         let streams = self.formats.printed() + files;
         if streams > 1 {
             faults.push(
-                Diagnostic::error("X051", "only one report can go to standard output")
+                Diagnostic::error("X058", "only one report can go to standard output")
                     .help("print one of them with `-`, and name files for the others"),
             );
         }
@@ -102,7 +102,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
     if args.html.is_some() || args.rrd.is_some() {
         told.extend(write_watched(args, &history)?);
     }
-    report_formats::tell(&told, printed);
+    output::tell(&told, printed);
     Ok(())
 }
 

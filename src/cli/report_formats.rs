@@ -2,7 +2,6 @@
 //! formats.
 
 use std::collections::BTreeSet;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -244,16 +243,5 @@ impl<'a> AllureFolder<'a> {
             told.push(format!("{} runs have no pictures and explanations: their traces can't be read", self.untraced));
         }
         told
-    }
-}
-
-/// Prints messages: to the error stream if a report goes to standard output.
-pub(super) fn tell(lines: &[String], printed: bool) {
-    let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
-    if printed {
-        // If the error stream itself fails, there is nowhere left to report it.
-        let _ = std::io::stderr().lock().write_all(text.as_bytes());
-    } else {
-        output::print(&text);
     }
 }

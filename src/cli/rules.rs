@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::Value;
 
-use crate::args::{Format, HistoryArgs};
+use crate::options::{Format, HistoryArgs};
 use crate::why::ontology_file;
 use crate::{history_dir, output};
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_history::RunFilter;
 use actcheck_ontology as ontology;
-use actcheck_ontology::{Action, Ontology, Property, RuleLanguage};
-use actcheck_report::{Share, Table};
+use actcheck_ontology::{Action, Ontology, Property};
+use actcheck_report::{Proportion, Table};
 use actcheck_verdict::Counts;
 
 /// `actcheck rules`
@@ -43,7 +43,7 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
     let counts = |property: &Property| judged.get(&property.iri).copied().unwrap_or_default();
     let properties = ontology.properties.values();
     let mut table = match args.format {
-        Format::Table => Table::new(["property", "label", "language", "file", "actions", "unit", "passed"]),
+        Format::Text => Table::new(["property", "label", "language", "file", "actions", "unit", "passed"]),
         Format::Csv | Format::Json => Table::new(
             ["property", "label", "language", "file", "actions", "precondition_of", "unit"]
                 .into_iter()
@@ -52,7 +52,7 @@ pub fn rules(args: &RulesArgs) -> Result<(), Diagnostics> {
         ),
     };
     table.rows = match args.format {
-        Format::Table => properties.map(|property| for_people(property, &ontology, counts(property))).collect(),
+        Format::Text => properties.map(|property| for_people(property, &ontology, counts(property))).collect(),
         Format::Csv | Format::Json => {
             properties.map(|property| for_programs(property, &ontology, counts(property))).collect()
         }
@@ -65,7 +65,8 @@ fn for_people(property: &Property, ontology: &Ontology, counts: Counts) -> Vec<V
     let preconditions = named(ontology, |action| action.preconditions.contains(&property.iri));
     let mut actions = named(ontology, |action| action.success_properties.contains(&property.iri));
     actions.extend(preconditions.into_iter().map(|name| format!("{name} (before it)")));
-    let rate = Share::new(counts.passed, counts.decided()).map_or_else(|| "–".to_owned(), |share| share.to_string());
+    let rate =
+        Proportion::new(counts.passed, counts.decided()).map_or_else(|| "–".to_owned(), |share| share.to_string());
     let unit = property.unit.clone().unwrap_or_default();
     let [name, label, language, file] = described(property);
     vec![name, label, language, file, actions.join(", ").into(), unit.into(), rate.into()]
@@ -74,8 +75,8 @@ fn for_people(property: &Property, ontology: &Ontology, counts: Counts) -> Vec<V
 fn for_programs(property: &Property, ontology: &Ontology, counts: Counts) -> Vec<Value> {
     let actions = named(ontology, |action| action.success_properties.contains(&property.iri));
     let preconditions = named(ontology, |action| action.preconditions.contains(&property.iri));
-    let share = Share::new(counts.passed, counts.decided());
-    let part = |part: fn(&Share) -> f64| Value::from(share.as_ref().map(part));
+    let share = Proportion::new(counts.passed, counts.decided());
+    let part = |part: fn(&Proportion) -> f64| Value::from(share.as_ref().map(part));
     let mut row: Vec<Value> = described(property).into();
     row.extend([actions.join(" ").into(), preconditions.join(" ").into(), property.unit.clone().into()]);
     row.extend(Outcome::ALL.map(|outcome| counts.get(outcome).into()));
@@ -85,10 +86,7 @@ fn for_programs(property: &Property, ontology: &Ontology, counts: Counts) -> Vec
 
 /// Name, label, language and file.
 fn described(property: &Property) -> [Value; 4] {
-    let language = match property.rule.language {
-        RuleLanguage::Datalog => "Datalog",
-        RuleLanguage::Sparql => "SPARQL",
-    };
+    let language = property.rule.language.word();
     let file = &*property.rule.source.name;
     [property.name.as_str(), property.label.as_str(), language, file].map(Value::from)
 }

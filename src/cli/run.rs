@@ -1,21 +1,24 @@
 //! `actcheck run`
 
-use std::num::NonZero;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
 
-use crate::args::{Format, RunArgs};
+use crate::options::Format;
 use crate::progress::Progress;
+use crate::run_args::RunArgs;
 use crate::session::{self, Opened, Session};
+use crate::work::{all_cores, quietly};
 use crate::{case, clock, health, output, shrink, stop};
 use actcheck_analysis as analysis;
 use actcheck_analysis::{Interval, Mirror};
-use actcheck_base::{Diagnostics, Outcome};
-use actcheck_campaign::{CampaignEnd, Ending, Env, Kept, Manner, Options, Spent, WeightedRate, resume_all};
+use actcheck_base::{Diagnostic, Diagnostics, Outcome};
+use actcheck_campaign::{
+    CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns, WeightedRate, resume_all,
+};
 use actcheck_history as history;
-use actcheck_history::{History, RunFilter};
+use actcheck_history::{History, RunFilter, RunRecord};
 use actcheck_report::{
     CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json, campaign_table,
     campaign_text, health_json, health_lines, shrunk_json, shrunk_text, with_shrunk,
@@ -35,39 +38,50 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     let session = match session::open(args, &budget, jobs)? {
         Opened::Case(env) => return case::run(args, *env),
         Opened::Campaign(session) => *session,
+        Opened::NoneFailed(campaign) => {
+            output::print_diagnostics(&none_failed(&campaign).into());
+            return Ok(0);
+        }
     };
     output::print_diagnostics(&session.env.campaign.warnings);
-    let mut progress = Progress::new(session.env.runs_to_make(), session.env.campaign.limits.time_secs);
+    let planned = session.runs_to_make();
+    let mut progress = Progress::new(planned, session.env.campaign.limits.time_secs);
     // From here on, an interrupt must end the campaign properly.
     shown.get_or_init(|| progress.bar());
     session.begin((clock.now)())?;
-    let Session { env, history, id, kept, regressions, .. } = session;
+    let Session { env, history, id, failed, kept, regressions, .. } = session;
 
-    let options = Options { jobs, manner: Manner { clock, disturb: None } };
-    let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::again).collect();
+    let options = CampaignOptions { jobs, context: RunContext { clock, disturb: None } };
+    let mut runs: Vec<RunSummary> = kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
-    let end = quietly(|| {
-        resume_all(&env, (&history, Kept::of(&kept)), &id, &options, &stop, |record| {
-            let summary = RunSummary::of(record);
-            progress.run(&summary);
-            runs.push(summary);
-            if runs.len().is_multiple_of(MIRROR_EVERY) {
-                mirror(&history);
-            }
-        })
+    let mut on_run = |record: &RunRecord| {
+        let summary = RunSummary::of(record);
+        progress.run(&summary);
+        runs.push(summary);
+        if runs.len().is_multiple_of(MIRROR_EVERY) {
+            mirror(&history);
+        }
+    };
+    let (end, faults) = quietly(|| match &failed {
+        Some(failed) => failed.run((&env, &history, &id), &options, &stop, &mut on_run),
+        None => {
+            let stored = StoredRuns::of(&kept);
+            (resume_all(&env, &history, &id, stored, &options, &stop, &mut on_run), Diagnostics::new())
+        }
     });
     progress.finish();
     // Sums are taken in the order of indices, so that a campaign merged from parts gets bit-identical results.
     runs.sort_by_key(|run| run.index);
     let finished = finish(&history, &id, &runs, &end, (clock.now)());
     let mut summary = summarise(&env, id.clone(), runs, &end);
-    summary.regressions = regressions;
+    (summary.planned, summary.regressions) = (planned, regressions);
     if finished.is_ok() {
         mirror(&history);
         summary.failure_modes = failure_modes(&history, id)?;
     }
-    // If the history failed, only that fault is reported.
-    let health = if finished.is_ok() { Some(health::examine(&history, &summary.campaign)?) } else { None };
+    // If the history failed, only that fault is reported. Failed runs are no sample whose health could be examined.
+    let health =
+        if finished.is_ok() && failed.is_none() { Some(health::examine(&history, &summary.campaign)?) } else { None };
     let results = Results { summary: &summary, health: health.as_ref(), format: args.format };
     let shrinks = args.shrink && finished.is_ok() && is_whole(&end);
     if shrinks {
@@ -78,9 +92,16 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
     match end.ending {
         Ending::Stopped(faults) => Err(faults),
         _ if shrinks && stop.load(Ordering::Relaxed) => finished.map(|()| stop::INTERRUPTED),
+        _ if faults.has_errors() => Err(faults),
         Ending::Finished | Ending::Budget(_) => finished.map(|()| summary.exit_code()),
         Ending::Interrupted => finished.map(|()| stop::INTERRUPTED),
     }
+}
+
+/// X039: `--last-failed` has nothing to run.
+fn none_failed(campaign: &str) -> Diagnostic {
+    Diagnostic::warning("X039", format!("no run failed in campaign {campaign}, the last one of this configuration"))
+        .help("run the configuration without `--last-failed` to try all its scenes")
 }
 
 /// Updates the tables beside the history. They can be rebuilt at any time, so a fault is only reported.
@@ -113,7 +134,7 @@ struct Results<'a> {
 impl Results<'_> {
     fn print(&self) {
         output::print(&match self.format {
-            Format::Table => {
+            Format::Text => {
                 campaign_text(self.summary, output::colour()) + &self.health.map(health_lines).unwrap_or_default()
             }
             Format::Csv => campaign_table(self.summary).render(self.format.into()),
@@ -137,12 +158,12 @@ impl Results<'_> {
     /// Prints the results with the shrunk runs. The table is printed before shrinking, so that users need not wait for
     /// it; CSV and JSON are one document.
     fn print_with(&self, shrink: impl FnOnce() -> shrink::ShrunkModes) -> Result<(), Diagnostics> {
-        if self.format == Format::Table {
+        if self.format == Format::Text {
             self.print();
         }
         let shrunk = shrink();
         output::print(&match self.format {
-            Format::Table => shrunk.done.iter().map(|one| format!("\n{}", shrunk_text(one))).collect(),
+            Format::Text => shrunk.done.iter().map(|one| format!("\n{}", shrunk_text(one))).collect(),
             Format::Csv => with_shrunk(campaign_table(self.summary), &shrunk.done).render(self.format.into()),
             Format::Json => {
                 let mut json = self.json();
@@ -165,22 +186,8 @@ fn examples(summary: &CampaignSummary) -> Vec<(String, u64)> {
         .collect()
 }
 
-/// As many workers as there are cores.
-pub(super) fn all_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, NonZero::get)
-}
-
-/// Silences panic messages, which would break the progress bar: a crash of the simulation is stored with its run.
-pub(super) fn quietly<T>(work: impl FnOnce() -> T) -> T {
-    let before = std::panic::take_hook();
-    std::panic::set_hook(Box::new(|_| {}));
-    let result = work();
-    std::panic::set_hook(before);
-    result
-}
-
 /// The budget that ended a campaign.
-fn spent(end: &CampaignEnd) -> Option<Spent> {
+fn spent(end: &CampaignResult) -> Option<ExhaustedBudget> {
     match end.ending {
         Ending::Budget(spent) => Some(spent),
         _ => None,
@@ -188,7 +195,7 @@ fn spent(end: &CampaignEnd) -> Option<Spent> {
 }
 
 /// Whether a campaign ended on its own, without an interrupt or a fault.
-fn is_whole(end: &CampaignEnd) -> bool {
+fn is_whole(end: &CampaignResult) -> bool {
     matches!(end.ending, Ending::Finished | Ending::Budget(_))
 }
 
@@ -197,7 +204,7 @@ fn finish(
     history: &History,
     id: &str,
     runs: &[RunSummary],
-    end: &CampaignEnd,
+    end: &CampaignResult,
     ended: String,
 ) -> Result<(), Diagnostics> {
     let whole = runs.iter().filter(|run| run.status != history::RunStatus::Broken);
@@ -222,7 +229,7 @@ fn failure_modes(history: &History, id: String) -> Result<Vec<analysis::FailureM
     Ok(analysis::failure_modes(&rows, &scenes))
 }
 
-fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignEnd) -> CampaignSummary {
+fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignResult) -> CampaignSummary {
     let mut properties: Vec<(String, String, Option<String>)> = Vec::new();
     for action in env.campaign.tests.iter().flatten().filter_map(|name| env.ontology.actions.get(name)) {
         for iri in &action.success_properties {
@@ -246,7 +253,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
         privileged: env.is_privileged(),
         planned: env.runs_to_make(),
         discards: end.discards.len() as u64,
-        ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), told: spent.to_string() }),
+        ended_by: spent(end).map(|spent| EndedBy { budget: spent.word(), description: spent.to_string() }),
         interrupted: !is_whole(end),
     };
     summary.search = guided_search(env, &summary, end);
@@ -254,7 +261,7 @@ fn summarise(env: &Env, campaign: String, runs: Vec<RunSummary>, end: &CampaignE
 }
 
 /// The failure rates of a guided search. Returns `None` if another strategy chose the scenes.
-fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignEnd) -> Option<GuidedSearch> {
+fn guided_search(env: &Env, summary: &CampaignSummary, end: &CampaignResult) -> Option<GuidedSearch> {
     let line = |found: &WeightedRate| WeightedLine {
         test: found.test.clone(),
         property: found.property.clone(),

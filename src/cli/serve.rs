@@ -6,12 +6,12 @@ use std::sync::mpsc::channel;
 
 use clap::Args;
 
-use crate::args::HistoryArgs;
+use crate::options::{HistoryArgs, duration};
 use crate::{history_dir, named_queries, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::History;
 use actcheck_serve as serve;
-use actcheck_serve::{Example, Options};
+use actcheck_serve::{ExampleQuery, ServeOptions};
 
 /// `actcheck serve`
 #[derive(Debug, Args)]
@@ -25,9 +25,9 @@ pub struct ServeArgs {
     /// A host name by which clients reach this server, besides addresses and localhost (may be given several times)
     #[arg(long, value_name = "NAME")]
     pub allow_host: Vec<String>,
-    /// Time limit for a query, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
-    pub max_secs: f64,
+    /// Time limit for a query, such as 500ms, 10s or 1m
+    #[arg(long, alias = "max-secs", value_name = "DURATION", default_value = "10s", value_parser = at_most_a_day)]
+    pub max_time: f64,
     /// Maximum number of rows or triples in an answer
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     pub max_rows: u64,
@@ -53,11 +53,9 @@ pub struct ServeQueryArgs {
     pub history: HistoryArgs,
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(seconds) if seconds > 0.0 && seconds <= 86_400.0 => Ok(seconds),
-        _ => Err("must be a number of seconds above 0 and at most 86400, such as 10".to_owned()),
-    }
+fn at_most_a_day(text: &str) -> Result<f64, String> {
+    duration(text)
+        .and_then(|secs| if secs <= 86_400.0 { Ok(secs) } else { Err(format!("`{text}` must be at most a day (24h)")) })
 }
 
 /// Serves until Ctrl-C.
@@ -92,7 +90,7 @@ pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
         .map_err(|error| Diagnostic::error("X005", format!("the query can't be read or answered: {error}")).into())
 }
 
-fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
+fn options(args: &ServeArgs, folder: &Path) -> Result<ServeOptions, Diagnostics> {
     let program = std::env::current_exe().map_err(|error| {
         Diagnostic::error("X052", format!("the path of this program can't be found: {error}"))
             .help("start actcheck by its full path")
@@ -100,13 +98,13 @@ fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
     let history = folder.display().to_string();
     let with_history = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).chain([history.clone()]).collect();
     let named = named_queries::all()?;
-    let example = |query: named_queries::NamedQuery| Example {
+    let example = |query: named_queries::NamedQuery| ExampleQuery {
         name: query.name,
         title: query.title,
         description: query.description,
         query: query.text,
     };
-    Ok(Options {
+    Ok(ServeOptions {
         history: folder.to_owned(),
         program,
         query_arguments: with_history(&["serve-query", "--history"]),
@@ -114,7 +112,7 @@ fn options(args: &ServeArgs, folder: &Path) -> Result<Options, Diagnostics> {
         address: args.bind,
         port: args.port,
         hosts: args.allow_host.clone(),
-        most_secs: args.max_secs,
+        most_secs: args.max_time,
         most_rows: args.max_rows,
         most_bytes: args.max_mb * 1_000_000,
         most_memory: args.max_memory_mb * 1_000_000,

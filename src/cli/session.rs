@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use crate::args::{HistoryArgs, RunArgs};
+use crate::options::HistoryArgs;
+use crate::run_args::RunArgs;
 use crate::{configurations, history_dir, regressions};
 use actcheck_base::{Diagnostics, digest_of};
-use actcheck_campaign::{Env, unfinished};
+use actcheck_campaign::{Env, LastFailed, unfinished};
 use actcheck_config as config;
 use actcheck_config::Overrides;
 use actcheck_history::{ActionDetail, CampaignRecord, History, RunDetail, RunFilter};
@@ -18,6 +19,8 @@ pub enum Opened {
     Case(Box<Env>),
     /// A campaign; its regressions have been run.
     Campaign(Box<Session>),
+    /// No run of this campaign failed, so `--last-failed` has no runs.
+    NoneFailed(String),
 }
 
 /// A campaign and its history.
@@ -30,6 +33,8 @@ pub struct Session {
     pub id: String,
     /// Whether it is resumed.
     goes_on: bool,
+    /// The runs of `--last-failed`, which replace the configuration's schedule.
+    pub failed: Option<LastFailed>,
     /// Runs that are in the history already, by index.
     pub kept: Vec<RunDetail>,
     /// The results of the project's cases.
@@ -39,6 +44,9 @@ pub struct Session {
 /// Prepares the campaign or case of the arguments, and runs the project's cases. They also run when a campaign is
 /// resumed, because its results include them.
 pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diagnostics> {
+    if args.last_failed {
+        return open_failed(args, budget);
+    }
     let going_on = args.resume.as_deref().map(|id| find(args, id)).transpose()?;
     let env = match &going_on {
         Some((history, record)) => Env::resume(history, record, budget.clone())?,
@@ -61,14 +69,48 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
         Some(id) => (id, true),
         None => (history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?, false),
     };
-    Ok(Opened::Campaign(Box::new(Session { env, history, id, goes_on, kept, regressions })))
+    Ok(Opened::Campaign(Box::new(Session { env, history, id, goes_on, failed: None, kept, regressions })))
+}
+
+/// Prepares the failed runs of a configuration's last campaign.
+fn open_failed(args: &RunArgs, budget: &Budget) -> Result<Opened, Diagnostics> {
+    let config = args.config.as_deref().ok_or_else(|| configurations::none_given("run"))?;
+    let loaded = config::load(config, &overrides(args))?;
+    if loaded.case.is_some() {
+        // A case refuses the option together with all others that don't fit.
+        return Ok(Opened::Case(Box::new(Env::prepare_within(config, &overrides(args), budget.clone())?)));
+    }
+    let history = History::open_existing(&loaded.history)?;
+    let (env, failed) = LastFailed::find(&history, config, budget.clone())?;
+    if failed.is_empty() {
+        return Ok(Opened::NoneFailed(failed.campaign));
+    }
+    let id = history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?;
+    let (kept, regressions) = (Vec::new(), Vec::new());
+    Ok(Opened::Campaign(Box::new(Session {
+        env,
+        history,
+        id,
+        goes_on: false,
+        failed: Some(failed),
+        kept,
+        regressions,
+    })))
 }
 
 impl Session {
+    /// Number of runs to make.
+    pub fn runs_to_make(&self) -> u64 {
+        self.failed.as_ref().map_or_else(|| self.env.runs_to_make(), LastFailed::len)
+    }
+
     /// Writes the beginning of a new campaign, or removes the end of a resumed one.
     pub fn begin(&self, now: String) -> Result<(), Diagnostics> {
         if self.goes_on {
             return self.history.reopen_campaign(&self.id);
+        }
+        if let Some(failed) = &self.failed {
+            return self.history.begin_campaign(&failed.record(&self.env, self.id.clone(), now));
         }
         let stem = Path::new(&*self.env.campaign.source.name).file_stem();
         let name = stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());

@@ -1,11 +1,31 @@
 //! `actcheck show`
 
-use crate::args::{Format, ShowArgs};
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::options::{Format, HistoryArgs};
 use crate::picture::Picture;
 use crate::{history_dir, output};
 use actcheck_base::Diagnostics;
 use actcheck_history::RunDetail;
 use actcheck_report::{Table, run_json, run_text};
+
+/// `actcheck show`
+#[derive(Debug, Args)]
+pub struct ShowArgs {
+    /// Id of the run, or a unique prefix
+    pub run: String,
+    /// The folder of the history.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// Draw the scene before and after the run into this file, as a raster (.png) or vector image (.svg)
+    #[arg(long, value_name = "FILE.png")]
+    pub picture: Option<PathBuf>,
+    /// How it is printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
 
 /// Prints one run, and draws it if a picture is requested.
 pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
@@ -13,7 +33,7 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     let history = history_dir::open_to_read(&args.history)?;
     let run = history.run(&args.run)?;
     output::print(&match args.format {
-        Format::Table => run_text(&run),
+        Format::Text => run_text(&run),
         Format::Json => format!("{:#}\n", run_json(&run)),
         Format::Csv => outcomes(&run).render(Format::Csv.into()),
     });

@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use crate::args::HistoryArgs;
+use crate::options::{Format, HistoryArgs, duration};
 use crate::picture::Picture;
-use crate::run::{all_cores, quietly};
+use crate::work::{all_cores, quietly};
 use crate::{clock, history_dir, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk, unit_of};
-use actcheck_campaign::{Env, Manner};
+use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk};
+use actcheck_campaign::{Env, RunContext};
 use actcheck_data::Choice;
 use actcheck_history::{History, RunRecord};
-use actcheck_report::{ShrunkChoice, ShrunkSummary, shrunk_json, shrunk_text};
+use actcheck_report::{ShrunkChoice, ShrunkSummary, Table, shrunk_json, shrunk_text};
 use actcheck_rules::Budget;
 
 /// `actcheck shrink`
@@ -28,12 +28,12 @@ pub struct ShrinkArgs {
     /// Maximum number of simulations, including those for the explanation
     #[arg(long, value_name = "N", default_value_t = TRIALS, value_parser = clap::value_parser!(u64).range(1..))]
     pub trials: u64,
-    /// Time limit in seconds [default: no limit]
-    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    /// Time limit, such as 90s, 10m or 2h [default: no limit]
+    #[arg(long, value_name = "DURATION", value_parser = duration)]
     pub time: Option<f64>,
     /// A scene must fail in K of N repetitions with fresh noise [default: once, with the recorded noise]
-    #[arg(long, value_name = "K/N", value_parser = repeat)]
-    pub repeat: Option<Repeat>,
+    #[arg(long, alias = "repeat", value_name = "K/N", value_parser = must_fail)]
+    pub must_fail: Option<Repeat>,
     /// Number of workers, each with one simulation; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
@@ -46,48 +46,39 @@ pub struct ShrinkArgs {
     /// Draw the shrunk scene before and after the run into this file, as a raster (.png) or vector image (.svg)
     #[arg(long, value_name = "FILE.png")]
     pub picture: Option<PathBuf>,
-    /// How it is printed
+    /// How it is printed (csv: one line for each choice that remains special)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
-    pub format: ShrinkFormat,
+    pub format: Format,
 }
 
 /// Default limit of simulations for one run: three times the number that most runs need.
 pub const TRIALS: u64 = 200;
-
-/// Formats of a shrunk run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum ShrinkFormat {
-    /// Human-readable text
-    #[default]
-    Text,
-    /// Machine-readable
-    Json,
-}
 
 /// Finds the smallest scene that fails in the same way as a run, stores it and prints it. Returns the exit code.
 pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open(&args.history)?;
     let run = history.run(&args.run)?;
-    let (env, _) = Env::recall(&history, &run.row.campaign, args.config.as_deref())?;
-    let manner = Manner { clock: clock::system(), disturb: None };
-    let until = args.time.map(|secs| (manner.clock.secs)() + secs);
+    let (env, _) = Env::from_history(&history, &run.row.campaign, args.config.as_deref())?;
+    let context = RunContext { clock: clock::system(), disturb: None };
+    let until = args.time.map(|secs| (context.clock.secs)() + secs);
     let asked = stop::on_interrupt(|| eprintln!("stopping; the smallest scene so far follows"));
-    let stop = || asked.load(Ordering::Relaxed) || until.is_some_and(|until| (manner.clock.secs)() >= until);
+    let stop = || asked.load(Ordering::Relaxed) || until.is_some_and(|until| (context.clock.secs)() >= until);
     let options = ShrinkOptions {
         property: args.property.as_deref(),
         trials: args.trials,
         jobs: args.jobs.map_or_else(all_cores, usize::from),
-        repeat: args.repeat,
-        manner,
+        repeat: args.must_fail,
+        context,
         stop: &stop,
     };
     let recorded = history.choices(&run.row.run)?;
     let index = env.index_of(&run.row.test, &recorded)?;
     let shrunk = shrink_one(&env, &history, (&run.row.run, index), &options)?;
     output::print(&match args.format {
-        ShrinkFormat::Text => shrunk_text(&shrunk),
-        ShrinkFormat::Json => format!("{:#}\n", shrunk_json(&shrunk)),
+        Format::Text => shrunk_text(&shrunk),
+        Format::Csv => choices_table(&shrunk).render(args.format.into()),
+        Format::Json => format!("{:#}\n", shrunk_json(&shrunk)),
     });
     if let Some(picture) = picture {
         picture.draw(&history, &shrunk.run)?;
@@ -111,9 +102,9 @@ pub fn shrink_modes(
     jobs: usize,
     asked: &AtomicBool,
 ) -> ShrunkModes {
-    let manner = Manner { clock: clock::system(), disturb: None };
+    let context = RunContext { clock: clock::system(), disturb: None };
     let stop = || asked.load(Ordering::Relaxed);
-    let options = ShrinkOptions { property: None, trials: TRIALS, jobs, repeat: None, manner, stop: &stop };
+    let options = ShrinkOptions { property: None, trials: TRIALS, jobs, repeat: None, context, stop: &stop };
     let mut shrunk = ShrunkModes { done: Vec::new(), faults: Diagnostics::new() };
     for (run, index) in examples.iter().take_while(|_| !stop()) {
         match shrink_one(env, history, (run, *index), &options) {
@@ -134,7 +125,7 @@ fn shrink_one(
 ) -> Result<ShrunkSummary, Diagnostics> {
     let recorded = history.choices(run)?;
     let shrunk = quietly(|| shrink::shrink(env, index, &recorded, options, &mut |_| {}))?;
-    let record = shrink::keep(env, history, (run, index), &shrunk, &options.manner)?;
+    let record = shrink::store(env, history, run, index, &shrunk, &options.context)?;
     summary(env, history, run, shrunk, &record)
 }
 
@@ -147,7 +138,7 @@ fn summary(
 ) -> Result<ShrunkSummary, Diagnostics> {
     let influences = shrunk.explained.influences.iter();
     let shown = |id: &Id| match influences.clone().filter(|other| other.id.name == id.name).count() {
-        0 | 1 => id.name.clone(),
+        0 | 1 => id.name.to_string(),
         _ => format!("{} ({})", id.name, id.nth + 1),
     };
     let choices = influences.clone().map(|influence| shrunk_choice(shown(&influence.id), influence));
@@ -168,13 +159,36 @@ fn summary(
     })
 }
 
+/// One row for each choice that remains special.
+fn choices_table(shrunk: &ShrunkSummary) -> Table {
+    let columns = ["run", "name", "value", "nominal", "unit", "needed", "fails_from", "fails_to", "passes_below"];
+    let mut table = Table::new(columns.into_iter().chain(["passes_above"]));
+    let row = |choice: &ShrunkChoice| {
+        let (fails, passes) = (choice.fails, choice.passes);
+        vec![
+            shrunk.run.row.run.clone().into(),
+            choice.name.clone().into(),
+            choice.value.into(),
+            choice.nominal.into(),
+            choice.unit.into(),
+            choice.matters.into(),
+            fails.0.into(),
+            fails.1.into(),
+            passes.0.into(),
+            passes.1.into(),
+        ]
+    };
+    table.rows = shrunk.choices.iter().map(row).collect();
+    table
+}
+
 fn shrunk_choice(name: String, influence: &shrink::Influence) -> ShrunkChoice {
     let Choice { name: full, kind, value } = &influence.choice;
     ShrunkChoice {
         name,
         value: *value,
         nominal: kind.nominal(),
-        unit: unit_of(full),
+        unit: full.unit(),
         matters: influence.matters,
         fails: influence.fails,
         passes: influence.passes,
@@ -198,14 +212,7 @@ fn why(env: &Env, record: &RunRecord, shrunk: &Shrunk) -> Result<Vec<String>, Di
     Ok(texts)
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(secs) if secs > 0.0 && secs.is_finite() => Ok(secs),
-        _ => Err("must be a number of seconds above 0".to_owned()),
-    }
-}
-
-fn repeat(text: &str) -> Result<Repeat, String> {
+fn must_fail(text: &str) -> Result<Repeat, String> {
     let parts = text.split_once('/').and_then(|(least, of)| Some((least.parse().ok()?, of.parse().ok()?)));
     match parts {
         Some((least, of)) if 1 <= least && least <= of && of <= 1000 => Ok(Repeat { least, of }),

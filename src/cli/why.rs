@@ -4,13 +4,33 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::args::WhyArgs;
-use crate::datalog::rendered;
-use crate::{history_dir, output};
+use clap::Args;
+
+use crate::options::{HistoryArgs, ProofFormat};
+use crate::{explanations, history_dir, output};
 use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
 use actcheck_history::{ActionDetail, RunDetail};
 use actcheck_ontology as ontology;
+use actcheck_report::{Table, TableFormat};
 use actcheck_rules::{Budget, RuleBook};
+
+/// `actcheck why`
+#[derive(Debug, Args)]
+pub struct WhyArgs {
+    /// Id of the run, or a unique prefix
+    pub run: String,
+    /// Only this property, by its name in the ontology [default: all that were judged]
+    pub property: Option<String>,
+    /// The ontology with the rules [default: ontology/actions.ttl here, or the shipped one]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
+    /// The folder of the history.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How explanations are printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: ProofFormat,
+}
 
 /// Prints, for each requested outcome of a run, the proof that the property holds or how close it came.
 pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
@@ -21,18 +41,25 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let (files, path) = ontology_file(args.ontology.as_deref());
     let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget)?;
     let mut told = 0;
+    let mut table = Table::new(["run", "step", "action", "property", "holds", "margin", "explanation"]);
     for (step, action) in run.actions.iter().enumerate() {
         let Some(seen) = facts.action(step) else { continue };
         for property in asked(action, args.property.as_deref()) {
             let title = format!("{} {}, {}", run.row.run, names::local(&action.action), names::local(&property));
             let explained = rules.explain(&seen, &property, &budget);
             let explained = explained.map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
-            if args.format == crate::args::ProofFormat::Text {
-                output::print(&format!("{title}\n"));
+            let columns = [run.row.run.as_str(), &(step + 1).to_string(), &action.action, &property];
+            match args.format {
+                ProofFormat::Csv => table.rows.push(explanations::row(&columns, &explained)),
+                ProofFormat::Text => output::print(&format!("{title}\n{}\n", explained.to_text())),
+                ProofFormat::Json => output::print(&format!("{:#}\n\n", explained.to_json())),
+                ProofFormat::Dot => output::print(&format!("{}\n", explained.to_dot())),
             }
-            output::print(&format!("{}\n", rendered(&explained, args.format)));
             told += 1;
         }
+    }
+    if args.format == ProofFormat::Csv && told > 0 {
+        output::print(&table.render(TableFormat::Csv));
     }
     if told == 0 { Err(nothing_to_tell(&run, args.property.as_deref()).into()) } else { Ok(()) }
 }

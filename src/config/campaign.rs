@@ -84,10 +84,18 @@ impl Campaign {
 
     /// Returns an error that a later stage found, at the span of `key` (see [`Campaign::places`]).
     pub fn fault(&self, code: &'static str, key: &str, message: impl Into<String>) -> Diagnostic {
-        let fault = Diagnostic::error(code, message);
+        self.placed(Diagnostic::error(code, message), key)
+    }
+
+    /// Returns a warning of a later stage, at the span of `key`.
+    pub fn warning(&self, code: &'static str, key: &str, message: impl Into<String>) -> Diagnostic {
+        self.placed(Diagnostic::warning(code, message), key)
+    }
+
+    fn placed(&self, diagnostic: Diagnostic, key: &str) -> Diagnostic {
         match self.places.get(key) {
-            Some(span) => fault.at(&self.source, span.clone()),
-            None => fault.in_source(&self.source),
+            Some(span) => diagnostic.at(&self.source, span.clone()),
+            None => diagnostic.in_source(&self.source),
         }
     }
 }

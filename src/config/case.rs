@@ -3,17 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::designators::Designators;
-use crate::{Located, OtherCounts, Table};
+use crate::{Located, Table};
 use actcheck_base::{Diagnostics, Span, did_you_mean};
-
-/// Choices that pick a name from a designator's candidates. They are written by name, so that a case stays valid when
-/// candidates are added. `*` matches a number.
-const NAMED: [(&str, &str); 4] = [
-    ("surface.model", "objectSurface"),
-    ("target.model", "pickObject"),
-    ("other.*.model", "surfaceObjects"),
-    ("place_other.*.model", "surfaceObjects"),
-];
+use actcheck_data::{ChoiceName, ChoiceValue, OBSTACLE_LIST, ObjectAxis};
 
 /// A scene fixed by the configuration: every run makes these choices.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -25,21 +17,21 @@ pub struct Case {
     /// Digest over all states of that run.
     pub trace: Option<String>,
     /// Values by name of the choice, in order if a name repeats. Missing choices take their nominal value.
-    pub choices: BTreeMap<String, Vec<f64>>,
+    pub choices: BTreeMap<ChoiceName, Vec<ChoiceValue>>,
 }
 
 impl Case {
     /// Returns the key of a choice in [`crate::Campaign::places`].
-    pub fn place_of(choice: &str) -> String {
+    pub fn place_of(choice: &ChoiceName) -> String {
         format!("case.choices.{choice}")
     }
 }
 
 /// The notation of a choice's value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Form<'a> {
-    /// As one of these names.
-    Name(&'a [String]),
+enum Form<'a> {
+    /// As one of these candidates. (Old cases have its index.)
+    Candidate(&'a [String]),
     /// As a count: the choice's value plus this least count.
     Count(u32),
     /// As `true` for 1 and `false` for 0.
@@ -50,25 +42,20 @@ pub(super) enum Form<'a> {
 
 impl<'a> Form<'a> {
     /// Returns the form of a choice's values, given its name.
-    pub(super) fn of(choice: &str, candidates: &'a BTreeMap<String, Vec<String>>, counts: &OtherCounts) -> Self {
-        let fits = |pattern: &str| match pattern.split_once('*') {
-            Some((start, end)) => {
-                choice.strip_prefix(start).and_then(|rest| rest.strip_suffix(end)).is_some_and(is_number)
+    fn of(choice: &ChoiceName, designators: &'a Designators) -> Self {
+        match choice {
+            ChoiceName::Designator(name) => {
+                designators.candidates.get(name).map_or(Self::Number, |names| Self::Candidate(names))
             }
-            None => choice == pattern,
-        };
-        let designator = NAMED.iter().find(|(pattern, _)| fits(pattern)).map_or(choice, |(_, designator)| designator);
-        match (candidates.get(designator), counts.of_choice(choice)) {
-            (Some(names), _) => Self::Name(names),
-            (None, Some((least, _))) => Self::Count(least),
-            (None, None) if choice.ends_with(".left_out") => Self::YesNo,
-            (None, None) => Self::Number,
+            ChoiceName::Object(_, ObjectAxis::LeftOut) => Self::YesNo,
+            _ => match (choice.candidates(), designators.other_counts.of_choice(choice)) {
+                (Some(OBSTACLE_LIST), _) => Self::Candidate(&designators.nav_obstacles),
+                (Some(table), _) => Self::Candidate(designators.candidates.get(table).map_or(&[], Vec::as_slice)),
+                (None, Some((least, _))) => Self::Count(least),
+                (None, None) => Self::Number,
+            },
         }
     }
-}
-
-fn is_number(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 /// Reads `[case]` and looks its names up among the candidates of their designators.
@@ -101,7 +88,7 @@ fn read_choices(
     mut table: Table,
     prefix: &str,
     designators: &Designators,
-    (choices, places): (&mut BTreeMap<String, Vec<f64>>, &mut BTreeMap<String, Span>),
+    (choices, places): (&mut BTreeMap<ChoiceName, Vec<ChoiceValue>>, &mut BTreeMap<String, Span>),
     found: &mut Diagnostics,
 ) {
     for key in table.untaken_tables() {
@@ -110,9 +97,9 @@ fn read_choices(
         }
     }
     for key in table.untaken_keys() {
-        let name = format!("{prefix}{key}");
+        let name = ChoiceName::from(format!("{prefix}{key}"));
         let span = table.key_span(&key).unwrap_or_default();
-        let form = Form::of(&name, &designators.candidates, &designators.other_counts);
+        let form = Form::of(&name, designators);
         let values = read_values(&mut table, &key, form);
         places.insert(Case::place_of(&name), span.clone());
         if choices.insert(name.clone(), values).is_some() {
@@ -124,15 +111,10 @@ fn read_choices(
 }
 
 /// Reads the values of one choice: a single value or a list.
-fn read_values(table: &mut Table, key: &str, form: Form<'_>) -> Vec<f64> {
-    match form {
-        Form::Name(names) => {
-            let written = match table.is_list(key) {
-                true => table.strings(key).unwrap_or_default(),
-                false => table.string(key).into_iter().collect(),
-            };
-            written.into_iter().filter_map(|text| index_of(table, key, &text, names)).collect()
-        }
+fn read_values(table: &mut Table, key: &str, form: Form<'_>) -> Vec<ChoiceValue> {
+    let numbers = match form {
+        Form::Candidate(_) if table.is_number(key) => table.number(key, 0.0..).into_iter().collect(),
+        Form::Candidate(names) => return read_candidates(table, key, names),
         Form::Count(least) => table
             .integer(key, 0..=i64::from(u32::MAX))
             .map(|count| count as f64 - f64::from(least))
@@ -141,15 +123,25 @@ fn read_values(table: &mut Table, key: &str, form: Form<'_>) -> Vec<f64> {
         Form::YesNo => table.boolean(key).map(f64::from).into_iter().collect(),
         Form::Number if table.is_list(key) => table.number_list(key, ..).unwrap_or_default(),
         Form::Number => table.number(key, ..).into_iter().collect(),
-    }
+    };
+    numbers.into_iter().map(ChoiceValue::Number).collect()
 }
 
-fn index_of(table: &mut Table, key: &str, text: &Located<String>, names: &[String]) -> Option<f64> {
-    let found = names.iter().position(|name| *name == text.value);
-    if found.is_none() {
+fn read_candidates(table: &mut Table, key: &str, names: &[String]) -> Vec<ChoiceValue> {
+    let written = match table.is_list(key) {
+        true => table.strings(key).unwrap_or_default(),
+        false => table.string(key).into_iter().collect(),
+    };
+    written.into_iter().filter_map(|text| candidate(table, key, text, names)).collect()
+}
+
+/// Returns a candidate, or reports that it is not in the list (C015).
+fn candidate(table: &mut Table, key: &str, text: Located<String>, names: &[String]) -> Option<ChoiceValue> {
+    if !names.contains(&text.value) {
         let message = format!("`{}` is not a candidate for `{key}`", text.value);
         let help = did_you_mean(&text.value, names.iter().map(String::as_str));
-        table.fault("C015", text.span.clone(), message, help);
+        table.fault("C015", text.span, message, help);
+        return None;
     }
-    found.map(|idx| idx as f64)
+    Some(ChoiceValue::Candidate(text.value))
 }

@@ -5,10 +5,9 @@ use std::fmt::Write as _;
 
 use toml::Value;
 
-use crate::Campaign;
-use crate::case::Form;
+use crate::{Campaign, OtherCounts};
 use actcheck_base::{Diagnostic, Diagnostics, Source};
-use actcheck_data::{Choice, ChoiceKind};
+use actcheck_data::{Choice, ChoiceKind, ChoiceName, ObjectAxis};
 
 /// Keys without a meaning for a single scene.
 const OF_CAMPAIGNS: [&str; 5] = ["case", "history", "repeat", "search", "seed"];
@@ -29,8 +28,6 @@ pub struct CaseText<'a> {
     pub trace: &'a str,
     /// Every choice of the run.
     pub choices: &'a [Choice],
-    /// Returns the unit of a choice by its name, or an empty string if it has none.
-    pub unit: fn(&str) -> &'static str,
     /// Values of the keys `ontology`, `model_dir` and the robot's `profile`; `None` omits a key.
     pub paths: [Option<String>; 3],
     /// Values to write for `test_launcher` and `[skill] dir`, if an external program performs actions.
@@ -109,12 +106,12 @@ fn names(names: &[String]) -> Value {
 
 /// Writes one line per name, in the order of first choices, with a blank line between objects.
 fn choice_lines(campaign: &Campaign, case: &CaseText<'_>) -> String {
-    let mut order: Vec<&str> = Vec::new();
-    let mut values: BTreeMap<&str, Vec<&Choice>> = BTreeMap::new();
+    let mut order: Vec<String> = Vec::new();
+    let mut values: BTreeMap<&ChoiceName, Vec<&Choice>> = BTreeMap::new();
     for choice in case.choices {
         let same = values.entry(&choice.name).or_default();
         if same.is_empty() {
-            order.push(&choice.name);
+            order.push(choice.name.to_string());
         }
         same.push(choice);
     }
@@ -126,23 +123,23 @@ fn choice_lines(campaign: &Campaign, case: &CaseText<'_>) -> String {
             out.push('\n');
         }
         thing = Some(of);
-        let form = Form::of(name, &campaign.candidates, &campaign.other_counts);
-        let written: Vec<String> = values[name].iter().map(|choice| written(choice.value, form)).collect();
+        let same = &values[&ChoiceName::from(name.as_str())];
+        let written: Vec<String> = same.iter().map(|choice| written(choice, &campaign.other_counts)).collect();
         let value = match written.as_slice() {
             [only] => only.clone(),
             several => format!("[{}]", several.join(", ")),
         };
-        let remark = values[name].first().and_then(|choice| remark(choice, form, (case.unit)(name)));
+        let remark = same.first().and_then(|choice| remark(choice));
         let _ = writeln!(out, "{} = {value}{}", key(name, &order), remark.unwrap_or_default());
     }
     out
 }
 
 /// Formats a name as dotted keys, or in quotation marks if a prefix of it is a choice too, which TOML forbids.
-fn key(name: &str, all: &[&str]) -> String {
+fn key(name: &str, all: &[String]) -> String {
     let quoted = |text: &str| Value::String(text.to_owned()).to_string();
-    let within = |other: &&&str| name.strip_prefix(**other).is_some_and(|rest| rest.starts_with('.'));
-    if all.iter().any(|other| within(&other)) {
+    let within = |other: &String| name.strip_prefix(other.as_str()).is_some_and(|rest| rest.starts_with('.'));
+    if all.iter().any(within) {
         return quoted(name);
     }
     let is_bare = |part: &str| {
@@ -152,28 +149,26 @@ fn key(name: &str, all: &[&str]) -> String {
     parts.collect::<Vec<_>>().join(".")
 }
 
-/// Formats a value for the reader of cases, with all its digits.
-fn written(value: f64, form: Form<'_>) -> String {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a wrong index finds no name")]
-    let whole = value.max(0.0) as usize;
-    match form {
-        Form::Name(names) => match names.get(whole) {
-            Some(name) => Value::String(name.clone()).to_string(),
-            None => whole.to_string(),
-        },
-        Form::Count(least) => (whole + least as usize).to_string(),
-        Form::YesNo => (value != 0.0).to_string(),
-        Form::Number => format!("{value:?}"),
+/// Formats a value for the reader of cases: a candidate by its name, a number with all its digits.
+fn written(choice: &Choice, counts: &OtherCounts) -> String {
+    match (choice.candidate(), counts.of_choice(&choice.name)) {
+        (Some(name), _) => Value::String(name.to_owned()).to_string(),
+        (None, Some((least, _))) => (choice.value as u32 + least).to_string(),
+        (None, None) if matches!(choice.name, ChoiceName::Object(_, ObjectAxis::LeftOut)) => {
+            (choice.value != 0.0).to_string()
+        }
+        (None, None) => format!("{:?}", choice.value),
     }
 }
 
 /// Returns unit and bounds as a TOML comment.
-fn remark(choice: &Choice, form: Form<'_>, unit: &str) -> Option<String> {
-    let bounds = match (form, &choice.kind) {
-        (Form::Number, ChoiceKind::Real { low, high, .. }) => format!("{} to {}", short(*low), short(*high)),
-        (Form::Number, ChoiceKind::Normal { sigma }) => format!("standard deviation {}", short(*sigma)),
-        _ => return None,
+fn remark(choice: &Choice) -> Option<String> {
+    let bounds = match &choice.kind {
+        ChoiceKind::Real { low, high, .. } => format!("{} to {}", short(*low), short(*high)),
+        ChoiceKind::Normal { sigma } => format!("standard deviation {}", short(*sigma)),
+        ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. } => return None,
     };
+    let unit = choice.name.unit();
     let unit = if unit.is_empty() { String::new() } else { format!("{unit}, ") };
     Some(format!("  # {unit}{bounds}"))
 }

@@ -1,5 +1,7 @@
 //! Numbers of other objects in a scene.
 
+use actcheck_data::ChoiceName;
+
 /// Numbers of other objects in a scene. Each is the least and the most; 0 by default.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct OtherCounts {
@@ -16,10 +18,10 @@ impl OtherCounts {
     }
 
     /// Returns the bounds of the count that this choice sets, or `None` if it sets something else.
-    pub fn of_choice(&self, name: &str) -> Option<(u32, u32)> {
+    pub fn of_choice(&self, name: &ChoiceName) -> Option<(u32, u32)> {
         match name {
-            "other.count" => Some(self.beside_target),
-            "place_other.count" => Some(self.at_place),
+            ChoiceName::OtherCount => Some(self.beside_target),
+            ChoiceName::PlaceOtherCount => Some(self.at_place),
             _ => None,
         }
     }

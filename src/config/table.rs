@@ -68,6 +68,11 @@ impl Table {
         self.entries.get(key).is_some_and(|entry| matches!(entry.value.value, Value::Array(_)))
     }
 
+    /// Whether a key that was not taken yet holds a number.
+    pub fn is_number(&self, key: &str) -> bool {
+        self.entries.get(key).is_some_and(|entry| matches!(entry.value.value, Value::Integer(_) | Value::Float(_)))
+    }
+
     /// Returns the keys that were not taken yet, sorted.
     pub fn untaken_keys(&self) -> Vec<String> {
         self.entries.keys().cloned().collect()

@@ -2,6 +2,8 @@
 //!
 //! Never: reads a file, steps the simulation, or decides anything.
 
+mod choice_name;
+mod choice_parts;
 mod choices;
 mod hull;
 mod mesh;
@@ -20,7 +22,9 @@ mod snapshot;
 mod stream;
 mod trace;
 
-pub use choices::{Choice, ChoiceKind, Choices};
+pub use choice_name::{ChoiceGroup, ChoiceName, OBSTACLE_LIST};
+pub use choice_parts::{ObjectAxis, PlacedObject, PlanarAxis, SightingAxis, StartAxis, WheelAxis};
+pub use choices::{Choice, ChoiceKind, ChoiceValue, Choices};
 pub use hull::convex_hull;
 pub use mesh::{Mesh, Top};
 pub use model::{Inertia, ObjectModel, Surface};

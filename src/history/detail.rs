@@ -144,7 +144,7 @@ fn actions(store: &Store, run: &NamedNode) -> Result<Vec<ActionDetail>, StorageE
             step: node.count("act:step").and_then(|step| u32::try_from(step).ok()).unwrap_or_default(),
             action: node.text("act:action").unwrap_or_default(),
             score: node.number("act:score").unwrap_or_default(),
-            reported: node.truth("act:reported"),
+            reported: node.boolean("act:reported"),
             message: node.text("act:message"),
             duration_secs: node.number("act:duration").unwrap_or_default(),
             end: node.text("act:end").unwrap_or_default(),
@@ -179,6 +179,6 @@ pub(super) fn judgement(store: &Store, assertion: &Node, graph: GraphNameRef<'_>
         margin: result.number("act:margin"),
         witness: result.text("act:witness").unwrap_or_default(),
         rule_digest: result.text("act:ruleDigest").unwrap_or_default(),
-        held_before: result.truth("act:heldBefore"),
+        held_before: result.boolean("act:heldBefore"),
     })
 }

@@ -25,7 +25,7 @@ pub(super) struct Folder {
 
 impl Folder {
     /// Locks a folder for writing. Creates it if it is missing and `create` is `true`.
-    pub(super) fn take(dir: &Path, create: bool) -> Result<Self, Diagnostics> {
+    pub(super) fn lock_exclusive(dir: &Path, create: bool) -> Result<Self, Diagnostics> {
         if dir.is_file() {
             return Err(fault::unusable(dir, "a file exists at its path"));
         }
@@ -49,7 +49,7 @@ impl Folder {
     }
 
     /// Locks an existing folder for reading: other processes may read it at the same time, and none may write.
-    pub(super) fn share(dir: &Path) -> Result<Self, Diagnostics> {
+    pub(super) fn lock_shared(dir: &Path) -> Result<Self, Diagnostics> {
         if !has_version(dir)? {
             return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
         }

@@ -32,6 +32,7 @@ mod write_run;
 mod write_scene;
 
 pub use answer::{Cancel, QueryAnswer};
+pub use lists::FAILED_AGAIN;
 pub use newest::NewestOutcomes;
 pub use rdf_text::{RdfSyntax, rdf_text};
 pub use recheck::{Recheck, StoredJudgement};

@@ -52,7 +52,16 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
     ?run act:campaign ?campaign ; act:index ?index ; act:test ?test ; act:status ?status .
 }";
 
-const SHRUNK: &str = "SELECT DISTINCT ?campaign WHERE { ?run act:shrunkFrom ?original ; act:campaign ?campaign }";
+/// Campaigns whose scenes were selected because they fail. The prefix is [`FAILED_AGAIN`].
+const SHRUNK: &str = "
+SELECT DISTINCT ?campaign WHERE {
+    { ?run act:shrunkFrom ?original ; act:campaign ?campaign }
+    UNION
+    { ?campaign a act:Campaign ; rdfs:label ?name FILTER(STRSTARTS(?name, 'failed runs of ')) }
+}";
+
+/// Name prefix of campaigns that ran the failed runs of another campaign again.
+pub const FAILED_AGAIN: &str = "failed runs of ";
 
 /// All judgements made after the run, with the values that distinguish them.
 const LATER: &str = "
@@ -74,12 +83,12 @@ fn id(row: &Row, column: usize) -> String {
     row.get(column).and_then(Option::as_ref).map(id_of).unwrap_or_default()
 }
 
-fn may<T: std::str::FromStr>(row: &Row, column: usize) -> Option<T> {
+fn optional<T: std::str::FromStr>(row: &Row, column: usize) -> Option<T> {
     row.get(column).and_then(Option::as_ref).and_then(|term| text_of(term).parse().ok())
 }
 
 fn number<T: std::str::FromStr + Default>(row: &Row, column: usize) -> T {
-    may(row, column).unwrap_or_default()
+    optional(row, column).unwrap_or_default()
 }
 
 /// All campaigns, sorted by start.
@@ -102,7 +111,7 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
         started: text("prov:startedAtTime"),
         ended: node.text("prov:endedAtTime"),
         ended_by: node.text("act:endedBy"),
-        interrupted: node.truth("act:interrupted").unwrap_or(true),
+        interrupted: node.boolean("act:interrupted").unwrap_or(true),
         seed: node.count("act:seed").unwrap_or_default(),
         planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
         runs,
@@ -119,7 +128,7 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
     }
 }
 
-/// Ids of the campaigns that hold a shrunk run.
+/// Ids of the campaigns that hold a shrunk run, or that ran failed runs again.
 pub(super) fn shrunk_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
     Ok(select(store, SHRUNK, Vec::new())?.iter().map(|row| id(row, 0)).collect())
 }
@@ -152,8 +161,8 @@ pub(super) fn runs(store: &Store, filter: &RunFilter) -> Result<Vec<RunRow>, Que
             run: id(row, 0),
             campaign: id(row, 1),
             index: number(row, 2),
-            repetition: may(row, 8).zip(may(row, 9)).map(|(scene, number)| Repetition { scene, number }),
-            weight: may(row, 10),
+            repetition: optional(row, 8).zip(optional(row, 9)).map(|(scene, number)| Repetition { scene, number }),
+            weight: optional(row, 10),
             test: text(row, 3),
             status: status(Some(&text(row, 4))),
             score: number(row, 5),
@@ -188,8 +197,8 @@ pub(super) fn rechecked(store: &Store, filter: &RunFilter) -> Result<Vec<(Outcom
 
 /// Pairs of a run's id and a judgement made after the run, as one text; unsorted.
 pub(super) fn later_judgements(store: &Store) -> Result<Vec<(String, String)>, QueryEvaluationError> {
-    let told = |row: &Row| (1..6).map(|column| text(row, column)).collect::<Vec<_>>().join(" ");
-    Ok(select(store, LATER, Vec::new())?.iter().map(|row| (id(row, 0), told(row))).collect())
+    let judgement = |row: &Row| (1..6).map(|column| text(row, column)).collect::<Vec<_>>().join(" ");
+    Ok(select(store, LATER, Vec::new())?.iter().map(|row| (id(row, 0), judgement(row))).collect())
 }
 
 /// A row of [`OUTCOMES`] or of [`RECHECKED`].
@@ -203,6 +212,6 @@ fn outcome_row(row: &Row) -> OutcomeRow {
         action: text(row, 6),
         property: text(row, 7),
         outcome: outcome(Some(&text(row, 8))),
-        margin: may(row, 9),
+        margin: optional(row, 9),
     }
 }

@@ -63,7 +63,7 @@ impl Node {
     }
 
     /// The first value as a Boolean. Returns `None` if it is missing or not a Boolean.
-    pub(super) fn truth(&self, property: &str) -> Option<bool> {
+    pub(super) fn boolean(&self, property: &str) -> Option<bool> {
         self.text(property)?.parse().ok()
     }
 }

@@ -56,7 +56,7 @@ pub(super) fn skill(node: &Node) -> Option<SkillRecord> {
     Some(SkillRecord {
         command: node.text("act:skillCommand")?,
         digest: node.text("act:skillDigest").unwrap_or_default(),
-        privileged: node.truth("act:privileged").unwrap_or_default(),
+        privileged: node.boolean("act:privileged").unwrap_or_default(),
     })
 }
 

@@ -109,5 +109,5 @@ fn write(recheck: &Recheck, at: &str, statements: &mut Statements) {
     let of = |part| unique(&[execution.as_str(), &recheck.now.property, part, at, &predecessor]);
     let assertion = of("recheck");
     write_assertion(&recheck.now, &execution, [assertion.clone(), of("recheck result")], statements);
-    statements.about(assertion).has("act:recheckedAt", time(at)).may("act:supersedes", supersedes.map(Term::from));
+    statements.about(assertion).has("act:recheckedAt", time(at)).optional("act:supersedes", supersedes.map(Term::from));
 }

@@ -51,7 +51,7 @@ impl About<'_> {
     }
 
     /// Adds the value of a property unless it is `None`.
-    pub(super) fn may(&mut self, property: &str, value: Option<impl Into<Term>>) -> &mut Self {
+    pub(super) fn optional(&mut self, property: &str, value: Option<impl Into<Term>>) -> &mut Self {
         match value {
             Some(value) => self.has(property, value),
             None => self,

@@ -40,7 +40,7 @@ impl History {
     /// `H001` the folder can't be used, `H002` another process has it open, `H003` it holds other files, `H004` a newer
     /// program wrote it, `H005` the disk is full, `H006`, `H007` it is damaged.
     pub fn open(dir: &Path) -> Result<Self, Diagnostics> {
-        Self::open_folder(Folder::take(dir, true)?)
+        Self::open_folder(Folder::lock_exclusive(dir, true)?)
     }
 
     /// Opens the existing history in a folder.
@@ -48,7 +48,7 @@ impl History {
     /// # Errors
     /// As [`History::open`]; also `H003` if the folder has no history.
     pub fn open_existing(dir: &Path) -> Result<Self, Diagnostics> {
-        Self::open_folder(Folder::take(dir, false)?)
+        Self::open_folder(Folder::lock_exclusive(dir, false)?)
     }
 
     /// Opens the existing history in a folder read-only. Other processes may do so at the same time.
@@ -56,7 +56,7 @@ impl History {
     /// # Errors
     /// As [`History::open_existing`]; `H002` while another process has it open for writing.
     pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
-        let folder = Folder::share(dir)?;
+        let folder = Folder::lock_shared(dir)?;
         let store = Store::open_read_only(folder.store());
         let store = store.map_err(|error| fault::store(dir, "opening its store", &error))?;
         Ok(Self { store: RwLock::new(Some(store)), folder })

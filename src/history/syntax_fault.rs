@@ -23,13 +23,13 @@ pub(super) fn syntax_fault(text: &Source, error: &str) -> Diagnostic {
     let expected: Vec<&str> = expected.strip_prefix("one of ").unwrap_or(expected).split(", ").map(str::trim).collect();
     // Every other item is a keyword, a quoted character or a character class in brackets.
     match expected.iter().find(|item| item.contains(' ') && !item.starts_with(['[', '"', '\''])) {
-        Some(reason) => told(text, end, reason),
+        Some(reason) => with_reason(text, end, reason),
         None => unexpected(text, end, &expected),
     }
 }
 
 /// Reports a reason in the parser's own words. Its place is after the word that it concerns.
-fn told(text: &Source, end: usize, reason: &str) -> Diagnostic {
+fn with_reason(text: &Source, end: usize, reason: &str) -> Diagnostic {
     let before = text.text[..end].trim_end();
     let start = before.rfind(char::is_whitespace).map_or(0, |at| at + 1);
     let word = &before[start..];

@@ -14,7 +14,9 @@ use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, SceneMap, Sn
 
 /// Magic bytes at the start of each file. The last one is the format version; it increases whenever a type of the trace
 /// changes.
-const MAGIC: &[u8; 8] = b"actrace3";
+const MAGIC: &[u8; 8] = b"actrace4";
+/// Magic bytes of files whose choices have the indices of candidates, without their names. All else is the same.
+const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
 
 /// First part: decisions, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies and
 /// the courses of the robot follow it. (Traces of earlier versions end before any of these.)
@@ -110,7 +112,8 @@ fn part_of<'a, T: Default + serde::Deserialize<'a>>(rest: &'a [u8]) -> Result<(T
 }
 
 fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let rest = bytes.strip_prefix(MAGIC.as_slice()).ok_or("it is not a trace of this format")?;
+    let rest = [MAGIC, WITHOUT_CANDIDATES].into_iter().find_map(|magic| bytes.strip_prefix(magic.as_slice()));
+    let rest = rest.ok_or("it is not a trace of this format")?;
     let (length, rest) = rest.split_first_chunk::<4>().ok_or("it ends too early")?;
     rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(|| "it ends too early".to_owned())
 }

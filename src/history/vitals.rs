@@ -19,7 +19,7 @@ pub struct RunVitals {
     /// Reasons why scenes were discarded before its own.
     pub discards: Vec<String>,
     /// Whether a search chose its scene, so that the run has an importance weight.
-    pub steered: bool,
+    pub is_weighted: bool,
     /// Position among the runs of its scene, from 0.
     pub repetition: u64,
     /// Unit: seconds.
@@ -40,7 +40,7 @@ pub(super) fn read(store: &Store, run: &str, choices: Vec<Choice>) -> Result<Run
         index: node.count("act:index").unwrap_or_default(),
         choices,
         discards: detail::discards(store, &node_name, &node)?,
-        steered: node.number("act:weight").is_some(),
+        is_weighted: node.number("act:weight").is_some(),
         repetition: node.count("act:repetition").unwrap_or_default(),
         wall_secs: node.number("act:wallSeconds").unwrap_or_default(),
         deepest_penetration_m: node.number("act:deepestPenetration"),

@@ -27,9 +27,9 @@ pub(super) fn beginning(record: &CampaignRecord) -> Vec<Quad> {
         .has("act:seed", count(record.seed))
         .has("act:plannedRuns", count(record.planned_runs))
         .has("act:repeat", count(u64::from(record.repeat)))
-        .may("act:timeBudget", record.time_secs.map(Literal::from))
-        .may("act:untilWidth", record.until_width.map(Literal::from))
-        .may("act:maxFailures", record.max_failures.map(count))
+        .optional("act:timeBudget", record.time_secs.map(Literal::from))
+        .optional("act:untilWidth", record.until_width.map(Literal::from))
+        .optional("act:maxFailures", record.max_failures.map(count))
         .text("act:strategy", &record.strategy)
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version))
@@ -68,10 +68,10 @@ pub(super) fn end(id: &str, end: &CampaignEnd) -> Vec<Quad> {
     let mut about = statements.about(campaign_node(id));
     about
         .has("prov:endedAtTime", time(&end.ended))
-        .may("act:score", end.score.map(Literal::from))
-        .may("act:scoreWithoutBroken", end.score_without_broken.map(Literal::from))
+        .optional("act:score", end.score.map(Literal::from))
+        .optional("act:scoreWithoutBroken", end.score_without_broken.map(Literal::from))
         .has("act:discards", count(end.discards))
-        .may("act:endedBy", end.ended_by.as_deref().map(Literal::new_simple_literal))
+        .optional("act:endedBy", end.ended_by.as_deref().map(Literal::new_simple_literal))
         .has("act:interrupted", Literal::from(end.interrupted));
     for (outcome, times) in &end.outcomes {
         about.has(&format!("act:{outcome}Count"), count(*times));

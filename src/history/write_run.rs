@@ -42,21 +42,21 @@ fn write_run(record: &RunRecord, run: &NamedNode, statements: &mut Statements) {
         .text("act:test", &record.test)
         .has("act:seed", count(record.seed))
         .has("act:index", count(record.index))
-        .may("act:sceneNumber", record.repetition.map(|repetition| count(repetition.scene)))
-        .may("act:repetition", record.repetition.map(|repetition| count(repetition.number)))
-        .may("act:weight", record.weight.map(Literal::from))
+        .optional("act:sceneNumber", record.repetition.map(|repetition| count(repetition.scene)))
+        .optional("act:repetition", record.repetition.map(|repetition| count(repetition.number)))
+        .optional("act:weight", record.weight.map(Literal::from))
         .has("act:score", Literal::from(record.score))
         .text("act:status", record.status.word())
         .text("act:traceHash", &record.trace.hash)
         .has("act:discards", count(record.discards.len() as u64))
-        .may("act:reason", record.reason.as_deref().map(Literal::new_simple_literal))
-        .may("act:programOutput", record.program_output.as_deref().map(Literal::new_simple_literal))
-        .may("act:shrunkFrom", record.shrunk_from.as_deref().map(run_node))
+        .optional("act:reason", record.reason.as_deref().map(Literal::new_simple_literal))
+        .optional("act:programOutput", record.program_output.as_deref().map(Literal::new_simple_literal))
+        .optional("act:shrunkFrom", record.shrunk_from.as_deref().map(run_node))
         .has("prov:startedAtTime", time(&record.started))
         .has("act:wallSeconds", Literal::from(record.wall_secs))
         .has("act:elapsedSeconds", Literal::from(record.elapsed_secs))
-        .may("act:deepestPenetration", record.quality.map(|quality| Literal::from(quality.deepest_penetration_m)))
-        .may("act:energyGain", record.quality.map(|quality| Literal::from(quality.energy_gain_j)))
+        .optional("act:deepestPenetration", record.quality.map(|quality| Literal::from(quality.deepest_penetration_m)))
+        .optional("act:energyGain", record.quality.map(|quality| Literal::from(quality.energy_gain_j)))
         .text("act:program", &program(env!("CARGO_PKG_VERSION")));
     write_designators(&record.scene.designators, record, &mut about);
 }
@@ -96,13 +96,13 @@ fn write_execution(record: &RunRecord, step: usize, run: &NamedNode, statements:
     about
         .is_a("act:ActionExecution")
         .has("act:ofRun", run.clone())
-        .may("act:action", record.actions.get(step).map(|action| iri(action)))
+        .optional("act:action", record.actions.get(step).map(|action| iri(action)))
         .has("act:step", Literal::from((step + 1) as u64))
-        .may("act:score", record.action_scores.get(step).copied().map(Literal::from))
+        .optional("act:score", record.action_scores.get(step).copied().map(Literal::from))
         .text("act:end", end_word(&action.end))
         .has("act:duration", Literal::from(action.duration_secs))
-        .may("act:reported", action.report.as_ref().map(|report| Literal::from(report.succeeded)))
-        .may("act:message", message(action).map(Literal::new_simple_literal));
+        .optional("act:reported", action.report.as_ref().map(|report| Literal::from(report.succeeded)))
+        .optional("act:message", message(action).map(Literal::new_simple_literal));
     write_designators(&action.parameters, record, &mut about);
     for (property, state) in [("act:before", step), ("act:after", step + 1)] {
         if state < record.facts.snapshots.len() {
@@ -154,10 +154,10 @@ pub(super) fn write_assertion(
         .about(result)
         .has("earl:outcome", iri(&format!("earl:{}", judgement.outcome.earl())))
         .text("act:outcome", judgement.outcome.word())
-        .may("act:margin", judgement.margin.map(Literal::from))
+        .optional("act:margin", judgement.margin.map(Literal::from))
         .text("act:witness", &judgement.witness)
         .text("act:ruleDigest", &judgement.rule_digest)
-        .may("act:heldBefore", judgement.held_before.map(Literal::from));
+        .optional("act:heldBefore", judgement.held_before.map(Literal::from));
 }
 
 /// A blank node whose label depends only on the texts.

@@ -95,13 +95,13 @@ fn write_object(record: &RunRecord, object: &SceneObject, run: &NamedNode, state
     ] {
         about.has(property, Literal::from(value));
     }
-    about.may("act:neighbourDistance", nearest(&record.scene, object, |other| other.role != Role::Platform));
+    about.optional("act:neighbourDistance", nearest(&record.scene, object, |other| other.role != Role::Platform));
     if object.role != Role::Platform && object.role != Role::Target {
-        about.may("act:targetDistance", nearest(&record.scene, object, targets));
+        about.optional("act:targetDistance", nearest(&record.scene, object, targets));
     }
     about
-        .may("act:displacement", largest(extremes().map(|extremes| extremes.max_displacement_m)))
-        .may("act:maxTilt", largest(extremes().map(|extremes| extremes.max_tilt_rad)));
+        .optional("act:displacement", largest(extremes().map(|extremes| extremes.max_displacement_m)))
+        .optional("act:maxTilt", largest(extremes().map(|extremes| extremes.max_tilt_rad)));
 }
 
 fn scene_base(record: &RunRecord) -> [f64; 3] {

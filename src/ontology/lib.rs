@@ -15,4 +15,5 @@ mod template;
 
 pub use assemble::load;
 pub use model::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
+pub use read::triples_of;
 pub use template::{Template, property_template};

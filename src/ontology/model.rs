@@ -2,10 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use actcheck_base::{Source, Span, Term};
+use actcheck_base::{Source, Span, Term, digest_of, names};
 
 /// A checked ontology, including its imports.
-#[derive(Debug, Clone)]
+///
+/// [`Ontology::default`] is empty: add statements, properties and libraries to apply rules without an ontology file.
+#[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Ontology {
     /// The root file and its imports, in reading order.
     pub sources: Vec<Source>,
@@ -21,7 +24,7 @@ pub struct Ontology {
     pub triples: Vec<[Term; 3]>,
     /// Each class with all its superclasses, excluding itself.
     pub superclasses: BTreeMap<String, BTreeSet<String>>,
-    /// Terms that facts and rules may use.
+    /// Terms that facts and rules may use. If it is empty, rules may use any term.
     pub vocabulary: Vocabulary,
     /// Digest of all sources, excluding the rule files.
     pub digest: String,
@@ -29,6 +32,7 @@ pub struct Ontology {
 
 /// One action.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Action {
     /// Its IRI.
     pub iri: String,
@@ -48,6 +52,7 @@ pub struct Action {
 
 /// One property.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Property {
     /// Its IRI.
     pub iri: String,
@@ -67,6 +72,7 @@ pub struct Property {
 
 /// A rule file, read but not yet parsed.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RuleFile {
     /// Its text.
     pub source: Source,
@@ -82,6 +88,7 @@ pub struct RuleFile {
 
 /// The two rule languages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum RuleLanguage {
     /// `.rls`
     Datalog,
@@ -91,6 +98,7 @@ pub enum RuleLanguage {
 
 /// The described terms.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Vocabulary {
     /// All described terms, by IRI.
     pub terms: BTreeMap<String, VocabularyTerm>,
@@ -98,6 +106,7 @@ pub struct Vocabulary {
 
 /// One described term.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct VocabularyTerm {
     /// Whether it can be a predicate.
     pub is_property: bool,
@@ -107,4 +116,39 @@ pub struct VocabularyTerm {
     pub label: Option<String>,
     /// `rdfs:comment`.
     pub comment: Option<String>,
+}
+
+impl Property {
+    /// Creates a property that a rule file verifies. Its label is the local name of its IRI.
+    pub fn new(iri: impl Into<String>, rule: RuleFile) -> Self {
+        let iri = iri.into();
+        let name = names::local(&iri).to_owned();
+        Self { label: name.clone(), name, iri, comment: None, rule, needs: BTreeSet::new(), unit: None }
+    }
+}
+
+impl RuleFile {
+    /// Creates a rule file from its text. The language is SPARQL if the source's name ends in `.rq`, else Datalog.
+    pub fn new(source: Source) -> Self {
+        let language = if source.name.ends_with(".rq") { RuleLanguage::Sparql } else { RuleLanguage::Datalog };
+        let (path, digest) = (source.name.to_string(), digest_of(&source.text));
+        Self { source, language, path, digest, linked_at: None }
+    }
+}
+
+impl RuleLanguage {
+    /// Returns the language's name.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Datalog => "Datalog",
+            Self::Sparql => "SPARQL",
+        }
+    }
+}
+
+impl VocabularyTerm {
+    /// Creates a term that can be a predicate, without a description.
+    pub fn property() -> Self {
+        Self { is_property: true, ..Self::default() }
+    }
 }

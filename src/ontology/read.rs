@@ -92,6 +92,19 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
     reading
 }
 
+/// Returns the statements of a source in Turtle or RDF/XML, in reading order. The file extension of its name determines
+/// the format. Imports are not followed.
+///
+/// `document` distinguishes the blank nodes of several sources.
+///
+/// # Errors
+/// `O002` for each syntax error, at most five.
+pub fn triples_of(source: &Source, document: usize) -> Result<Vec<[Term; 3]>, Diagnostics> {
+    let (mut statements, mut found) = (Vec::new(), Diagnostics::new());
+    parse(source, document, "", &mut statements, &mut found);
+    found.or(statements.into_iter().map(|it| [it.subject, Term::Iri(it.predicate), it.object]).collect())
+}
+
 fn unreadable(path: &Path, reason: &str, importer: Option<(&Source, Span)>) -> Diagnostic {
     match importer {
         None => Diagnostic::error("O001", format!("cannot read the ontology {}: {reason}", path.display()))

@@ -29,10 +29,10 @@ mod tests {
             max_force_n: f64::from(idx % 50),
         };
         let all: Vec<ContactEpisode> = (0..100).map(contact).collect();
-        let told = strongest(&all);
-        assert_eq!(told.len(), MOST_CONTACTS);
-        assert!(told.iter().all(|contact| contact.max_force_n >= 20.0));
-        assert!(told.is_sorted_by(|a, b| a.start_secs <= b.start_secs));
+        let shown = strongest(&all);
+        assert_eq!(shown.len(), MOST_CONTACTS);
+        assert!(shown.iter().all(|contact| contact.max_force_n >= 20.0));
+        assert!(shown.is_sorted_by(|a, b| a.start_secs <= b.start_secs));
         assert_eq!(strongest(&all[..3]), all[..3].iter().collect::<Vec<_>>());
     }
 }

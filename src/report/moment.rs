@@ -15,7 +15,7 @@ const BEFORE_SECS: f64 = 0.3;
 /// In this order: the robot first touched a named object that is not a parameter of the action; such an object moved;
 /// the robot lost contact with the named objects; if it never touched them, a link was nearest to them. If none
 /// applies, returns the end of the action. All but the last are shifted earlier by [`BEFORE_SECS`].
-pub(super) fn decided(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
+pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
     let begin = |idx: usize| trace.snapshots.get(idx).or(trace.snapshots.last()).map_or(0.0, |state| state.time_secs);
     let (run_begin, start, end) = (begin(0), begin(action_idx), begin(action_idx + 1));
     let Some(action) = trace.actions.get(action_idx) else { return end - run_begin };
@@ -58,7 +58,12 @@ fn names(text: &str, word: &str) -> bool {
 }
 
 /// Positions of a track in the frames of an action, with times since the action began. Units: seconds, metres.
-fn course<'a>(trace: &'a Trace, slot: usize, start: f64, end: f64) -> impl Iterator<Item = (f64, [f64; 3])> + use<'a> {
+fn positions<'a>(
+    trace: &'a Trace,
+    slot: usize,
+    start: f64,
+    end: f64,
+) -> impl Iterator<Item = (f64, [f64; 3])> + use<'a> {
     let secs = |idx: usize| idx as f64 * trace.frames.period_secs;
     let at = move |row: &Vec<f32>| row.get(7 * slot..7 * slot + 3).map(|at| [at[0], at[1], at[2]].map(f64::from));
     let rows = trace.frames.rows.iter().enumerate().map(move |(idx, row)| (secs(idx), row));
@@ -74,9 +79,9 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// since the run began.
 fn moved(trace: &Trace, id: &str, start: f64, end: f64) -> Option<f64> {
     let slot = trace.frames.names.iter().position(|name| name == id)?;
-    let mut course = course(trace, slot, start, end);
-    let (_, place) = course.next()?;
-    course.find(|(_, now)| distance(*now, place) > MOVED_M).map(|(secs, _)| secs)
+    let mut track = positions(trace, slot, start, end);
+    let (_, place) = track.next()?;
+    track.find(|(_, now)| distance(*now, place) > MOVED_M).map(|(secs, _)| secs)
 }
 
 /// When a link of the robot was nearest to any of the objects, since the action began. Unit: seconds; `start` and `end`
@@ -88,7 +93,7 @@ fn nearest(trace: &Trace, ids: &[&str], start: f64, end: f64) -> Option<f64> {
     let (links, things) = (slots(&|name| name.starts_with("robot/")), slots(&|name| ids.contains(&name)));
     let pairs = things.iter().flat_map(|thing| links.iter().map(move |link| (*thing, *link)));
     let apart = pairs.flat_map(|(thing, link)| {
-        let both = course(trace, thing, start, end).zip(course(trace, link, start, end));
+        let both = positions(trace, thing, start, end).zip(positions(trace, link, start, end));
         both.map(|((secs, thing), (_, link))| (secs, distance(thing, link)))
     });
     apart.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(secs, _)| secs)

@@ -7,7 +7,10 @@ use std::sync::Arc;
 use crate::overlap::Solid;
 use crate::surroundings::Surroundings;
 use crate::{Space, placement};
-use actcheck_data::{Choices, Location, ObjectModel, Pose, RobotStart, Role, Scene, SceneObject, Surface};
+use actcheck_data::{
+    ChoiceName, Choices, Location, ObjectAxis, ObjectModel, PlacedObject, Pose, RobotStart, Role, Scene, SceneObject,
+    Surface,
+};
 
 /// Maximum number of tries to place one object; then the scene is discarded. On a half-full table about every second
 /// try succeeds, so after fifty failures further tries are not worthwhile.
@@ -123,7 +126,7 @@ impl<'a> SceneBuilder<'a> {
             let is_of_world =
                 !self.space.worlds.is_empty() && ["world", "objectLocation"].contains(&designator.as_str());
             if !values.is_empty() && !is_of_world {
-                let value = values[self.choices.index(designator, values.len())].clone();
+                let value = values[self.choices.candidate(designator.as_str().into(), values.clone())].clone();
                 self.designators.insert(designator.clone(), vec![value]);
             }
         }
@@ -135,7 +138,8 @@ impl<'a> SceneBuilder<'a> {
         if worlds.is_empty() {
             return None;
         }
-        let world = &worlds[self.choices.index("world", worlds.len())];
+        let names = worlds.iter().map(|world| world.map.name.clone()).collect();
+        let world = &worlds[self.choices.candidate(ChoiceName::World, names)];
         self.designators.insert("world".to_owned(), vec![world.map.name.clone()]);
         Some(world)
     }
@@ -146,7 +150,8 @@ impl<'a> SceneBuilder<'a> {
         if there.is_empty() {
             return None;
         }
-        let platform = there[self.choices.index("surface.name", there.len())];
+        let names = there.iter().map(|platform| platform.id.clone()).collect();
+        let platform = there[self.choices.candidate(ChoiceName::SurfaceName, names)];
         self.designators.insert("objectSurface".to_owned(), vec![platform.id.clone()]);
         self.choose_location(world, Some(&platform.id));
         self.platform = Some(platform.pose);
@@ -164,9 +169,9 @@ impl<'a> SceneBuilder<'a> {
             world.map.locations.is_empty()
                 || location.is_some_and(|location| location.surface.as_deref().is_none_or(|of| Some(of) == surface))
         });
-        let there: Vec<&String> = there.collect();
+        let there: Vec<String> = there.cloned().collect();
         if !there.is_empty() {
-            let chosen = there[self.choices.index("location.name", there.len())].clone();
+            let chosen = there[self.choices.candidate(ChoiceName::LocationName, there.clone())].clone();
             self.designators.insert("objectLocation".to_owned(), vec![chosen]);
         }
     }
@@ -177,18 +182,17 @@ impl<'a> SceneBuilder<'a> {
         let first = self.designators.get("objectSurface").and_then(|ids| ids.first()).cloned();
         let id = match world.filter(|world| world.surfaces().next().is_some()) {
             Some(world) => {
-                let there: Vec<&String> =
-                    self.space.place_names.iter().filter(|name| world.surface(name).is_some()).collect();
-                let others: Vec<&String> =
-                    there.iter().filter(|name| Some(**name) != first.as_ref()).copied().collect();
-                let choice = if others.is_empty() { there } else { others };
-                if choice.is_empty() {
+                let there = self.space.place_names.iter().filter(|name| world.surface(name).is_some());
+                let there: Vec<String> = there.cloned().collect();
+                let others: Vec<String> = there.iter().filter(|name| Some(*name) != first.as_ref()).cloned().collect();
+                let names = if others.is_empty() { there } else { others };
+                if names.is_empty() {
                     return;
                 }
-                choice[self.choices.index("place.name", choice.len())].clone()
+                names[self.choices.candidate(ChoiceName::PlaceName, names.clone())].clone()
             }
             None => {
-                let Some(model) = self.choose("place.model", &self.space.places) else { return };
+                let Some(model) = self.choose(ChoiceName::PlaceModel, &self.space.places) else { return };
                 let beside = self.objects.first().map_or(0.0, |platform| platform.model.size_m[1] / 2.0);
                 let pose = Pose::upright([0.0, beside + PLACE_GAP_M + model.size_m[1] / 2.0, 0.0], 0.0);
                 let id = self.free_id(&model);
@@ -211,7 +215,7 @@ impl<'a> SceneBuilder<'a> {
     }
 
     fn set_platform(&mut self) -> Option<Surface> {
-        let model = self.choose("surface.model", &self.space.surfaces)?;
+        let model = self.choose(ChoiceName::SurfaceModel, &self.space.surfaces)?;
         let surface = model.surface;
         let id = self.free_id(&model);
         self.objects.push(platform(id.clone(), model, Pose::IDENTITY));
@@ -221,8 +225,9 @@ impl<'a> SceneBuilder<'a> {
 
     /// Places the target on the reachable part of the surface. Nominal: the centre.
     fn set_target(&mut self, surface: &Surface) -> Result<(), Discard> {
-        if let Some(model) = self.choose("target.model", &self.space.targets) {
-            let id = self.place("target", model, Role::Target, surface, [0.0, 0.0])?;
+        let target = PlacedObject::Target;
+        if let Some(model) = self.choose(ChoiceName::Object(target, ObjectAxis::Model), &self.space.targets) {
+            let id = self.place(target, model, Role::Target, surface, [0.0, 0.0])?;
             self.designators.insert("pickObject".to_owned(), vec![id]);
         }
         Ok(())
@@ -232,7 +237,7 @@ impl<'a> SceneBuilder<'a> {
     fn set_others(&mut self, surface: &Surface) -> Result<(), Discard> {
         let counts = self.space.other_counts.beside_target;
         if !self.space.others.is_empty() && counts.1 > 0 {
-            let ids = self.place_others("other", Role::Other, counts, surface)?;
+            let ids = self.place_others(Role::Other, counts, surface)?;
             self.designators.insert("surfaceObjects".to_owned(), ids);
         }
         Ok(())
@@ -250,7 +255,7 @@ impl<'a> SceneBuilder<'a> {
             return Ok(());
         }
         let platform = self.platform.replace(pose);
-        let strewn = self.place_others("place_other", Role::PlaceOther, counts, &surface);
+        let strewn = self.place_others(Role::PlaceOther, counts, &surface);
         self.platform = platform;
         strewn.map(|_| ())
     }
@@ -259,57 +264,60 @@ impl<'a> SceneBuilder<'a> {
     /// centre, the first at the far side.
     fn place_others(
         &mut self,
-        kind: &str,
         role: Role,
         (least, most): (u32, u32),
         surface: &Surface,
     ) -> Result<Vec<String>, Discard> {
-        let more = self.choices.index(&format!("{kind}.count"), (most - least + 1) as usize);
-        let count = least as usize + more;
+        let (more, numbered): (ChoiceName, fn(u32) -> PlacedObject) = match role {
+            Role::PlaceOther => (ChoiceName::PlaceOtherCount, PlacedObject::PlaceOther),
+            _ => (ChoiceName::OtherCount, PlacedObject::Other),
+        };
+        let count = least + self.choices.index(more, (most - least + 1) as usize) as u32;
         // Seven tenths of the distance from the centre to the edge: the ring is clear of both.
         let radius = 0.35 * surface.size_m[0].min(surface.size_m[1]);
         let mut ids = Vec::new();
         for number in 1..=count {
-            let name = format!("{kind}.{number}");
-            if let Some(model) = self.choose(&format!("{name}.model"), &self.space.others) {
+            let object = numbered(number);
+            if let Some(model) = self.choose(ChoiceName::Object(object, ObjectAxis::Model), &self.space.others) {
                 // Only shrunk runs leave objects out; the ids of the others do not change.
-                if self.choices.exception(&format!("{name}.left_out"), 2) == 1 {
+                if self.choices.exception(ChoiceName::Object(object, ObjectAxis::LeftOut), 2) == 1 {
                     self.left_out.push(model.name.clone());
                     continue;
                 }
-                let angle = TAU * (number - 1) as f64 / count as f64;
+                let angle = TAU * f64::from(number - 1) / f64::from(count);
                 let nominal = [radius * libm::cos(angle), radius * libm::sin(angle)];
-                ids.push(self.place(&name, model, role, surface, nominal)?);
+                ids.push(self.place(object, model, role, surface, nominal)?);
             }
         }
         Ok(ids)
     }
 
     /// Chooses one of the models. Nominal: the first. Returns `None` if there are no models.
-    pub(super) fn choose(&mut self, name: &str, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
+    pub(super) fn choose(&mut self, name: ChoiceName, models: &[Arc<ObjectModel>]) -> Option<Arc<ObjectModel>> {
         if models.is_empty() {
             return None;
         }
-        models.get(self.choices.index(name, models.len())).cloned()
+        let names = models.iter().map(|model| model.name.clone()).collect();
+        models.get(self.choices.candidate(name, names)).cloned()
     }
 
     /// Places an object on a free part of the surface and returns its id. Nominal: the position `nominal`, yaw 0, and
     /// the model's own mass, friction and restitution.
     fn place(
         &mut self,
-        name: &str,
+        object: PlacedObject,
         model: Arc<ObjectModel>,
         role: Role,
         surface: &Surface,
         nominal: [f64; 2],
     ) -> Result<String, Discard> {
         let physics = &self.space.physics;
-        let model = self.sized(name, model);
-        let mass_scale = self.between(&format!("{name}.mass_scale"), physics.mass_scale, 1.0);
-        let friction_scale = self.between(&format!("{name}.friction_scale"), physics.friction_scale, 1.0);
-        let restitution = self.between(&format!("{name}.restitution"), physics.restitution, model.restitution);
+        let model = self.sized(object, model);
+        let mass_scale = self.simple(object, ObjectAxis::MassScale, physics.mass_scale);
+        let friction_scale = self.simple(object, ObjectAxis::FrictionScale, physics.friction_scale);
+        let restitution = self.between(object, ObjectAxis::Restitution, physics.restitution, model.restitution);
         for _ in 0..TRIES {
-            let Some(pose) = self.try_place(name, &model, role, surface, nominal) else { continue };
+            let Some(pose) = self.try_place(object, &model, role, surface, nominal) else { continue };
             let pose = self.on_platform(pose);
             let solid = Solid::new(&model, &pose);
             if self.solids.iter().any(|standing| standing.is_in_the_way_of(&solid)) {
@@ -328,26 +336,26 @@ impl<'a> SceneBuilder<'a> {
             });
             return Ok(id);
         }
-        Err(Discard { model: model.name.clone(), name: name.to_owned(), tries: TRIES })
+        Err(Discard { model: model.name.clone(), name: object.to_string(), tries: TRIES })
     }
 
     /// Draws a pose on the surface. Returns `None` if the object would overhang the edge at the drawn yaw.
     fn try_place(
         &mut self,
-        name: &str,
+        object: PlacedObject,
         model: &ObjectModel,
         role: Role,
         surface: &Surface,
         nominal: [f64; 2],
     ) -> Option<Pose> {
         let share = if role == Role::Target { self.space.lying.0 } else { self.space.lying.1 };
-        let lies = share > 0.0 && self.between(&format!("{name}.stands"), (0.0, 1.0), 1.0) < share;
+        let lies = share > 0.0 && self.simple(object, ObjectAxis::Stands, (0.0, 1.0)) < share;
         let stance = if lies { placement::lying(model) } else { placement::standing(model) };
-        let yaw = self.between(&format!("{name}.yaw"), (-PI, PI), 0.0);
+        let yaw = self.simple(object, ObjectAxis::Yaw, (-PI, PI));
         let whole = placement::area(surface, &stance, yaw)?;
         let area = if role == Role::Target { placement::reachable(whole, surface) } else { whole };
-        let x = self.between(&format!("{name}.x"), area.x, nominal[0]);
-        let y = self.between(&format!("{name}.y"), area.y, nominal[1]);
+        let x = self.between(object, ObjectAxis::X, area.x, nominal[0]);
+        let y = self.between(object, ObjectAxis::Y, area.y, nominal[1]);
         let foot = Pose::upright([x, y, surface.height_m], yaw);
         Some(if lies { Pose::from_isometry(&(foot.to_isometry() * stance.foot_from_model)) } else { foot })
     }
@@ -361,17 +369,21 @@ impl<'a> SceneBuilder<'a> {
     }
 
     /// Returns the model scaled by a drawn factor.
-    fn sized(&mut self, name: &str, model: Arc<ObjectModel>) -> Arc<ObjectModel> {
+    fn sized(&mut self, object: PlacedObject, model: Arc<ObjectModel>) -> Arc<ObjectModel> {
         let (low, high) = self.space.physics.size_scale;
         if (low, high) == (1.0, 1.0) {
             return model;
         }
-        let scale = self.between(&format!("{name}.size_scale"), (low, high), 1.0);
+        let scale = self.simple(object, ObjectAxis::SizeScale, (low, high));
         Arc::new(model.scaled(scale))
     }
 
-    fn between(&mut self, name: &str, (low, high): (f64, f64), nominal: f64) -> f64 {
-        self.choices.real(name, low, high, nominal)
+    fn simple(&mut self, object: PlacedObject, axis: ObjectAxis, (low, high): (f64, f64)) -> f64 {
+        self.choices.simple(ChoiceName::Object(object, axis), low, high)
+    }
+
+    fn between(&mut self, object: PlacedObject, axis: ObjectAxis, (low, high): (f64, f64), nominal: f64) -> f64 {
+        self.choices.real(ChoiceName::Object(object, axis), low, high, nominal)
     }
 
     /// Returns an id: the model's name and the first free number.

@@ -9,7 +9,10 @@ use crate::draw::{Discard, SceneBuilder, TRIES};
 use crate::floor_plan::{FRONT_GAP_M, front_of};
 use crate::overlap::Solid;
 use crate::surroundings::Surroundings;
-use actcheck_data::{Location, ObjectModel, Part, Pose, Role, SceneObject, Shape, Surface};
+use actcheck_data::{
+    ChoiceName, Location, ObjectAxis, ObjectModel, Part, PlacedObject, Pose, Role, SceneObject, Shape, StartAxis,
+    Surface,
+};
 
 /// Gap between the surface's edge and the centre of the robot's base. Unit: metres. Shape: minimum, nominal, maximum.
 const BASE_GAP_M: [f64; 3] = [0.59, FRONT_GAP_M, 0.79];
@@ -48,9 +51,12 @@ impl SceneBuilder<'_> {
         }
         let [least, nominal, most] = if self.is_fixed() { FIXED_GAP_M } else { BASE_GAP_M };
         let edge = surface.map_or(0.0, |surface| surface.size_m[0] / 2.0);
-        let gap = self.choices.real("robot.gap", least, most, nominal);
-        let side = self.choices.real("robot.side", -BASE_SIDE_M, BASE_SIDE_M, 0.0);
-        let heading = self.choices.real("robot.heading", -BASE_HEADING_RAD, BASE_HEADING_RAD, 0.0);
+        let mut draw = |axis: StartAxis, low: f64, high: f64, nominal: f64| {
+            self.choices.real(ChoiceName::Robot(axis), low, high, nominal)
+        };
+        let gap = draw(StartAxis::Gap, least, most, nominal);
+        let side = draw(StartAxis::Side, -BASE_SIDE_M, BASE_SIDE_M, 0.0);
+        let heading = draw(StartAxis::Heading, -BASE_HEADING_RAD, BASE_HEADING_RAD, 0.0);
         Ok(self.in_world([-edge - gap, side, heading]))
     }
 
@@ -88,11 +94,11 @@ impl SceneBuilder<'_> {
         serves: impl Fn(&[f64; 3]) -> bool,
     ) -> Result<[f64; 3], Discard> {
         for _ in 0..TRIES {
-            let mut draw = |name: &str, axis: usize| {
+            let mut draw = |name: StartAxis, axis: usize| {
                 let (low, high) = ranges[axis];
-                self.choices.real(name, low, high, nominal[axis])
+                self.choices.real(ChoiceName::Robot(name), low, high, nominal[axis])
             };
-            let base = [draw("robot.x", 0), draw("robot.y", 1), draw("robot.heading", 2)];
+            let base = [draw(StartAxis::X, 0), draw(StartAxis::Y, 1), draw(StartAxis::Heading, 2)];
             if serves(&base) && self.is_free(&self.own_room(base)) {
                 return Ok(base);
             }
@@ -183,32 +189,35 @@ impl SceneBuilder<'_> {
         let (low, high) =
             if drives { self.arena(world) } else { world.map_or_else(|| field(base), Surroundings::extent) };
         for number in 1..=self.space.obstacle_count {
-            let name = format!("obstacle.{number}");
-            let Some(model) = self.choose(&format!("{name}.model"), &self.space.obstacles) else { continue };
-            self.set_obstacle(&name, model, (low, high), &kept_free)?;
+            let object = PlacedObject::Obstacle(number);
+            let name = ChoiceName::Object(object, ObjectAxis::Model);
+            let Some(model) = self.choose(name, &self.space.obstacles) else { continue };
+            self.set_obstacle(object, model, (low, high), &kept_free)?;
         }
         Ok(())
     }
 
     fn set_obstacle(
         &mut self,
-        name: &str,
+        object: PlacedObject,
         model: Arc<ObjectModel>,
         (low, high): ([f64; 2], [f64; 2]),
         kept_free: &[Solid],
     ) -> Result<(), Discard> {
         for _ in 0..TRIES {
-            let mut draw = |what: &str, low: f64, high: f64| {
-                self.choices.real(&format!("{name}.{what}"), low, high, (low + high) / 2.0)
+            let mut draw = |axis: ObjectAxis, low: f64, high: f64| {
+                self.choices.simple(ChoiceName::Object(object, axis), low, high)
             };
-            let (x, y, yaw) = (draw("x", low[0], high[0]), draw("y", low[1], high[1]), draw("yaw", -PI, PI));
+            let x = draw(ObjectAxis::X, low[0], high[0]);
+            let y = draw(ObjectAxis::Y, low[1], high[1]);
+            let yaw = draw(ObjectAxis::Yaw, -PI, PI);
             let pose = Pose::upright([x, y, 0.0], yaw);
             let solid = Solid::new(&model, &pose);
             if !self.is_free(&solid) || kept_free.iter().any(|kept| kept.is_in_the_way_of(&solid)) {
                 continue;
             }
             self.solids.push(solid);
-            let object = SceneObject {
+            self.objects.push(SceneObject {
                 id: self.free_id(&model),
                 role: Role::Obstacle,
                 pose,
@@ -216,11 +225,10 @@ impl SceneBuilder<'_> {
                 friction: model.friction,
                 restitution: model.restitution,
                 model,
-            };
-            self.objects.push(object);
+            });
             return Ok(());
         }
-        Err(Discard { model: model.name.clone(), name: name.to_owned(), tries: TRIES })
+        Err(Discard { model: model.name.clone(), name: object.to_string(), tries: TRIES })
     }
 
     /// The places in front of the platforms.

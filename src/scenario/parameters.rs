@@ -3,13 +3,13 @@
 use std::f64::consts::PI;
 
 use crate::Space;
-use actcheck_data::Range;
+use actcheck_data::{ChoiceName, ObjectAxis, PlacedObject, Range, StartAxis};
 
 /// A parameter of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Parameter {
     /// The name of its choice in [`crate::draw`].
-    pub name: String,
+    pub name: ChoiceName,
     /// Its values.
     pub kind: ParameterKind,
 }
@@ -19,9 +19,8 @@ pub struct Parameter {
 pub enum ParameterKind {
     /// A range of numbers.
     Range,
-    /// A range for the position of another object along one axis of the surface. Holds the name of the target's
-    /// position along the same axis.
-    Beside(&'static str),
+    /// A range for the position of another object along this axis of the surface, near the target's.
+    Beside(ObjectAxis),
     /// This many unordered alternatives.
     OneOf(usize),
     /// This many counts in rising order.
@@ -36,38 +35,41 @@ impl Space {
     /// without them. They are drawn at random.
     pub fn parameters(&self) -> Vec<Parameter> {
         let mut found = Vec::new();
-        let mut add = |name: String, kind: ParameterKind| match kind {
+        let mut add = |name: ChoiceName, kind: ParameterKind| match kind {
             ParameterKind::OneOf(0 | 1) | ParameterKind::Count(0 | 1) => {}
             kind => found.push(Parameter { name, kind }),
         };
         let (least, most) = self.other_counts.beside_target;
         let most = if self.others.is_empty() { 0 } else { most };
         if most > 0 {
-            add("other.count".to_owned(), ParameterKind::Count((most - least + 1) as usize));
+            add(ChoiceName::OtherCount, ParameterKind::Count((most - least + 1) as usize));
         }
-        self.names.iter().for_each(|(name, values)| add(name.clone(), ParameterKind::OneOf(values.len())));
-        add("surface.model".to_owned(), ParameterKind::OneOf(self.surfaces.len()));
+        self.names.iter().for_each(|(name, values)| add(name.as_str().into(), ParameterKind::OneOf(values.len())));
+        add(ChoiceName::SurfaceModel, ParameterKind::OneOf(self.surfaces.len()));
         if !self.targets.is_empty() {
-            add("target.model".to_owned(), ParameterKind::OneOf(self.targets.len()));
+            let of_target = |axis| ChoiceName::Object(PlacedObject::Target, axis);
+            add(of_target(ObjectAxis::Model), ParameterKind::OneOf(self.targets.len()));
             let physics = &self.physics;
-            let ranges: [(&str, Range); 6] = [
-                ("x", (0.0, 1.0)),
-                ("y", (0.0, 1.0)),
-                ("yaw", (-PI, PI)),
-                ("mass_scale", physics.mass_scale),
-                ("friction_scale", physics.friction_scale),
-                ("restitution", physics.restitution),
+            let ranges: [(ObjectAxis, Range); 6] = [
+                (ObjectAxis::X, (0.0, 1.0)),
+                (ObjectAxis::Y, (0.0, 1.0)),
+                (ObjectAxis::Yaw, (-PI, PI)),
+                (ObjectAxis::MassScale, physics.mass_scale),
+                (ObjectAxis::FrictionScale, physics.friction_scale),
+                (ObjectAxis::Restitution, physics.restitution),
             ];
             let open = ranges.into_iter().filter(|(_, (low, high))| low < high);
-            open.for_each(|(name, _)| add(format!("target.{name}"), ParameterKind::Range));
+            open.for_each(|(axis, _)| add(of_target(axis), ParameterKind::Range));
         }
-        for name in ["gap", "side", "heading"] {
-            add(format!("robot.{name}"), ParameterKind::Range);
+        for axis in [StartAxis::Gap, StartAxis::Side, StartAxis::Heading] {
+            add(ChoiceName::Robot(axis), ParameterKind::Range);
         }
         for number in 1..=most {
-            add(format!("other.{number}.model"), ParameterKind::OneOf(self.others.len()));
-            add(format!("other.{number}.x"), ParameterKind::Beside("target.x"));
-            add(format!("other.{number}.y"), ParameterKind::Beside("target.y"));
+            let of_other = |axis| ChoiceName::Object(PlacedObject::Other(number), axis);
+            add(of_other(ObjectAxis::Model), ParameterKind::OneOf(self.others.len()));
+            for axis in [ObjectAxis::X, ObjectAxis::Y] {
+                add(of_other(axis), ParameterKind::Beside(axis));
+            }
         }
         found
     }

@@ -28,4 +28,4 @@ pub use sampler::{Ask, GENERATION, Search};
 pub use space::{Dimension, Space};
 pub use strategy::Strategy;
 
-pub use archive::Told;
+pub use archive::PropertyResult;

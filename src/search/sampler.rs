@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::archive::{Archive, Closed, Told, Tried};
+use super::archive::{Archive, ClosedRegion, PropertyResult, Tried};
 use super::estimate::{Estimate, Weighted};
 use super::fill;
 use super::proposal::{Component, Proposal};
@@ -28,13 +28,13 @@ const CHOSEN_FOR_A_PLAIN: f64 = 0.25;
 const MOST_CHOSEN: f64 = 0.4;
 
 /// A failing region is closed after this many failures of chosen points of one property.
-const FAILURES_OF_A_PLACE: usize = 12;
+const FAILURES_OF_A_REGION: usize = 12;
 
 /// A region is closed after this many chosen points without a lower margin.
 const PATIENCE: usize = 24;
 
 /// Radius of a closed region, as a root mean square distance over the axes. Two random points have distance 0.4.
-const PLACE_RADIUS: f64 = 0.1;
+const REGION_RADIUS: f64 = 0.1;
 
 /// A point to evaluate.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,7 +62,7 @@ pub struct Search {
     waiting: VecDeque<Ask>,
     /// Weight, largest weight and failures of the generation's points so far. The weights are valid only for a whole
     /// generation.
-    told: Vec<(f64, f64, Vec<bool>)>,
+    counted: Vec<(f64, f64, Vec<bool>)>,
     archive: Archive,
     /// For each property: the number of points evaluated when its current region was started.
     begun: Vec<usize>,
@@ -81,7 +81,7 @@ impl Search {
             unusual: 0,
             chosen: 0,
             waiting: VecDeque::new(),
-            told: Vec::new(),
+            counted: Vec::new(),
             archive: Archive::default(),
             begun: Vec::new(),
             rates: Vec::new(),
@@ -110,17 +110,17 @@ impl Search {
         };
         self.generation += 1;
         self.waiting = asked.iter().cloned().collect();
-        self.told.clear();
+        self.counted.clear();
         asked
     }
 
     /// Records the results of each property for the next pending point, in the order of [`Search::ask`].
     ///
     /// The list may be empty for a point without results. Results without a pending point are ignored.
-    pub fn tell(&mut self, told: Vec<Told>) {
+    pub fn tell(&mut self, results: Vec<PropertyResult>) {
         let Some(ask) = self.waiting.pop_front() else { return };
-        self.count(&ask, &told);
-        self.learn(ask, told);
+        self.count(&ask, &results);
+        self.learn(ask, results);
     }
 
     /// Records results for the next pending point if it is infeasible and was replaced by a random feasible point.
@@ -128,20 +128,20 @@ impl Search {
     /// The replacement takes over the weight. Infeasible points have, weighted, their nominal share, and replacements
     /// are distributed like all feasible points, so rates are unbiased for the distribution of feasible points.
     /// Strategies don't learn from the replacement.
-    pub fn tell_stand_in(&mut self, told: &[Told]) {
+    pub fn tell_replacement(&mut self, results: &[PropertyResult]) {
         let Some(ask) = self.waiting.pop_front() else { return };
-        self.count(&ask, told);
+        self.count(&ask, results);
         self.learn(ask, Vec::new());
     }
 
     /// Stores a result, and adds a generation to the rates when it is complete.
-    fn count(&mut self, ask: &Ask, told: &[Told]) {
-        let failed = told.iter().map(|told| told.failed).collect();
-        self.told.push((ask.weight, ask.largest_weight, failed));
+    fn count(&mut self, ask: &Ask, results: &[PropertyResult]) {
+        let failed = results.iter().map(|result| result.failed).collect();
+        self.counted.push((ask.weight, ask.largest_weight, failed));
         if !self.waiting.is_empty() {
             return;
         }
-        for (weight, largest, failed) in self.told.drain(..) {
+        for (weight, largest, failed) in self.counted.drain(..) {
             self.rates.resize(self.rates.len().max(failed.len()), Weighted::default());
             for (rate, failed) in self.rates.iter_mut().zip(failed) {
                 rate.add(weight, largest, failed);
@@ -149,11 +149,11 @@ impl Search {
         }
     }
 
-    fn learn(&mut self, ask: Ask, told: Vec<Told>) {
-        self.begun.resize(self.begun.len().max(told.len()), 0);
-        self.archive.tried.push(Tried { point: ask.point, told, focus: ask.focus });
+    fn learn(&mut self, ask: Ask, results: Vec<PropertyResult>) {
+        self.begun.resize(self.begun.len().max(results.len()), 0);
+        self.archive.tried.push(Tried { point: ask.point, results, focus: ask.focus });
         if let Some(property) = ask.focus {
-            self.leave_if_done(property);
+            self.close_if_exhausted(property);
         }
     }
 
@@ -224,7 +224,7 @@ impl Search {
     /// yet, or over all once each has failed. Returns `None` if no property has informative margins.
     fn focus(&self) -> Option<usize> {
         let telling: Vec<usize> =
-            (0..self.archive.properties()).filter(|property| self.archive.says_something(*property)).collect();
+            (0..self.archive.properties()).filter(|property| self.archive.has_informative_margins(*property)).collect();
         let unfailed = |property: &usize| !self.archive.tried.iter().any(|tried| tried.failed(*property));
         let fresh: Vec<usize> = telling.iter().copied().filter(unfailed).collect();
         let turn = if fresh.is_empty() { telling } else { fresh };
@@ -241,7 +241,7 @@ impl Search {
     }
 
     /// Closes the current region of a property after enough failures, or when the margin no longer decreases.
-    fn leave_if_done(&mut self, property: usize) {
+    fn close_if_exhausted(&mut self, property: usize) {
         let begun = self.begun[property];
         let own: Vec<&Tried> =
             self.archive.tried[begun..].iter().filter(|tried| tried.focus == Some(property)).collect();
@@ -251,9 +251,9 @@ impl Search {
             return;
         };
         let stuck = failures == 0 && own.len() - 1 - at >= PATIENCE;
-        if failures >= FAILURES_OF_A_PLACE || stuck {
+        if failures >= FAILURES_OF_A_REGION || stuck {
             let centre = best.point.clone();
-            self.archive.closed.push(Closed { property, centre, radius: PLACE_RADIUS });
+            self.archive.closed.push(ClosedRegion { property, centre, radius: REGION_RADIUS });
             self.begun[property] = self.archive.tried.len();
         }
     }
@@ -281,8 +281,8 @@ mod tests {
         Space::new([continuous, continuous, Dimension::Categorical(4), continuous])
     }
 
-    fn told(margin: f64) -> Told {
-        Told { failed: margin < 0.0, margin: Some(margin) }
+    fn result(margin: f64) -> PropertyResult {
+        PropertyResult { failed: margin < 0.0, margin: Some(margin) }
     }
 
     /// Returns the search after this many generations, and all its points.
@@ -295,7 +295,7 @@ mod tests {
             for ask in &generation {
                 assert!(ask.point.iter().all(|value| (0.0..1.0).contains(value)), "{ask:?}");
                 assert!(ask.weight > 0.0 && ask.weight <= ask.largest_weight, "{ask:?}");
-                search.tell(vec![told(margin(&ask.point))]);
+                search.tell(vec![result(margin(&ask.point))]);
             }
             asked.extend(generation);
         }
@@ -369,7 +369,7 @@ mod tests {
             for _ in 0..10 {
                 for ask in search.ask(GENERATION) {
                     assert_eq!((ask.weight, ask.focus), (1.0, None));
-                    search.tell(vec![Told { failed: margin(&ask.point) < 0.0, margin: None }]);
+                    search.tell(vec![PropertyResult { failed: margin(&ask.point) < 0.0, margin: None }]);
                 }
             }
         }
@@ -387,7 +387,7 @@ mod tests {
                     let mean = ask.point.iter().sum::<f64>() / 6.0;
                     let margins = [mean - 0.2, 0.8 - mean];
                     (0..2).for_each(|property| failed[property] += usize::from(margins[property] < 0.0));
-                    search.tell(margins.map(told).to_vec());
+                    search.tell(margins.map(result).to_vec());
                 }
             }
             // A share of 1.2⁶ / 6! = 0.0041 of plain random points fails, four of 1000 (Irwin–Hall distribution).
@@ -415,7 +415,7 @@ mod tests {
                     assert!(ask.weight > 0.0 && ask.weight <= ask.largest_weight, "{ask:?}");
                     let told = fails(&ask.point);
                     (0..2).for_each(|property| failed[property] += usize::from(told[property]));
-                    search.tell(told.map(|failed| Told { failed, margin: None }).to_vec());
+                    search.tell(told.map(|failed| PropertyResult { failed, margin: None }).to_vec());
                 }
             }
             found += failed[0];
@@ -445,13 +445,13 @@ mod tests {
             for _ in 0..6 {
                 for ask in search.ask(GENERATION) {
                     if possible(&ask.point) {
-                        search.tell(vec![told(margin(&ask.point))]);
+                        search.tell(vec![result(margin(&ask.point))]);
                     } else {
                         let stand_in =
                             std::iter::repeat_with(|| [fill::unit(&mut generator), fill::unit(&mut generator)])
                                 .find(|point| possible(point))
                                 .expect("the iterator is infinite");
-                        search.tell_stand_in(&[told(margin(&stand_in))]);
+                        search.tell_replacement(&[result(margin(&stand_in))]);
                     }
                 }
             }
@@ -468,10 +468,10 @@ mod tests {
     fn only_complete_generations_count() {
         let mut search = Search::new(space(), Strategy::Bandit, 1);
         let first = search.ask(5);
-        first.iter().for_each(|ask| search.tell(vec![told(margin(&ask.point))]));
+        first.iter().for_each(|ask| search.tell(vec![result(margin(&ask.point))]));
         let whole = search.estimates();
         search.ask(GENERATION);
-        search.tell(vec![told(-1.0)]);
+        search.tell(vec![result(-1.0)]);
         assert_eq!(search.estimates(), whole);
         search.ask(GENERATION);
         assert_eq!(search.estimates(), whole);
@@ -480,13 +480,13 @@ mod tests {
     #[test]
     fn unrequested_results_are_ignored() {
         let mut search = Search::new(Space::new([]), Strategy::Boundary, 1);
-        search.tell(vec![told(-1.0)]);
+        search.tell(vec![result(-1.0)]);
         assert!(search.estimates().is_empty());
         (0..5).for_each(|_| {
             search.ask(2);
             search.tell(Vec::new());
-            search.tell(vec![told(f64::NAN)]);
-            search.tell(vec![told(-1.0)]);
+            search.tell(vec![result(f64::NAN)]);
+            search.tell(vec![result(-1.0)]);
         });
         assert_eq!(search.estimates().len(), 1);
     }

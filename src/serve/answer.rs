@@ -39,26 +39,26 @@ pub fn answer(history: &Path, mut input: impl Read, mut output: impl Write) -> s
     input.read_to_end(&mut bytes)?;
     let question: Question = serde_json::from_slice(&bytes)?;
     watch::limit(question.most_secs, question.most_memory);
-    let (status, media_type, body) = answered(history, &question);
+    let (status, media_type, body) = run_query(history, &question);
     let head = Head { status, media_type: media_type.to_owned() };
     writeln!(output, "{}", serde_json::to_string(&head)?)?;
     output.write_all(&body)?;
     output.flush()
 }
 
-fn answered(history: &Path, question: &Question) -> (u16, &'static str, Vec<u8>) {
+fn run_query(history: &Path, question: &Question) -> (u16, &'static str, Vec<u8>) {
     let source = Source::new("query", question.query.as_str());
     let history = match History::open_to_read(history) {
         Ok(history) => history,
         // A campaign is writing: the client can retry soon.
-        Err(faults) => return told(503, &faults),
+        Err(faults) => return format_faults(503, &faults),
     };
     let choose = |offered: &[_]| accept::choose(&question.accept, offered);
     match history.wire_answer(&source, choose, question.most_rows) {
         Ok((syntax, body)) => (200, syntax.media_types()[0], body),
-        Err(WireFault::Malformed(faults)) => told(400, &faults),
-        Err(WireFault::Refused(faults)) => told(403, &faults),
-        Err(WireFault::Failed(faults)) => told(500, &faults),
+        Err(WireFault::Malformed(faults)) => format_faults(400, &faults),
+        Err(WireFault::Refused(faults)) => format_faults(403, &faults),
+        Err(WireFault::Failed(faults)) => format_faults(500, &faults),
         Err(WireFault::NotAcceptable) => {
             let why = format!("the answer has no format that `Accept: {}` allows\n", question.accept);
             (406, "text/plain", why.into_bytes())
@@ -67,7 +67,7 @@ fn answered(history: &Path, question: &Question) -> (u16, &'static str, Vec<u8>)
 }
 
 /// Formats diagnostics as lines with their places.
-fn told(status: u16, faults: &Diagnostics) -> (u16, &'static str, Vec<u8>) {
+fn format_faults(status: u16, faults: &Diagnostics) -> (u16, &'static str, Vec<u8>) {
     let mut text = String::new();
     for fault in faults.iter() {
         let place = fault.place().map_or_else(String::new, |place| format!("{place}: "));

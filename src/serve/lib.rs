@@ -17,5 +17,5 @@ mod watch;
 mod worker;
 
 pub use answer::answer;
-pub use page::Example;
-pub use server::{Options, Serving, serve};
+pub use page::ExampleQuery;
+pub use server::{ServeOptions, Serving, serve};

@@ -13,7 +13,7 @@ pub(super) const SCRIPT: &str = include_str!("web/query.js");
 
 /// An example query of the page.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Example {
+pub struct ExampleQuery {
     /// Its name.
     pub name: String,
     /// Title, one line.
@@ -25,7 +25,7 @@ pub struct Example {
 }
 
 /// Renders the page.
-pub(super) fn page(history: &str, examples: &[Example]) -> String {
+pub(super) fn page(history: &str, examples: &[ExampleQuery]) -> String {
     let mut options = String::new();
     for example in examples {
         // Writing to a string does not fail.
@@ -71,8 +71,12 @@ mod tests {
     #[test]
     fn shown_text_is_escaped() {
         let nasty = "\"><script>alert('1')</script>&".to_owned();
-        let example =
-            Example { name: nasty.clone(), title: nasty.clone(), description: nasty.clone(), query: nasty.clone() };
+        let example = ExampleQuery {
+            name: nasty.clone(),
+            title: nasty.clone(),
+            description: nasty.clone(),
+            query: nasty.clone(),
+        };
         let page = page(&nasty, &[example]);
         assert!(!page.contains("<script>") && !page.contains("'1'") && page.matches("<script").count() == 1, "{page}");
     }

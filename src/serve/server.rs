@@ -13,7 +13,7 @@ use oxhttp::model::{Body, Request, Response, StatusCode};
 
 use crate::answer::{Head, Question};
 use crate::guard::guard;
-use crate::page::{self, Example};
+use crate::page::{self, ExampleQuery};
 use crate::question::{Parts, Refusal, question};
 use crate::report::LiveReport;
 use crate::watch;
@@ -39,9 +39,9 @@ const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' blob
 /// Policy of answers, which are not pages.
 const NO_POLICY: &str = "default-src 'none'; frame-ancestors 'none'; sandbox";
 
-/// Options of [`serve`].
+/// ServeOptions of [`serve`].
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct ServeOptions {
     /// Folder of the history.
     pub history: PathBuf,
     /// Path of this program, which is started for each query.
@@ -66,8 +66,8 @@ pub struct Options {
     pub most_memory: u64,
     /// Maximum number of concurrent queries.
     pub most_queries: usize,
-    /// Example queries.
-    pub examples: Vec<Example>,
+    /// ExampleQuery queries.
+    pub examples: Vec<ExampleQuery>,
 }
 
 /// A server that runs until the process ends.
@@ -81,9 +81,9 @@ pub struct Serving {
 ///
 /// # Errors
 /// The address can't be bound.
-pub fn serve(options: Options) -> std::io::Result<Serving> {
+pub fn serve(options: ServeOptions) -> std::io::Result<Serving> {
     let (ip, wanted) = (options.address, options.port);
-    let desk = std::sync::Arc::new(Desk::new(options));
+    let state = std::sync::Arc::new(AppState::new(options));
     let mut last = Error::from(ErrorKind::AddrInUse);
     for _ in 0..if wanted == 0 { TRIES } else { 1 } {
         let address = match wanted {
@@ -91,8 +91,8 @@ pub fn serve(options: Options) -> std::io::Result<Serving> {
             0 => TcpListener::bind((ip, 0))?.local_addr()?,
             port => SocketAddr::new(ip, port),
         };
-        let at_the_desk = std::sync::Arc::clone(&desk);
-        let server = Server::new(move |request| at_the_desk.respond(request))
+        let shared = std::sync::Arc::clone(&state);
+        let server = Server::new(move |request| shared.respond(request))
             .bind(address)
             .with_global_timeout(PATIENCE)
             .with_max_concurrent_connections(MOST_CONNECTIONS);
@@ -106,8 +106,8 @@ pub fn serve(options: Options) -> std::io::Result<Serving> {
 }
 
 /// State shared by all requests.
-struct Desk {
-    options: Options,
+struct AppState {
+    options: ServeOptions,
     query: Worker,
     report: LiveReport,
     page: String,
@@ -137,8 +137,8 @@ impl From<Refusal> for Reply {
     }
 }
 
-impl Desk {
-    fn new(options: Options) -> Self {
+impl AppState {
+    fn new(options: ServeOptions) -> Self {
         let worker = |arguments: &[String]| Worker { program: options.program.clone(), arguments: arguments.to_vec() };
         let report = LiveReport {
             worker: worker(&options.report_arguments),
@@ -190,12 +190,13 @@ impl Desk {
         let query = question(&parts)?;
         let accepts = request.headers().get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
         let accept = accepts.collect::<Vec<&str>>().join(",");
-        let _place = self.place().ok_or_else(|| Refusal::new(503, "too many queries are running: try again soon"))?;
+        let _place =
+            self.reserve_slot().ok_or_else(|| Refusal::new(503, "too many queries are running: try again soon"))?;
         self.ask(query, accept)
     }
 
     fn ask(&self, query: String, accept: String) -> Result<Reply, Refusal> {
-        let Options { most_rows, most_secs, most_memory, most_bytes, .. } = self.options;
+        let ServeOptions { most_rows, most_secs, most_memory, most_bytes, .. } = self.options;
         let question = Question { query, accept, most_rows, most_secs, most_memory };
         let Ok(input) = serde_json::to_vec(&question) else { return Err(Refusal::new(400, "the query can't be read")) };
         let time = START + Duration::try_from_secs_f64(most_secs).unwrap_or(Duration::MAX / 2);
@@ -205,7 +206,7 @@ impl Desk {
         };
         let late = || Refusal::new(504, format!("the query took longer than {most_secs} s"));
         match ended {
-            Ended::Itself { code: Some(0), output, .. } => answered(output),
+            Ended::Itself { code: Some(0), output, .. } => parse_output(output),
             Ended::Itself { code: Some(watch::TIME_SPENT), .. } | Ended::Late => Err(late()),
             Ended::Itself { code: Some(watch::MEMORY_SPENT), .. } => {
                 Err(Refusal::new(500, format!("the query took more than {} MB of memory", most_memory / 1_000_000)))
@@ -219,24 +220,24 @@ impl Desk {
     }
 
     /// Reserves a slot for a query. Returns `None` if all slots are in use.
-    fn place(&self) -> Option<Place<'_>> {
+    fn reserve_slot(&self) -> Option<QuerySlot<'_>> {
         let taken = self.running.fetch_add(1, Ordering::AcqRel);
-        let place = Place(&self.running);
-        (taken < self.options.most_queries).then_some(place)
+        let slot = QuerySlot(&self.running);
+        (taken < self.options.most_queries).then_some(slot)
     }
 }
 
 /// A slot for a running query; dropping it frees the slot.
-struct Place<'a>(&'a AtomicUsize);
+struct QuerySlot<'a>(&'a AtomicUsize);
 
-impl Drop for Place<'_> {
+impl Drop for QuerySlot<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::AcqRel);
     }
 }
 
 /// Splits the output of the process into head and body.
-fn answered(output: Vec<u8>) -> Result<Reply, Refusal> {
+fn parse_output(output: Vec<u8>) -> Result<Reply, Refusal> {
     let crashed = || Refusal::new(500, "the query crashed the evaluator");
     let end = output.iter().position(|byte| *byte == b'\n').ok_or_else(crashed)?;
     let head: Head = serde_json::from_slice(&output[..end]).map_err(|_| crashed())?;

@@ -70,13 +70,10 @@ fn unmet_precondition(
 
 fn outcome_of(result: &Result<Findings, RuleFault>, property: Option<&Property>) -> (Outcome, Option<f64>, String) {
     match result {
-        Err(RuleFault::BudgetSpent(reason)) => (Outcome::Timeout, None, reason.clone()),
-        Err(RuleFault::Value(reason)) => (Outcome::Broken, None, reason.clone()),
-        Err(RuleFault::Interrupted) => (Outcome::Untested, None, RuleFault::Interrupted.to_string()),
-        Ok(found) if !found.applicable => (Outcome::Inapplicable, None, words(found, property)),
+        Err(fault) => (fault.outcome(), None, fault.reason().to_owned()),
         Ok(found) => {
-            let outcome = if found.holds { Outcome::Passed } else { Outcome::Failed };
-            (outcome, found.margin, words(found, property))
+            let margin = found.margin.filter(|_| found.applicable);
+            (found.outcome(), margin, words(found, property))
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::World;
 use crate::convert::{from_pose, to_real};
 use crate::engine::Owner;
 use crate::rays::{Lens, Solids};
-use actcheck_data::{Camera, Choices, Stream};
+use actcheck_data::{Camera, ChoiceName, Choices, Stream};
 
 /// Number of noise seeds, including 0 (no noise).
 const FRAMES: usize = 1 << 32;
@@ -56,7 +56,7 @@ impl World {
     pub fn look(&self, choices: &mut Choices) -> DepthImage {
         let began_secs = self.watch_secs();
         let camera = &self.sensing.camera;
-        let frame = choices.index("sense.camera.frame", FRAMES);
+        let frame = choices.index(ChoiceName::CameraFrame, FRAMES);
         let noise = (frame > 0).then(|| Noise { camera, stream: Stream::new(frame as u64) });
         let eye = self.robot.kinematics.camera(&self.robot.state(&self.engine).0);
         let solids = Solids::new(lens(camera), &eye, self.solids());

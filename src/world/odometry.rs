@@ -1,13 +1,13 @@
 //! Localisation of the base while it drives: wheel odometry drifts, landmarks correct it.
 //!
-//! The relative wheel errors are constant within a stretch of the path. Each stretch has its own choices, named
-//! `sense.odometry.*`. A landmark measures the true pose with noise; its weight depends on the current uncertainty of
-//! the estimate (a Kalman filter with one variance for the position and one for the heading).
+//! The relative wheel errors are constant within a stretch of the path. Each stretch has its own choices. A landmark
+//! measures the true pose with noise; its weight depends on the current uncertainty of the estimate (a Kalman filter
+//! with one variance for the position and one for the heading).
 
 use nalgebra::Vector2;
 
 use crate::World;
-use actcheck_data::{Choices, Odometry, Pose};
+use actcheck_data::{ChoiceName, Choices, Odometry, PlanarAxis, Pose, WheelAxis};
 
 /// Length of a stretch with constant wheel errors: distance plus rotation. Units: metres and radians.
 const STRETCH: f64 = 0.5;
@@ -85,12 +85,12 @@ impl World {
         let tracker = &mut self.tracker;
         tracker.left -= step.way_m + step.turn_rad.abs();
         if tracker.left <= 0.0 && step.way_m + step.turn_rad.abs() > 0.0 {
-            let mut draw = |what: &str, sigma: f64| choices.normal(&format!("sense.odometry.{what}"), sigma);
+            let mut draw = |axis: WheelAxis, sigma: f64| choices.normal(ChoiceName::Odometry(axis), sigma);
             tracker.off = [
-                draw("along", odometry.drift),
-                draw("across", odometry.drift),
-                draw("turning", odometry.heading_drift),
-                draw("veering", odometry.heading_drift),
+                draw(WheelAxis::Along, odometry.drift),
+                draw(WheelAxis::Across, odometry.drift),
+                draw(WheelAxis::Turning, odometry.heading_drift),
+                draw(WheelAxis::Veering, odometry.heading_drift),
             ];
             tracker.left = STRETCH;
         }
@@ -115,8 +115,8 @@ impl World {
             share(&mut tracker.variances[0], odometry.landmark_noise_m),
             share(&mut tracker.variances[1], odometry.landmark_noise_rad),
         ];
-        for (axis, name) in ["x", "y", "heading"].into_iter().enumerate() {
-            let seen = truth[axis] + choices.normal(&format!("sense.odometry.landmark.{name}"), noise[axis]);
+        for (axis, name) in PlanarAxis::ALL.into_iter().enumerate() {
+            let seen = truth[axis] + choices.normal(ChoiceName::Landmark(name), noise[axis]);
             tracker.pending[axis] = shares[axis / 2] * (seen - believed[axis]);
         }
     }

@@ -360,7 +360,7 @@ pub(super) mod tests {
     /// A random posture within the limits.
     fn posture(world: &World, choices: &mut Choices) -> Vec<f64> {
         let joints = world.kinematics().joints().iter();
-        joints.map(|joint| choices.real("q", joint.lower.max(-2.0), joint.upper.min(2.0), 0.0)).collect()
+        joints.map(|joint| choices.real("q".into(), joint.lower.max(-2.0), joint.upper.min(2.0), 0.0)).collect()
     }
 
     #[test]

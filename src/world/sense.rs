@@ -1,12 +1,12 @@
 //! Perception of objects: ground truth with noise, relative to the robot's pose estimate.
 //!
-//! Every random sample is a recorded choice named `sense.*`.
+//! Every random sample is a recorded choice.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::World;
 use crate::simulation::Object;
-use actcheck_data::{Choices, Pose};
+use actcheck_data::{ChoiceName, Choices, PlanarAxis, Pose, SightingAxis};
 
 /// Tilt beyond which an object counts as lying: it is then seen as its upright bounding box. Unit: radians.
 const LYING_RAD: f64 = 0.3;
@@ -30,9 +30,10 @@ impl World {
     /// Samples the base's initial pose estimate. Its error stays constant while the base moves, unless the odometry
     /// drifts.
     pub fn localise(&mut self, choices: &mut Choices) {
-        let x = choices.normal("sense.localisation.x", self.sensing.localisation_noise_m);
-        let y = choices.normal("sense.localisation.y", self.sensing.localisation_noise_m);
-        let turn = choices.normal("sense.localisation.heading", self.sensing.heading_noise_rad);
+        let mut draw = |axis: PlanarAxis, sigma: f64| choices.normal(ChoiceName::Localisation(axis), sigma);
+        let x = draw(PlanarAxis::X, self.sensing.localisation_noise_m);
+        let y = draw(PlanarAxis::Y, self.sensing.localisation_noise_m);
+        let turn = draw(PlanarAxis::Heading, self.sensing.heading_noise_rad);
         let [base_x, base_y, heading] = self.base_true();
         let truth = Pose::upright([base_x, base_y, 0.0], heading).to_isometry();
         let believed = Pose::upright([base_x + x, base_y + y, 0.0], heading + turn).to_isometry();
@@ -77,15 +78,16 @@ impl World {
         let idx = self.objects.iter().position(|object| object.id == id)?;
         let object = &self.objects[idx];
         let (true_pose, true_size) = self.foot(object, &self.shown(idx));
-        let mut draw = |what: &str, sigma: f64| choices.normal(&format!("sense.{id}.{what}"), sigma);
+        let mut draw = |axis: SightingAxis, sigma: f64| choices.normal(ChoiceName::sighting(id, axis), sigma);
         let sensing = &self.sensing;
         let shift = Vector3::new(
-            draw("x", sensing.position_noise_m),
-            draw("y", sensing.position_noise_m),
-            draw("z", sensing.height_noise_m),
+            draw(SightingAxis::X, sensing.position_noise_m),
+            draw(SightingAxis::Y, sensing.position_noise_m),
+            draw(SightingAxis::Z, sensing.height_noise_m),
         );
-        let turn = draw("yaw", sensing.yaw_noise_rad);
-        let size_noise = ["width", "depth", "height"].map(|side| draw(side, sensing.size_noise_m));
+        let turn = draw(SightingAxis::Yaw, sensing.yaw_noise_rad);
+        let sides = [SightingAxis::Width, SightingAxis::Depth, SightingAxis::Height];
+        let size_noise = sides.map(|side| draw(side, sensing.size_noise_m));
         let seen = Isometry3::from_parts(
             Translation3::from(true_pose.translation.vector + shift),
             UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn) * true_pose.rotation,
@@ -100,7 +102,7 @@ impl World {
 
     /// Returns the gap between the fingers, measured with noise. Unit: metres.
     pub fn feel_opening(&self, choices: &mut Choices) -> f64 {
-        self.observe().gripper_opening_m + choices.normal("sense.gripper", self.sensing.gripper_noise_m)
+        self.observe().gripper_opening_m + choices.normal(ChoiceName::Gripper, self.sensing.gripper_noise_m)
     }
 
     /// Returns the upright pose of an object's foot, and its size along the axes of that pose.

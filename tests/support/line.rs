@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use actcheck::base::{Outcome, names};
-use actcheck::campaign::{Clock, Disturbance, Env, Manner, run_line};
+use actcheck::campaign::{Clock, Disturbance, Env, RunContext, run_line};
 use actcheck::config::Overrides;
 use actcheck::data::{ActionReport, Choices};
 use actcheck::history::RunRecord;
@@ -19,7 +19,7 @@ pub fn env_of(text: &str) -> Env {
 /// The run with the given choices.
 pub fn run(env: &Env, choices: Choices, disturb: Option<Disturbance>) -> RunRecord {
     let clock = Clock { now: String::new, secs: || 0.0 };
-    run_line(env, "test", 0, choices, &Manner { clock, disturb }).unwrap()
+    run_line(env, "test", 0, choices, &RunContext { clock, disturb }).unwrap()
 }
 
 /// The nominal scene with noiseless sensors.

@@ -23,7 +23,7 @@ pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
         PropertyReport {
             maps: [["surface_y_m", "surface_x_m"], ["target_category", "target_turned_rad"]]
                 .iter()
-                .filter_map(|by| two_way(&findings.subject, by))
+                .filter_map(|by| two_way(&findings.input, by))
                 .collect(),
             unit: Some("m".to_owned()),
             trend: trend(table, of, LEVEL),

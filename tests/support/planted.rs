@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use actcheck::analysis::{Condition, Parameter, Subject, Values};
+use actcheck::analysis::{Condition, Parameter, PatternInput, Values};
 
 /// Kinds of objects with their ancestors, the nearest first.
 pub const KINDS: [(&str, &[&str]); 8] = [
@@ -71,7 +71,7 @@ impl Dice {
 }
 
 /// Runs with twelve parameters that fail more often if one of the patterns holds.
-pub fn subject(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> Subject {
+pub fn input(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> PatternInput {
     let mut dice = Dice::new(seed);
     let mut parameters = vec![
         kinds("target_category", KINDS.len(), |kind| KINDS[kind], runs, &mut dice),
@@ -93,27 +93,27 @@ pub fn subject(runs: usize, seed: u64, planted: &[Vec<Condition>]) -> Subject {
             .for_each(|(distance, _)| *distance = f64::NAN);
     }
     let held_out = (0..runs).map(|_| dice.below(3) == 0).collect();
-    let mut subject = Subject { failed: vec![false; runs], held_out, parameters };
+    let mut input = PatternInput { failed: vec![false; runs], held_out, parameters };
     let mut within = vec![false; runs];
     for conditions in planted {
         let mut all = vec![true; runs];
         for condition in conditions {
-            all.iter_mut().zip(condition.holds(&subject)).for_each(|(all, holds)| *all &= holds);
+            all.iter_mut().zip(condition.holds(&input)).for_each(|(all, holds)| *all &= holds);
         }
         within.iter_mut().zip(all).for_each(|(within, all)| *within |= all);
     }
-    subject.failed = within.iter().map(|within| dice.share() < if *within { WITHIN } else { ELSEWHERE }).collect();
-    subject
+    input.failed = within.iter().map(|within| dice.share() < if *within { WITHIN } else { ELSEWHERE }).collect();
+    input
 }
 
 /// The same runs with randomly permuted failures.
-pub fn shuffled(subject: &Subject, seed: u64) -> Subject {
+pub fn shuffled(input: &PatternInput, seed: u64) -> PatternInput {
     let mut dice = Dice::new(seed);
-    let mut failed = subject.failed.clone();
+    let mut failed = input.failed.clone();
     for at in (1..failed.len()).rev() {
         failed.swap(at, dice.below(at as u64 + 1) as usize);
     }
-    Subject { failed, ..subject.clone() }
+    PatternInput { failed, ..input.clone() }
 }
 
 fn kinds(

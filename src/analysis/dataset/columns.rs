@@ -6,7 +6,7 @@ use crate::ColumnKind;
 
 /// Description of a column.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Said {
+pub(super) struct ColumnSpec {
     pub name: &'static str,
     #[serde(rename = "type")]
     pub kind: ColumnKind,
@@ -16,34 +16,35 @@ pub(super) struct Said {
 
 /// Description of a table.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct TableSaid {
+pub(super) struct TableSpec {
     pub file: &'static str,
     pub rows: &'static str,
-    pub columns: &'static [Said],
+    pub columns: &'static [ColumnSpec],
 }
 
-const fn text(name: &'static str, description: &'static str) -> Said {
-    Said { name, kind: ColumnKind::Text, unit: "", description }
+const fn text(name: &'static str, description: &'static str) -> ColumnSpec {
+    ColumnSpec { name, kind: ColumnKind::Text, unit: "", description }
 }
 
-const fn count(name: &'static str, description: &'static str) -> Said {
-    Said { name, kind: ColumnKind::Count, unit: "", description }
+const fn count(name: &'static str, description: &'static str) -> ColumnSpec {
+    ColumnSpec { name, kind: ColumnKind::Count, unit: "", description }
 }
 
-const fn truth(name: &'static str, description: &'static str) -> Said {
-    Said { name, kind: ColumnKind::Truth, unit: "", description }
+const fn bool(name: &'static str, description: &'static str) -> ColumnSpec {
+    ColumnSpec { name, kind: ColumnKind::Bool, unit: "", description }
 }
 
-const fn number(name: &'static str, unit: &'static str, description: &'static str) -> Said {
-    Said { name, kind: ColumnKind::Number, unit, description }
+const fn number(name: &'static str, unit: &'static str, description: &'static str) -> ColumnSpec {
+    ColumnSpec { name, kind: ColumnKind::Number, unit, description }
 }
 
-const RUN: Said = text("run", "id of the run");
-const STEP: Said = count("step", "position of the action in the test, from 1");
-const TIME: Said = number("time_s", "s", "time since the action began; ten rows a second, the first at its start");
+const RUN: ColumnSpec = text("run", "id of the run");
+const STEP: ColumnSpec = count("step", "position of the action in the test, from 1");
+const TIME: ColumnSpec =
+    number("time_s", "s", "time since the action began; ten rows a second, the first at its start");
 
 /// Actions with their results.
-pub(super) const ACTIONS: TableSaid = TableSaid {
+pub(super) const ACTIONS: TableSpec = TableSpec {
     file: "actions.parquet",
     rows: "one for each action of each run",
     columns: &[
@@ -54,7 +55,7 @@ pub(super) const ACTIONS: TableSaid = TableSaid {
         text("action", "the action (IRI)"),
         text("parameters", "values of the action's designators (JSON)"),
         text("end", "how the action ended: completed, broken, timeout or untested"),
-        truth("reported", "whether the action reported success"),
+        bool("reported", "whether the action reported success"),
         text("message", "the action's message, or the reason why it did not complete"),
         number("duration_s", "s", "simulated duration of the action"),
         count("properties_passed", "number of success properties that passed; see outcomes.parquet for each"),
@@ -64,7 +65,7 @@ pub(super) const ACTIONS: TableSaid = TableSaid {
 };
 
 /// Observations and commands of each joint.
-pub(super) const JOINTS: TableSaid = TableSaid {
+pub(super) const JOINTS: TableSpec = TableSpec {
     file: "joints.parquet",
     rows: "one for each action, time and joint",
     columns: &[
@@ -80,7 +81,7 @@ pub(super) const JOINTS: TableSaid = TableSaid {
 };
 
 /// Observations and commands of the gripper and the base.
-pub(super) const ROBOT: TableSaid = TableSaid {
+pub(super) const ROBOT: TableSpec = TableSpec {
     file: "robot.parquet",
     rows: "one for each action and time",
     columns: &[
@@ -102,7 +103,7 @@ pub(super) const ROBOT: TableSaid = TableSaid {
 };
 
 /// Ground truth of objects.
-pub(super) const OBJECTS: TableSaid = TableSaid {
+pub(super) const OBJECTS: TableSpec = TableSpec {
     file: "objects.parquet",
     rows: "one for each action, time and movable object: ground truth, which no robot receives",
     columns: &[
@@ -121,7 +122,7 @@ pub(super) const OBJECTS: TableSaid = TableSaid {
 };
 
 /// Perceived objects.
-pub(super) const PERCEPTS: TableSaid = TableSaid {
+pub(super) const PERCEPTS: TableSpec = TableSpec {
     file: "percepts.parquet",
     rows: "one for each perceived object, in the order of perception",
     columns: &[

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use polars::io::parquet::write::BatchedWriter;
 use polars::prelude::{DataFrame, ParquetWriter, PolarsError};
 
-use crate::dataset::columns::TableSaid;
+use crate::dataset::columns::TableSpec;
 use crate::tables::{Cell, series, unwritten};
 use actcheck_base::Diagnostics;
 
@@ -15,7 +15,7 @@ const ROWS_AT_ONCE: usize = 100_000;
 
 /// Writer of one table of a dataset.
 pub(super) struct Sheet {
-    said: TableSaid,
+    spec: TableSpec,
     path: PathBuf,
     writer: BatchedWriter<File>,
     cells: Vec<Vec<Cell>>,
@@ -26,15 +26,15 @@ pub(super) struct Sheet {
 
 impl Sheet {
     /// Creates an empty table in a folder.
-    pub(super) fn begin(said: TableSaid, folder: &Path) -> Result<Self, Diagnostics> {
-        let path = folder.join(said.file);
-        let cells: Vec<Vec<Cell>> = said.columns.iter().map(|_| Vec::new()).collect();
+    pub(super) fn begin(spec: TableSpec, folder: &Path) -> Result<Self, Diagnostics> {
+        let path = folder.join(spec.file);
+        let cells: Vec<Vec<Cell>> = spec.columns.iter().map(|_| Vec::new()).collect();
         let open = || -> Result<BatchedWriter<File>, PolarsError> {
-            let empty = frame(&said, cells.clone(), 0)?;
+            let empty = frame(&spec, cells.clone(), 0)?;
             ParquetWriter::new(File::create(&path)?).batched(empty.schema())
         };
         let writer = open().map_err(|error| unwritten(&path, &error))?;
-        Ok(Self { said, path, writer, cells, waiting: 0, rows: 0 })
+        Ok(Self { spec, path, writer, cells, waiting: 0, rows: 0 })
     }
 
     /// Adds a row. Cells are in the order of the columns.
@@ -63,12 +63,12 @@ impl Sheet {
             return Ok(());
         }
         let cells = self.cells.iter_mut().map(std::mem::take).collect();
-        let written = frame(&self.said, cells, height).and_then(|frame| self.writer.write_batch(&frame));
+        let written = frame(&self.spec, cells, height).and_then(|frame| self.writer.write_batch(&frame));
         written.map_err(|error| unwritten(&self.path, &error))
     }
 }
 
-fn frame(said: &TableSaid, cells: Vec<Vec<Cell>>, height: usize) -> Result<DataFrame, PolarsError> {
-    let columns = said.columns.iter().zip(cells).map(|(column, cells)| series(column.name, column.kind, cells));
+fn frame(spec: &TableSpec, cells: Vec<Vec<Cell>>, height: usize) -> Result<DataFrame, PolarsError> {
+    let columns = spec.columns.iter().zip(cells).map(|(column, cells)| series(column.name, column.kind, cells));
     DataFrame::new(height, columns.collect())
 }

@@ -48,7 +48,7 @@ impl Sheets {
             Cell::text(&action.action),
             Cell::text(parameters),
             Cell::text(&action.end),
-            Cell::Truth(action.reported),
+            Cell::Bool(action.reported),
             Cell::Text(action.message.clone()),
             Cell::number(action.duration_secs),
             Cell::count(passed),

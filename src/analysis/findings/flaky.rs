@@ -1,4 +1,4 @@
-//! Flaky scenes, which sometimes pass and sometimes fail.
+//! SceneCounts scenes, which sometimes pass and sometimes fail.
 
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ pub fn flaky_scenes(table: &OutcomeTable, of: &JudgedProperty) -> (Vec<FlakyScen
     }
     let found = consistency(&runs);
     let repeated = found.always_passed + found.always_failed + found.flaky.len() as u64;
-    let named = |flaky: &crate::Flaky| {
+    let named = |flaky: &crate::SceneCounts| {
         let (of, scene) = keys[flaky.scene as usize];
         FlakyScene { campaign: campaign.texts[of as usize].clone(), scene, passed: flaky.passed, of: flaky.of }
     };

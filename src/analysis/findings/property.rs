@@ -6,7 +6,7 @@ use crate::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::findings::margins::{Quantiles, quantiles};
 use crate::findings::parameters::parameters;
 use crate::findings::scenes::Scenes;
-use crate::{Hierarchy, Interval, OutcomeTable, PatternOptions, Patterns, Subject, mine, wilson};
+use crate::{Hierarchy, Interval, OutcomeTable, PatternInput, PatternOptions, Patterns, mine, wilson};
 use actcheck_base::{Outcome, digest_of};
 use actcheck_verdict::Counts;
 
@@ -27,7 +27,7 @@ pub struct PropertyFindings {
     /// Margins of its decided outcomes.
     pub margins: Option<Quantiles>,
     /// Decided runs from which patterns were mined.
-    pub subject: Subject,
+    pub input: PatternInput,
     /// IDs and rows of these runs.
     pub examples: Vec<Example>,
     /// Number of decided runs that were left out because a later run is bit-identical.
@@ -35,12 +35,12 @@ pub struct PropertyFindings {
     /// Number of decided runs that were left out because another run of the same scene is used.
     pub repeated: u64,
     /// Number of used runs whose scene a search chose.
-    pub steered: u64,
+    pub weighted_runs: u64,
     /// Patterns of its failures.
     pub patterns: Patterns,
 }
 
-/// A run of a subject.
+/// A run of the input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Example {
     /// ID of the run.
@@ -65,7 +65,7 @@ pub fn property_findings(
     let scenes = Scenes::of(table);
     let rows = scenes.first_rows(&newest);
     let weight = table.number("weight");
-    let subject = Subject {
+    let input = PatternInput {
         failed: rows.iter().map(|row| failed(outcomes[*row as usize]) == Some(true)).collect(),
         held_out: rows.iter().map(|row| is_held_out(table, *row as usize)).collect(),
         parameters: parameters(table, &rows, hierarchy),
@@ -89,10 +89,12 @@ pub fn property_findings(
             .collect(),
         twins: (decided.len() - newest.len()) as u64,
         repeated: (newest.len() - rows.len()) as u64,
-        steered: rows.iter().filter(|row| weight.get(**row as usize).is_some_and(|weight| !weight.is_nan())).count()
-            as u64,
-        patterns: mine(&subject, options),
-        subject,
+        weighted_runs: rows
+            .iter()
+            .filter(|row| weight.get(**row as usize).is_some_and(|weight| !weight.is_nan()))
+            .count() as u64,
+        patterns: mine(&input, options),
+        input,
     }
 }
 

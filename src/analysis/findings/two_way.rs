@@ -1,6 +1,6 @@
 //! Failure rates by one or two parameters, for heat maps.
 
-use crate::{Interval, Parameter, Subject, Values, simplest_between, wilson};
+use crate::{Interval, Parameter, PatternInput, Values, simplest_between, wilson};
 
 /// Maximum number of cells along a numeric axis.
 const MOST_CELLS: usize = 8;
@@ -32,19 +32,19 @@ pub struct TwoWayCell {
 /// Counts failures by one or two named parameters. Returns `None` if one does not exist.
 ///
 /// Numeric ranges are cut into equal steps, so that positions form an undistorted map.
-pub fn two_way(subject: &Subject, by: &[&str]) -> Option<TwoWay> {
-    let parameter = |name: &str| subject.parameters.iter().find(|parameter| parameter.name == name);
+pub fn two_way(input: &PatternInput, by: &[&str]) -> Option<TwoWay> {
+    let parameter = |name: &str| input.parameters.iter().find(|parameter| parameter.name == name);
     let down = labelled(parameter(by.first()?)?);
     let across = match by.get(1) {
         Some(name) => labelled(parameter(name)?),
-        None => (vec![String::new()], vec![Some(0); subject.len()]),
+        None => (vec![String::new()], vec![Some(0); input.len()]),
     };
     let mut cells = vec![vec![TwoWayCell::default(); across.0.len()]; down.0.len()];
-    for run in 0..subject.len() {
+    for run in 0..input.len() {
         if let (Some(row), Some(column)) = (down.1[run], across.1[run]) {
             let cell = &mut cells[row][column];
             cell.runs += 1;
-            cell.failed += u64::from(subject.failed[run]);
+            cell.failed += u64::from(input.failed[run]);
         }
     }
     cells.iter_mut().flatten().for_each(|cell| cell.failing = wilson(cell.failed, cell.runs));

@@ -1,7 +1,7 @@
 //! Exhaustive search for the box of cells with the highest score.
 
 use crate::patterns::Condition;
-use crate::patterns::cells::{Axis, Choices};
+use crate::patterns::cells::{Axis, Conditions};
 use crate::patterns::likelihood::{Count, Likelihood, one};
 
 /// Summing the boxes of three parameters costs as much as counting this many runs. (Measured with eight cells each.)
@@ -184,8 +184,8 @@ impl Axis {
             }
             place += 1;
         };
-        match &self.choices {
-            Choices::Ranges(_) => {
+        match &self.conditions {
+            Conditions::Ranges(_) => {
                 for first in 1..self.cells {
                     let mut sum: Count = 0;
                     for count in &row[first..self.cells] {
@@ -194,7 +194,7 @@ impl Axis {
                     }
                 }
             }
-            Choices::Kinds(kinds) => {
+            Conditions::Kinds(kinds) => {
                 for (_, members) in kinds {
                     look(members.iter().fold(0, |sum, cell| sum.wrapping_add(row[*cell])));
                 }

@@ -1,7 +1,7 @@
 //! Discretisation of parameters into cells, and the conditions that are unions of cells.
 
 use crate::patterns::likelihood::Count;
-use crate::patterns::{Condition, Parameter, Subject, Values, simplest_between};
+use crate::patterns::{Condition, Parameter, PatternInput, Values, simplest_between};
 
 /// Parameters with more kinds than this are ignored: a unique name for each scene makes no pattern.
 const MOST_KINDS: usize = 64;
@@ -16,12 +16,12 @@ pub(super) struct Axis {
     /// The cell of each run.
     pub of_run: Vec<u8>,
     /// The possible conditions.
-    pub choices: Choices,
+    pub conditions: Conditions,
 }
 
 /// Conditions on one parameter.
 #[derive(Debug, Clone)]
-pub(super) enum Choices {
+pub(super) enum Conditions {
     /// All ranges of adjacent cells, given by the cuts between cells 1, 2, ….
     Ranges(Vec<Cut>),
     /// Kinds with their cells.
@@ -40,9 +40,9 @@ pub(super) struct Cut {
 impl Axis {
     /// Number of conditions.
     pub fn len(&self) -> usize {
-        match &self.choices {
-            Choices::Ranges(_) => (self.cells - 1) * self.cells / 2,
-            Choices::Kinds(kinds) => kinds.len(),
+        match &self.conditions {
+            Conditions::Ranges(_) => (self.cells - 1) * self.cells / 2,
+            Conditions::Kinds(kinds) => kinds.len(),
         }
     }
 
@@ -56,8 +56,8 @@ impl Axis {
         let add = |sum: &mut [Count], row: &[Count]| {
             sum.iter_mut().zip(row).for_each(|(sum, count)| *sum = sum.wrapping_add(*count));
         };
-        match &self.choices {
-            Choices::Ranges(_) => {
+        match &self.conditions {
+            Conditions::Ranges(_) => {
                 for first in 1..self.cells {
                     sum.fill(0);
                     for last in first..self.cells {
@@ -66,7 +66,7 @@ impl Axis {
                     }
                 }
             }
-            Choices::Kinds(kinds) => {
+            Conditions::Kinds(kinds) => {
                 for (_, members) in kinds {
                     sum.fill(0);
                     members.iter().for_each(|cell| add(&mut sum, row(*cell)));
@@ -78,9 +78,9 @@ impl Axis {
 
     /// Returns the condition with an index in the output of [`Axis::expand`].
     pub fn condition(&self, place: usize) -> Condition {
-        match &self.choices {
-            Choices::Kinds(kinds) => Condition::Kind { parameter: self.parameter, kind: kinds[place].0.clone() },
-            Choices::Ranges(cuts) => {
+        match &self.conditions {
+            Conditions::Kinds(kinds) => Condition::Kind { parameter: self.parameter, kind: kinds[place].0.clone() },
+            Conditions::Ranges(cuts) => {
                 let (first, last) = self.range(place);
                 let bound = |cut: usize| cuts.get(cut).map(|cut| cut.bound);
                 Condition::Range {
@@ -110,10 +110,10 @@ impl Axis {
 /// runs, or with the same partition into kinds, only the first is used.
 ///
 /// Numbers are cut into cells of about equally many runs, or into one cell for each distinct number if there are few.
-pub(super) fn axes(subject: &Subject, takes_part: &[bool], cells: usize) -> Vec<Axis> {
+pub(super) fn axes(input: &PatternInput, takes_part: &[bool], cells: usize) -> Vec<Axis> {
     let mut axes: Vec<Axis> = Vec::new();
-    for (place, parameter) in subject.parameters.iter().enumerate() {
-        let known = axes.iter().any(|axis| is_same(&subject.parameters[axis.parameter].values, &parameter.values));
+    for (place, parameter) in input.parameters.iter().enumerate() {
+        let known = axes.iter().any(|axis| is_same(&input.parameters[axis.parameter].values, &parameter.values));
         if !known && let Some(axis) = axis(place, parameter, takes_part, cells) {
             axes.push(axis);
         }
@@ -140,13 +140,13 @@ fn axis(place: usize, parameter: &Parameter, takes_part: &[bool], cells: usize) 
                 parameter: place,
                 cells: cuts.len() + 2,
                 of_run: numbers.iter().map(cell).collect(),
-                choices: Choices::Ranges(cuts),
+                conditions: Conditions::Ranges(cuts),
             }
         }
         Values::Kinds { of_run, names, above } => {
             let kinds = (names.len() <= MOST_KINDS).then(|| kinds(names, above))?;
             let of_run = of_run.iter().map(|of| of.map_or(0, |of| of as u8 + 1)).collect();
-            Axis { parameter: place, cells: names.len() + 1, of_run, choices: Choices::Kinds(kinds) }
+            Axis { parameter: place, cells: names.len() + 1, of_run, conditions: Conditions::Kinds(kinds) }
         }
     };
     let mut met = axis.of_run.iter().zip(takes_part).filter(|(_, part)| **part).map(|(cell, _)| *cell);

@@ -1,6 +1,6 @@
 //! A condition on one parameter.
 
-use crate::patterns::{Subject, Values};
+use crate::patterns::{PatternInput, Values};
 
 /// A condition on one parameter of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,8 +33,8 @@ impl Condition {
 
     /// Returns for each run whether the condition holds. A run without a value for the parameter satisfies no condition
     /// on it.
-    pub fn holds(&self, subject: &Subject) -> Vec<bool> {
-        match (self, &subject.parameters[self.parameter()].values) {
+    pub fn holds(&self, input: &PatternInput) -> Vec<bool> {
+        match (self, &input.parameters[self.parameter()].values) {
             (Self::Range { low, high, .. }, Values::Numbers(numbers)) => numbers
                 .iter()
                 .map(|value| {
@@ -47,7 +47,7 @@ impl Condition {
                 of_run.iter().map(|of| of.is_some_and(|of| belongs[of as usize])).collect()
             }
             // A condition of the wrong type holds for no run.
-            _ => vec![false; subject.len()],
+            _ => vec![false; input.len()],
         }
     }
 
@@ -64,10 +64,10 @@ impl Condition {
 }
 
 /// Returns for each run whether all conditions hold.
-pub(super) fn all_hold(conditions: &[Condition], subject: &Subject) -> Vec<bool> {
-    let mut holds = vec![true; subject.len()];
+pub(super) fn all_hold(conditions: &[Condition], input: &PatternInput) -> Vec<bool> {
+    let mut holds = vec![true; input.len()];
     for condition in conditions {
-        for (all, one) in holds.iter_mut().zip(condition.holds(subject)) {
+        for (all, one) in holds.iter_mut().zip(condition.holds(input)) {
             *all &= one;
         }
     }

@@ -5,10 +5,10 @@ use crate::patterns::boxes::Runs;
 use crate::patterns::cells::{Axis, axes};
 use crate::patterns::condition::all_hold;
 use crate::patterns::confirm::{confirm, count};
-use crate::patterns::fold::fold;
 use crate::patterns::likelihood::{Likelihood, one};
-use crate::patterns::refine::{Field, refine};
-use crate::patterns::{Condition, Subject};
+use crate::patterns::refine::{OpenRuns, refine};
+use crate::patterns::simplify::simplify;
+use crate::patterns::{Condition, PatternInput};
 use crate::{Interval, TwoByTwo, benjamini_hochberg, wilson};
 
 /// Minimum number of failures and of passes. With fewer, no pattern can be significant.
@@ -101,27 +101,27 @@ impl Patterns {
 ///
 /// The score of a pattern is the likelihood ratio of separate failure rates within and outside against one common rate.
 /// Ties go to fewer conditions. The same runs in the same order give the same patterns.
-pub fn mine(subject: &Subject, options: &PatternOptions) -> Patterns {
+pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
     let mut found = Patterns {
-        runs: subject.len() as u64,
-        failed: subject.failed.iter().filter(|failed| **failed).count() as u64,
-        held_out: subject.held_out.iter().filter(|held_out| **held_out).count() as u64,
+        runs: input.len() as u64,
+        failed: input.failed.iter().filter(|failed| **failed).count() as u64,
+        held_out: input.held_out.iter().filter(|held_out| **held_out).count() as u64,
         ..Patterns::default()
     };
-    let open: Vec<bool> = subject.held_out.iter().map(|held_out| !held_out).collect();
+    let open: Vec<bool> = input.held_out.iter().map(|held_out| !held_out).collect();
     let runs = open.iter().filter(|open| **open).count();
-    let axes = axes(subject, &open, cells(runs, options.cells));
+    let axes = axes(input, &open, cells(runs, options.cells));
     found.parameters = axes.len();
-    let rounds = search(subject, open, &axes, options, &mut found);
+    let rounds = search(input, open, &axes, options, &mut found);
     let probabilities: Vec<f64> = rounds.iter().map(|(_, table)| table.fisher().greater).collect();
     let adjusted = benjamini_hochberg(&probabilities, found.tried);
     let conditions: Vec<Vec<Condition>> = rounds.iter().map(|(conditions, _)| conditions.clone()).collect();
-    let confirmed = confirm(&conditions, subject);
+    let confirmed = confirm(&conditions, input);
     for ((((conditions, searched), p), q), (held_out, p_held_out)) in
         rounds.into_iter().zip(probabilities).zip(adjusted).zip(confirmed)
     {
-        let within = all_hold(&conditions, subject);
-        let all = count(subject, &within, |_| true);
+        let within = all_hold(&conditions, input);
+        let all = count(input, &within, |_| true);
         let (inside, outside) = (all.failed_in + all.passed_in, all.failed_out + all.passed_out);
         let Some(rate) = wilson(all.failed_in, inside) else { continue };
         let overall = found.failed as f64 / found.runs as f64;
@@ -151,7 +151,7 @@ fn cells(runs: usize, most: usize) -> usize {
 
 /// Finds patterns, each with its counts among the runs that were still open when it was found.
 fn search(
-    subject: &Subject,
+    input: &PatternInput,
     mut open: Vec<bool>,
     axes: &[Axis],
     options: &PatternOptions,
@@ -159,24 +159,24 @@ fn search(
 ) -> Vec<(Vec<Condition>, TwoByTwo)> {
     let mut rounds: Vec<(Vec<Condition>, TwoByTwo)> = Vec::new();
     while rounds.len() < options.most_patterns {
-        let whole = count(subject, &vec![true; subject.len()], |run| open[run]);
+        let whole = count(input, &vec![true; input.len()], |run| open[run]);
         if whole.failed_in.min(whole.passed_in) < LEAST_OF_EACH {
             break;
         }
         let depth = affordable_depth(axes, whole, options);
         found.depth = found.depth.max(depth);
         let likelihood =
-            Likelihood::new((0..open.len()).filter(|run| open[*run]).map(|run| one(subject.failed[run])).sum());
-        let runs = Runs::new(axes, &subject.failed, &open, &likelihood);
+            Likelihood::new((0..open.len()).filter(|run| open[*run]).map(|run| one(input.failed[run])).sum());
+        let runs = Runs::new(axes, &input.failed, &open, &likelihood);
         let mut best = runs.best(depth, options.work);
         found.tried += best.tried;
         found.combined = found.combined.max(best.combined);
         if best.conditions.is_empty() {
             break;
         }
-        let field = Field { subject, open: &open, axes, likelihood: &likelihood };
-        fold(&mut best.conditions, &field, options.level);
-        let table = count(subject, &all_hold(&best.conditions, subject), |run| open[run]);
+        let open_runs = OpenRuns { input, open: &open, axes, likelihood: &likelihood };
+        simplify(&mut best.conditions, &open_runs, options.level);
+        let table = count(input, &all_hold(&best.conditions, input), |run| open[run]);
         // Later patterns are weaker: if this one is not significant, they are not either.
         let rank = rounds.len() as f64 + 1.0;
         if table.fisher().greater * found.tried as f64 / rank > options.level {
@@ -184,8 +184,8 @@ fn search(
         }
         // Bounds between the cuts describe the pattern better. They are not part of the test, because not all of them
         // were tried.
-        refine(&mut best.conditions, &field);
-        let within = all_hold(&best.conditions, subject);
+        refine(&mut best.conditions, &open_runs);
+        let within = all_hold(&best.conditions, input);
         open.iter_mut().zip(&within).for_each(|(open, within)| *open &= !within);
         rounds.push((best.conditions, table));
     }

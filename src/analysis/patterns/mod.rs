@@ -10,12 +10,12 @@ mod boxes;
 mod cells;
 mod condition;
 mod confirm;
-mod fold;
+mod input;
 mod likelihood;
 mod mine;
 mod refine;
-mod subject;
+mod simplify;
 
 pub use condition::{Condition, simplest_between};
+pub use input::{Parameter, PatternInput, Values};
 pub use mine::{Pattern, PatternOptions, Patterns, mine};
-pub use subject::{Parameter, Subject, Values};

@@ -2,17 +2,17 @@
 
 use std::ops::RangeInclusive;
 
-use crate::patterns::cells::{Axis, Choices, Cut};
+use crate::patterns::cells::{Axis, Conditions, Cut};
 use crate::patterns::condition::all_hold;
 use crate::patterns::likelihood::{Count, Likelihood, one};
-use crate::patterns::{Condition, Subject, Values, simplest_between};
+use crate::patterns::{Condition, PatternInput, Values, simplest_between};
 
 /// Bounds depend on each other, but converge quickly.
 const MOST_PASSES: usize = 4;
 
 /// The open runs, and the score of patterns among them.
-pub(super) struct Field<'a> {
-    pub subject: &'a Subject,
+pub(super) struct OpenRuns<'a> {
+    pub input: &'a PatternInput,
     pub open: &'a [bool],
     pub axes: &'a [Axis],
     pub likelihood: &'a Likelihood,
@@ -20,13 +20,13 @@ pub(super) struct Field<'a> {
 
 /// Moves each bound in turn to the position with the highest score between the adjacent cuts, with all other bounds
 /// fixed.
-pub(super) fn refine(conditions: &mut [Condition], field: &Field<'_>) {
+pub(super) fn refine(conditions: &mut [Condition], open_runs: &OpenRuns<'_>) {
     for _ in 0..MOST_PASSES {
         let before = conditions.to_vec();
         for at in 0..conditions.len() {
             let mut others = conditions.to_vec();
             let condition = others.remove(at);
-            if let Some(better) = refined(&condition, &others, field) {
+            if let Some(better) = refined(&condition, &others, open_runs) {
                 conditions[at] = better;
             }
         }
@@ -43,10 +43,10 @@ struct Scale {
 }
 
 impl Scale {
-    fn new(numbers: &[f64], part: &[bool], field: &Field<'_>) -> Self {
+    fn new(numbers: &[f64], part: &[bool], open_runs: &OpenRuns<'_>) -> Self {
         let mut pairs: Vec<(f64, Count)> = (0..numbers.len())
-            .filter(|run| part[*run] && field.open[*run] && !numbers[*run].is_nan())
-            .map(|run| (numbers[run], one(field.subject.failed[run])))
+            .filter(|run| part[*run] && open_runs.open[*run] && !numbers[*run].is_nan())
+            .map(|run| (numbers[run], one(open_runs.input.failed[run])))
             .collect();
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut scale = Self { values: Vec::new(), below: vec![0] };
@@ -74,14 +74,14 @@ impl Scale {
     }
 }
 
-fn refined(condition: &Condition, others: &[Condition], field: &Field<'_>) -> Option<Condition> {
+fn refined(condition: &Condition, others: &[Condition], open_runs: &OpenRuns<'_>) -> Option<Condition> {
     let Condition::Range { parameter, low, high } = condition else { return None };
-    let Values::Numbers(numbers) = &field.subject.parameters[*parameter].values else { return None };
-    let Choices::Ranges(cuts) = &field.axes.iter().find(|axis| axis.parameter == *parameter)?.choices else {
+    let Values::Numbers(numbers) = &open_runs.input.parameters[*parameter].values else { return None };
+    let Conditions::Ranges(cuts) = &open_runs.axes.iter().find(|axis| axis.parameter == *parameter)?.conditions else {
         return None;
     };
-    let scale = Scale::new(numbers, &all_hold(others, field.subject), field);
-    let score = |first: usize, last: usize| field.likelihood.gain(scale.below[last] - scale.below[first]);
+    let scale = Scale::new(numbers, &all_hold(others, open_runs.input), open_runs);
+    let score = |first: usize, last: usize| open_runs.likelihood.gain(scale.below[last] - scale.below[first]);
     let end = scale.values.len();
     let (mut first, last) = (low.map_or(0, |low| scale.place(low)), high.map_or(end, |high| scale.place(high)));
     let (mut low, mut high) = (*low, *high);

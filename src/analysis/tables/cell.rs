@@ -6,7 +6,7 @@ pub(crate) enum Cell {
     Text(Option<String>),
     Number(Option<f64>),
     Count(Option<i64>),
-    Truth(Option<bool>),
+    Bool(Option<bool>),
 }
 
 impl Cell {

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::tables::cell::Cell;
-use crate::tables::place::{Place, angle};
+use crate::tables::row_source::{RowSource, angle};
 use actcheck_base::names;
 use actcheck_data::Role;
 use actcheck_history::ObjectDetail;
@@ -20,7 +20,7 @@ pub enum ColumnKind {
     /// An integer.
     Count,
     /// True or false.
-    Truth,
+    Bool,
 }
 
 /// A column of the table.
@@ -38,7 +38,7 @@ pub struct Column {
     /// Description of its values.
     pub description: &'static str,
     #[serde(skip)]
-    pub(super) cell: fn(&Place<'_>) -> Cell,
+    pub(super) cell: fn(&RowSource<'_>) -> Cell,
 }
 
 /// Returns all columns in order.
@@ -68,7 +68,7 @@ const COLUMNS: &[Column] = &[
     count("step", "position of the action in the test, from 1", |p| Cell::count(p.action.step)),
     text("action", "the action (IRI)", |p| Cell::text(&p.action.action)),
     text("action_end", "how the action ended: completed, broken, timeout or untested", |p| Cell::text(&p.action.end)),
-    truth("reported", "whether the action reported success", |p| Cell::Truth(p.action.reported)),
+    truth("reported", "whether the action reported success", |p| Cell::Bool(p.action.reported)),
     text("message", "the action's message, or the reason why it did not complete", |p| {
         Cell::Text(p.action.message.clone())
     }),
@@ -82,7 +82,7 @@ const COLUMNS: &[Column] = &[
     }),
     text("witness", "explanation of the outcome", |p| Cell::text(&p.judgement.witness)),
     truth("held_before", "whether the property already held before the action", |p| {
-        Cell::Truth(p.judgement.held_before)
+        Cell::Bool(p.judgement.held_before)
     }),
     text(
         "designators",
@@ -208,7 +208,7 @@ const COLUMNS: &[Column] = &[
     }),
 ];
 
-type Of = fn(&Place<'_>) -> Cell;
+type Of = fn(&RowSource<'_>) -> Cell;
 
 const fn text(name: &'static str, description: &'static str, cell: Of) -> Column {
     Column { name, kind: ColumnKind::Text, unit: "", parameter: false, description, cell }
@@ -223,7 +223,7 @@ const fn count(name: &'static str, description: &'static str, cell: Of) -> Colum
 }
 
 const fn truth(name: &'static str, description: &'static str, cell: Of) -> Column {
-    Column { name, kind: ColumnKind::Truth, unit: "", parameter: false, description, cell }
+    Column { name, kind: ColumnKind::Bool, unit: "", parameter: false, description, cell }
 }
 
 impl Column {
@@ -233,8 +233,8 @@ impl Column {
     }
 }
 
-fn with_role(place: &Place<'_>, role: Role) -> usize {
-    place.run.objects.iter().filter(|object| object.role == role).count()
+fn with_role(source: &RowSource<'_>, role: Role) -> usize {
+    source.run.objects.iter().filter(|object| object.role == role).count()
 }
 
 fn model(object: Option<&ObjectDetail>) -> Cell {
@@ -245,24 +245,24 @@ fn category(object: Option<&ObjectDetail>) -> Cell {
     Cell::Text(object.map(|object| object.category.clone()))
 }
 
-fn neighbour<'a>(place: &Place<'a>) -> Option<&'a ObjectDetail> {
-    place.scene.neighbour.map(|(object, _)| object)
+fn neighbour<'a>(source: &RowSource<'a>) -> Option<&'a ObjectDetail> {
+    source.scene.neighbour.map(|(object, _)| object)
 }
 
-fn of_target(place: &Place<'_>, number: impl Fn(&ObjectDetail) -> f64) -> Cell {
-    Cell::Number(place.scene.target.map(number))
+fn of_target(source: &RowSource<'_>, number: impl Fn(&ObjectDetail) -> f64) -> Cell {
+    Cell::Number(source.scene.target.map(number))
 }
 
-fn noise(place: &Place<'_>, name: &str) -> Cell {
-    Cell::Number(place.run.noise.get(name).copied())
+fn noise(source: &RowSource<'_>, name: &str) -> Cell {
+    Cell::Number(source.run.noise.get(name).copied())
 }
 
-fn designators(place: &Place<'_>) -> Cell {
+fn designators(source: &RowSource<'_>) -> Cell {
     let named = |value: &String| {
-        let object = place.run.objects.iter().find(|object| object.id == *value);
+        let object = source.run.objects.iter().find(|object| object.id == *value);
         object.map_or_else(|| names::local(value).to_owned(), |object| object.model.clone())
     };
-    let values = place.action.parameters.iter();
+    let values = source.action.parameters.iter();
     let json: serde_json::Map<String, serde_json::Value> =
         values.map(|(name, values)| (name.clone(), json!(values.iter().map(named).collect::<Vec<_>>()))).collect();
     Cell::text(serde_json::Value::Object(json).to_string())

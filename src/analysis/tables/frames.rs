@@ -6,7 +6,7 @@ use polars::prelude::{Column as Series, DataFrame, NamedFrom as _, PolarsError, 
 
 use crate::tables::cell::Cell;
 use crate::tables::columns::{ColumnKind, columns};
-use crate::tables::place::{ActionScene, Hierarchy, Place};
+use crate::tables::row_source::{ActionScene, Hierarchy, RowSource};
 use actcheck_base::names;
 use actcheck_history::RunDetail;
 
@@ -31,9 +31,9 @@ impl Rows {
         for action in &run.actions {
             let scene = ActionScene::of(run, action);
             for judgement in &action.judgements {
-                let place = Place { run, action, judgement, scene: &scene };
+                let source = RowSource { run, action, judgement, scene: &scene };
                 for (cells, column) in self.cells.iter_mut().zip(columns()) {
-                    cells.push((column.cell)(&place));
+                    cells.push((column.cell)(&source));
                 }
                 self.height += 1;
             }
@@ -68,9 +68,9 @@ pub(crate) fn series(name: &str, kind: ColumnKind, cells: Vec<Cell>) -> Series {
             let count = |cell| if let Cell::Count(count) = cell { count } else { None };
             Values::new(name, cells.map(count).collect::<Vec<Option<i64>>>())
         }
-        ColumnKind::Truth => {
-            let truth = |cell| if let Cell::Truth(truth) = cell { truth } else { None };
-            Values::new(name, cells.map(truth).collect::<Vec<Option<bool>>>())
+        ColumnKind::Bool => {
+            let bool = |cell| if let Cell::Bool(bool) = cell { bool } else { None };
+            Values::new(name, cells.map(bool).collect::<Vec<Option<bool>>>())
         }
     }
     .into()
@@ -85,7 +85,7 @@ pub(super) fn with_kinds(frame: &mut DataFrame, hierarchy: &Hierarchy) -> Result
         let kinds: Vec<Option<String>> = categories
             .iter()
             .map(|category| {
-                category.map(|category| known.entry(category).or_insert_with(|| told(category, hierarchy)).clone())
+                category.map(|category| known.entry(category).or_insert_with(|| kinds_of(category, hierarchy)).clone())
             })
             .collect();
         frame.with_column(Values::new(to.into(), kinds).into())?;
@@ -98,7 +98,7 @@ pub(super) fn kinds_columns() -> impl Iterator<Item = (&'static str, String)> {
     KINDS.into_iter().map(|(from, to)| (to, format!("local names of {from} and its superclasses, nearest first")))
 }
 
-fn told(category: &str, hierarchy: &Hierarchy) -> String {
+fn kinds_of(category: &str, hierarchy: &Hierarchy) -> String {
     let above = hierarchy.get(category).into_iter().flatten().map(String::as_str);
     std::iter::once(names::local(category)).chain(above).collect::<Vec<&str>>().join(" ")
 }

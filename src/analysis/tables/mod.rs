@@ -10,7 +10,7 @@ mod columns;
 mod frames;
 mod mirror;
 mod outcomes;
-mod place;
+mod row_source;
 mod write;
 
 pub(super) use cell::Cell;
@@ -19,6 +19,6 @@ pub(super) use frames::series;
 pub(super) use mirror::unwritten;
 pub use mirror::{Mirror, MirrorChange};
 pub use outcomes::{OutcomeTable, TableFilter, TextColumn};
-pub use place::Hierarchy;
+pub use row_source::Hierarchy;
 pub(super) use write::schema as outcomes_schema;
 pub use write::{export_csv, export_parquet};

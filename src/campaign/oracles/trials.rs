@@ -7,9 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use crate::oracles::Fault;
-use crate::{Env, Manner, Planned, run_line, run_sabotaged};
+use crate::workers::workers;
+use crate::{Env, Planned, RunContext, RunInput, run_line, run_sabotaged};
 use actcheck_actions::Saboteur;
-use actcheck_base::{Diagnostic, Diagnostics, Judgement, Outcome};
+use actcheck_base::{Diagnostics, Judgement, Outcome};
 use actcheck_data::{Choice, Choices};
 use actcheck_history::{RunRecord, RunStatus};
 
@@ -24,7 +25,7 @@ pub struct TrialOptions {
     /// Workers, one simulation each.
     pub jobs: usize,
     /// How each run is made.
-    pub manner: Manner,
+    pub context: RunContext,
 }
 
 /// One scene with one fault or without a fault.
@@ -62,13 +63,10 @@ pub fn try_faults(
     stop: &AtomicBool,
     on_done: impl Fn() + Sync,
 ) -> Result<Vec<Trial>, Diagnostics> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.jobs.max(1))
-        .build()
-        .map_err(|error| Diagnostic::error("X010", format!("workers can't be started: {error}")))?;
+    let pool = workers(options.jobs)?;
     let going = || !stop.load(Ordering::Relaxed);
     let sound = |index: u64| {
-        let made = if going() { without_fault(env, index, &options.manner) } else { None };
+        let made = if going() { without_fault(env, index, &options.context) } else { None };
         on_done();
         made
     };
@@ -78,7 +76,7 @@ pub fn try_faults(
     };
     let with_fault = |(scene, fault): &(&Scene, &Fault)| {
         let made =
-            if going() && concerns(scene, fault) { with_fault(env, scene, fault, &options.manner) } else { None };
+            if going() && concerns(scene, fault) { with_fault(env, scene, fault, &options.context) } else { None };
         on_done();
         made
     };
@@ -94,13 +92,13 @@ pub fn try_faults(
 }
 
 /// Runs the scene of an index as a campaign would. Returns `None` if no scene can be built.
-fn without_fault(env: &Env, index: u64, manner: &Manner) -> Option<(Scene, Trial)> {
+fn without_fault(env: &Env, index: u64, context: &RunContext) -> Option<(Scene, Trial)> {
     let repeat = u64::from(env.campaign.repeat);
     let repetition = (repeat > 1).then_some(index % repeat);
     let planned = Planned { index, scene: index / repeat, repetition, steering: None };
     (0..SCENES_PER_RUN).find_map(|attempt| {
         let choices = planned.choices(env.campaign.seed, attempt);
-        let record = run(env, index, choices, manner, None)?;
+        let record = run(env, index, choices, context, None)?;
         let outcomes = outcomes(&record);
         let trial = Trial { index, fault: None, came_about: true, outcomes };
         Some((Scene { index, choices: record.choices }, trial))
@@ -108,20 +106,26 @@ fn without_fault(env: &Env, index: u64, manner: &Manner) -> Option<(Scene, Trial
 }
 
 /// Runs the same scene with a fault. Choices that only arise because of the fault are drawn anew.
-fn with_fault(env: &Env, scene: &Scene, fault: &Fault, manner: &Manner) -> Option<Trial> {
+fn with_fault(env: &Env, scene: &Scene, fault: &Fault, context: &RunContext) -> Option<Trial> {
     let index = scene.index;
     let choices = Choices::partly_recorded(&scene.choices, env.campaign.seed, index);
     let mut saboteur = Saboteur::new(fault.sabotage);
-    let record = run(env, index, choices, manner, Some(&mut saboteur));
+    let record = run(env, index, choices, context, Some(&mut saboteur));
     let outcomes = record.as_ref().map(outcomes).unwrap_or_default();
     Some(Trial { index, fault: Some(fault.name), came_about: saboteur.came_about(), outcomes })
 }
 
 /// Makes one run. Returns `None` if the scene was discarded or the simulation crashed.
-fn run(env: &Env, index: u64, choices: Choices, manner: &Manner, saboteur: Option<&mut Saboteur>) -> Option<RunRecord> {
+fn run(
+    env: &Env,
+    index: u64,
+    choices: Choices,
+    context: &RunContext,
+    saboteur: Option<&mut Saboteur>,
+) -> Option<RunRecord> {
     let line = || match saboteur {
-        None => run_line(env, NO_CAMPAIGN, index, choices, manner),
-        Some(saboteur) => run_sabotaged(env, NO_CAMPAIGN, (index, choices), manner, saboteur),
+        None => run_line(env, NO_CAMPAIGN, index, choices, context),
+        Some(saboteur) => run_sabotaged(env, RunInput { campaign: NO_CAMPAIGN, index, choices }, context, saboteur),
     };
     catch_unwind(AssertUnwindSafe(line)).ok()?.ok()
 }

@@ -3,17 +3,18 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::case::end_of;
-use crate::line::TEST_LEFT_OUT;
-use crate::shrink::list::{accepted_places, has};
-use crate::shrink::{Explained, Limits, Plan, Search, Tried, explain, reduce};
-use crate::{Env, Manner, run_line};
+use crate::finished_run::RunPlace;
+use crate::line::simulate;
+use crate::run_cases::end_of;
+use crate::shrink::list::{drop_rejected_tries, has};
+use crate::shrink::{Explained, ShrinkPlan, TrialLimits, TrialSearch, Tried, explain, reduce};
+use crate::{Env, RunContext, RunInput, run_line};
+use actcheck_actions::Interference;
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, did_you_mean, names};
-use actcheck_data::{Choice, ChoiceKind, Choices, Role};
+use actcheck_data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices, ObjectAxis, PlacedObject, Role};
 use actcheck_history::{History, RunRecord, RunStatus};
+use actcheck_scenario as scenario;
 
-/// Prefix of the choices of sensor noise.
-const NOISE: &str = "sense.";
 /// Repetitions of the shrunk scene with fresh noise, to estimate how often it fails.
 const FRESH: u32 = 5;
 /// Smaller movements come from settling and rounding. Unit: metres.
@@ -39,7 +40,7 @@ pub struct ShrinkOptions<'a> {
     /// Test with fresh noise; `None`: the noise is as recorded, and is shrunk like the other choices.
     pub repeat: Option<Repeat>,
     /// How runs are made.
-    pub manner: Manner,
+    pub context: RunContext,
     /// Whether the time is up or the user has interrupted.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -76,7 +77,8 @@ pub struct Shrunk {
 /// smaller scene.
 ///
 /// # Errors
-/// `S050` if nothing fails when the run is repeated, or not the requested property; `S051` if its scene can't be built.
+/// `S050` if nothing fails when the run is repeated, or not the requested property; `S051` if its scene can't be built,
+/// for example because one of its candidates was removed.
 pub fn shrink(
     env: &Env,
     index: u64,
@@ -84,24 +86,25 @@ pub fn shrink(
     options: &ShrinkOptions<'_>,
     on_better: &mut dyn FnMut(&[Choice]),
 ) -> Result<Shrunk, Diagnostics> {
-    let recorded = accepted_places(recorded);
+    check_candidates(env, index, recorded)?;
+    let recorded = drop_rejected_tries(recorded);
     let first = remake(env, index, &recorded, options)?;
     let subject = Subject { env, index, failed: signature(&first), options };
     subject.check_property()?;
     let removals = removals(&first, &recorded);
     let others_before = removals.len();
     let ends = ends(env, index);
-    let plan = Plan { removals, ends, group: &group };
-    let start = accepted_places(&first.choices);
+    let plan = ShrinkPlan { removals, ends, group: &group };
+    let start = drop_rejected_tries(&first.choices);
     let fresh_noise = |list: &[Choice]| subject.with_fresh_noise(list);
     let as_recorded = |list: &[Choice]| subject.as_recorded(list);
-    let noisy = start.iter().any(|choice| is_noise(&choice.name) && choice.value != 0.0);
+    let noisy = start.iter().any(|choice| choice.name.is_noise() && choice.value != 0.0);
     let repeated = options.repeat.is_some() && noisy && fresh_noise(&start).made.is_some();
     let test: &(dyn Fn(&[Choice]) -> Tried + Sync) = if repeated { &fresh_noise } else { &as_recorded };
-    let limits = Limits { simulations: options.trials, jobs: options.jobs, stop: options.stop };
-    let mut search = Search::new(test, limits);
+    let limits = TrialLimits { simulations: options.trials, jobs: options.jobs, stop: options.stop };
+    let mut search = TrialSearch::new(test, limits);
     let special_before = special(&start);
-    let start = if repeated { start.into_iter().filter(|choice| !is_noise(&choice.name)).collect() } else { start };
+    let start = if repeated { start.into_iter().filter(|choice| !choice.name.is_noise()).collect() } else { start };
     let (choices, minimal) = reduce(&mut search, start, &plan, on_better);
     let simulations = search.simulations();
     let explained = explain(&mut search, &choices, &plan);
@@ -124,27 +127,29 @@ pub fn shrink(
 pub(crate) const SHRUNK: &str = "shrunk ";
 
 /// Runs the shrunk scene again and stores it in the history, in a campaign of its own. Returns the run, which names the
-/// run it was shrunk from.
+/// `original` run, from which it was shrunk. `index` is the original's position in its campaign.
 ///
 /// # Errors
 /// Writing failed; or `S051` if the scene can't be built, for example because the program changed.
-pub fn keep(
+pub fn store(
     env: &Env,
     history: &History,
-    (original, index): (&str, u64),
+    original: &str,
+    index: u64,
     shrunk: &Shrunk,
-    manner: &Manner,
+    context: &RunContext,
 ) -> Result<RunRecord, Diagnostics> {
     let id = history.next_campaign_id(&actcheck_base::digest_of(&env.campaign.source.text), env.campaign.seed)?;
-    let mut campaign = env.record(id.clone(), format!("{SHRUNK}{original}"), (manner.clock.now)());
+    let mut campaign = env.record(id.clone(), format!("{SHRUNK}{original}"), (context.clock.now)());
     (campaign.planned_runs, campaign.repeat) = (1, 1);
     campaign.shards.clear();
-    let mut record = run_line(env, &id, index, Choices::recorded(&shrunk.choices), manner)
+    let input = RunInput { campaign: &id, index, choices: Choices::recorded(&shrunk.choices) };
+    let run = simulate(env, input, context, context.clock.start(), Interference::default())
         .map_err(|failure| Diagnostic::error("S051", format!("the shrunk scene can't be built again: {failure}")))?;
-    record.shrunk_from = Some(original.to_owned());
+    let record = run.into_record(RunPlace { shrunk_from: Some(original.to_owned()), ..RunPlace::alone(&id) });
     history.begin_campaign(&campaign)?;
     history.commit(&record)?;
-    history.finish_campaign(&id, &end_of(&record, (manner.clock.now)()))?;
+    history.finish_campaign(&id, &end_of(&record, (context.clock.now)()))?;
     Ok(record)
 }
 
@@ -180,7 +185,7 @@ impl Subject<'_> {
 
     /// Makes one run. Returns `None` unless it completes and fails as required.
     fn run(&self, choices: Choices) -> Option<RunRecord> {
-        let run = || run_line(self.env, "shrink", self.index, choices, &self.options.manner).ok();
+        let run = || run_line(self.env, "shrink", self.index, choices, &self.options.context).ok();
         let record = catch_unwind(AssertUnwindSafe(run)).ok().flatten()?;
         let failed = signature(&record);
         let same = match self.options.property {
@@ -191,13 +196,13 @@ impl Subject<'_> {
     }
 
     fn as_recorded(&self, list: &[Choice]) -> Tried {
-        let made = self.run(Choices::recorded(list)).map(|record| accepted_places(&record.choices));
+        let made = self.run(Choices::recorded(list)).map(|record| drop_rejected_tries(&record.choices));
         Tried { made, simulations: 1 }
     }
 
     /// Runs the scene of a list with the noise of a repetition. The noise does not depend on the scene.
     fn repetition(&self, list: &[Choice], number: u32) -> Option<RunRecord> {
-        let scene: Vec<Choice> = list.iter().filter(|choice| !is_noise(&choice.name)).cloned().collect();
+        let scene: Vec<Choice> = list.iter().filter(|choice| !choice.name.is_noise()).cloned().collect();
         // The campaign uses the streams from 0 up; these count down from the maximum.
         self.run(Choices::partly_recorded(&scene, self.env.campaign.seed, u64::MAX - u64::from(number)))
     }
@@ -218,7 +223,7 @@ impl Subject<'_> {
             }
         }
         let scene = |made: Vec<Choice>| {
-            accepted_places(&made).into_iter().filter(|choice| !is_noise(&choice.name)).collect::<Vec<_>>()
+            drop_rejected_tries(&made).into_iter().filter(|choice| !choice.name.is_noise()).collect::<Vec<_>>()
         };
         Tried { made: made.filter(|_| failures >= least).map(scene), simulations }
     }
@@ -233,13 +238,32 @@ impl Subject<'_> {
     fn with_failing_noise(&self, list: &[Choice]) -> Vec<Choice> {
         let of = self.options.repeat.map_or(1, |repeat| repeat.of);
         let failing = (0..of).find_map(|number| self.repetition(list, number));
-        failing.map_or_else(|| list.to_vec(), |record| accepted_places(&record.choices))
+        failing.map_or_else(|| list.to_vec(), |record| drop_rejected_tries(&record.choices))
     }
+}
+
+/// Checks that the run's candidates still exist.
+fn check_candidates(env: &Env, index: u64, recorded: &[Choice]) -> Result<(), Diagnostics> {
+    let mut choices = Choices::recorded(recorded);
+    // Whether the scene can be built is checked by making the run again.
+    let _ = scenario::draw(&env.space, env.test_of(index), &mut choices);
+    let mut faults = Diagnostics::new();
+    for made in choices.made() {
+        let was = recorded.iter().find(|choice| choice.name == made.name).and_then(Choice::candidate);
+        if let (Some(was), ChoiceKind::Candidate { names }) = (was, &made.kind)
+            && made.candidate() != Some(was)
+        {
+            let message = format!("the run's scene can no longer be built: `{}` can't be `{was}` now", made.name);
+            let help = format!("add it to the configuration again; candidates there: {}", names.join(", "));
+            faults.push(Diagnostic::error("S051", message).help(help));
+        }
+    }
+    faults.or(())
 }
 
 /// Makes the run again.
 fn remake(env: &Env, index: u64, recorded: &[Choice], options: &ShrinkOptions<'_>) -> Result<RunRecord, Diagnostics> {
-    run_line(env, "shrink", index, Choices::recorded(recorded), &options.manner).map_err(|failure| {
+    run_line(env, "shrink", index, Choices::recorded(recorded), &options.context).map_err(|failure| {
         Diagnostic::error("S051", format!("the run's scene can no longer be built: {failure}"))
             .help("models, robot or program have changed since the run was made")
             .into()
@@ -255,32 +279,24 @@ fn is_named(iri: &str, name: &str) -> bool {
     iri == name || names::local(iri) == name
 }
 
-fn is_noise(name: &str) -> bool {
-    name.starts_with(NOISE)
-}
-
 /// Number of choices that are not nominal, without those that only set the number of objects.
 fn special(list: &[Choice]) -> usize {
     list.iter().filter(|choice| choice.value != choice.kind.nominal() && group(list, &choice.name).is_some()).count()
 }
 
-/// The numbered object of a choice, such as `other.3`.
-fn thing_of(name: &str) -> Option<&str> {
-    let (thing, _) = name.rsplit_once('.')?;
-    let (kind, number) = thing.split_once('.')?;
-    (kind != "sense" && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(thing)
-}
-
-fn left_out(thing: &str) -> Choice {
-    Choice { name: format!("{thing}.left_out"), kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
+fn left_out(object: PlacedObject) -> Choice {
+    let name = ChoiceName::Object(object, ObjectAxis::LeftOut);
+    Choice { name, kind: ChoiceKind::Index { of: 2 }, value: 1.0 }
 }
 
 /// Removals of each object except target and platform: first the objects that moved, farthest first, then those nearest
 /// to the target.
 fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
-    let things = recorded.iter().filter(|choice| choice.name.ends_with(".model"));
-    let things = things.filter_map(|choice| thing_of(&choice.name));
-    let left = things.map(left_out).filter(|removal| !has(recorded, removal));
+    let models = recorded.iter().filter(|choice| matches!(choice.name, ChoiceName::Object(_, ObjectAxis::Model)));
+    let left = models
+        .filter_map(|choice| choice.name.numbered_object())
+        .map(left_out)
+        .filter(|removal| !has(recorded, removal));
     let objects = &record.scene.objects;
     let target = objects.iter().find(|object| object.role == Role::Target).map(|object| object.pose.position);
     let others = objects.iter().filter(|object| object.role.is_bystander());
@@ -303,27 +319,16 @@ fn removals(record: &RunRecord, recorded: &[Choice]) -> Vec<Choice> {
 fn ends(env: &Env, index: u64) -> Vec<Choice> {
     let of = env.campaign.tests[env.test_of(index)].len();
     let end = |left_out: usize| Choice {
-        name: TEST_LEFT_OUT.to_owned(),
+        name: ChoiceName::ActionsLeftOut,
         kind: ChoiceKind::Index { of },
         value: left_out as f64,
     };
     (1..of).rev().map(end).collect()
 }
 
-/// Group of choices that become nominal together: noise, physics, the robot's start, positions of other objects, the
-/// target's position, and models. Returns `None` for numbers of objects.
-fn group(list: &[Choice], name: &str) -> Option<u8> {
-    let behind = name.rsplit('.').next().unwrap_or(name);
-    let thing = thing_of(name);
-    let gone = thing.is_some_and(|thing| has(list, &left_out(thing)));
-    match (name, behind) {
-        (_, "count" | "left_out") => None,
-        _ if gone => None,
-        _ if is_noise(name) => Some(0),
-        (_, "mass_scale" | "friction_scale" | "restitution") => Some(1),
-        _ if name.starts_with("robot.") => Some(2),
-        (_, "x" | "y" | "yaw") if thing.is_some() => Some(3),
-        (_, "x" | "y" | "yaw") => Some(4),
-        _ => Some(5),
-    }
+/// Group of choices that become nominal together. Returns `None` for numbers of objects, and for the choices of objects
+/// that are left out.
+fn group(list: &[Choice], name: &ChoiceName) -> Option<ChoiceGroup> {
+    let gone = name.numbered_object().is_some_and(|object| has(list, &left_out(object)));
+    if gone { None } else { name.group() }
 }

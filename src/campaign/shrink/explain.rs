@@ -1,7 +1,7 @@
 //! Explains a failing list: the choices that matter, the failing range of each, and the nearest passing list.
 
 use crate::shrink::list::{ids, is_nominal, spread, with_value};
-use crate::shrink::{Id, Plan, Search};
+use crate::shrink::{Id, ShrinkPlan, TrialSearch};
 use actcheck_data::{Choice, ChoiceKind};
 
 /// Bisections between a failing and a passing value: the gap shrinks to an eighth.
@@ -58,7 +58,7 @@ struct Bracket {
 }
 
 /// Explains a failing list by changing one choice at a time.
-pub fn explain(search: &mut Search<'_>, list: &[Choice], plan: &Plan<'_>) -> Explained {
+pub fn explain(search: &mut TrialSearch<'_>, list: &[Choice], plan: &ShrinkPlan<'_>) -> Explained {
     let special =
         ids(list).into_iter().filter(|(id, choice)| !is_nominal(choice) && (plan.group)(list, &id.name).is_some());
     let mut influences: Vec<Influence> = special
@@ -115,13 +115,13 @@ fn brackets(influences: &[Influence]) -> Vec<Bracket> {
                     -FARTHEST_SIGMAS * sigma
                 }
             }
-            ChoiceKind::Index { .. } => return None,
+            ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. } => return None,
         };
         (end != value).then_some((of, end))
     });
     let bracket = |(of, end): (usize, f64)| {
         let choice = &influences[of].choice;
-        let continuous = !matches!(choice.kind, ChoiceKind::Index { .. });
+        let continuous = !matches!(choice.kind, ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. });
         Bracket { of, fails: choice.value, passes: None, end, continuous, open: true }
     };
     towards.chain(away).map(bracket).collect()

@@ -1,12 +1,12 @@
 //! Edits lists of named choices.
 
-use actcheck_data::{Choice, ChoiceKind};
+use actcheck_data::{Choice, ChoiceKind, ChoiceName};
 
 /// Identifies a choice of a list: names may repeat.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Id {
     /// Name of the choice.
-    pub name: String,
+    pub name: ChoiceName,
     /// Number of choices of this name before it.
     pub nth: usize,
 }
@@ -68,27 +68,18 @@ pub(super) fn has(list: &[Choice], set: &Choice) -> bool {
 pub(super) fn spread(kind: &ChoiceKind) -> f64 {
     match kind {
         ChoiceKind::Index { of } => *of as f64,
+        ChoiceKind::Candidate { names } => names.len() as f64,
         ChoiceKind::Real { low, high, .. } => high - low,
         ChoiceKind::Normal { sigma } => 8.0 * sigma,
     }
 }
 
 /// Drops the rejected tries of placements: only the last one, which was accepted, stays.
-pub(crate) fn accepted_places(list: &[Choice]) -> Vec<Choice> {
+pub(crate) fn drop_rejected_tries(list: &[Choice]) -> Vec<Choice> {
     // Sensor noise is drawn repeatedly, and every draw counts.
-    let placed = |name: &str| !name.starts_with("sense.");
     let kept = list
         .iter()
         .enumerate()
-        .filter(|(at, choice)| !placed(&choice.name) || !list[at + 1..].iter().any(|later| later.name == choice.name));
+        .filter(|(at, choice)| choice.name.is_noise() || !list[at + 1..].iter().any(|later| later.name == choice.name));
     kept.map(|(_, choice)| choice.clone()).collect()
-}
-
-/// The unit of a choice, from the last part of its name; empty for names, counts and factors.
-pub fn unit_of(name: &str) -> &'static str {
-    match name.rsplit('.').next().unwrap_or(name) {
-        "x" | "y" | "z" | "gap" | "side" | "width" | "depth" | "height" | "gripper" => "m",
-        "yaw" | "heading" => "rad",
-        _ => "",
-    }
 }

@@ -13,9 +13,9 @@ mod reduce;
 mod search;
 
 pub(super) use counterexample::SHRUNK;
-pub use counterexample::{Repeat, ShrinkOptions, Shrunk, keep, shrink};
+pub use counterexample::{Repeat, ShrinkOptions, Shrunk, shrink, store};
 pub use explain::{Explained, Influence, Neighbour, explain};
-pub(super) use list::accepted_places;
-pub use list::{Id, ids, unit_of};
-pub use reduce::{Plan, reduce};
-pub use search::{Limits, Search, Tried};
+pub(super) use list::drop_rejected_tries;
+pub use list::{Id, ids};
+pub use reduce::{ShrinkPlan, reduce};
+pub use search::{TrialLimits, TrialSearch, Tried};

@@ -3,21 +3,21 @@
 use std::collections::BTreeMap;
 
 use crate::shrink::list::{find, has, ids, is_nominal, spread, with_choice, with_nominal, with_value};
-use crate::shrink::{Id, Search};
-use actcheck_data::{Choice, ChoiceKind};
+use crate::shrink::{Id, TrialSearch};
+use actcheck_data::{Choice, ChoiceGroup, ChoiceKind, ChoiceName};
 
 /// Maximum number of halvings of a value towards nominal; below a quarter, further tries are not worthwhile.
 const HALVINGS: usize = 2;
 
 /// The meaning of the choices for the shrinker.
-pub struct Plan<'a> {
+pub struct ShrinkPlan<'a> {
     /// Choices that each remove one object; the object most likely to be needed comes first.
     pub removals: Vec<Choice>,
     /// Choices that remove the last actions; each removes more than the next.
     pub ends: Vec<Choice>,
     /// Group of a choice. The choices of a group become nominal together if possible, the lowest group first. `None`
     /// for choices that stay unchanged.
-    pub group: &'a dyn Fn(&[Choice], &str) -> Option<u8>,
+    pub group: &'a dyn Fn(&[Choice], &ChoiceName) -> Option<ChoiceGroup>,
 }
 
 /// Returns the smallest failing list found within the search's limits, and whether it is minimal: no object can be
@@ -25,9 +25,9 @@ pub struct Plan<'a> {
 ///
 /// `list` must fail. `on_better` is called with each smaller list.
 pub fn reduce(
-    search: &mut Search<'_>,
+    search: &mut TrialSearch<'_>,
     list: Vec<Choice>,
-    plan: &Plan<'_>,
+    plan: &ShrinkPlan<'_>,
     on_better: &mut dyn FnMut(&[Choice]),
 ) -> (Vec<Choice>, bool) {
     let mut reducer = Reducer { search, best: list, plan, on_better };
@@ -41,9 +41,9 @@ pub fn reduce(
 }
 
 struct Reducer<'a, 's> {
-    search: &'a mut Search<'s>,
+    search: &'a mut TrialSearch<'s>,
     best: Vec<Choice>,
-    plan: &'a Plan<'a>,
+    plan: &'a ShrinkPlan<'a>,
     on_better: &'a mut dyn FnMut(&[Choice]),
 }
 
@@ -57,7 +57,7 @@ impl Reducer<'_, '_> {
     }
 
     /// Choices that are not nominal and may become nominal, with their groups.
-    fn special(&self) -> Vec<(u8, Id)> {
+    fn special(&self) -> Vec<(ChoiceGroup, Id)> {
         let choices = ids(&self.best).into_iter().filter(|(_, choice)| !is_nominal(choice));
         choices.filter_map(|(id, _)| Some(((self.plan.group)(&self.best, &id.name)?, id))).collect()
     }
@@ -96,7 +96,7 @@ impl Reducer<'_, '_> {
 
     /// Makes all choices nominal at once, else group by group, else by halves.
     fn normalise(&mut self) {
-        let mut groups: BTreeMap<u8, Vec<Id>> = BTreeMap::new();
+        let mut groups: BTreeMap<ChoiceGroup, Vec<Id>> = BTreeMap::new();
         for (group, id) in self.special() {
             groups.entry(group).or_default().push(id);
         }
@@ -170,7 +170,7 @@ impl Reducer<'_, '_> {
 }
 
 fn is_index(choice: &Choice) -> bool {
-    matches!(choice.kind, ChoiceKind::Index { .. })
+    matches!(choice.kind, ChoiceKind::Index { .. } | ChoiceKind::Candidate { .. })
 }
 
 /// Rounds the value to a power of ten that is at most a hundredth of its spread.

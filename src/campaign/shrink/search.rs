@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::ThreadPool;
 use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
 
-use actcheck_data::Choice;
+use crate::workers::workers;
+use actcheck_data::{Choice, ChoiceName};
 
 /// The result of a try.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +18,7 @@ pub struct Tried {
 }
 
 /// Limits of a search.
-pub struct Limits<'a> {
+pub struct TrialLimits<'a> {
     /// Maximum number of simulations; the last try may exceed it.
     pub simulations: u64,
     /// Workers; the result does not depend on their number.
@@ -27,26 +28,26 @@ pub struct Limits<'a> {
 }
 
 /// Names and value bits of a list.
-type Key = Vec<(String, u64)>;
+type Key = Vec<(ChoiceName, u64)>;
 
 /// Tries lists and caches the results. Results that a single worker would not have computed count only once they are
 /// used.
-pub struct Search<'a> {
+pub struct TrialSearch<'a> {
     test: &'a (dyn Fn(&[Choice]) -> Tried + Sync),
-    limits: Limits<'a>,
-    workers: Option<ThreadPool>,
+    limits: TrialLimits<'a>,
+    pool: Option<ThreadPool>,
     known: BTreeMap<Key, Tried>,
     counted: BTreeSet<Key>,
     simulations: u64,
 }
 
-impl<'a> Search<'a> {
+impl<'a> TrialSearch<'a> {
     /// Creates a search with an empty cache.
-    pub fn new(test: &'a (dyn Fn(&[Choice]) -> Tried + Sync), limits: Limits<'a>) -> Self {
+    pub fn new(test: &'a (dyn Fn(&[Choice]) -> Tried + Sync), limits: TrialLimits<'a>) -> Self {
         let several = limits.jobs > 1;
         // Without a thread pool, this thread does the work: slower, but with the same result.
-        let workers = several.then(|| rayon::ThreadPoolBuilder::new().num_threads(limits.jobs).build().ok()).flatten();
-        Self { test, limits, workers, known: BTreeMap::new(), counted: BTreeSet::new(), simulations: 0 }
+        let pool = several.then(|| workers(limits.jobs).ok()).flatten();
+        Self { test, limits, pool, known: BTreeMap::new(), counted: BTreeSet::new(), simulations: 0 }
     }
 
     /// Number of simulations so far.
@@ -99,8 +100,8 @@ impl<'a> Search<'a> {
         }
         let unknown: Vec<(Key, &Vec<Choice>)> = unknown.into_iter().collect();
         let test = self.test;
-        let tried: Vec<Tried> = match &self.workers {
-            Some(workers) => workers.install(|| unknown.par_iter().map(|(_, list)| test(list)).collect()),
+        let tried: Vec<Tried> = match &self.pool {
+            Some(pool) => pool.install(|| unknown.par_iter().map(|(_, list)| test(list)).collect()),
             None => unknown.iter().map(|(_, list)| test(list)).collect(),
         };
         self.known.extend(unknown.into_iter().map(|(key, _)| key).zip(tried));

@@ -42,26 +42,26 @@ pub fn carry_out(
     mut on_run: impl FnMut(),
 ) -> Result<Merged, Diagnostics> {
     let renames: Vec<Renames> = (0..sources.len())
-        .map(|place| {
-            let of_place = plan.ids.iter().filter(|((of, _), _)| *of == place);
+        .map(|source| {
+            let of_place = plan.ids.iter().filter(|((of, _), _)| *of == source);
             Renames::new(of_place.map(|((_, old), new)| (old.clone(), new.clone())))
         })
         .collect();
     let mut writer = Writer { sources, renames, into, merged: Merged::default() };
     for campaign in &plan.campaigns {
         writer.begin(campaign)?;
-        for (index, (place, run)) in &campaign.work.runs {
+        for (index, (source, run)) in &campaign.work.runs {
             if stop.load(Ordering::Relaxed) {
                 writer.merged.interrupted = true;
                 into.flush()?;
                 return Ok(writer.merged);
             }
             let new = format!("{}-{}", campaign.id, index + 1);
-            writer.run(*place, run, &new)?;
+            writer.run(*source, run, &new)?;
             on_run();
         }
-        for (place, run) in campaign.work.judgements.values() {
-            writer.judgements(*place, run)?;
+        for (source, run) in campaign.work.judgements.values() {
+            writer.judgements(*source, run)?;
         }
         writer.end(campaign)?;
     }
@@ -87,23 +87,23 @@ impl Writer<'_> {
         for shard in &work.shards {
             about.text("act:shard", shard);
         }
-        about.may("prov:startedAtTime", work.started.as_deref().map(time));
+        about.optional("prov:startedAtTime", work.started.as_deref().map(time));
         let mut quads = statements.quads;
-        if let Some((place, id)) = &work.statements {
-            quads.extend(self.statements(campaign, *place, id)?);
+        if let Some((source, id)) = &work.statements {
+            quads.extend(self.statements(campaign, *source, id)?);
         }
         let ends = if matches!(work.end, PlannedEnd::Same) { Vec::new() } else { self.ends(&node)? };
         self.write(&quads, &ends)
     }
 
     /// A source's statements about a campaign that the destination lacks, without its start and end.
-    fn statements(&self, campaign: &PlannedMerge, place: usize, id: &str) -> Result<Vec<Quad>, Diagnostics> {
+    fn statements(&self, campaign: &PlannedMerge, source: usize, id: &str) -> Result<Vec<Quad>, Diagnostics> {
         let [start, path, first] = ["prov:startedAtTime", "act:configPath", "act:firstId"].map(iri);
-        let mut quads = self.about(place, &campaign_node(id))?;
+        let mut quads = self.about(source, &campaign_node(id))?;
         quads.retain(|quad| !is_end(quad) && quad.predicate != start);
         for quad in quads.iter_mut().filter(|quad| quad.predicate == path) {
-            let moved = moved(&text_of(&quad.object), self.sources[place].dir(), self.into.dir());
-            quad.object = Literal::new_simple_literal(moved).into();
+            let path = relative_path_from(&text_of(&quad.object), self.sources[source].dir(), self.into.dir());
+            quad.object = Literal::new_simple_literal(path).into();
         }
         if id != campaign.id && !campaign.joined && !quads.iter().any(|quad| quad.predicate == first) {
             let mut statements = Statements::default();
@@ -113,22 +113,22 @@ impl Writer<'_> {
         Ok(quads)
     }
 
-    fn run(&mut self, place: usize, run: &str, new: &str) -> Result<(), Diagnostics> {
+    fn run(&mut self, source: usize, run: &str, new: &str) -> Result<(), Diagnostics> {
         let doing = format!("writing run {new}");
-        match std::fs::read(self.sources[place].trace_path(run)) {
+        match std::fs::read(self.sources[source].trace_path(run)) {
             Ok(bytes) => write_atomic(&self.into.trace_path(new), &bytes)
                 .map_err(|error| fault::io(self.into.dir(), &doing, &error))?,
             Err(_) => self.merged.without_trace.push(new.to_owned()),
         }
-        self.write(&self.about(place, &run_node(run))?, &[])?;
+        self.write(&self.about(source, &run_node(run))?, &[])?;
         self.merged.runs += 1;
         Ok(())
     }
 
     /// Copies only later judgements: the destination has the rest of the run.
-    fn judgements(&self, place: usize, run: &str) -> Result<(), Diagnostics> {
+    fn judgements(&self, source: usize, run: &str) -> Result<(), Diagnostics> {
         let later = GraphName::from(iri("act:rechecked"));
-        let mut quads = self.about(place, &run_node(run))?;
+        let mut quads = self.about(source, &run_node(run))?;
         quads.retain(|quad| quad.graph_name == later);
         self.write(&quads, &[])
     }
@@ -136,8 +136,8 @@ impl Writer<'_> {
     fn end(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
         let quads = match &campaign.work.end {
             PlannedEnd::Same => return Ok(()),
-            PlannedEnd::Of(place, id) => {
-                let mut quads = self.about(*place, &campaign_node(id))?;
+            PlannedEnd::Of(source, id) => {
+                let mut quads = self.about(*source, &campaign_node(id))?;
                 quads.retain(is_end);
                 quads
             }
@@ -148,10 +148,10 @@ impl Writer<'_> {
     }
 
     /// All statements of a source about a campaign or run, with the ids of the destination.
-    fn about(&self, place: usize, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
-        let source = &self.sources[place];
-        let quads = about(&source.store()?, node).map_err(|error| source.fault("reading it", &error))?;
-        Ok(self.renames[place].apply(quads))
+    fn about(&self, source: usize, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
+        let history = &self.sources[source];
+        let quads = about(&history.store()?, node).map_err(|error| history.fault("reading it", &error))?;
+        Ok(self.renames[source].apply(quads))
     }
 
     fn ends(&self, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
@@ -188,7 +188,7 @@ fn is_end(quad: &Quad) -> bool {
 
 /// Converts a path relative to one folder into a path relative to another. Returns it unchanged if the file does not
 /// exist.
-fn moved(path: &str, from: &Path, to: &Path) -> String {
+fn relative_path_from(path: &str, from: &Path, to: &Path) -> String {
     let absolute = std::fs::canonicalize(from.join(path)).ok();
     let seen = absolute.zip(std::fs::canonicalize(to).ok()).and_then(|(path, to)| pathdiff::diff_paths(path, to));
     seen.map_or_else(|| path.to_owned(), |path| path.display().to_string())

@@ -7,13 +7,13 @@ use crate::merge::survey::Found;
 use actcheck_base::Diagnostic;
 
 /// Maximum number of run numbers in one message.
-const TOLD: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// Lists the run numbers of indices.
 pub(super) fn numbers(indices: &[u64]) -> String {
-    let mut text = indices.iter().take(TOLD).map(|index| (index + 1).to_string()).collect::<Vec<_>>().join(", ");
-    if indices.len() > TOLD {
-        text.push_str(&format!(" and {} more", indices.len() - TOLD));
+    let mut text = indices.iter().take(MAX_LISTED).map(|index| (index + 1).to_string()).collect::<Vec<_>>().join(", ");
+    if indices.len() > MAX_LISTED {
+        text.push_str(&format!(" and {} more", indices.len() - MAX_LISTED));
     }
     text
 }

@@ -84,8 +84,8 @@ pub(super) enum PlannedEnd {
 /// destination, `H024` later judgements differ, `H025` a campaign to leave out does not exist; all faults at once.
 pub fn plan(sources: &[History], into: Option<&History>, options: &MergeOptions) -> Result<MergePlan, Diagnostics> {
     let mut found = Vec::new();
-    for (place, source) in sources.iter().enumerate() {
-        found.extend(survey(source, Some(place))?);
+    for (number, source) in sources.iter().enumerate() {
+        found.extend(survey(source, Some(number))?);
     }
     let found = without(found, &options.leave_out)?;
     let own = into.map(|history| survey(history, None)).transpose()?.unwrap_or_default();
@@ -167,11 +167,11 @@ fn groups(all: &[Found]) -> Vec<Vec<&Found>> {
 }
 
 fn order(found: &Found) -> (bool, &str, &str, &str) {
-    (found.place.is_some(), &found.record.started, &found.record.id, &found.dir)
+    (found.source.is_some(), &found.record.started, &found.record.id, &found.dir)
 }
 
 fn check_group(group: &[&Found], faults: &mut Diagnostics) {
-    let own: Vec<&Found> = group.iter().copied().filter(|found| found.place.is_none()).collect();
+    let own: Vec<&Found> = group.iter().copied().filter(|found| found.source.is_none()).collect();
     if own.len() > 1 {
         faults.push(conflict::parts_in_place(&own));
     }
@@ -236,7 +236,7 @@ fn new_ids(groups: &[Vec<&Found>], campaigns: &[PlannedMerge]) -> BTreeMap<(usiz
     let ids = groups
         .iter()
         .flatten()
-        .filter_map(|found| Some(((found.place?, found.record.id.clone()), (*of_name.get(&found.name())?).clone())));
+        .filter_map(|found| Some(((found.source?, found.record.id.clone()), (*of_name.get(&found.name())?).clone())));
     ids.collect()
 }
 
@@ -249,7 +249,7 @@ type Copy<'a> = (&'a Found, &'a FoundRun);
 
 /// Plans the merge of a group.
 fn planned(group: &[&Found], id: String) -> PlannedMerge {
-    let own = group.iter().copied().find(|found| found.place.is_none());
+    let own = group.iter().copied().find(|found| found.source.is_none());
     let first = group[0];
     let best = best_copies(group);
     let joined = !first.record.shards.is_empty();
@@ -272,7 +272,7 @@ fn planned(group: &[&Found], id: String) -> PlannedMerge {
         planned: first.record.planned_runs,
         missing,
         work: Work {
-            statements: first.place.map(|place| (place, first.record.id.clone())),
+            statements: first.source.map(|source| (source, first.record.id.clone())),
             shards: new_shards(group, own),
             started: own.is_none().then(|| started(group)),
             runs,
@@ -302,7 +302,7 @@ fn best_copies<'a>(group: &[&'a Found]) -> BTreeMap<u64, Copy<'a>> {
 /// Source history and id of each wanted run, by index. Excludes runs of the destination.
 fn copies(best: &BTreeMap<u64, Copy<'_>>, wanted: impl Fn(u64, &FoundRun) -> bool) -> BTreeMap<u64, (usize, String)> {
     let wanted = best.iter().filter(|(index, (_, run))| wanted(**index, run));
-    wanted.filter_map(|(index, (found, run))| Some((*index, (found.place?, run.row.run.clone())))).collect()
+    wanted.filter_map(|(index, (found, run))| Some((*index, (found.source?, run.row.run.clone())))).collect()
 }
 
 /// Parts of the group that the destination's campaign does not list yet.
@@ -316,17 +316,17 @@ fn new_shards(group: &[&Found], own: Option<&Found>) -> Vec<String> {
 /// The end of the most complete copy.
 fn end_of_copies(group: &[&Found]) -> PlannedEnd {
     let rank =
-        |found: &&&Found| (found.runs.len(), found.row.ended.is_some(), !found.row.interrupted, found.place.is_none());
+        |found: &&&Found| (found.runs.len(), found.row.ended.is_some(), !found.row.interrupted, found.source.is_none());
     // Among equals, the first wins.
     match group.iter().rev().max_by_key(rank) {
-        Some(found) => found.place.map_or(PlannedEnd::Same, |place| PlannedEnd::Of(place, found.record.id.clone())),
+        Some(found) => found.source.map_or(PlannedEnd::Same, |source| PlannedEnd::Of(source, found.record.id.clone())),
         None => PlannedEnd::Same,
     }
 }
 
 /// The end of all parts together, as a run of the whole campaign would have written it.
 fn end_of_parts(group: &[&Found], best: &BTreeMap<u64, Copy<'_>>, missing: &[u64], more: bool) -> PlannedEnd {
-    let own = group.iter().find(|found| found.place.is_none());
+    let own = group.iter().find(|found| found.source.is_none());
     let Some(ended) = group.iter().filter_map(|found| found.row.ended.clone()).max() else { return PlannedEnd::Same };
     if own.is_some_and(|own| own.row.ended.is_some()) && !more {
         return PlannedEnd::Same;

@@ -13,7 +13,7 @@ use actcheck_verdict::Counts;
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     /// Index of its history among the sources; `None` if it is in the destination.
-    pub(super) place: Option<usize>,
+    pub(super) source: Option<usize>,
     /// The folder of its history, as the caller gave it.
     pub(super) dir: String,
     pub(super) record: CampaignRecord,
@@ -75,7 +75,7 @@ impl Found {
 ///
 /// # Errors
 /// It can't be read.
-pub(super) fn survey(history: &History, place: Option<usize>) -> Result<Vec<Found>, Diagnostics> {
+pub(super) fn survey(history: &History, source: Option<usize>) -> Result<Vec<Found>, Diagnostics> {
     let shrunk = history.shrunk_campaigns()?;
     let store = history.store()?;
     let mut later: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -88,7 +88,7 @@ pub(super) fn survey(history: &History, place: Option<usize>) -> Result<Vec<Foun
             Node::read(&store, &campaign_node(&row.id)).map_err(|error| history.fault("reading a campaign", &error))?;
         let runs = runs(history, &row.id, &mut later)?;
         all.push(Found {
-            place,
+            source,
             dir: history.dir().display().to_string(),
             record: history.campaign(&row.id)?,
             first_id: node.text("act:firstId").unwrap_or_else(|| row.id.clone()),

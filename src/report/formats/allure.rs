@@ -128,24 +128,24 @@ fn details(judgement: &Judgement) -> String {
 /// Parameters that identify a result (scene and repetition), and further parameters that are excluded from the
 /// identity.
 fn parameters(run: &RunDetail, number: u64, scene: &str, judgement: &Judgement) -> Vec<Value> {
-    let told = |name: &str, value: String| json!({ "name": name, "value": value, "excluded": true });
+    let parameter = |name: &str, value: String| json!({ "name": name, "value": value, "excluded": true });
     let mut all = vec![
         json!({ "name": "scene", "value": scene }),
         json!({ "name": "repetition", "value": number.to_string() }),
-        told("run", run.row.run.clone()),
-        told("campaign", run.row.campaign.clone()),
-        told("world", run.world.clone()),
+        parameter("run", run.row.run.clone()),
+        parameter("campaign", run.row.campaign.clone()),
+        parameter("world", run.world.clone()),
     ];
     if let Some(margin) = judgement.margin {
-        all.push(told("margin", format!("{margin:+.4}")));
+        all.push(parameter("margin", format!("{margin:+.4}")));
     }
     for target in run.objects.iter().filter(|object| object.role == Role::Target) {
-        all.push(told("target", names::local(&target.category).to_owned()));
-        all.push(told("target x, y, yaw", format!("{:.3} m, {:.3} m, {:.3} rad", target.x, target.y, target.yaw)));
-        all.push(told("target mass, friction", format!("{:.3} kg, {:.3}", target.mass_kg, target.friction)));
+        all.push(parameter("target", names::local(&target.category).to_owned()));
+        all.push(parameter("target x, y, yaw", format!("{:.3} m, {:.3} m, {:.3} rad", target.x, target.y, target.yaw)));
+        all.push(parameter("target mass, friction", format!("{:.3} kg, {:.3}", target.mass_kg, target.friction)));
     }
-    all.push(told("objects", run.objects.len().to_string()));
-    all.extend(run.noise.iter().map(|(name, deviation)| told(name, deviation.to_string())));
+    all.push(parameter("objects", run.objects.len().to_string()));
+    all.extend(run.noise.iter().map(|(name, deviation)| parameter(name, deviation.to_string())));
     all
 }
 
@@ -166,7 +166,7 @@ fn steps(run: &RunDetail, judged: &ActionDetail, judgement: &Judgement) -> Vec<V
                 "steps": [], "attachments": [], "parameters": [],
             });
             json!({
-                "name": format!("{}. {}: {}", action.step, names::local(&action.action), said(action)),
+                "name": format!("{}. {}: {}", action.step, names::local(&action.action), report_of(action)),
                 "status": end(action), "statusDetails": { "message": action.message },
                 "stage": "finished", "start": start, "stop": stop, "parameters": parameters, "attachments": [],
                 "steps": if action.step == judged.step { vec![judging] } else { Vec::new() },
@@ -175,7 +175,7 @@ fn steps(run: &RunDetail, judged: &ActionDetail, judgement: &Judgement) -> Vec<V
         .collect()
 }
 
-fn said(action: &ActionDetail) -> &str {
+fn report_of(action: &ActionDetail) -> &str {
     match (action.end.as_str(), action.reported) {
         ("completed", Some(true)) => "reported success",
         ("completed", Some(false)) => "reported failure",

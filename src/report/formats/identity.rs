@@ -14,14 +14,14 @@ const SCENE_LETTERS: usize = 12;
 ///
 /// Noise is not included: it is the only difference between runs of a scene.
 pub(super) fn scene(run: &RunDetail) -> String {
-    let mut told = format!("{} {} {:?}", run.row.test, run.world, run.robot_base);
+    let mut text = format!("{} {} {:?}", run.row.test, run.world, run.robot_base);
     for object in &run.objects {
         let (place, body) =
             ([object.x, object.y, object.z, object.yaw], [object.mass_kg, object.friction, object.restitution]);
         // Writing to a `String` does not fail.
-        let _ = write!(told, " {} {} {:?} {place:?} {body:?}", object.id, object.model, object.role);
+        let _ = write!(text, " {} {} {:?} {place:?} {body:?}", object.id, object.model, object.role);
     }
-    digest_of(&told).chars().take(SCENE_LETTERS).collect()
+    digest_of(&text).chars().take(SCENE_LETTERS).collect()
 }
 
 /// Name of a property of an action of a test: `Pick Place/2 Place: ObjectReleased`.

@@ -35,8 +35,8 @@ impl MarkdownReport {
 
     /// Records which campaigns had a skill program that received ground truth.
     pub fn know(&mut self, campaigns: &[CampaignRow]) {
-        let told = campaigns.iter().filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
-        self.privileged = told.map(|row| row.id.clone()).collect();
+        let privileged = campaigns.iter().filter(|row| row.skill.as_ref().is_some_and(|skill| skill.privileged));
+        self.privileged = privileged.map(|row| row.id.clone()).collect();
     }
 
     /// Adds a run.

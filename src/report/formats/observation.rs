@@ -58,13 +58,12 @@ pub fn observation(run: &RunDetail, campaign_started: &str) -> Value {
 
 fn result(run: &RunDetail, counts: Counts) -> (&'static str, String) {
     if counts.failed > 0 {
-        return ("failed", told(run, |judgement| judgement.outcome == Outcome::Failed));
+        return ("failed", witnesses(run, |judgement| judgement.outcome == Outcome::Failed));
     }
     if run.row.status != RunStatus::Completed || counts.broken + counts.timeout > 0 {
-        let first = run
-            .reason
-            .clone()
-            .unwrap_or_else(|| told(run, |judgement| matches!(judgement.outcome, Outcome::Broken | Outcome::Timeout)));
+        let first = run.reason.clone().unwrap_or_else(|| {
+            witnesses(run, |judgement| matches!(judgement.outcome, Outcome::Broken | Outcome::Timeout))
+        });
         return ("gave_up", first);
     }
     match counts.passed {
@@ -73,14 +72,14 @@ fn result(run: &RunDetail, counts: Counts) -> (&'static str, String) {
     }
 }
 
-fn told(run: &RunDetail, about: impl Fn(&Judgement) -> bool) -> String {
+fn witnesses(run: &RunDetail, about: impl Fn(&Judgement) -> bool) -> String {
     let lines = run.actions.iter().flat_map(|action| {
-        let told = action.judgements.iter().filter(|judgement| about(judgement));
+        let judgements = action.judgements.iter().filter(|judgement| about(judgement));
         let line = |judgement: &Judgement| {
             let (action, property) = (names::local(&action.action), names::local(&judgement.property));
             format!("{action}: {property}: {}", judgement.witness)
         };
-        told.map(line).collect::<Vec<String>>()
+        judgements.map(line).collect::<Vec<String>>()
     });
     lines.collect::<Vec<String>>().join("; ")
 }

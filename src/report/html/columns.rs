@@ -69,14 +69,14 @@ pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
     let mut pack = Pack::default();
     let runs = table.text("run");
     let first_rows = first_rows(table);
-    pack.say("runs", runs.texts.clone());
+    pack.set("runs", runs.texts.clone());
     for name in ["campaign", "test", "status", "started"] {
         let column = kinds(table, name, &first_rows, &mut pack);
-        pack.say(name, column);
+        pack.set(name, column);
     }
     for name in ["index", "score", "scene", "repetition"] {
         let column = pack.numbers(&of_rows(table, name, &first_rows));
-        pack.say(name, column);
+        pack.set(name, column);
     }
     outcomes(table, slots, &mut pack);
     steps(table, &mut pack);
@@ -94,7 +94,7 @@ pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
             }))
         })
         .collect();
-    pack.say("parameters", parameters);
+    pack.set("parameters", parameters);
     pack.finish()
 }
 
@@ -168,12 +168,12 @@ fn outcomes(table: &OutcomeTable, slots: &Slots, pack: &mut Pack) {
         }
     }
     let outcomes = pack.bytes(&outcomes);
-    pack.say("outcomes", outcomes);
+    pack.set("outcomes", outcomes);
     let margins: Vec<Value> = margins.iter().map(|margins| pack.numbers(margins).into()).collect();
-    pack.say("margins", margins);
+    pack.set("margins", margins);
     let places: Vec<u32> = shown_by.keys().map(|at| *at as u32).collect();
     let places = pack.places(&places);
-    pack.say("witnesses", json!({ "at": places, "texts": shown_by.values().collect::<Vec<_>>() }));
+    pack.set("witnesses", json!({ "at": places, "texts": shown_by.values().collect::<Vec<_>>() }));
 }
 
 /// Packs the message and duration of each action, step by step.
@@ -187,7 +187,7 @@ fn steps(table: &OutcomeTable, pack: &mut Pack) {
             rows[*step as usize - 1][run as usize].get_or_insert(row);
         }
     }
-    let told: Vec<Value> = rows
+    let steps: Vec<Value> = rows
         .iter()
         .map(|rows| {
             // Runs without this step refer to the row after the last, which is empty.
@@ -197,5 +197,5 @@ fn steps(table: &OutcomeTable, pack: &mut Pack) {
             json!({ "action": action, "message": messages, "seconds": pack.numbers(&of_rows(table, "duration_s", &rows)) })
         })
         .collect();
-    pack.say("steps", told);
+    pack.set("steps", steps);
 }

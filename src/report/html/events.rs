@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::contacts::strongest;
 use crate::html::Explained;
-use crate::moment::decided;
+use crate::moment::deciding_moment;
 use actcheck_base::{Outcome, names};
 use actcheck_data::{Pose, Trace};
 use actcheck_history::RunDetail;
@@ -18,37 +18,37 @@ pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explain
         json!({
             "property": judgement.property, "outcome": judgement.outcome.word(), "margin": judgement.margin,
             "witness": judgement.witness, "held": judgement.held_before, "why": why.map(|why| &why.text),
-            "decided": trace.filter(|_| failed).map(|trace| decided(trace, idx, &judgement.witness)),
+            "decided": trace.filter(|_| failed).map(|trace| deciding_moment(trace, idx, &judgement.witness)),
         })
     });
-    let mut told = json!({
+    let mut packed = json!({
         "action": action.action, "step": action.step, "reported": action.reported, "message": action.message,
         "seconds": action.duration_secs, "end": action.end, "parameters": action.parameters,
         "judged": judged.collect::<Vec<Value>>(),
     });
     if let Some(trace) = trace {
-        events(&mut told, trace, idx);
+        events(&mut packed, trace, idx);
     }
-    told
+    packed
 }
 
 /// Adds the events of an action from the trace: start, phases, contacts, percepts.
-fn events(told: &mut Value, trace: &Trace, idx: usize) {
+fn events(packed: &mut Value, trace: &Trace, idx: usize) {
     let Some(action) = trace.actions.get(idx) else { return };
     let begin = trace.snapshots.first().map_or(0.0, |state| state.time_secs);
     let state = trace.snapshots.get(idx).or(trace.snapshots.last());
-    told["start"] = json!(state.map_or(0.0, |state| state.time_secs - begin));
-    told["phases"] = action.phases.iter().map(|phase| json!([phase.name, phase.start_secs])).collect();
+    packed["start"] = json!(state.map_or(0.0, |state| state.time_secs - begin));
+    packed["phases"] = action.phases.iter().map(|phase| json!([phase.name, phase.start_secs])).collect();
     let contacts = strongest(&action.contacts).into_iter().map(|contact| {
         let [a, b] = &contact.pair;
         json!([a, b, contact.start_secs, contact.end_secs, contact.max_force_n])
     });
-    told["contacts"] = contacts.collect();
+    packed["contacts"] = contacts.collect();
     let asked = action.percepts.iter().map(|percept| seen(&percept.id, &percept.pose, percept.size_m));
     let things = action.perceived.iter().flat_map(|perceived| &perceived.things);
     let things =
         things.map(|thing| seen(thing.category.as_deref().map_or("?", names::local), &thing.pose, thing.size_m));
-    told["seen"] = asked.chain(things).collect();
+    packed["seen"] = asked.chain(things).collect();
 }
 
 /// A perceived object: the pose of its bottom centre, and its size.

@@ -25,7 +25,7 @@ pub(super) struct Pack {
 
 impl Pack {
     /// Sets an entry of the header.
-    pub fn say(&mut self, name: &str, value: impl Into<Value>) {
+    pub fn set(&mut self, name: &str, value: impl Into<Value>) {
         self.head.insert(name.to_owned(), value.into());
     }
 
@@ -66,7 +66,7 @@ impl Pack {
 
     /// Adds columns of integers as second differences, which are small because bodies move smoothly. All low bytes
     /// precede all high bytes, which are nearly always equal and so compress well.
-    pub fn courses(&mut self, columns: &[Vec<i16>]) -> Value {
+    pub fn trajectories(&mut self, columns: &[Vec<i16>]) -> Value {
         let length = columns.first().map_or(0, Vec::len);
         let mut lower = Vec::with_capacity(columns.len() * length);
         let mut higher = Vec::with_capacity(columns.len() * length);
@@ -115,8 +115,8 @@ mod tests {
     fn packed_numbers_are_exact_to_half_a_step() {
         let mut pack = Pack::default();
         let values = [0.5, -1.5, f64::NAN, 3.25];
-        let told = pack.numbers(&values).expect("the values are not empty");
-        let (low, step) = (told["low"].as_f64().unwrap_or_default(), told["step"].as_f64().unwrap_or_default());
+        let column = pack.numbers(&values).expect("the values are not empty");
+        let (low, step) = (column["low"].as_f64().unwrap_or_default(), column["step"].as_f64().unwrap_or_default());
         for (value, code) in values.iter().zip(pack.body.chunks(2)) {
             let code = u16::from_le_bytes([code[0], code[1]]);
             match value.is_nan() {
@@ -125,13 +125,13 @@ mod tests {
             }
         }
         assert_eq!(pack.numbers(&[f64::NAN, f64::INFINITY]), None);
-        assert_eq!(pack.numbers(&[2.0, 2.0]).map(|told| told["whole"].clone()), Some(json!(true)));
+        assert_eq!(pack.numbers(&[2.0, 2.0]).map(|column| column["whole"].clone()), Some(json!(true)));
     }
 
     #[test]
     fn packed_text_has_no_markup_characters() {
         let mut pack = Pack::default();
-        pack.say("name", "</script><img src=x onerror=alert(1)>");
+        pack.set("name", "</script><img src=x onerror=alert(1)>");
         let text = pack.finish();
         assert!(text.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"+/=".contains(&byte)), "{text}");
     }

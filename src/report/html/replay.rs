@@ -30,12 +30,12 @@ impl Replays {
     /// Adds a run. A run without a trace can't be played back, but its details are included.
     pub fn add(&mut self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) {
         let mut pack = Pack::default();
-        told(&mut pack, run);
+        details(&mut pack, run);
         let actions: Vec<Value> =
             run.actions.iter().enumerate().map(|(idx, _)| action(run, trace, idx, explained)).collect();
-        pack.say("actions", actions);
+        pack.set("actions", actions);
         if let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) {
-            self.course(&mut pack, run, trace);
+            self.trajectories(&mut pack, run, trace);
         }
         let packed = pack.finish();
         self.bytes += packed.len();
@@ -58,12 +58,12 @@ impl Replays {
     }
 
     /// Packs the trajectories of moving bodies, and the fixed bodies.
-    fn course(&mut self, pack: &mut Pack, run: &RunDetail, trace: &Trace) {
+    fn trajectories(&mut self, pack: &mut Pack, run: &RunDetail, trace: &Trace) {
         let forms: BTreeMap<&str, &Form> = trace.forms.iter().map(|form| (form.name.as_str(), form)).collect();
         let first = trace.snapshots.iter().take(1).flat_map(|state| &state.bodies);
         let bodies: BTreeMap<&str, &BodyState> = first.map(|body| (body.id.as_str(), body)).collect();
         let roles: BTreeMap<&str, &str> =
-            run.objects.iter().map(|object| (object.id.as_str(), word(object.role))).collect();
+            run.objects.iter().map(|object| (object.id.as_str(), role_name(object.role))).collect();
         let mut form = |name: &str| match (forms.get(name), bodies.get(name)) {
             (Some(form), _) => Some(self.shapes.of(form)),
             (None, Some(body)) => Some(self.shapes.around(body)),
@@ -83,49 +83,49 @@ impl Replays {
             let (kind, role) = (names::local(&body.category), roles.get(body.id.as_str()));
             Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": role }))
         });
-        pack.say("still", still.collect::<Vec<Value>>());
-        pack.say("tracks", tracks);
-        say_courses(pack, trace, &slots);
+        pack.set("still", still.collect::<Vec<Value>>());
+        pack.set("tracks", tracks);
+        set_trajectories(pack, trace, &slots);
     }
 }
 
 /// Packs the trajectories of some tracks, with their scale and frame period.
-fn say_courses(pack: &mut Pack, trace: &Trace, slots: &[usize]) {
+fn set_trajectories(pack: &mut Pack, trace: &Trace, slots: &[usize]) {
     let (columns, low, grain) = columns(&trace.frames.rows, slots);
-    pack.say("period", trace.frames.period_secs);
-    pack.say("low", low.to_vec());
-    pack.say("grain", grain);
-    pack.say("turn", GRAIN_TURN);
-    let courses = pack.courses(&columns);
-    pack.say("courses", courses);
+    pack.set("period", trace.frames.period_secs);
+    pack.set("low", low.to_vec());
+    pack.set("grain", grain);
+    pack.set("turn", GRAIN_TURN);
+    let trajectories = pack.trajectories(&columns);
+    pack.set("courses", trajectories);
 }
 
 /// Packs the details of a run, except its actions.
-fn told(pack: &mut Pack, run: &RunDetail) {
-    pack.say("run", run.row.run.as_str());
-    pack.say("seed", run.seed);
-    pack.say("reason", run.reason.clone());
-    pack.say("discards", run.discards.clone());
-    pack.say("world", run.world.as_str());
-    pack.say("program", run.program_version.as_str());
-    pack.say("base", run.robot_base.to_vec());
-    pack.say("noise", json!(run.noise));
+fn details(pack: &mut Pack, run: &RunDetail) {
+    pack.set("run", run.row.run.as_str());
+    pack.set("seed", run.seed);
+    pack.set("reason", run.reason.clone());
+    pack.set("discards", run.discards.clone());
+    pack.set("world", run.world.as_str());
+    pack.set("program", run.program_version.as_str());
+    pack.set("base", run.robot_base.to_vec());
+    pack.set("noise", json!(run.noise));
     let objects: Vec<Value> = run
         .objects
         .iter()
         .map(|object| {
             json!({
-                "id": object.id, "model": object.model, "kind": names::local(&object.category), "role": word(object.role),
+                "id": object.id, "model": object.model, "kind": names::local(&object.category), "role": role_name(object.role),
                 "x": object.x, "y": object.y, "yaw": object.yaw, "mass": object.mass_kg, "friction": object.friction,
                 "moved": object.displacement_m, "tilt": object.max_tilt_rad,
             })
         })
         .collect();
-    pack.say("objects", objects);
+    pack.set("objects", objects);
 }
 
 /// Name of a role. Objects at the place location are drawn like other objects.
-fn word(role: Role) -> &'static str {
+fn role_name(role: Role) -> &'static str {
     if role == Role::PlaceOther { Role::Other.word() } else { role.word() }
 }
 
@@ -140,7 +140,7 @@ fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64)
     let extent = low.iter().enumerate().map(|(axis, low)| along(axis).map(|value| value - low).fold(0.0, f64::max));
     let grain = GRAIN_M.max(extent.fold(0.0, f64::max) / f64::from(u16::MAX));
     // Positions are relative to the lowest corner; quaternion components are absolute.
-    let told = |part: usize, value: f64| match low.get(part) {
+    let quantised = |part: usize, value: f64| match low.get(part) {
         Some(low) => (value - low) / grain,
         None => value / GRAIN_TURN,
     };
@@ -150,7 +150,7 @@ fn columns(rows: &[Vec<f32>], slots: &[usize]) -> (Vec<Vec<i16>>, [f64; 3], f64)
         let column = rows.iter().map(|row| {
             if let Some(value) = value(row, 7 * slot + part) {
                 // Positions use all 16 bits as unsigned integers; quaternion components are within ±5000.
-                last = (told(part, value).round().clamp(-32_768.0, 65_535.0) as i32) as i16;
+                last = (quantised(part, value).round().clamp(-32_768.0, 65_535.0) as i32) as i16;
             }
             last
         });
@@ -169,8 +169,8 @@ mod tests {
             (0..50).map(|at| vec![at as f32 * 0.02 - 3.0, 1.5, f32::NAN, 0.0, 0.0, -0.6, 0.8]).collect();
         let (columns, low, grain) = columns(&rows, &[0]);
         assert_eq!((columns.len(), grain), (7, GRAIN_M));
-        for (row, told) in rows.iter().zip(&columns[0]) {
-            let value = low[0] + f64::from(*told as u16) * grain;
+        for (row, code) in rows.iter().zip(&columns[0]) {
+            let value = low[0] + f64::from(*code as u16) * grain;
             assert!((value - f64::from(row[0])).abs() <= grain / 2.0 + 1e-6);
         }
         assert!((f64::from(columns[5][7]) * GRAIN_TURN + 0.6).abs() < GRAIN_TURN);

@@ -20,20 +20,20 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     let mut findings = findings_json(report.findings);
     number_runs(&mut findings, &places);
     let mut pack = Pack::default();
-    pack.say("version", report.version);
-    pack.say("made", report.made);
-    pack.say("history", report.findings.history.as_str());
-    pack.say("program", report.findings.program.as_str());
-    pack.say("options", report.findings.options.as_str());
-    pack.say("outcomes", Outcome::ALL.map(Outcome::word).to_vec());
-    pack.say("privileged", SkillRecord::PRIVILEGED);
-    pack.say("scores", scores(report));
+    pack.set("version", report.version);
+    pack.set("made", report.made);
+    pack.set("history", report.findings.history.as_str());
+    pack.set("program", report.findings.program.as_str());
+    pack.set("options", report.findings.options.as_str());
+    pack.set("outcomes", Outcome::ALL.map(Outcome::word).to_vec());
+    pack.set("privileged", SkillRecord::PRIVILEGED);
+    pack.set("scores", scores(report));
     sentences(&mut findings, report);
-    pack.say("findings", findings);
+    pack.set("findings", findings);
     let shown = report.campaigns.iter().filter(|row| report.findings.campaigns.contains(&row.id));
-    pack.say("campaigns", shown.map(campaign).collect::<Vec<Value>>());
-    pack.say("slots", slots.slots.iter().map(|slot| told(slot, report)).collect::<Vec<Value>>());
-    pack.say("replays", report.replays.runs().map(|(run, _)| run).collect::<Vec<&str>>());
+    pack.set("campaigns", shown.map(campaign).collect::<Vec<Value>>());
+    pack.set("slots", slots.slots.iter().map(|slot| property_slot(slot, report)).collect::<Vec<Value>>());
+    pack.set("replays", report.replays.runs().map(|(run, _)| run).collect::<Vec<&str>>());
     pack.finish()
 }
 
@@ -105,7 +105,7 @@ fn campaign(row: &CampaignRow) -> Value {
     })
 }
 
-fn told(slot: &Slot, report: &HtmlReport<'_>) -> Value {
+fn property_slot(slot: &Slot, report: &HtmlReport<'_>) -> Value {
     let words = report.words.get(&slot.property);
     let of = report
         .findings

@@ -54,14 +54,14 @@ impl Caption {
 }
 
 fn what_was_done(action: &ActionDetail) -> String {
-    let said = match (action.reported, action.message.as_deref()) {
+    let report = match (action.reported, action.message.as_deref()) {
         (Some(true), _) => "reported success".to_owned(),
         (Some(false), Some(message)) => format!("reported failure: {message}"),
         (Some(false), None) => "reported failure".to_owned(),
         (None, _) => action.end.clone(),
     };
     let name = names::local(&action.action);
-    format!("{}. {name}: A = {:.2}, {:.1} s, {said}", action.step, action.score, action.duration_secs)
+    format!("{}. {name}: A = {:.2}, {:.1} s, {report}", action.step, action.score, action.duration_secs)
 }
 
 /// Draws the header from `top` on and returns its lower end.

@@ -1,7 +1,7 @@
 //! The legend of a picture. It only has the colours and lines that occur.
 
 use crate::picture::drawing::{Drawing, Paint, Rect, Style, Words};
-use crate::picture::panel::Material;
+use crate::picture::panel::PanelData;
 use crate::picture::paths::Mover;
 use crate::picture::{font, paint};
 use actcheck_data::Role;
@@ -15,13 +15,13 @@ const SAMPLE_PX: f64 = 22.0;
 
 enum Sample {
     Area(Style),
-    Way(Mover),
+    Path(Mover),
 }
 
 /// Draws the legend from `top` on and returns its lower end.
-pub(super) fn draw(drawing: &mut Drawing, material: &Material<'_>, left: f64, top: f64, width: f64) -> f64 {
+pub(super) fn draw(drawing: &mut Drawing, data: &PanelData<'_>, left: f64, top: f64, width: f64) -> f64 {
     let (mut x, mut y) = (left, top);
-    for (sample, text) in entries(material) {
+    for (sample, text) in entries(data) {
         let wide = SAMPLE_PX + 6.0 + font::width(text, SIZE_PX, false) + 20.0;
         if x + wide > left + width && x > left {
             (x, y) = (left, y + LINE_PX);
@@ -32,8 +32,8 @@ pub(super) fn draw(drawing: &mut Drawing, material: &Material<'_>, left: f64, to
                 let area = Rect { left: x, top: middle - 6.0, width: SAMPLE_PX, height: 12.0 };
                 drawing.polygon(area.corners(), style);
             }
-            Sample::Way(mover) => {
-                drawing.line(vec![[x, middle], [x + SAMPLE_PX, middle]], paint::way(mover, paint::action(0)));
+            Sample::Path(mover) => {
+                drawing.line(vec![[x, middle], [x + SAMPLE_PX, middle]], paint::path(mover, paint::action(0)));
             }
         }
         let at = [x + SAMPLE_PX + 6.0, middle + SIZE_PX * 0.36];
@@ -44,11 +44,10 @@ pub(super) fn draw(drawing: &mut Drawing, material: &Material<'_>, left: f64, to
     y + LINE_PX
 }
 
-fn entries(material: &Material<'_>) -> Vec<(Sample, &'static str)> {
-    let has = |role: Role| material.roles.values().any(|other| *other == role);
-    let moved = |mover: Mover| material.ways.iter().any(|way| way.mover == mover);
-    let perceived =
-        material.trace.actions.iter().any(|action| !action.percepts.is_empty() || action.perceived.is_some());
+fn entries(data: &PanelData<'_>) -> Vec<(Sample, &'static str)> {
+    let has = |role: Role| data.roles.values().any(|other| *other == role);
+    let moved = |mover: Mover| data.paths.iter().any(|path| path.mover == mover);
+    let perceived = data.trace.actions.iter().any(|action| !action.percepts.is_empty() || action.perceived.is_some());
     let all = [
         (has(Role::Target), Sample::Area(paint::movable(Role::Target)), "target"),
         (has(Role::Other) || has(Role::PlaceOther), Sample::Area(paint::movable(Role::Other)), "other objects"),
@@ -56,9 +55,9 @@ fn entries(material: &Material<'_>) -> Vec<(Sample, &'static str)> {
         (true, Sample::Area(paint::FURNITURE), "furniture"),
         (true, Sample::Area(paint::ROBOT), "robot"),
         (perceived, Sample::Area(paint::GLIMPSE), "perceived, where the robot believes it"),
-        (moved(Mover::Base), Sample::Way(Mover::Base), "path of the base, in the colour of its action"),
-        (moved(Mover::Hand), Sample::Way(Mover::Hand), "of the hand"),
-        (moved(Mover::Target), Sample::Way(Mover::Target), "of the target"),
+        (moved(Mover::Base), Sample::Path(Mover::Base), "path of the base, in the colour of its action"),
+        (moved(Mover::Hand), Sample::Path(Mover::Hand), "of the hand"),
+        (moved(Mover::Target), Sample::Path(Mover::Target), "of the target"),
     ];
     all.into_iter().filter(|(there, ..)| *there).map(|(_, sample, text)| (sample, text)).collect()
 }

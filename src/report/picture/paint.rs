@@ -47,7 +47,7 @@ pub(super) fn movable(role: Role) -> Style {
 }
 
 /// Line style of a path: base wide, hand thin, target dotted.
-pub(super) fn way(mover: Mover, rgb: u32) -> Line {
+pub(super) fn path(mover: Mover, rgb: u32) -> Line {
     match mover {
         Mover::Base => Line::new(Paint::new(rgb, 0.45), 5.0),
         Mover::Hand => Line::new(Paint::new(rgb, 0.9), 1.6),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
 use crate::picture::labels::{Label, Labels};
 use crate::picture::outline::silhouette;
-use crate::picture::paths::{Mover, Way, pose_at};
+use crate::picture::paths::{Mover, Path, pose_at};
 use crate::picture::window::{Bounds, Window};
 use crate::picture::{font, paint};
 use actcheck_base::names;
@@ -16,9 +16,9 @@ use actcheck_data::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
 const LINK_REACH_M: f64 = 0.8;
 
 /// Data shared by all panels of a run.
-pub(super) struct Material<'a> {
+pub(super) struct PanelData<'a> {
     pub(super) trace: &'a Trace,
-    pub(super) ways: &'a [Way],
+    pub(super) paths: &'a [Path],
     pub(super) roles: &'a BTreeMap<String, Role>,
     pub(super) forms: BTreeMap<&'a str, &'a Form>,
 }
@@ -32,7 +32,7 @@ pub(super) enum Moment {
     After,
 }
 
-impl Material<'_> {
+impl PanelData<'_> {
     fn snapshot(&self, moment: Moment) -> Option<&Snapshot> {
         match moment {
             Moment::Before => self.trace.snapshots.first(),
@@ -47,34 +47,34 @@ impl Material<'_> {
 }
 
 /// Draws a panel. Maps show places and label furniture; close-ups label movable objects.
-pub(super) fn draw(drawing: &mut Drawing, material: &Material<'_>, moment: Moment, window: &Window, is_map: bool) {
-    let Some(snapshot) = material.snapshot(moment) else { return };
+pub(super) fn draw(drawing: &mut Drawing, data: &PanelData<'_>, moment: Moment, window: &Window, is_map: bool) {
+    let Some(snapshot) = data.snapshot(moment) else { return };
     drawing.polygon(window.panel.corners(), paint::BACKGROUND);
     drawing.clip(Some(window.panel));
     if is_map {
-        rooms(drawing, material.trace, window);
+        rooms(drawing, data.trace, window);
     }
-    let shown: Vec<&BodyState> = snapshot.bodies.iter().filter(|body| window.is_about(&Bounds::of(body))).collect();
+    let shown: Vec<&BodyState> = snapshot.bodies.iter().filter(|body| window.overlaps(&Bounds::of(body))).collect();
     for body in shown.iter().filter(|body| body.fixed) {
-        drawing.shape(form(material, body, window), true, fixed_style(body));
+        drawing.shape(form(data, body, window), true, fixed_style(body));
     }
     for body in shown.iter().filter(|body| !body.fixed) {
-        drawing.shape(form(material, body, window), true, paint::movable(material.role(body)));
+        drawing.shape(form(data, body, window), true, paint::movable(data.role(body)));
     }
-    robot(drawing, material, moment, window);
+    robot(drawing, data, moment, window);
     heading(drawing, snapshot.robot.base_true, window);
     match moment {
-        Moment::Before => glimpses(drawing, material.trace, window),
-        Moment::After => ways(drawing, material.ways, window),
+        Moment::Before => percepts(drawing, data.trace, window),
+        Moment::After => paths(drawing, data.paths, window),
     }
     let mut labels = Labels::new(window.panel, things(&shown, window));
     ruler(drawing, window, &mut labels);
     if is_map {
-        name_places(drawing, material.trace, window, &mut labels);
+        name_places(drawing, data.trace, window, &mut labels);
     }
-    name_bodies(drawing, material, &shown, window, &mut labels, is_map);
+    name_bodies(drawing, data, &shown, window, &mut labels, is_map);
     if moment == Moment::Before && !is_map && window.view.up == 1 {
-        name_glimpses(drawing, material.trace, window, &mut labels);
+        name_percepts(drawing, data.trace, window, &mut labels);
     }
     drawing.clip(None);
 }
@@ -88,24 +88,24 @@ fn fixed_style(body: &BodyState) -> Style {
 }
 
 /// Outline of a body's shape, or of its bounding box if the trace has no shape.
-fn form(material: &Material<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64; 2]>> {
-    match material.forms.get(body.id.as_str()) {
+fn form(data: &PanelData<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64; 2]>> {
+    match data.forms.get(body.id.as_str()) {
         Some(form) => silhouette(&form.parts, &body.pose.to_isometry(), window),
         None => vec![window.rect(&Bounds::of(body)).corners()],
     }
 }
 
 /// Draws the robot's links as in the first or last frame.
-fn robot(drawing: &mut Drawing, material: &Material<'_>, moment: Moment, window: &Window) {
-    let frames = &material.trace.frames;
+fn robot(drawing: &mut Drawing, data: &PanelData<'_>, moment: Moment, window: &Window) {
+    let frames = &data.trace.frames;
     let row = if moment == Moment::Before { 0 } else { frames.rows.len().saturating_sub(1) };
     // Objects have tracks too.
     let links = frames.names.iter().enumerate().filter(|(_, name)| name.starts_with("robot/"));
     let links = links.filter_map(|(slot, name)| {
-        let form = material.forms.get(name.as_str())?;
-        let pose = pose_at(material.trace, row, slot)?;
+        let form = data.forms.get(name.as_str())?;
+        let pose = pose_at(data.trace, row, slot)?;
         let around = Bounds::point(pose.translation.vector.into()).grown(LINK_REACH_M);
-        window.is_about(&around).then(|| silhouette(&form.parts, &pose, window))
+        window.overlaps(&around).then(|| silhouette(&form.parts, &pose, window))
     });
     drawing.shape(links.flatten().collect(), true, paint::ROBOT);
 }
@@ -135,7 +135,7 @@ fn rooms(drawing: &mut Drawing, trace: &Trace, window: &Window) {
 }
 
 /// Percepts as boxes: objects, planes, and objects that a skill queried.
-fn glimpse_parts(trace: &Trace) -> Vec<(String, Part)> {
+fn percept_parts(trace: &Trace) -> Vec<(String, Part)> {
     let standing = |pose: &actcheck_data::Pose, [x, y, z]: [f64; 3]| {
         let middle = pose.to_isometry() * nalgebra::Translation3::new(0.0, 0.0, z / 2.0);
         Part { pose: actcheck_data::Pose::from_isometry(&middle), shape: Shape::Box { size: [x, y, z] } }
@@ -157,15 +157,15 @@ fn glimpse_parts(trace: &Trace) -> Vec<(String, Part)> {
     parts
 }
 
-fn glimpses(drawing: &mut Drawing, trace: &Trace, window: &Window) {
-    for (_, part) in glimpse_parts(trace) {
+fn percepts(drawing: &mut Drawing, trace: &Trace, window: &Window) {
+    for (_, part) in percept_parts(trace) {
         let outline = silhouette(&[part], &nalgebra::Isometry3::identity(), window);
         drawing.shape(outline, true, paint::GLIMPSE);
     }
 }
 
 /// Labels percepts with their recognised category.
-fn name_glimpses(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &mut Labels) {
+fn name_percepts(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &mut Labels) {
     let seen = trace.actions.iter().filter_map(|action| action.perceived.as_ref());
     for thing in seen.flat_map(|perceived| &perceived.things) {
         let name = thing.category.as_deref().map_or("unknown", names::local);
@@ -176,15 +176,15 @@ fn name_glimpses(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: 
     }
 }
 
-fn ways(drawing: &mut Drawing, ways: &[Way], window: &Window) {
+fn paths(drawing: &mut Drawing, paths: &[Path], window: &Window) {
     // In side views, the path of the base is only a line on the floor.
-    for way in ways.iter().filter(|way| way.mover != Mover::Base || window.view.up == 1) {
-        let points: Vec<[f64; 2]> = way.points.iter().map(|point| window.pixel(*point)).collect();
-        let rgb = paint::action(way.action);
-        if let (Some(start), Mover::Hand | Mover::Base) = (points.first(), way.mover) {
+    for path in paths.iter().filter(|path| path.mover != Mover::Base || window.view.up == 1) {
+        let points: Vec<[f64; 2]> = path.points.iter().map(|point| window.pixel(*point)).collect();
+        let rgb = paint::action(path.action);
+        if let (Some(start), Mover::Hand | Mover::Base) = (points.first(), path.mover) {
             drawing.circle(*start, 2.6, Style::fill(Paint::solid(rgb)));
         }
-        drawing.line(points, paint::way(way.mover, rgb));
+        drawing.line(points, paint::path(path.mover, rgb));
     }
 }
 
@@ -229,14 +229,14 @@ fn name_places(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: &m
 /// Labels movable objects, the target first, then furniture.
 fn name_bodies(
     drawing: &mut Drawing,
-    material: &Material<'_>,
+    data: &PanelData<'_>,
     shown: &[&BodyState],
     window: &Window,
     labels: &mut Labels,
     is_map: bool,
 ) {
     let mut named: Vec<(&BodyState, Role)> =
-        shown.iter().filter(|body| !is_wall(body)).map(|body| (*body, material.role(body))).collect();
+        shown.iter().filter(|body| !is_wall(body)).map(|body| (*body, data.role(body))).collect();
     let order = [Role::Target, Role::Obstacle, Role::Other, Role::PlaceOther, Role::Platform];
     let rank = |role: Role| order.iter().position(|other| *other == role);
     named.sort_by_key(|(body, role)| (body.fixed, rank(*role)));

@@ -14,7 +14,7 @@ pub(super) enum Mover {
 
 /// A path during one action.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Way {
+pub(super) struct Path {
     pub(super) mover: Mover,
     /// Index of the action.
     pub(super) action: usize,
@@ -28,14 +28,14 @@ const SHORTEST_M: f64 = 0.01;
 const MEASURABLE_M: f64 = 0.003;
 
 /// All paths that are long enough to draw.
-pub(super) fn ways(trace: &Trace, target: Option<&str>) -> Vec<Way> {
+pub(super) fn paths(trace: &Trace, target: Option<&str>) -> Vec<Path> {
     let followed = [
         (Mover::Base, base(trace)),
         (Mover::Hand, hand(trace)),
         (Mover::Target, target.and_then(|id| Some((slot(trace, id)?, Isometry3::identity())))),
     ];
     let spans = spans(trace);
-    let mut ways = Vec::new();
+    let mut paths = Vec::new();
     for (mover, (track, offset)) in followed.into_iter().filter_map(|(mover, found)| Some((mover, found?))) {
         let points: Vec<[f64; 3]> = (0..trace.frames.rows.len())
             .filter_map(|row| pose_at(trace, row, track))
@@ -44,11 +44,11 @@ pub(super) fn ways(trace: &Trace, target: Option<&str>) -> Vec<Way> {
         for (action, (first, last)) in spans.iter().enumerate() {
             let Some(points) = points.get(*first..=(*last).min(points.len().saturating_sub(1))) else { continue };
             if length(points) > SHORTEST_M {
-                ways.push(Way { mover, action, points: points.to_vec() });
+                paths.push(Path { mover, action, points: points.to_vec() });
             }
         }
     }
-    ways
+    paths
 }
 
 /// First and last frame of each action. The last frame of an action is the first of the next.

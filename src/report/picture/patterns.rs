@@ -4,7 +4,7 @@
 use crate::FindingsSummary;
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
 use crate::picture::{font, paint};
-use actcheck_analysis::{Condition, Parameter, Pattern, Subject, Values};
+use actcheck_analysis::{Condition, Parameter, Pattern, PatternInput, Values};
 
 /// Width of a picture. Unit: pixels.
 const WIDTH_PX: f64 = 1200.0;
@@ -39,7 +39,7 @@ pub fn patterns_picture(findings: &FindingsSummary) -> Option<Drawing> {
         .iter()
         .flat_map(|report| report.findings.patterns.confirmed().map(move |pattern| (report, pattern)));
     for (report, pattern) in confirmed {
-        let Some(plane) = Plane::of(&report.findings.subject, pattern) else { continue };
+        let Some(plane) = Plane::of(&report.findings.input, pattern) else { continue };
         let left = GAP_PX + (width + GAP_PX) * f64::from(drawn % 2);
         if drawn % 2 == 0 {
             top = lowest;
@@ -52,7 +52,7 @@ pub fn patterns_picture(findings: &FindingsSummary) -> Option<Drawing> {
             width: width - NUMBERS_PX[0],
             height: PANEL_PX - NUMBERS_PX[1],
         };
-        plane.draw(&mut drawing, panel, &report.findings.subject, pattern);
+        plane.draw(&mut drawing, panel, &report.findings.input, pattern);
         lowest = lowest.max(panel.bottom() + NUMBERS_PX[1] + GAP_PX);
     }
     drawing.height = lowest;
@@ -116,15 +116,15 @@ struct Plane<'a> {
 impl<'a> Plane<'a> {
     /// Chooses the axes: the ranges of a pattern first, then the usual parameters. Returns `None` if there are fewer
     /// than two.
-    fn of(subject: &'a Subject, pattern: &Pattern) -> Option<Self> {
+    fn of(input: &'a PatternInput, pattern: &Pattern) -> Option<Self> {
         let ranges = pattern.conditions.iter().filter_map(|condition| match condition {
-            Condition::Range { parameter, low, high } => Axis::of(subject.parameters.get(*parameter)?, [*low, *high]),
+            Condition::Range { parameter, low, high } => Axis::of(input.parameters.get(*parameter)?, [*low, *high]),
             Condition::Kind { .. } => None,
         });
         let mut axes: Vec<Axis<'a>> = ranges.take(2).collect();
         for name in USUAL {
             let known = axes.iter().any(|axis| axis.parameter.name == name);
-            let parameter = subject.parameters.iter().find(|parameter| parameter.name == name && !known);
+            let parameter = input.parameters.iter().find(|parameter| parameter.name == name && !known);
             axes.extend(parameter.and_then(|parameter| Axis::of(parameter, [None, None])));
         }
         axes.truncate(2);
@@ -136,21 +136,21 @@ impl<'a> Plane<'a> {
         [panel.left + across.share(x) * panel.width, panel.bottom() - up.share(y) * panel.height]
     }
 
-    fn draw(&self, drawing: &mut Drawing, panel: Rect, subject: &Subject, pattern: &Pattern) {
+    fn draw(&self, drawing: &mut Drawing, panel: Rect, input: &PatternInput, pattern: &Pattern) {
         drawing.polygon(panel.corners(), paint::BACKGROUND);
         self.numbers(drawing, panel);
         drawing.clip(Some(panel));
         self.asked(drawing, panel);
         // If the pattern has conditions on kinds, only draw runs of these kinds.
         let kinds = pattern.conditions.iter().filter(|condition| matches!(condition, Condition::Kind { .. }));
-        let kinds: Vec<Vec<bool>> = kinds.map(|condition| condition.holds(subject)).collect();
+        let kinds: Vec<Vec<bool>> = kinds.map(|condition| condition.holds(input)).collect();
         let shown = |run: &usize| kinds.iter().all(|holds| holds[*run]);
         let place = |run: usize| {
             let at = [self.axes[0].numbers[run], self.axes[1].numbers[run]];
             at.iter().all(|value| value.is_finite()).then(|| self.pixel(panel, at))
         };
         let of = |failed: bool| -> Vec<[f64; 2]> {
-            (0..subject.len()).filter(shown).filter(|run| subject.failed[*run] == failed).filter_map(place).collect()
+            (0..input.len()).filter(shown).filter(|run| input.failed[*run] == failed).filter_map(place).collect()
         };
         let passed = of(false);
         let every = passed.len().div_ceil(MOST_PASSED).max(1);

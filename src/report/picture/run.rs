@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::picture::Caption;
 use crate::picture::drawing::{Drawing, Paint, Rect, Words};
-use crate::picture::panel::{Material, Moment};
-use crate::picture::paths::{Mover, ways};
+use crate::picture::panel::{Moment, PanelData};
+use crate::picture::paths::{Mover, paths};
 use crate::picture::window::{Bounds, View, Window, close_ups, overview};
 use crate::picture::{header, legend, paint, panel};
 use actcheck_data::{Role, Trace};
@@ -32,25 +32,25 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
         Some(target) => BTreeSet::from([target]),
         None => of_role(Role::Other).collect(),
     };
-    let ways = ways(trace, target);
-    let material = Material {
+    let paths = paths(trace, target);
+    let data = PanelData {
         trace,
-        ways: &ways,
+        paths: &paths,
         roles: &caption.roles,
         forms: trace.forms.iter().map(|form| (form.name.as_str(), form)).collect(),
     };
     let close_ups = close_ups(trace, &subjects)?;
     let base_way: Vec<[f64; 3]> =
-        ways.iter().filter(|way| way.mover == Mover::Base).flat_map(|way| way.points.iter().copied()).collect();
+        paths.iter().filter(|path| path.mover == Mover::Base).flat_map(|path| path.points.iter().copied()).collect();
     let mut drawing = Drawing::new(WIDTH_PX);
     let inner = WIDTH_PX - 2.0 * GAP_PX;
     let mut y = header::draw(&mut drawing, caption, GAP_PX, GAP_PX - 4.0, inner) + 12.0;
     let side = View { across: across(trace, &close_ups[0]), up: 2 };
     let whole = overview(trace, &close_ups, &base_way).map(|whole| (View::TOP, [whole; 2], 0));
     for (view, bounds, kind) in whole.into_iter().chain([(View::TOP, close_ups, 1), (side, close_ups, 2)]) {
-        y = row(&mut drawing, &material, view, &bounds, kind, y);
+        y = row(&mut drawing, &data, view, &bounds, kind, y);
     }
-    drawing.height = legend::draw(&mut drawing, &material, GAP_PX, y, inner) + GAP_PX / 2.0;
+    drawing.height = legend::draw(&mut drawing, &data, GAP_PX, y, inner) + GAP_PX / 2.0;
     Some(drawing)
 }
 
@@ -58,12 +58,12 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
 /// each other.
 fn across(trace: &Trace, about: &Bounds) -> usize {
     let base = trace.snapshots.first().map_or([0.0; 3], |snapshot| snapshot.robot.base_true);
-    let way = |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();
-    usize::from(way(1) > way(0))
+    let path = |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();
+    usize::from(path(1) > path(0))
 }
 
 /// Draws two panels of one view, before and after. Returns their lower end.
-fn row(drawing: &mut Drawing, material: &Material<'_>, view: View, bounds: &[Bounds; 2], kind: usize, top: f64) -> f64 {
+fn row(drawing: &mut Drawing, data: &PanelData<'_>, view: View, bounds: &[Bounds; 2], kind: usize, top: f64) -> f64 {
     let width = (WIDTH_PX - 3.0 * GAP_PX) / 2.0;
     let extent = |axis: usize| bounds[0].extent(axis).max(bounds[1].extent(axis));
     let scale = (width / extent(view.across)).min(HIGHEST_PX[kind] / extent(view.up));
@@ -77,7 +77,7 @@ fn row(drawing: &mut Drawing, material: &Material<'_>, view: View, bounds: &[Bou
         let text = format!("{when}, {what}{}", view.title());
         let paint = Paint::solid(paint::GREY);
         drawing.words(Words { text, at: [left, top + TITLE_PX - 6.0], size: 12.0, bold: false, paint, rim: false });
-        panel::draw(drawing, material, moment, &Window::new(view, bounds[idx], scale, panel), is_map);
+        panel::draw(drawing, data, moment, &Window::new(view, bounds[idx], scale, panel), is_map);
     }
     top + TITLE_PX + height + 10.0
 }

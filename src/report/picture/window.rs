@@ -109,7 +109,7 @@ impl Window {
     }
 
     /// Whether a body overlaps the window's region on all three axes.
-    pub(super) fn is_about(&self, bounds: &Bounds) -> bool {
+    pub(super) fn overlaps(&self, bounds: &Bounds) -> bool {
         [0, 1, 2].into_iter().all(|axis| bounds.meets(&self.bounds, axis))
     }
 }
@@ -126,8 +126,8 @@ const LARGEST_CLOSE_UP_M: f64 = 2.8;
 /// Regions of the close-ups before and after: the same region if it is small enough. Returns `None` if the trace has no
 /// states.
 pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>) -> Option<[Bounds; 2]> {
-    let before = about(trace.snapshots.first()?, subjects, trace);
-    let after = about(trace.snapshots.last()?, subjects, trace);
+    let before = region_of_interest(trace.snapshots.first()?, subjects, trace);
+    let after = region_of_interest(trace.snapshots.last()?, subjects, trace);
     let both = before.with(after);
     let fits = [0, 1].into_iter().all(|axis| both.extent(axis) <= LARGEST_CLOSE_UP_M);
     let [mut before, mut after] = if fits { [both, both] } else { [before, after] };
@@ -143,7 +143,7 @@ pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>) -> Option<[Bou
 }
 
 /// Region of interest at a moment: the subjects, the furniture below them, their neighbours, and the hand.
-fn about(snapshot: &Snapshot, subjects: &BTreeSet<&str>, trace: &Trace) -> Bounds {
+fn region_of_interest(snapshot: &Snapshot, subjects: &BTreeSet<&str>, trace: &Trace) -> Bounds {
     let bodies = || snapshot.bodies.iter();
     let base = Bounds::point([snapshot.robot.base_true[0], snapshot.robot.base_true[1], 0.5]);
     let perceived = trace.actions.iter().filter_map(|action| action.perceived.as_ref()?.plane);
@@ -176,15 +176,15 @@ fn limited(mut bounds: Bounds) -> Bounds {
 
 /// The whole world. Returns `None` if the close-ups already show nearly all of it: places, furniture and the path of
 /// the base.
-pub(super) fn overview(trace: &Trace, close_ups: &[Bounds; 2], ways: &[[f64; 3]]) -> Option<Bounds> {
+pub(super) fn overview(trace: &Trace, close_ups: &[Bounds; 2], paths: &[[f64; 3]]) -> Option<Bounds> {
     let rooms = trace
         .map
         .rooms
         .iter()
         .map(|room| Bounds { low: [room.low_m[0], room.low_m[1], 0.0], high: [room.high_m[0], room.high_m[1], 0.0] });
     let bodies = trace.snapshots.iter().flat_map(|snapshot| &snapshot.bodies).map(Bounds::of);
-    let ways = ways.iter().map(|point| Bounds::point(*point).grown(0.3));
-    let whole = Bounds::union(rooms.chain(bodies).chain(ways))?.grown(0.15);
+    let paths = paths.iter().map(|point| Bounds::point(*point).grown(0.3));
+    let whole = Bounds::union(rooms.chain(bodies).chain(paths))?.grown(0.15);
     let seen = close_ups[0].with(close_ups[1]);
     let beyond = |axis: usize| (seen.low[axis] - whole.low[axis]).max(whole.high[axis] - seen.high[axis]);
     (beyond(0).max(beyond(1)) > 0.35).then_some(whole)

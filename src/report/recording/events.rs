@@ -3,7 +3,7 @@
 use re_sdk_types::archetypes::TextLog;
 
 use crate::contacts::strongest;
-use crate::moment::decided;
+use crate::moment::deciding_moment;
 use crate::recording::stream::{Recording, RecordingFault, place};
 use actcheck_base::{Outcome, names};
 use actcheck_data::Trace;
@@ -36,7 +36,7 @@ pub(super) fn record(
             .with_many_text(lines.iter().map(|line| line.text.as_str()))
             .with_many_level(lines.iter().map(|line| line.level));
         let columns = texts.columns_of_unit_batches()?;
-        recording.course(place(["events", kind]), lines.iter().map(|line| line.secs), columns)?;
+        recording.log_series(place(["events", kind]), lines.iter().map(|line| line.secs), columns)?;
     }
     Ok(())
 }
@@ -52,7 +52,8 @@ fn actions(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
     let mut lines = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {
         let (name, start) = (names::local(&action.action), begin(trace, idx));
-        let line = |secs: f64, level, said: &str| Line { secs, level, text: format!("{}. {name} {said}", action.step) };
+        let line =
+            |secs: f64, level, event: &str| Line { secs, level, text: format!("{}. {name} {event}", action.step) };
         if action.end == Outcome::Untested.word() {
             lines.push(line(start, "WARN", "was not reached"));
             continue;
@@ -62,12 +63,12 @@ fn actions(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
         lines.extend(phases.map(|phase| line(start + phase.start_secs, "DEBUG", &format!("· {}", phase.name))));
         let words = action.message.as_deref().filter(|message| !message.is_empty());
         let words = words.map_or_else(String::new, |message| format!(": {message}"));
-        let (level, said) = match action.reported {
+        let (level, event) = match action.reported {
             Some(true) => ("INFO", "reports success".to_owned()),
             Some(false) => ("WARN", "reports failure".to_owned()),
             None => ("ERROR", format!("ends as {}", action.end)),
         };
-        lines.push(line(start + action.duration_secs, level, &(said + &words)));
+        lines.push(line(start + action.duration_secs, level, &(event + &words)));
     }
     lines
 }
@@ -98,7 +99,7 @@ fn outcomes(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
                 Outcome::Inapplicable | Outcome::Untested => "WARN",
             };
             let secs = match trace {
-                Some(trace) if failed => decided(trace, idx, &judgement.witness),
+                Some(trace) if failed => deciding_moment(trace, idx, &judgement.witness),
                 _ => begin(trace, idx) + action.duration_secs,
             };
             let (action, property) = (names::local(&action.action), names::local(&judgement.property));

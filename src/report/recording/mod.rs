@@ -5,12 +5,12 @@
 //!
 //! Never: reads a history, writes a file, chooses a run, reads a clock, or generates random ids.
 
-mod course;
 mod events;
 mod footer;
 mod hull;
 mod look;
 mod mesh;
+mod motion;
 mod outcomes;
 mod recordings;
 mod solids;

@@ -21,16 +21,16 @@ pub(super) fn document(run: &RunDetail, explained: &[Explained]) -> String {
     if let Some(reason) = &run.reason {
         let _ = writeln!(out, "\n{}", plain(reason));
     }
-    for (action, told) in run.actions.iter().zip(&caption.actions) {
-        let _ = writeln!(out, "\n## {}\n", plain(told));
+    for (action, caption) in run.actions.iter().zip(&caption.actions) {
+        let _ = writeln!(out, "\n## {}\n", plain(caption));
         for judgement in &action.judgements {
-            told_of(&mut out, action, judgement, explained);
+            judgement_text(&mut out, action, judgement, explained);
         }
     }
     out
 }
 
-fn told_of(out: &mut String, action: &ActionDetail, judgement: &Judgement, explained: &[Explained]) {
+fn judgement_text(out: &mut String, action: &ActionDetail, judgement: &Judgement, explained: &[Explained]) {
     let (property, outcome) = (names::local(&judgement.property), judgement.outcome.word());
     let outcome = if judgement.outcome == Outcome::Passed { outcome.to_owned() } else { format!("**{outcome}**") };
     let _ = write!(out, "- {}: {outcome}", plain(property));

@@ -6,7 +6,7 @@ use re_sdk_types::archetypes::{RecordingInfo, TextDocument};
 
 use crate::html::Explained;
 use crate::recording::stream::{Recording, RecordingFault, place};
-use crate::recording::{course, events, footer, outcomes};
+use crate::recording::{events, footer, motion, outcomes};
 use actcheck_data::Trace;
 use actcheck_history::RunDetail;
 
@@ -40,10 +40,11 @@ impl Recordings {
     ) -> Result<(), RecordingFault> {
         let mut recording = Recording::begin(&mut self.encoder, &run.row.run)?;
         let name = RecordingInfo::new().with_name(outcomes::title(run));
-        recording.still(EntityPath::properties(), &[&name])?;
-        recording.still(place(["outcomes"]), &[&TextDocument::from_markdown(outcomes::document(run, explained))])?;
+        recording.log_static(EntityPath::properties(), &[&name])?;
+        recording
+            .log_static(place(["outcomes"]), &[&TextDocument::from_markdown(outcomes::document(run, explained))])?;
         if let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) {
-            course::record(&mut recording, run, trace)?;
+            motion::record(&mut recording, run, trace)?;
         }
         events::record(&mut recording, run, trace)?;
         self.runs += 1;

@@ -55,19 +55,19 @@ impl<'a> Recording<'a> {
     ///
     /// # Errors
     /// The components can't be converted or encoded.
-    pub fn still(&mut self, at: EntityPath, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
-        self.since(at, TimePoint::STATIC, what)
+    pub fn log_static(&mut self, at: EntityPath, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
+        self.log(at, TimePoint::STATIC, what)
     }
 
     /// Logs components that hold from a moment on. Unit: seconds since the run began.
     ///
     /// # Errors
     /// The components can't be converted or encoded.
-    pub fn from(&mut self, at: EntityPath, secs: f64, what: &dyn AsComponents) -> Result<(), RecordingFault> {
-        self.since(at, TimePoint::default().with(Timeline::new_duration(SIM_TIME), nanos(secs)), &[what])
+    pub fn log_at(&mut self, at: EntityPath, secs: f64, what: &dyn AsComponents) -> Result<(), RecordingFault> {
+        self.log(at, TimePoint::default().with(Timeline::new_duration(SIM_TIME), nanos(secs)), &[what])
     }
 
-    fn since(&mut self, at: EntityPath, time: TimePoint, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
+    fn log(&mut self, at: EntityPath, time: TimePoint, what: &[&dyn AsComponents]) -> Result<(), RecordingFault> {
         let batches = what.iter().flat_map(|what| what.as_serialized_batches());
         let row = self.row();
         let chunk = Chunk::builder_with_id(self.chunk(), at).with_serialized_batches(row, time, batches);
@@ -78,7 +78,7 @@ impl<'a> Recording<'a> {
     ///
     /// # Errors
     /// The components can't be converted or encoded.
-    pub fn course(
+    pub fn log_series(
         &mut self,
         at: EntityPath,
         secs: impl IntoIterator<Item = f64>,

@@ -1,7 +1,7 @@
 //! 3D geometry functions, an extension: a file that uses them must declare the prefix. Units: metres and radians.
 
 use crate::builtins::Value;
-use crate::values::{Number, double_term};
+use crate::model::values::{Number, double_term};
 use actcheck_base::{Term, tilt_of, yaw_of};
 
 /// Namespace of the geometry built-ins.

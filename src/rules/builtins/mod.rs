@@ -1,5 +1,8 @@
 //! The built-in functions of the rule language, by name.
 //!
+//! A function returns `None` if its arguments are outside its domain: the condition does not hold, or the variable gets
+//! no value.
+//!
 //! Never: depends on a predicate, a rule or a fact; a function depends only on its arguments.
 
 mod bits;
@@ -8,8 +11,12 @@ mod numeric;
 mod table;
 mod text;
 mod types;
+mod value;
 
 pub(crate) use geometry::GEO3D;
 pub(crate) use numeric::{compare, equal};
-pub(crate) use table::{Builtin, Value, builtin, builtin_in_words, builtin_names};
+#[cfg(feature = "sparql")]
+pub(crate) use table::builtin_by_exact_name;
+pub(crate) use table::{Builtin, builtin, builtin_names};
 pub(crate) use text::compile_pattern;
+pub(crate) use value::Value;

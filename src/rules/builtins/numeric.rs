@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use crate::builtins::Value;
-use crate::values::Number::{self, Double, Float, Integer};
+use crate::model::values::Number::{self, Double, Float, Integer};
 use actcheck_base::Term;
 
 /// Returns whether two values are the same term.

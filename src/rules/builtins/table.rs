@@ -1,21 +1,16 @@
 //! Table of the built-ins: name, number of arguments, function.
 
-use std::borrow::Cow;
-
-use crate::builtins::{bits, geometry, numeric, text, types};
+use crate::builtins::{Value, bits, geometry, numeric, text, types};
 use actcheck_base::Term;
-
-/// An argument or result; borrowed if it is an interned term.
-pub(crate) type Value<'a> = Cow<'a, Term>;
 
 /// A built-in function.
 pub(crate) struct Builtin {
     /// Name as written in messages.
     pub(crate) name: &'static str,
     /// Minimum number of arguments.
-    pub(crate) least: usize,
+    pub(crate) min_args: usize,
     /// Maximum number of arguments.
-    pub(crate) most: usize,
+    pub(crate) max_args: usize,
     /// The function. Returns `None` if the arguments are outside its domain.
     pub(crate) apply: fn(&[Value<'_>]) -> Option<Term>,
 }
@@ -28,8 +23,13 @@ impl std::fmt::Debug for Builtin {
 
 const MANY: usize = usize::MAX;
 
-const fn entry(name: &'static str, least: usize, most: usize, apply: fn(&[Value<'_>]) -> Option<Term>) -> Builtin {
-    Builtin { name, least, most, apply }
+const fn entry(
+    name: &'static str,
+    min_args: usize,
+    max_args: usize,
+    apply: fn(&[Value<'_>]) -> Option<Term>,
+) -> Builtin {
+    Builtin { name, min_args, max_args, apply }
 }
 
 /// Every built-in. The first six are also written as operators.
@@ -136,7 +136,8 @@ pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> + Clone {
     BUILTINS.iter().map(|b| b.name)
 }
 
-/// Finds a built-in by the exact name that [`builtin_names`] returns. Returns `None` if there is no such built-in.
-pub(crate) fn builtin_in_words(name: &str) -> Option<&'static Builtin> {
+/// Finds a built-in by the exact name that [`builtin_names`] returns. Returns `None` if it is unknown.
+#[cfg(feature = "sparql")]
+pub(crate) fn builtin_by_exact_name(name: &str) -> Option<&'static Builtin> {
     BUILTINS.iter().find(|b| b.name == name)
 }

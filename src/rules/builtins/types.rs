@@ -1,7 +1,7 @@
 //! Type tests, conversions between types, and boolean functions.
 
 use crate::builtins::Value;
-use crate::values::{self, Number};
+use crate::model::values::{self, Number};
 use actcheck_base::Term;
 
 fn truth(value: &Term) -> Option<bool> {

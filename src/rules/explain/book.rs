@@ -1,19 +1,16 @@
 //! Explanations of properties.
 
-use crate::book::{JudgeRules, RuleBook, fault};
-use crate::evaluate::{Layers, Planned, Rounds, Tables, evaluate_noting};
+use crate::book::judge::{Judge, JudgeRules, RuleBook};
+use crate::engine::budget::Budget;
+use crate::engine::evaluate::{Layers, Planned, Rounds, Tables, evaluate_recording_rounds, fault};
+use crate::engine::meter::Meter;
+use crate::engine::reading::{Verdict, findings};
+use crate::explain::goal::{Goal, PROOFS_SHOWN, goal_explained};
 use crate::explain::model::Explanation;
 use crate::explain::proof::Prover;
-use crate::explain::search::Ground;
-use crate::findings::Budget;
-use crate::meter::Meter;
-use crate::program::Rule;
-use crate::reading::{Verdict, findings};
-use crate::universe::Universe;
+use crate::explain::search::ProofContext;
+use crate::model::universe::Universe;
 use actcheck_base::{ActionFacts, Findings, RuleFault};
-
-/// Maximum number of proofs shown.
-pub(super) const PROOFS_SHOWN: usize = 3;
 
 impl RuleBook {
     /// Explains why a property (by IRI) holds in an action, or why not.
@@ -21,12 +18,13 @@ impl RuleBook {
     /// # Errors
     /// The property is unknown, a value is invalid, or the budget was exceeded.
     pub fn explain(&self, facts: &ActionFacts<'_>, property: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
-        let judge =
-            self.properties.get(property).ok_or_else(|| RuleFault::Value(format!("unknown property {property}")))?;
+        let judge = self.property(property)?;
         match &judge.rules {
-            JudgeRules::Datalog { planned, verdict } => {
-                self.explain_datalog(facts, &judge.label, planned, verdict, budget)
+            JudgeRules::Datalog { planned, verdict, .. } => {
+                let evaluated = self.evaluate_for_proofs(facts, planned, verdict, budget)?;
+                Ok(explained(&judge.label, evaluated.findings.clone()?, verdict, &evaluated.context(self, planned)))
             }
+            #[cfg(feature = "sparql")]
             JudgeRules::Sparql(_) => {
                 let results = self.judge(facts, &[property.to_owned()], budget).remove(property);
                 let findings =
@@ -36,70 +34,115 @@ impl RuleBook {
         }
     }
 
-    fn explain_datalog(
+    /// Explains why the rules of a property (by IRI) derive a statement such as `near(obj:cup_1, _)` in an action, or
+    /// why not. `_` matches any value. The statement may use the prefixes of the property's rule file.
+    ///
+    /// # Errors
+    /// The property is unknown or a SPARQL query, the statement is invalid, or the budget was exceeded.
+    pub fn explain_statement(
         &self,
         facts: &ActionFacts<'_>,
-        label: &str,
+        property: &str,
+        statement: &str,
+        budget: &Budget,
+    ) -> Result<Explanation, RuleFault> {
+        match &self.property(property)?.rules {
+            JudgeRules::Datalog { planned, verdict, scope, prefixes } => {
+                let goal = Goal::parse(statement, prefixes)?;
+                let predicate = goal.predicate(&self.predicates, &[*scope, 0])?;
+                let mut evaluated = self.evaluate_for_proofs(facts, planned, verdict, budget)?;
+                let known = goal.known(&mut evaluated.universe);
+                Ok(goal_explained(statement, predicate, &known, &evaluated.context(self, planned)))
+            }
+            #[cfg(feature = "sparql")]
+            JudgeRules::Sparql(_) => {
+                Err(RuleFault::Value("a SPARQL query derives no statements; explain the property instead".into()))
+            }
+        }
+    }
+
+    fn property(&self, iri: &str) -> Result<&Judge, RuleFault> {
+        self.properties.get(iri).ok_or_else(|| RuleFault::Value(format!("unknown property {iri}")))
+    }
+
+    /// Evaluates the rules of a property over an action, and keeps the tuples of every stage.
+    fn evaluate_for_proofs<'a>(
+        &'a self,
+        facts: &ActionFacts<'a>,
         planned: &Planned,
         verdict: &Verdict,
         budget: &Budget,
-    ) -> Result<Explanation, RuleFault> {
+    ) -> Result<Evaluated<'a>, RuleFault> {
         let mut universe = Universe::new(&self.terms, Some(facts.terms));
         let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
         let given = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let own = self.given.load(facts, &mut universe, &self.predicates, &self.indexes);
         let mut enriched = Layers { own, below: vec![&self.fixed] };
-        let (predicates, indexes) = (&self.predicates, &self.indexes);
-        evaluate_noting(
-            &self.libraries,
-            predicates,
-            indexes,
-            &mut enriched,
-            &mut universe,
-            &mut meter,
-            Some(&mut rounds),
-        )
-        .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
-        let mut layers = Layers { own: Tables::default(), below: vec![&enriched.own, &self.fixed] };
-        evaluate_noting(planned, predicates, indexes, &mut layers, &mut universe, &mut meter, Some(&mut rounds))
-            .map_err(|stopped| fault(&meter, stopped, planned))?;
-        let findings = findings(verdict, &layers, &universe)?;
-        let rules: Vec<&Rule> =
-            planned.rules.iter().chain(&self.libraries.rules).chain(&self.fixed_rules.rules).collect();
-        let stated = stated(&[planned, &self.libraries, &self.fixed_rules], self);
-        let ground = Ground {
-            predicates,
-            rules,
-            layers: vec![&layers.own, &enriched.own, &self.fixed],
-            facts: vec![&given, &self.fixed_facts, &stated],
-            rounds: &rounds,
-            universe: &universe,
+        let mut evaluate = |planned: &Planned, layers: &mut Layers<'_>| {
+            let (predicates, indexes) = (&self.predicates, &self.indexes);
+            let rounds = Some(&mut rounds);
+            evaluate_recording_rounds(planned, predicates, indexes, layers, &mut universe, &mut meter, rounds)
+                .map_err(|stopped| fault(&meter, stopped, planned))
         };
-        Ok(explained(label, findings, verdict, &ground))
+        evaluate(&self.libraries, &mut enriched)?;
+        let mut layers = Layers { own: Tables::default(), below: vec![&enriched.own, &self.fixed] };
+        evaluate(planned, &mut layers)?;
+        let findings = findings(verdict, &layers, &universe);
+        let own = layers.own;
+        let stated = given_facts(&[planned, &self.libraries, &self.fixed_rules], self);
+        Ok(Evaluated { universe, rounds, given, stated, enriched: enriched.own, own, findings })
+    }
+}
+
+/// The tuples of one action and one property by stage, from which proofs are built.
+struct Evaluated<'a> {
+    universe: Universe<'a>,
+    rounds: Rounds,
+    /// The facts of the action.
+    given: Tables,
+    /// The facts written in the rule texts.
+    stated: Tables,
+    /// The facts of the action with the tuples of the libraries.
+    enriched: Tables,
+    /// The tuples of the property's rules.
+    own: Tables,
+    findings: Result<Findings, RuleFault>,
+}
+
+impl Evaluated<'_> {
+    fn context<'c>(&'c self, book: &'c RuleBook, planned: &'c Planned) -> ProofContext<'c> {
+        ProofContext {
+            predicates: &book.predicates,
+            rules: planned.rules.iter().chain(&book.libraries.rules).chain(&book.fixed_rules.rules).collect(),
+            layers: vec![&self.own, &self.enriched, &book.fixed],
+            facts: vec![&self.given, &book.fixed_facts, &self.stated],
+            rounds: &self.rounds,
+            universe: &self.universe,
+        }
     }
 }
 
 /// Returns the facts written in the rule texts.
-fn stated(programs: &[&Planned], book: &RuleBook) -> Tables {
+fn given_facts(programs: &[&Planned], book: &RuleBook) -> Tables {
     let mut tables = Tables::default();
     for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
         let width = book.predicates.get(*predicate).width;
-        let table = crate::relation::finished(width, rows.clone(), book.indexes.of(*predicate).clone());
+        let table = crate::engine::relation::finished(width, rows.clone(), book.indexes.of(*predicate).clone());
         tables.set(*predicate, table);
     }
     tables
 }
 
-fn explained(label: &str, findings: Findings, verdict: &Verdict, ground: &Ground<'_>) -> Explanation {
+fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &ProofContext<'_>) -> Explanation {
     let mut explanation =
         Explanation { title: label.to_owned(), findings: None, proofs: Vec::new(), miss: None, notes: Vec::new() };
     if let Some(decisive) = &verdict.decisive {
-        let mut prover = Prover::new(ground);
-        let mut rows: Vec<&[u32]> = ground.rows(decisive.predicate).collect();
+        let mut prover = Prover::new(context);
+        let mut rows: Vec<&[u32]> = context.rows(decisive.predicate).collect();
         rows.truncate(PROOFS_SHOWN);
         explanation.proofs = rows.into_iter().map(|row| prover.prove(decisive.predicate, row, 0)).collect();
         if explanation.proofs.is_empty() {
-            explanation.miss = ground.miss(decisive.predicate, &vec![None; decisive.arity], 0);
+            explanation.miss = context.miss(decisive.predicate, &vec![None; decisive.arity], 0);
         }
         let shown = explanation.proofs.len();
         if findings.witness_count > shown {
@@ -114,6 +157,7 @@ fn explained(label: &str, findings: Findings, verdict: &Verdict, ground: &Ground
 }
 
 /// Explains a query by its rows: it has no proof tree.
+#[cfg(feature = "sparql")]
 fn of_query(label: &str, findings: Findings) -> Explanation {
     let notes = findings
         .witness

@@ -2,12 +2,12 @@
 
 use std::cell::Cell;
 
+use crate::engine::naive::unify;
 use crate::explain::model::{Failure, Miss};
 use crate::explain::proof::Prover;
-use crate::explain::search::{Binding, Ground, STEP_LIMIT, reading_order};
-use crate::naive::unify;
-use crate::program::{Atom, Literal, Operand, PredicateId, Rule};
-use crate::values::Number;
+use crate::explain::search::{Binding, ProofContext, STEP_LIMIT, reading_order};
+use crate::model::program::{Atom, Literal, Operand, PredicateId, Rule};
+use crate::model::values::Number;
 use actcheck_base::TermId;
 
 /// Maximum nesting depth of misses.
@@ -43,7 +43,7 @@ impl Attempt<'_> {
     }
 }
 
-impl<'a> Ground<'a> {
+impl<'a> ProofContext<'a> {
     /// Returns the closest attempt to derive a pattern: a predicate with some arguments known. Returns `None` if no
     /// rule derives it.
     pub(super) fn miss(&self, predicate: PredicateId, known: &[Option<TermId>], depth: usize) -> Option<Miss> {
@@ -57,7 +57,7 @@ impl<'a> Ground<'a> {
                 best = Some(attempt);
             }
         }
-        best.map(|attempt| self.told(&attempt, known, depth))
+        best.map(|attempt| self.build_miss(&attempt, known, depth))
     }
 
     /// Evaluates a rule and returns the attempt that satisfied the largest fraction of its conditions.
@@ -119,7 +119,7 @@ impl<'a> Ground<'a> {
         Some((side(left)? - side(right)?).abs())
     }
 
-    fn told(&self, attempt: &Attempt<'a>, known: &[Option<TermId>], depth: usize) -> Miss {
+    fn build_miss(&self, attempt: &Attempt<'a>, known: &[Option<TermId>], depth: usize) -> Miss {
         let rule = attempt.rule;
         let shown = |idx: &usize| self.literal(rule, &rule.body[*idx], &attempt.binding);
         let open = open_binding(&rule.head, known, rule.variables.len()).unwrap_or_default();

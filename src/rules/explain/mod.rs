@@ -3,7 +3,10 @@
 //! Never: changes a result, decides an outcome, or costs time unless an explanation is requested.
 
 mod book;
-mod export;
+mod dot;
+mod goal;
+#[cfg(feature = "json")]
+mod json;
 mod miss;
 mod model;
 mod program;

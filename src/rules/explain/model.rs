@@ -2,8 +2,33 @@
 
 use actcheck_base::Findings;
 
-/// Explains why a property or goal holds or does not hold.
+/// Explains why a property or goal holds or does not hold: a tree, which [`Explanation::to_text`] formats.
+///
+/// ```
+/// use actcheck_rules::explain::{Failure, Premise, Support};
+/// use actcheck_rules::{Facts, Rules};
+///
+/// let rules = Rules::parse(
+///     "@prefix ex: <http://example.org/> .
+///      % A full cup was lifted.
+///      success(?cup) :- after(?cup, ex:lifted, true), after(?cup, ex:fill, ?f), ?f > 0.9 .",
+/// )?;
+/// let prefix = "@prefix ex: <http://example.org/> .";
+///
+/// let full = Facts::from_turtle(&format!("{prefix} ex:cup ex:lifted true ; ex:fill 1 ."))?;
+/// let why = rules.why(&full)?;
+/// let Support::Rule { rule, premises } = &why.proofs[0].support else { panic!("a rule derives it") };
+/// assert_eq!(rule.comment.as_deref(), Some("A full cup was lifted."));
+/// assert!(matches!(&premises[2], Premise::Computed(text) if text == "?f > 0.9, with 1 > 0.9"));
+///
+/// let half = Facts::from_turtle(&format!("{prefix} ex:cup ex:lifted true ; ex:fill 0.5 ."))?;
+/// let miss = rules.why(&half)?.miss.expect("the rule came close");
+/// assert_eq!((miss.satisfied.len(), miss.failed.as_str()), (2, "?f > 0.9, with 0.5 > 0.9"));
+/// assert!(matches!(miss.failure, Failure::Comparison { distance: Some(distance) } if (distance - 0.4).abs() < 1e-9));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Explanation {
     /// The property's label, or the goal as written.
     pub title: String,
@@ -19,6 +44,7 @@ pub struct Explanation {
 
 /// A statement with its support.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Proof {
     /// The statement, for example `after(obj:glass_1, w:x, 0.9)`.
     pub statement: String,
@@ -28,6 +54,7 @@ pub struct Proof {
 
 /// The support of a statement.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Support {
     /// It is a given fact.
     Fact,
@@ -53,6 +80,7 @@ pub enum Support {
 
 /// One satisfied condition of a rule.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Premise {
     /// A statement with its own proof.
     Proof(Proof),
@@ -64,6 +92,7 @@ pub enum Premise {
 
 /// A reference to a rule.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RuleRef {
     /// `#[name("…")]`.
     pub name: Option<String>,
@@ -77,6 +106,7 @@ pub struct RuleRef {
 
 /// The closest attempt to derive a goal that does not hold.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Miss {
     /// The goal, with `_` for unbound arguments.
     pub goal: String,
@@ -92,6 +122,7 @@ pub struct Miss {
 
 /// Why a condition could not be satisfied.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Failure {
     /// No fact or derived tuple matches.
     NoMatch {

@@ -1,18 +1,15 @@
 //! Explanations of the tuples of a standalone program.
 
-use crate::book::fault;
-use crate::evaluate::{Layers, Rounds, Tables, evaluate_noting};
-use crate::explain::book::PROOFS_SHOWN;
+use crate::engine::budget::Budget;
+use crate::engine::evaluate::{Layers, Rounds, Tables, evaluate_recording_rounds, fault};
+use crate::engine::meter::Meter;
+use crate::engine::relation::finished;
+use crate::explain::goal::{Goal, goal_explained};
 use crate::explain::model::Explanation;
-use crate::explain::proof::Prover;
-use crate::explain::search::Ground;
-use crate::findings::Budget;
-use crate::meter::Meter;
-use crate::program::PredicateId;
-use crate::relation::finished;
+use crate::explain::search::ProofContext;
+use crate::model::universe::Universe;
 use crate::standalone::Program;
-use crate::universe::Universe;
-use actcheck_base::{RuleFault, Term};
+use actcheck_base::RuleFault;
 
 impl Program {
     /// Explains why the program derives a statement such as `p(1, "a")`, or why not. `_` matches any value.
@@ -20,12 +17,13 @@ impl Program {
     /// # Errors
     /// The statement is invalid, or the budget was exceeded.
     pub fn explain(&self, statement: &str, budget: &Budget) -> Result<Explanation, RuleFault> {
-        let (name, pattern) = self.pattern(statement).map_err(RuleFault::Value)?;
+        let goal = Goal::parse(statement, &self.syntax.prefixes)?;
+        let predicate = goal.predicate(&self.predicates, &[0])?;
         let mut universe = Universe::new(&self.terms, None);
         let (mut rounds, mut meter) = (Rounds::default(), Meter::new(budget));
         let mut layers = Layers { own: Tables::new(self.predicates.len()), below: Vec::new() };
         let planned = &self.planned;
-        evaluate_noting(
+        evaluate_recording_rounds(
             planned,
             &self.predicates,
             &self.indexes,
@@ -35,8 +33,9 @@ impl Program {
             Some(&mut rounds),
         )
         .map_err(|stopped| fault(&meter, stopped, planned))?;
-        let facts = self.stated();
-        let ground = Ground {
+        let facts = self.given_facts();
+        let known = goal.known(&mut universe);
+        let context = ProofContext {
             predicates: &self.predicates,
             rules: planned.rules.iter().collect(),
             layers: vec![&layers.own],
@@ -44,14 +43,11 @@ impl Program {
             rounds: &rounds,
             universe: &universe,
         };
-        let Some(predicate) = self.predicates.find(0, &name, None) else {
-            return Err(RuleFault::Value(format!("the program has no predicate `{name}`")));
-        };
-        Ok(explained(statement, predicate, &pattern, &ground))
+        Ok(goal_explained(statement, predicate, &known, &context))
     }
 
     /// Returns the program's facts without derived tuples.
-    fn stated(&self) -> Tables {
+    fn given_facts(&self) -> Tables {
         let mut facts = Tables::default();
         for (predicate, rows) in &self.planned.facts {
             let width = self.predicates.get(*predicate).width;
@@ -59,28 +55,4 @@ impl Program {
         }
         facts
     }
-}
-
-fn explained(statement: &str, predicate: PredicateId, pattern: &[Option<Term>], ground: &Ground<'_>) -> Explanation {
-    // A term without an id occurs in no tuple, so the pattern can't match.
-    let known: Option<Vec<Option<u32>>> = pattern
-        .iter()
-        .map(|term| term.as_ref().map_or(Some(None), |term| ground.universe.id(term).map(Some)))
-        .collect();
-    let fits = |row: &&[u32]| {
-        known.as_ref().is_some_and(|known| known.iter().zip(*row).all(|(k, v)| k.is_none_or(|k| k == *v)))
-    };
-    let mut prover = Prover::new(ground);
-    let proofs: Vec<_> =
-        ground.rows(predicate).filter(fits).take(PROOFS_SHOWN).map(|row| prover.prove(predicate, row, 0)).collect();
-    let miss = match &known {
-        Some(known) if proofs.is_empty() => ground.miss(predicate, known, 0),
-        _ => None,
-    };
-    let notes = if proofs.is_empty() && miss.is_none() {
-        vec!["it is not a fact and no rule derives it".to_owned()]
-    } else {
-        Vec::new()
-    };
-    Explanation { title: statement.trim().to_owned(), findings: None, proofs, miss, notes }
 }

@@ -3,10 +3,10 @@
 use std::cell::Cell;
 use std::collections::BTreeSet;
 
+use crate::engine::naive::unify;
 use crate::explain::model::{Premise, Proof, Support};
-use crate::explain::search::{Binding, Ground, STEP_LIMIT, reading_order};
-use crate::naive::unify;
-use crate::program::{Literal, PredicateId, Rule};
+use crate::explain::search::{Binding, ProofContext, STEP_LIMIT, reading_order};
+use crate::model::program::{Literal, PredicateId, Rule};
 use actcheck_base::TermId;
 
 /// Deeper proofs are cut, so that the tree stays small and readable.
@@ -16,33 +16,33 @@ const MATCHES_SHOWN: usize = 3;
 
 /// Proves tuples; each derived tuple is expanded only once.
 pub(super) struct Prover<'g, 'a> {
-    ground: &'g Ground<'a>,
+    context: &'g ProofContext<'a>,
     shown: BTreeSet<(PredicateId, Vec<TermId>)>,
     steps: Cell<usize>,
 }
 
 impl<'g, 'a> Prover<'g, 'a> {
-    pub(super) fn new(ground: &'g Ground<'a>) -> Self {
-        Self { ground, shown: BTreeSet::new(), steps: Cell::new(0) }
+    pub(super) fn new(context: &'g ProofContext<'a>) -> Self {
+        Self { context, shown: BTreeSet::new(), steps: Cell::new(0) }
     }
 
     /// Builds the proof of a tuple that holds.
     pub(super) fn prove(&mut self, predicate: PredicateId, row: &[TermId], depth: usize) -> Proof {
-        let statement = self.ground.statement(predicate, row);
-        if self.ground.is_fact(predicate, row) {
+        let statement = self.context.statement(predicate, row);
+        if self.context.is_fact(predicate, row) {
             return Proof { statement, support: Support::Fact };
         }
         if depth >= DEPTH_LIMIT || !self.shown.insert((predicate, row.to_vec())) {
             return Proof { statement, support: Support::Cut };
         }
-        let round = self.ground.round(predicate, row);
-        let rules: Vec<&Rule> = self.ground.rules_of(predicate).collect();
+        let round = self.context.round(predicate, row);
+        let rules: Vec<&Rule> = self.context.rules_of(predicate).collect();
         for rule in rules {
-            let Some(binding) = self.ground.head_binding(rule, row) else { continue };
+            let Some(binding) = self.context.head_binding(rule, row) else { continue };
             let support = match &rule.aggregation {
                 Some(_) => self.aggregate(rule, row, depth),
                 None => self.instance(rule, binding, round).map(|binding| Support::Rule {
-                    rule: self.ground.rule_ref(rule),
+                    rule: self.context.rule_ref(rule),
                     premises: self.premises(rule, &binding, round, depth),
                 }),
             };
@@ -53,7 +53,7 @@ impl<'g, 'a> Prover<'g, 'a> {
         Proof { statement, support: Support::Cut }
     }
 
-    /// Returns a binding that satisfies a rule's body using only premises of earlier rounds.
+    /// Returns a binding that satisfies a rule's body using only premises of earlier rounds, or `None` if there is none.
     fn instance(&self, rule: &Rule, mut binding: Binding, round: Option<u32>) -> Option<Binding> {
         let order = reading_order(rule, &binding);
         self.satisfy(rule, &order, &mut binding, round, &mut |_| true).then_some(binding)
@@ -72,13 +72,13 @@ impl<'g, 'a> Prover<'g, 'a> {
         let literal = &rule.body[*first];
         let Literal::Positive(atom) = literal else {
             let before = binding.clone();
-            if self.ground.tested(literal, binding) == Some(true) && self.satisfy(rule, rest, binding, round, found) {
+            if self.context.tested(literal, binding) == Some(true) && self.satisfy(rule, rest, binding, round, found) {
                 return true;
             }
             *binding = before;
             return false;
         };
-        for row in self.ground.candidates(atom, binding) {
+        for row in self.context.candidates(atom, binding) {
             self.steps.set(self.steps.get() + 1);
             if self.steps.get() > STEP_LIMIT {
                 return false;
@@ -97,7 +97,7 @@ impl<'g, 'a> Prover<'g, 'a> {
 
     /// Returns whether a tuple was derived before a round.
     fn earlier(&self, predicate: PredicateId, row: &[TermId], round: Option<u32>) -> bool {
-        match (round, self.ground.round(predicate, row)) {
+        match (round, self.context.round(predicate, row)) {
             (Some(limit), Some(round)) => round < limit,
             _ => true,
         }
@@ -112,25 +112,26 @@ impl<'g, 'a> Prover<'g, 'a> {
             premises.push(match literal {
                 Literal::Positive(atom) => {
                     let row = self
-                        .ground
+                        .context
                         .candidates(atom, binding)
                         .find(|row| self.earlier(atom.predicate, row, round) && unify(atom, row, &mut binding.clone()));
                     match row {
                         Some(row) => Premise::Proof(self.prove(atom.predicate, row, depth + 1)),
-                        None => Premise::Computed(self.ground.literal(rule, literal, binding)),
+                        None => Premise::Computed(self.context.literal(rule, literal, binding)),
                     }
                 }
-                Literal::Negative(atom) => Premise::Absent(self.ground.negated(rule, atom, binding)),
-                _ => Premise::Computed(self.ground.literal(rule, literal, binding)),
+                Literal::Negative(atom) => Premise::Absent(self.context.negated(rule, atom, binding)),
+                _ => Premise::Computed(self.context.literal(rule, literal, binding)),
             });
         }
         premises
     }
 
-    /// Returns the matches of the group from which an aggregating rule derived a head row.
+    /// Returns the matches of the group from which an aggregating rule derived a head row, or `None` if the rule did not
+    /// derive the row.
     fn aggregate(&mut self, rule: &Rule, row: &[TermId], depth: usize) -> Option<Support> {
         let aggregation = rule.aggregation.as_ref()?;
-        let mut binding = self.ground.head_binding(rule, row)?;
+        let mut binding = self.context.head_binding(rule, row)?;
         for (variable, slot) in binding.iter_mut().enumerate() {
             if !aggregation.group.contains(&variable) {
                 *slot = None;
@@ -146,6 +147,6 @@ impl<'g, 'a> Prover<'g, 'a> {
             false
         });
         let premises = first.iter().flat_map(|binding| self.premises(rule, binding, None, depth)).collect();
-        (count > 0).then(|| Support::Aggregate { rule: self.ground.rule_ref(rule), matches: count, premises })
+        (count > 0).then(|| Support::Aggregate { rule: self.context.rule_ref(rule), matches: count, premises })
     }
 }

@@ -1,17 +1,17 @@
 //! Backward search: evaluates rules from their heads over finished tuples.
 
-use crate::evaluate::{Rounds, Tables};
-use crate::expression::holds;
-use crate::naive::unify;
-use crate::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
-use crate::universe::Universe;
+use crate::engine::evaluate::{Rounds, Tables};
+use crate::engine::naive::unify;
+use crate::model::expression::holds;
+use crate::model::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
+use crate::model::universe::Universe;
 use actcheck_base::{Term, TermId};
 
 /// Values of a rule's variables; `None` if unbound.
 pub(super) type Binding = Vec<Option<TermId>>;
 
 /// The rules and tuples that an explanation is built from.
-pub(crate) struct Ground<'a> {
+pub(crate) struct ProofContext<'a> {
     pub(crate) predicates: &'a Predicates,
     /// Every rule that was evaluated.
     pub(crate) rules: Vec<&'a Rule>,
@@ -26,7 +26,7 @@ pub(crate) struct Ground<'a> {
 /// Maximum number of rows read for one explanation, so that it stays fast enough for interactive use.
 pub(super) const STEP_LIMIT: usize = 20_000_000;
 
-impl<'a> Ground<'a> {
+impl<'a> ProofContext<'a> {
     /// Returns all tuples of a predicate.
     pub(super) fn rows(&self, predicate: PredicateId) -> impl Iterator<Item = &'a [TermId]> + use<'a> {
         let width = self.predicates.get(predicate).width;
@@ -157,7 +157,7 @@ pub(super) fn reading_order(rule: &Rule, known: &Binding) -> Vec<usize> {
 }
 
 /// Returns a fully bound atom, which is only a test; otherwise the first atom that shares a bound variable, to keep the
-/// textual order, which is easier to follow; otherwise the first atom.
+/// textual order, which is easier to follow; otherwise the first atom. Returns `None` if no atom is left.
 fn next_atom(rule: &Rule, left: &[usize], bound: &[bool]) -> Option<usize> {
     let mut best: Option<(usize, usize)> = None;
     for idx in left.iter().copied() {

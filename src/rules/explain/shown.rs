@@ -1,17 +1,17 @@
 //! Formats atoms and conditions of rules with the values of a binding.
 
 use crate::explain::model::RuleRef;
-use crate::explain::search::{Binding, Ground};
-use crate::expression::Expr;
-use crate::given::property_place;
-use crate::program::{Atom, Literal, Operand, PredicateId, Rule};
+use crate::explain::search::{Binding, ProofContext};
+use crate::model::expression::Expr;
+use crate::model::given::property_place;
+use crate::model::program::{Atom, Literal, Operand, PredicateId, Rule};
 use actcheck_base::{Term, TermId, names};
 
-impl Ground<'_> {
+impl ProofContext<'_> {
     /// Formats a tuple as a statement.
     pub(super) fn statement(&self, predicate: PredicateId, row: &[TermId]) -> String {
         let args = row.iter().map(|id| self.term(*id)).collect();
-        self.written(predicate, args)
+        self.format_atom(predicate, args)
     }
 
     /// Formats an atom with its bound values, and `_` for unbound arguments.
@@ -25,11 +25,11 @@ impl Ground<'_> {
                 Operand::Any => "_".into(),
             })
             .collect();
-        self.written(atom.predicate, args)
+        self.format_atom(atom.predicate, args)
     }
 
     /// Formats a predicate with its arguments as in the rule text: with the property, and the phase as a shorthand.
-    fn written(&self, predicate: PredicateId, mut args: Vec<String>) -> String {
+    fn format_atom(&self, predicate: PredicateId, mut args: Vec<String>) -> String {
         let predicate = self.predicates.get(predicate);
         let name = predicate.name.as_str();
         args.truncate(predicate.arity);

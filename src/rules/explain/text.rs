@@ -32,6 +32,12 @@ impl Explanation {
     }
 }
 
+impl std::fmt::Display for Explanation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.to_text())
+    }
+}
+
 fn line(out: &mut String, depth: usize, text: &str) {
     // Writing to a string can't fail.
     let _ = writeln!(out, "{:width$}{text}", "", width = depth * 2);

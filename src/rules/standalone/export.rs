@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::options::{OptionValue, options};
+use crate::check::options::{OptionValue, options};
+use crate::model::values;
 use crate::standalone::program::{Closure, Program};
 use crate::standalone::table::delimiter_of;
 use crate::standalone::unfinished::Unfinished;
 use crate::syntax::{Statement, Syntax, Transfer};
-use crate::values;
 use actcheck_base::{Diagnostic, Diagnostics, RuleFault, did_you_mean};
 
 const FORMATS: [&str; 3] = ["csv", "dsv", "tsv"];
@@ -49,7 +49,7 @@ fn export(program: &Program, syntax: &Syntax, transfer: &Transfer, diagnostics: 
         return None;
     }
     let mut terms = program.terms.clone();
-    let mut checking = crate::check::Checking::new(&mut terms, None);
+    let mut checking = crate::check::checking::Checking::new(&mut terms, None);
     let options = options(&mut checking, syntax, transfer);
     diagnostics.extend(checking.diagnostics);
     let text = |name: &str| match options.get(name) {

@@ -7,14 +7,14 @@ use std::sync::atomic::AtomicBool;
 use oxrdf::GraphName;
 use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 
-use crate::check::{Checking, Role, counted};
-use crate::dataset::from_rdf;
-use crate::options::{OptionValue, options};
-use crate::program::{Predicates, Program};
+use crate::check::checking::{Checking, Role, counted};
+use crate::check::options::{OptionValue, options};
+use crate::model::program::{Predicates, Program};
+use crate::model::rdf::from_rdf;
+use crate::model::values::lexical;
 use crate::standalone::stoppable::Stoppable;
 use crate::standalone::table::{ColumnKind, LeftOut, delimiter_of, read_table};
 use crate::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
-use crate::values::lexical;
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, TermId, Terms, did_you_mean};
 
 /// Formats of imports.
@@ -157,7 +157,7 @@ fn rdf(
     Some((Content::Rdf { format, base: text(options, "base") }, arity))
 }
 
-/// Returns the number of arguments of a predicate, as used in the program.
+/// Returns the number of arguments of a predicate, or `None` if the program does not use it.
 fn arity_in_rules(checking: &Checking<'_>, syntax: &Syntax, predicate: &str) -> Option<usize> {
     if let Some(definition) = checking.defined.get(&(0, predicate.to_owned())) {
         return Some(definition.arity);
@@ -213,12 +213,22 @@ fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
 fn open(path: &Path) -> Result<Box<dyn Read>, String> {
     let file = std::fs::File::open(path).map_err(|error| error.to_string().to_lowercase())?;
     let file = std::io::BufReader::new(file);
-    let packed = path.extension().is_some_and(|extension| extension == "gz");
-    Ok(if packed {
-        Box::new(flate2::read::MultiGzDecoder::new(file).take(SIZE_LIMIT))
-    } else {
-        Box::new(file.take(SIZE_LIMIT))
-    })
+    if path.extension().is_some_and(|extension| extension == "gz") {
+        return unpacked(file);
+    }
+    Ok(Box::new(file.take(SIZE_LIMIT)))
+}
+
+/// Decompresses a file.
+#[cfg(feature = "gzip")]
+fn unpacked(file: impl Read + 'static) -> Result<Box<dyn Read>, String> {
+    Ok(Box::new(flate2::read::MultiGzDecoder::new(file).take(SIZE_LIMIT)))
+}
+
+/// Reports that compressed files need the feature `gzip`.
+#[cfg(not(feature = "gzip"))]
+fn unpacked(_file: impl Read) -> Result<Box<dyn Read>, String> {
+    Err("this build can't decompress it; unpack it, or build `actcheck-rules` with the feature `gzip`".to_owned())
 }
 
 /// Second pass: adds the rows of a file to the program's facts.
@@ -301,4 +311,38 @@ fn read_rdf(
         }
     }
     Ok(left_out)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::standalone::Program;
+    use actcheck_base::Source;
+
+    /// A table of two rows, compressed with gzip.
+    const PACKED: [u8; 28] = [
+        0x1f, 0x8b, 0x08, 0x00, 0x00, 0x00, 0x00, 0x00, 0x02, 0xff, 0x33, 0xd4, 0x31, 0xe2, 0x32, 0xd6, 0x31, 0xe1,
+        0x02, 0x00, 0x47, 0x93, 0x6c, 0xaf, 0x08, 0x00, 0x00, 0x00,
+    ];
+
+    fn load(folder: &std::path::Path) -> Result<Program, actcheck_base::Diagnostics> {
+        std::fs::write(folder.join("table.csv.gz"), PACKED).expect("the folder is writable");
+        Program::load(&Source::new("p.rls", "@import p :- csv{resource = \"table.csv.gz\"} ."), folder)
+    }
+
+    #[test]
+    #[cfg(feature = "gzip")]
+    fn a_compressed_table_is_imported() {
+        let folder = tempfile::tempdir().expect("there is a folder for temporary files");
+        let program = load(folder.path()).expect("the table is valid");
+        let closure = program.close(crate::standalone::Engine::Fast, &crate::Budget::default()).expect("it is small");
+        assert_eq!((closure.arity("p"), closure.count("p")), (Some(2), 2));
+    }
+
+    #[test]
+    #[cfg(not(feature = "gzip"))]
+    fn a_compressed_table_without_the_feature_is_reported() {
+        let folder = tempfile::tempdir().expect("there is a folder for temporary files");
+        let found = load(folder.path()).expect_err("the feature is off").to_string();
+        assert!(found.contains("R072") && found.contains("feature `gzip`"), "{found}");
+    }
 }

@@ -4,23 +4,22 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use crate::book::fault;
-use crate::check::{Checking, Role, unique};
-use crate::evaluate::{Layers, Planned, Tables, evaluate};
-use crate::findings::Budget;
-use crate::meter::Meter;
-use crate::naive;
-use crate::parse::parse;
-use crate::plan::Indexes;
-use crate::program::{PredicateId, Predicates};
+use crate::check::checking::{Checking, Role, unique};
+use crate::check::stratify::stratify;
+use crate::engine::budget::Budget;
+use crate::engine::evaluate::{Layers, Planned, Tables, evaluate, fault};
+use crate::engine::meter::Meter;
+use crate::engine::naive;
+use crate::engine::plan::Indexes;
+use crate::model::program::{PredicateId, Predicates};
+use crate::model::universe::Universe;
 use crate::standalone::import::{define_imports, import};
-use crate::stratify::stratify;
-use crate::syntax::{ExpressionKind, Statement, Syntax};
-use crate::universe::Universe;
+use crate::syntax::{Statement, Syntax, parse};
 use actcheck_base::{Diagnostics, RuleFault, Source, Term, TermId, Terms};
 
 /// The evaluator of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Engine {
     /// Semi-naive evaluation on datafrog relations.
     Fast,
@@ -28,7 +27,28 @@ pub enum Engine {
     Naive,
 }
 
-/// A checked program with its facts.
+/// A checked program with its facts. Unlike the rules of a property, it has only predicates of its own.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use actcheck_base::{Source, Term};
+/// use actcheck_rules::Budget;
+/// use actcheck_rules::standalone::{Engine, Program};
+///
+/// let text = "reaches(?a, ?b) :- door(?a, ?b) .\n reaches(?a, ?c) :- reaches(?a, ?b), door(?b, ?c) .";
+/// // The folder is that of relative paths in `@import`.
+/// let mut program = Program::load(&Source::new("rooms.rls", text), Path::new(""))?;
+/// let door = |from: &str, to: &str| [Term::string(from), Term::string(to)];
+/// let doors = [door("hall", "kitchen"), door("kitchen", "cellar")];
+/// program.add_facts("door", doors.iter().map(|row| row.as_slice()))?;
+///
+/// let closure = program.close(Engine::Fast, &Budget::default())?;
+/// assert_eq!(closure.count("reaches"), 3);
+/// let why = program.explain(r#"reaches("hall", "cellar")"#, &Budget::default())?;
+/// assert!(why.to_text().contains(r#"door("kitchen", "cellar")  (fact)"#));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Program {
     pub(crate) syntax: Syntax,
@@ -41,6 +61,21 @@ pub struct Program {
 }
 
 /// Everything that a program derives, including its facts.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use actcheck_base::{Source, Term};
+/// use actcheck_rules::Budget;
+/// use actcheck_rules::standalone::{Engine, Program};
+///
+/// let text = "price(\"cup\", 3) . price(\"plate\", 5) . total(#sum(?p, ?item)) :- price(?item, ?p) .";
+/// let program = Program::load(&Source::new("prices.rls", text), Path::new(""))?;
+/// let closure = program.close(Engine::Fast, &Budget::default())?;
+/// assert_eq!(closure.tuples("total"), [[Term::Integer(8)]]);
+/// assert_eq!(closure.predicates().collect::<Vec<_>>(), ["price", "total"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Closure {
     terms: Vec<Term>,
@@ -165,31 +200,9 @@ impl Program {
                 tables.insert(predicate.name.clone(), (predicate.arity, rows));
             }
         }
-        let made = universe.into_made();
-        let terms = (0..self.terms.len()).map(|id| self.terms.term(id as TermId).clone()).chain(made).collect();
+        let created = universe.into_created();
+        let terms = (0..self.terms.len()).map(|id| self.terms.term(id as TermId).clone()).chain(created).collect();
         Ok(Closure { terms, tables })
-    }
-
-    /// Parses a statement to its predicate and arguments; `None` means `_`.
-    pub(crate) fn pattern(&self, statement: &str) -> Result<(String, Vec<Option<Term>>), String> {
-        let prefixes: String =
-            self.syntax.prefixes.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
-        let statement = statement.trim().trim_end_matches('.');
-        let (syntax, faults) = parse(&Source::new("statement", format!("{prefixes}{statement} .")));
-        if let Some(fault) = faults.iter().next() {
-            return Err(fault.message.clone());
-        }
-        let rule = syntax.statements.iter().find_map(|statement| match statement {
-            Statement::Rule(rule) if rule.body.is_empty() => rule.heads.first(),
-            _ => None,
-        });
-        let head = rule.ok_or("write a statement such as `p(1, _)`")?;
-        let args = head.args.iter().map(|arg| match &arg.kind {
-            ExpressionKind::Constant(term) => Ok(Some(term.clone())),
-            ExpressionKind::Anonymous | ExpressionKind::Variable(_) => Ok(None),
-            _ => Err("a statement may contain only constants and `_`".to_owned()),
-        });
-        Ok((head.predicate.clone(), args.collect::<Result<_, _>>()?))
     }
 
     fn naive(

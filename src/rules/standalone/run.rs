@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::findings::{Budget, interrupted};
+use crate::engine::budget::{Budget, interrupted};
 use crate::standalone::export::{exports, write};
 use crate::standalone::program::{Engine, Program};
 use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault};
 
 /// Results of running a program.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Summary {
     /// Name and number of tuples of each predicate.
     pub tuples: Vec<(String, usize)>,

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use crate::values::{Number, double_term, integer, is_beyond_64_bits, literal};
+use crate::model::values::{Number, double_term, integer, is_beyond_64_bits, literal};
 use actcheck_base::{Term, TermId, Terms, names};
 
 /// How the fields of a column are parsed.

@@ -1,0 +1,51 @@
+//! The input of pattern mining: decided runs, and the parameters of their scenes.
+
+/// Decided runs with their parameters. Every list has one entry for each run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PatternInput {
+    /// Whether the run failed.
+    pub failed: Vec<bool>,
+    /// Whether the run is held out of the search, to confirm patterns.
+    pub held_out: Vec<bool>,
+    /// Parameters that may affect the outcome.
+    pub parameters: Vec<Parameter>,
+}
+
+/// One parameter of the scenes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Name, such as `target_friction`.
+    pub name: String,
+    /// Unit of its numbers, if any.
+    pub unit: Option<String>,
+    /// Values, one for each run.
+    pub values: Values,
+}
+
+/// Values of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Numbers, NaN if missing.
+    Numbers(Vec<f64>),
+    /// Categories, each of which may have superkinds.
+    Kinds {
+        /// Index in `names` of each run's kind, `None` if missing. Names are in the order of first occurrence.
+        of_run: Vec<Option<u32>>,
+        /// Names of the kinds.
+        names: Vec<String>,
+        /// Superkinds of each kind, nearest first.
+        above: Vec<Vec<String>>,
+    },
+}
+
+impl PatternInput {
+    /// Number of decided runs.
+    pub fn len(&self) -> usize {
+        self.failed.len()
+    }
+
+    /// Whether there are no runs.
+    pub fn is_empty(&self) -> bool {
+        self.failed.is_empty()
+    }
+}

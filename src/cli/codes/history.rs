@@ -1,0 +1,138 @@
+//! Codes of histories, queries and merges.
+
+use super::{Area, Code, code};
+
+/// Codes that begin with `H`.
+pub(super) const HISTORY: Area = Area { letter: 'H', title: "Histories, queries and merges", codes: CODES_H };
+
+const CODES_H: &[Code] = &[
+    code(
+        "H001",
+        "the history can't be opened",
+        "its folder is not writable, or a file is at its path",
+        "name a writable folder with `--history DIR`",
+    ),
+    code(
+        "H002",
+        "the history is open in another process",
+        "a campaign is running",
+        "wait until it ends, or name another folder",
+    ),
+    code(
+        "H003",
+        "there is no history",
+        "the folder is wrong, empty, or holds other files",
+        "name the folder of a history with `--history DIR`; `actcheck run CONFIG` writes one",
+    ),
+    code(
+        "H004",
+        "a newer actcheck wrote the history",
+        "the program is older than the history",
+        "update actcheck, or name another folder",
+    ),
+    code(
+        "H005",
+        "the disk of the history is full",
+        "runs and traces need space",
+        "free some space and run again; stored data is complete",
+    ),
+    code(
+        "H006",
+        "reading or writing a file of the history failed",
+        "the disk has a fault",
+        "check the disk and run again; stored data is complete",
+    ),
+    code(
+        "H007",
+        "the history is damaged",
+        "a file was changed or truncated from outside",
+        "restore the folder from a backup",
+    ),
+    code(
+        "H008",
+        "there is no such run, or several match",
+        "the id or its prefix is misspelt or too short",
+        "take the suggested id; `actcheck list` shows all runs",
+    ),
+    code(
+        "H009",
+        "the trace of a run can't be read",
+        "its file is missing",
+        "restore the file from a backup; outcomes and facts of the run are intact",
+    ),
+    code(
+        "H010",
+        "a SPARQL query has a syntax error",
+        "a word, bracket or prefix is wrong or missing",
+        "correct the marked place",
+    ),
+    code("H011", "a query is an update", "histories are read-only", "use `SELECT`, `ASK`, `CONSTRUCT` or `DESCRIBE`"),
+    code(
+        "H012",
+        "a query failed",
+        "it uses `SERVICE`, or the store could not answer",
+        "query only the history; if the help names no way out, report this bug",
+    ),
+    code("H013", "a query was stopped", "Ctrl-C, or its time limit", "ask for less, or raise the limit"),
+    code(
+        "H014",
+        "there is no such campaign",
+        "the id is misspelt",
+        "take the suggested id; `actcheck list` shows all runs with their campaigns",
+    ),
+    code(
+        "H015",
+        "the stored configuration of a campaign can't be used",
+        "the files that it names have moved",
+        "name the configuration's new path with `--config`",
+    ),
+    code(
+        "H016",
+        "an RDF file can't be written",
+        "the folder does not exist or is not writable",
+        "name a file in an existing, writable folder",
+    ),
+    code(
+        "H017",
+        "a query over HTTP uses `SERVICE`",
+        "it would query another endpoint",
+        "query only the history, and join the results elsewhere",
+    ),
+    code(
+        "H018",
+        "the answer of a query over HTTP is too large",
+        "it has more rows than `--max-rows`",
+        "request less, or fetch it in parts with `LIMIT` and `OFFSET`",
+    ),
+    code(
+        "H020",
+        "the same run has two different results",
+        "parts of a campaign were made under conditions that their records don't show, such as another machine or program",
+        "leave one out with `--leave-out`",
+    ),
+    code(
+        "H021",
+        "parts of a campaign were made with different versions",
+        "program, ontology, rules or models changed between the parts",
+        "run the part again, or leave one out",
+    ),
+    code(
+        "H022",
+        "two campaigns have the same id",
+        "they come from different histories",
+        "`--rename` gives the later one a new id",
+    ),
+    code(
+        "H023",
+        "the destination of a merge holds parts of one campaign",
+        "campaigns in the destination are not changed",
+        "name a new folder with `--into`, and add this one to the histories to merge",
+    ),
+    code(
+        "H024",
+        "a run was rechecked in both histories with different results",
+        "the rules differed",
+        "leave one out, and recheck the result",
+    ),
+    code("H025", "there is no such campaign to leave out", "the id is misspelt", "take the suggested id"),
+];

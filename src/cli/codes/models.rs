@@ -1,0 +1,184 @@
+//! Codes of models, robots and worlds.
+
+use super::{Area, Code, code};
+
+/// Codes that begin with `W`.
+pub(super) const MODELS: Area = Area { letter: 'W', title: "Models, robots and worlds", codes: CODES_W };
+
+const CODES_W: &[Code] = &[
+    code(
+        "W001",
+        "a model has a part of an unknown kind",
+        "the kind is misspelt",
+        "write box, capsule, cylinder, sphere or tube",
+    ),
+    code(
+        "W002",
+        "the size of a model does not match its parts",
+        "`size_m` is not the outer size, or the origin is not on the ground below the middle",
+        "correct `size_m` or move the parts",
+    ),
+    code(
+        "W003",
+        "a category is not an IRI",
+        "the prefix is missing or unknown",
+        "write it like `category = \"act:Glass\"`",
+    ),
+    code(
+        "W010",
+        "a robot profile or its URDF can't be read",
+        "the path is wrong, or required keys of the profile are missing",
+        "correct the path; that of the URDF is relative to the profile",
+    ),
+    code(
+        "W011",
+        "a robot profile is inconsistent",
+        "an unknown kind of base, or lists of joints and positions of different lengths",
+        "give one position for each joint, and a base that the help names",
+    ),
+    code(
+        "W012",
+        "the URDF of a profile can't be found",
+        "a `package://` path names an unknown package",
+        "add the folder of the package to `package_dirs`",
+    ),
+    code(
+        "W020",
+        "the URDF of the robot can't be used",
+        "the file is not a URDF file with one tree of links",
+        "name a URDF file in the profile's `urdf`",
+    ),
+    code(
+        "W021",
+        "the robot lacks a part that its profile names",
+        "a link or a joint is misspelt",
+        "take the suggested name",
+    ),
+    code(
+        "W022",
+        "the robot has a part that is not supported",
+        "a joint is floating or planar, or a shape is of an unknown kind",
+        "use fixed, revolute, continuous or prismatic joints, and boxes, cylinders, spheres, capsules or meshes",
+    ),
+    code(
+        "W023",
+        "the physics settings can't be simulated",
+        "`[physics]` contradicts itself",
+        "correct `[physics]` in the configuration",
+    ),
+    code(
+        "W030",
+        "a model of another program can't be read",
+        "its folder lacks `model.config` or the SDF file that it names",
+        "name a folder with both, or a URDF file",
+    ),
+    code(
+        "W031",
+        "a model file is not XML",
+        "an element is not closed, or a `<` in a text is not escaped",
+        "correct the marked place",
+    ),
+    code(
+        "W032",
+        "a model file has another format or version than its name says",
+        "the root element is wrong, or the file has no model or several",
+        "follow the help; a file with a `<world>` belongs in the folder `worlds`",
+    ),
+    code(
+        "W033",
+        "a model file lacks a required element or attribute",
+        "the file is incomplete",
+        "add the element or attribute that the help names",
+    ),
+    code(
+        "W034",
+        "a value in a model file is not allowed",
+        "a number is malformed, zero or negative where it must not be",
+        "correct the value",
+    ),
+    code(
+        "W035",
+        "a model file uses a feature that is not supported",
+        "an object with movable joints, nested models, or a tilted model in a world",
+        "follow the help; robots are read through `[robot] profile`",
+    ),
+    code(
+        "W036",
+        "a part of a model file is ignored",
+        "the simulation has no counterpart for it, such as plugins and air drag",
+        "nothing, if the model works without it; otherwise follow the help",
+    ),
+    code(
+        "W037",
+        "a mesh can't be used",
+        "the file is missing or damaged, or its surface is not closed",
+        "export it again as triangles to stl, obj or dae; use a thin box for a sheet",
+    ),
+    code("W038", "a model has no solid shape", "none of its links has a `<collision>`", "give a link a `<collision>`"),
+    code(
+        "W039",
+        "a model has no category",
+        "its file and `[categories]` name none, so rules see only `act:Object`",
+        "add the model to `[categories]`",
+    ),
+    code(
+        "W040",
+        "a world uses a model that does not exist",
+        "the model's name is misspelt, or the model itself has errors",
+        "take the suggested name, or correct the model",
+    ),
+    code(
+        "W041",
+        "two things in a world have the same name",
+        "a part of the file was copied",
+        "give one of them another name",
+    ),
+    code(
+        "W042",
+        "a location names a surface that the world lacks",
+        "the name is misspelt, or that furniture has no surface",
+        "take the suggested name",
+    ),
+    code(
+        "W043",
+        "a location is inside a piece of furniture",
+        "its coordinates are wrong; the robot drives to locations",
+        "move the location away",
+    ),
+    code(
+        "W044",
+        "a room or wall has no extent",
+        "both corners or both ends are the same, or their coordinates are swapped",
+        "correct the coordinates",
+    ),
+    code(
+        "W050",
+        "the URDF has no such link or joint",
+        "a name in the robot profile is misspelt",
+        "take the suggested name",
+    ),
+    code(
+        "W051",
+        "the links of a URDF don't form one tree",
+        "a link has two parents or none, links form a cycle, or names are used twice",
+        "correct the joints; the help names the fault",
+    ),
+    code(
+        "W052",
+        "a joint has two roles",
+        "it is in two lists of the profile, or `base` and `base_joints` are both set",
+        "leave it in one list",
+    ),
+    code(
+        "W053",
+        "a joint can't have its role",
+        "it has the wrong type, such as a finger that turns, or no limits",
+        "name another joint, or correct its type in the URDF",
+    ),
+    code(
+        "W054",
+        "a posture or opening exceeds the limits of a joint",
+        "the profile and the URDF disagree",
+        "choose a value within the limits in the help",
+    ),
+];

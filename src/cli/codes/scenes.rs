@@ -1,0 +1,155 @@
+//! Codes of scenes, runs and cases.
+
+use super::{Area, Code, code};
+
+/// Codes that begin with `S`.
+pub(super) const SCENES: Area = Area { letter: 'S', title: "Scenes, runs and cases", codes: CODES_S };
+
+const CODES_S: &[Code] = &[
+    code("S001", "the ontology has no such action", "an action in `tests` is misspelt", "take the suggested name"),
+    code(
+        "S002",
+        "an action has no success property",
+        "the ontology states none, so that runs can't be judged",
+        "state one: `act:NAME act:successProperty …`",
+    ),
+    code(
+        "S003",
+        "an action needs a designator without candidates",
+        "the configuration lacks its table",
+        "add the table that the help shows",
+    ),
+    code("S004", "a table is named after no designator", "its name is misspelt", "take the suggested name"),
+    code(
+        "S005",
+        "a model's category is not a class of the ontology",
+        "the category is misspelt, or the class is not declared",
+        "correct the category, or declare the class",
+    ),
+    code(
+        "S006",
+        "a model has no surface to place objects on",
+        "it is an object in place of furniture",
+        "name one of the models in the help",
+    ),
+    code(
+        "S007",
+        "an object does not fit on a surface",
+        "the object is larger than the surface",
+        "choose a smaller object or a larger surface",
+    ),
+    code(
+        "S008",
+        "the configuration names no surface",
+        "an action needs `[objectSurface]`",
+        "add `[objectSurface]` with `object_surfaces = [\"coffee_table\"]`",
+    ),
+    code(
+        "S009",
+        "a surface or location does not match the world",
+        "the world has no such surface, or no location from which the robot reaches it",
+        "name one of those in the help",
+    ),
+    code(
+        "S010",
+        "the reference skills can't perform an action",
+        "the action is new, or its name is misspelt",
+        "name a program that performs it in `test_launcher`, or take the suggested name",
+    ),
+    code(
+        "S024",
+        "the search strategy contradicts another option",
+        "guided searches are biased towards failures, so a width or a part can't be requested",
+        "remove the option, or use `strategy = \"random\"`",
+    ),
+    code(
+        "S030",
+        "no scene could be built for a run",
+        "in 50 draws, objects overlapped or did not come to rest",
+        "use fewer or smaller objects, or a larger surface",
+    ),
+    code(
+        "S031",
+        "a run could not be made",
+        "the simulation crashed twice in the same way",
+        "report this bug with the configuration and seed",
+    ),
+    code(
+        "S032",
+        "many scenes were discarded",
+        "objects rarely fit, or few scenes satisfy `[scene] require`",
+        "use fewer or smaller objects, a larger surface, or ranges closer to the requirement",
+    ),
+    code(
+        "S033",
+        "the program that performs actions broke too many runs in a row",
+        "it crashes or does not answer",
+        "`actcheck show RUN` shows its output; `[skill] max_broken` is the limit",
+    ),
+    code(
+        "S040",
+        "the configuration has no test with the actions of a stored run",
+        "`tests` changed since the run was made",
+        "use the configuration of the run's campaign, or add the test again",
+    ),
+    code(
+        "S041",
+        "a stored run can't be run again",
+        "models, configuration or program changed so that its scene can't be built",
+        "restore them; `actcheck show` prints the digests of the run's campaign",
+    ),
+    code(
+        "S042",
+        "the recorded choices of a run don't fit exactly",
+        "a range or a list of candidates changed",
+        "use `--nearest`, which clamps values and uses nominal values for missing choices",
+    ),
+    code(
+        "S050",
+        "the run has nothing to shrink",
+        "no property fails in it under the present rules and models, or the named property does not",
+        "name a property that fails, or another run",
+    ),
+    code(
+        "S051",
+        "the scene of a run to shrink can't be built",
+        "models, robot or program changed since the run was made",
+        "make a new run with `actcheck run`",
+    ),
+    code(
+        "S060",
+        "the scene of a case can't be built",
+        "an edited value moved an object onto another one",
+        "move the objects in the way, or remove them",
+    ),
+    code(
+        "S061",
+        "a case has a choice that its scene lacks",
+        "the choice is misspelt, or its object was removed",
+        "remove it, or take the suggested name",
+    ),
+    code(
+        "S062",
+        "a choice of a case is out of bounds",
+        "a value was edited, or the range changed",
+        "choose a value within the bounds in the help",
+    ),
+    code(
+        "S063",
+        "an object of a case can't be placed",
+        "another object is in the way",
+        "move one of the two, or remove one",
+    ),
+    code(
+        "S064",
+        "the scene of a case can't be run",
+        "it can't be built or does not come to rest with the present models, robot or program",
+        "move the objects in the way, or export the case again",
+    ),
+    code(
+        "S065",
+        "a file in the folder `regressions` is not a case",
+        "it has no `[case]`",
+        "keep only files from `actcheck export` in this folder",
+    ),
+];

@@ -1,0 +1,99 @@
+//! The commands in groups, as the program's help lists them, and the command tree for completions and the manual.
+
+use clap::builder::styling::{Effects, Style};
+use clap::{Command, CommandFactory as _};
+
+use crate::args::Arguments;
+
+/// A group of commands in the program's help.
+struct Group {
+    title: &'static str,
+    /// Names of its commands, most used first.
+    commands: &'static [&'static str],
+}
+
+/// All commands except hidden ones. They are declared in the same order, which completions and the manual use.
+const GROUPS: [Group; 4] = [
+    Group { title: "Run", commands: &["run", "new", "check", "replay", "shrink"] },
+    Group {
+        title: "Look",
+        commands: &["list", "show", "report", "analyse", "compare", "health", "query", "serve", "explain"],
+    },
+    Group { title: "Judge", commands: &["why", "recheck", "rules", "check-oracles", "datalog"] },
+    Group { title: "Exchange", commands: &["export", "merge", "schema", "completions", "man"] },
+];
+
+/// The program, whose help lists the commands in groups.
+pub(super) fn program() -> Command {
+    let heading = Style::new().effects(Effects::BOLD | Effects::UNDERLINE);
+    let help = format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{}{heading}Options:{heading:#}\n{{options}}{{after-help}}",
+        listed(heading)
+    );
+    Arguments::command().help_template(help)
+}
+
+/// The program with all commands except the hidden ones, for completions and the manual.
+pub(super) fn command_tree() -> Command {
+    let all = Arguments::command();
+    Command::new("actcheck")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about(all.get_about().cloned().unwrap_or_default())
+        .after_help(all.get_after_help().cloned().unwrap_or_default())
+        .disable_help_subcommand(true)
+        .subcommand_required(true)
+        .subcommands(shown(&all).cloned())
+}
+
+fn shown(all: &Command) -> impl Iterator<Item = &Command> {
+    all.get_subcommands().filter(|command| !command.is_hide_set())
+}
+
+/// The list of commands as clap renders it, in the width of the terminal, with a heading before each group.
+fn listed(heading: Style) -> String {
+    let all = Arguments::command();
+    let mut list = Command::new("actcheck")
+        .disable_help_subcommand(true)
+        .max_term_width(100)
+        .help_template("{subcommands}")
+        .subcommands(shown(&all).enumerate().map(|(place, command)| command.clone().display_order(place)));
+    let list = list.render_help();
+    let (plain, styled) = (list.to_string(), list.ansi().to_string());
+    let mut text = String::new();
+    for (plain, styled) in plain.lines().zip(styled.lines()) {
+        let name = plain.split_whitespace().next().filter(|_| !plain.starts_with("   "));
+        if let Some(group) = GROUPS.iter().find(|group| group.commands.first().copied() == name) {
+            let before = if text.is_empty() { "" } else { "\n" };
+            text.push_str(&format!("{before}{heading}{}:{heading:#}\n", group.title));
+        }
+        text.push_str(&format!("{styled}\n"));
+    }
+    text + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A new command needs a place in the table, and the same one in the enum.
+    #[test]
+    fn every_command_is_in_one_group_and_declared_in_the_same_order() {
+        let all = Arguments::command();
+        let declared: Vec<&str> = shown(&all).map(Command::get_name).collect();
+        let grouped: Vec<&str> = GROUPS.iter().flat_map(|group| group.commands).copied().collect();
+        assert_eq!(declared, grouped);
+    }
+
+    #[test]
+    fn help_lists_every_command_below_the_heading_of_its_group() {
+        let help = program().render_help().to_string();
+        let mut rest = help.as_str();
+        for group in GROUPS {
+            rest = rest.split_once(&format!("\n{}:\n", group.title)).expect("a heading").1;
+            for name in group.commands {
+                rest = rest.split_once(&format!("  {name} ")).unwrap_or_else(|| panic!("{name}:\n{help}")).1;
+            }
+        }
+        assert!(rest.contains("\nOptions:\n") && rest.contains("Example:"), "{help}");
+    }
+}

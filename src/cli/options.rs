@@ -1,0 +1,100 @@
+//! Options that several commands have: the history's folder, output formats, durations.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use actcheck_config::duration_secs;
+use actcheck_report::TableFormat;
+
+/// The folder of a history.
+#[derive(Debug, Args)]
+pub struct HistoryArgs {
+    /// Folder of the history [default: `.actcheck` here, or the only one in a subfolder]
+    #[arg(long, value_name = "DIR")]
+    pub history: Option<PathBuf>,
+}
+
+/// Formats of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Format {
+    /// Human-readable text
+    #[default]
+    #[value(alias = "table")]
+    Text,
+    /// Comma-separated values
+    Csv,
+    /// Machine-readable
+    Json,
+}
+
+impl From<Format> for TableFormat {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::Text => Self::Table,
+            Format::Csv => Self::Csv,
+            Format::Json => Self::Json,
+        }
+    }
+}
+
+/// Formats of a query's answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum QueryFormat {
+    /// Human-readable text
+    #[default]
+    #[value(alias = "table")]
+    Text,
+    /// Comma-separated values
+    Csv,
+    /// Machine-readable
+    Json,
+    /// RDF, for queries whose answer is a graph
+    Turtle,
+}
+
+/// Formats of an explanation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum ProofFormat {
+    /// Human-readable text
+    #[default]
+    Text,
+    /// Comma-separated values
+    Csv,
+    /// Machine-readable
+    Json,
+    /// For Graphviz
+    Dot,
+}
+
+/// Parses a duration such as `90s`, `10m` or `1h30m` into seconds. A plain number, which earlier versions required, is a
+/// number of seconds.
+///
+/// # Errors
+/// A message if the text is neither, or not above zero.
+pub fn duration(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(secs) if secs > 0.0 && secs.is_finite() => Ok(secs),
+        Ok(_) => Err(format!("`{text}` must be a duration above zero, such as 90s, 10m or 2h")),
+        Err(_) => duration_secs(text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_have_units_and_plain_numbers_are_seconds() {
+        for (text, secs) in [("10m", 600.0), ("1.5s", 1.5), ("200ms", 0.2), ("1h30m", 5400.0), ("7", 7.0), ("0.5", 0.5)]
+        {
+            assert_eq!(duration(text), Ok(secs), "{text}");
+        }
+        for wrong in ["", "0", "0s", "-5", "-5s", "inf", "NaN", "soon", "10 apples"] {
+            assert!(
+                duration(wrong).is_err_and(|message| message.contains("10m") || message.contains("zero")),
+                "{wrong}"
+            );
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! A comparison of two campaigns as JSON.
+
+use serde_json::{Value, json};
+
+use crate::CompareSummary;
+use crate::summary::compared_parts;
+use actcheck_analysis::{Compared, ComparedLine};
+
+/// Returns the whole comparison as JSON.
+pub fn compare_json(summary: &CompareSummary) -> Value {
+    let found = &summary.comparison;
+    let [first, second] = summary.sides.each_ref().map(|side| {
+        json!({
+            "name": side.name, "campaign": side.campaign, "config": side.config, "runs": side.runs,
+            "planned": side.planned, "started": side.started,
+        })
+    });
+    let changes: Vec<Value> = summary
+        .changes
+        .iter()
+        .map(|change| json!({"kind": change.kind, "name": change.name, "a": change.first, "b": change.second}))
+        .collect();
+    let [only_a, only_b] = summary.config_lines();
+    let worse = summary.level.map(|level| found.worse_at(level).into_iter().map(of).collect::<Vec<Value>>());
+    json!({
+        "a": first,
+        "b": second,
+        "pairs": found.pairs,
+        "other_physics": found.other_physics,
+        "only_in_a": found.alone[0],
+        "only_in_b": found.alone[1],
+        "other_scene": found.other_scene,
+        "judged_only_in_a": found.judged_alone[0].iter().map(parts_json).collect::<Vec<_>>(),
+        "judged_only_in_b": found.judged_alone[1].iter().map(parts_json).collect::<Vec<_>>(),
+        "changes": changes,
+        "config_only_in_a": only_a,
+        "config_only_in_b": only_b,
+        "lines": found.lines.iter().map(line).collect::<Vec<Value>>(),
+        "level": summary.level,
+        "worse": worse,
+    })
+}
+
+fn line(line: &ComparedLine) -> Value {
+    let (action, property) = compared_parts(&line.of);
+    json!({
+        "action": action,
+        "property": property,
+        "table": line.table,
+        "difference": line.difference,
+        "p": line.test.two_sided,
+        "p_holm": line.two_sided_adjusted,
+        "mid_p": line.test.mid_p,
+        "p_b_worse": line.test.second_worse,
+        "p_b_worse_holm": line.second_worse_adjusted,
+        "left_out": { "scenes": line.left_out[0].total(), "a": line.left_out[0], "b": line.left_out[1] },
+        "worse": line.worse,
+        "better": line.better,
+    })
+}
+
+fn of(line: &ComparedLine) -> Value {
+    parts_json(&line.of)
+}
+
+fn parts_json(of: &Compared) -> Value {
+    let (action, property) = compared_parts(of);
+    json!({ "action": action, "property": property })
+}

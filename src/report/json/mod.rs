@@ -1,0 +1,25 @@
+//! Whole reports as one JSON object each, one file for each summary. Their keys are an interface for other programs.
+//!
+//! Never: computes what it prints (see `summary`), or writes to a stream.
+
+mod campaign;
+mod case;
+mod compare;
+mod findings;
+mod health;
+mod oracles;
+mod recheck;
+mod repeated;
+mod run;
+mod shrunk;
+mod weighted;
+
+pub use campaign::campaign_json;
+pub use case::case_json;
+pub use compare::compare_json;
+pub use findings::findings_json;
+pub use health::health_json;
+pub use oracles::oracles_json;
+pub use recheck::recheck_json;
+pub use run::run_json;
+pub use shrunk::shrunk_json;

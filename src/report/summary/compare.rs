@@ -1,0 +1,121 @@
+//! A comparison of two campaigns, with a description of each side.
+
+use actcheck_analysis::{Compared, Comparison};
+use actcheck_base::names;
+
+/// One side of a comparison.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComparedSide {
+    /// As given on the command line: `k7f3`, `old/.actcheck#k7f3` or `k7f3@rechecked`.
+    pub name: String,
+    /// Id of the campaign.
+    pub campaign: String,
+    /// Name of its configuration.
+    pub config: String,
+    /// Number of runs it has.
+    pub runs: u64,
+    /// Number of runs it was asked for.
+    pub planned: u64,
+    /// When it started (RFC 3339).
+    pub started: String,
+    /// Text of its configuration.
+    pub config_text: String,
+}
+
+/// One difference between the sides.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SideChange {
+    /// Such as "model".
+    pub kind: String,
+    /// Its name.
+    pub name: String,
+    /// Digest or version in the first side; `None` if it is absent there.
+    pub first: Option<String>,
+    /// Digest or version in the second side; `None` if it is absent there.
+    pub second: Option<String>,
+}
+
+/// Two compared campaigns, ready to print.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompareSummary {
+    /// First and second side.
+    pub sides: [ComparedSide; 2],
+    /// The statistical comparison.
+    pub comparison: Comparison,
+    /// Configuration, program, models, ontology and rules that differ.
+    pub changes: Vec<SideChange>,
+    /// Significance level at which the second side must not be worse, if one was given.
+    pub level: Option<f64>,
+}
+
+impl CompareSummary {
+    /// 1 if the second side is significantly worse at the given level, otherwise 0.
+    pub fn exit_code(&self) -> u8 {
+        u8::from(self.level.is_some_and(|level| !self.comparison.worse_at(level).is_empty()))
+    }
+
+    /// Configuration lines that only the first side has, and those that only the second has. Comments are ignored.
+    pub fn config_lines(&self) -> [Vec<String>; 2] {
+        let [first, second] = self.sides.each_ref().map(|side| settings(&side.config_text));
+        [without(&first, &second), without(&second, &first)]
+    }
+}
+
+/// The subject of a comparison line, in words.
+pub(crate) fn compared_name(of: &Compared) -> String {
+    match of {
+        Compared::WholeRun => "whole run".to_owned(),
+        Compared::Property { action, property } => format!("{} {}", names::local(action), names::local(property)),
+    }
+}
+
+/// Action and property; `(None, None)` for whole runs.
+pub(crate) fn compared_parts(of: &Compared) -> (Option<String>, Option<String>) {
+    match of {
+        Compared::WholeRun => (None, None),
+        Compared::Property { action, property } => (Some(action.clone()), Some(property.clone())),
+    }
+}
+
+/// Lines of a configuration, each prefixed with its table's name. Comments are removed.
+fn settings(text: &str) -> Vec<String> {
+    let (mut found, mut table) = (Vec::new(), String::new());
+    for line in text.lines() {
+        // A `#` inside quotes is cut too. Both sides are cut alike, so only the printed line gets shorter.
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.starts_with('[') && line.ends_with(']') && !line.contains('=') {
+            table = format!("{line} ");
+        } else if !line.is_empty() {
+            found.push(format!("{table}{line}"));
+        }
+    }
+    found
+}
+
+/// Multiset difference: the lines of `lines` that `others` lacks, counting repetitions.
+fn without(lines: &[String], others: &[String]) -> Vec<String> {
+    let mut left: Vec<&String> = others.iter().collect();
+    let mut found = Vec::new();
+    for line in lines {
+        match left.iter().position(|other| *other == line) {
+            Some(at) => {
+                left.swap_remove(at);
+            }
+            None => found.push(line.clone()),
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_are_shown_with_their_table_and_without_comments() {
+        let first = settings("seed = 7 # any\n[sensing]\nyaw = 0.1\n\n# nothing\nsize = 1");
+        let second = settings("seed = 7\n[sensing]\nyaw = 0.2\nsize = 1\n");
+        assert_eq!(without(&first, &second), ["[sensing] yaw = 0.1"]);
+        assert_eq!(without(&second, &first), ["[sensing] yaw = 0.2"]);
+    }
+}

@@ -1,0 +1,121 @@
+//! Findings of the analysis, with the names needed to print them.
+
+use actcheck_analysis::{
+    Cascade, Condition, FailureMode, FlakyScene, Parameter, Pattern, PropertyFindings, Trend, TwoWay,
+};
+use actcheck_base::names;
+use actcheck_verdict::Counts;
+
+/// The output of `actcheck analyse`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FindingsSummary {
+    /// Path of the history, as the user named it.
+    pub history: String,
+    /// How the user invoked this program.
+    pub program: String,
+    /// Options that select the same runs again, each preceded by a space.
+    pub options: String,
+    /// Ids of the campaigns in order of their start.
+    pub campaigns: Vec<String>,
+    /// Number of runs in the table.
+    pub runs: u64,
+    /// Outcome counts of the table.
+    pub counts: Counts,
+    /// Failure modes: runs that share the same set of failed properties.
+    pub modes: Vec<FailureMode>,
+    /// Pairs of properties in which a failure is associated with a later failure.
+    pub cascades: Vec<Cascade>,
+    /// One report for each property of each action.
+    pub properties: Vec<PropertyReport>,
+    /// Significance level of the findings.
+    pub level: f64,
+}
+
+/// One property.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PropertyReport {
+    /// Findings of the analysis.
+    pub findings: PropertyFindings,
+    /// Unit of its margin.
+    pub unit: Option<String>,
+    /// Failure rate from campaign to campaign.
+    pub trend: Trend,
+    /// Scenes that both passed and failed.
+    pub flaky: Vec<FlakyScene>,
+    /// Number of scenes that were run more than once.
+    pub repeated_scenes: u64,
+    /// Heat maps.
+    pub maps: Vec<TwoWay>,
+}
+
+impl PropertyReport {
+    /// Display name of the property.
+    pub fn name(&self) -> &str {
+        names::local(&self.findings.property)
+    }
+
+    /// Describes a pattern in one sentence.
+    pub fn sentence(&self, pattern: &Pattern) -> String {
+        let all = pattern.all;
+        let elsewhere = match pattern.elsewhere {
+            Some(elsewhere) => format!("; elsewhere in {}", percent(elsewhere.rate)),
+            None => String::new(),
+        };
+        format!(
+            "{} fails in {} [{:.0}–{:.0}] of {} runs with {}{elsewhere}",
+            self.name(),
+            percent(pattern.rate.rate),
+            pattern.rate.low * 100.0,
+            pattern.rate.high * 100.0,
+            all.failed_in + all.passed_in,
+            self.conditions(pattern)
+        )
+    }
+
+    /// Describes the conditions of a pattern in words.
+    pub fn conditions(&self, pattern: &Pattern) -> String {
+        let parameters = &self.findings.input.parameters;
+        let conditions: Vec<String> = pattern
+            .conditions
+            .iter()
+            .map(|condition| condition_text(condition, &parameters[condition.parameter()]))
+            .collect();
+        match conditions.as_slice() {
+            [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+            all => all.join(""),
+        }
+    }
+
+    /// Ids of the runs of a pattern, failed runs first.
+    pub fn runs(&self, pattern: &Pattern) -> Vec<&str> {
+        let failed = &self.findings.input.failed;
+        let of = |wanted: bool| pattern.runs.iter().filter(move |run| failed[**run] == wanted);
+        of(true).chain(of(false)).map(|run| self.findings.examples[*run].run.as_str()).collect()
+    }
+}
+
+/// Formats a proportion, such as `71 %`; values below 10 % have one decimal.
+pub(crate) fn percent(share: f64) -> String {
+    let share = share * 100.0;
+    if share > 0.0 && share < 9.95 { format!("{share:.1} %") } else { format!("{share:.0} %") }
+}
+
+/// Describes a condition, such as `target friction < 0.35`.
+fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
+    let unit = parameter.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
+    let bare = match &parameter.unit {
+        Some(unit) => parameter.name.strip_suffix(&format!("_{unit}")).unwrap_or(&parameter.name),
+        None => &parameter.name,
+    };
+    let name = bare.replace('_', " ");
+    match condition {
+        Condition::Kind { kind, .. } => {
+            let thing = bare.strip_suffix("_category").or_else(|| bare.strip_suffix("_model")).unwrap_or(bare);
+            format!("{} {kind}", thing.replace('_', " "))
+        }
+        Condition::Range { low: Some(low), high: Some(high), .. } => format!("{low} ≤ {name} < {high}{unit}"),
+        Condition::Range { low: Some(low), .. } => format!("{name} ≥ {low}{unit}"),
+        Condition::Range { high: Some(high), .. } => format!("{name} < {high}{unit}"),
+        Condition::Range { .. } => format!("any {name}"),
+    }
+}

@@ -1,0 +1,33 @@
+//! Plain data that is printed: summaries of campaigns, comparisons, findings and other results, with exit codes.
+//!
+//! Never: formats a whole report. `text`, `table` and `json` do, each with a file for each summary.
+
+mod campaign;
+mod case;
+mod compare;
+mod findings;
+mod health;
+mod oracles;
+mod recheck;
+mod remarks;
+mod repeated;
+mod shrunk;
+mod weighted;
+
+#[cfg(test)]
+pub(crate) use campaign::tests as campaign_samples;
+pub use campaign::{ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RunSummary};
+pub use case::CaseSummary;
+pub use compare::{CompareSummary, ComparedSide, SideChange};
+pub(crate) use compare::{compared_name, compared_parts};
+pub(crate) use findings::percent;
+pub use findings::{FindingsSummary, PropertyReport};
+pub use health::HealthSummary;
+pub use oracles::OracleSummary;
+pub(crate) use oracles::notice_word;
+pub(crate) use recheck::reason_text;
+pub use recheck::{RecheckChange, RecheckLine, RecheckSummary, Why};
+pub use remarks::{Oddity, Remark};
+pub use repeated::RepeatedProperty;
+pub use shrunk::{ShrunkChoice, ShrunkSummary};
+pub use weighted::{GuidedSearch, WeightedLine};

@@ -1,0 +1,60 @@
+//! The result of shrinking a run.
+
+use actcheck_history::RunDetail;
+
+/// The result of shrinking, as plain data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShrunkSummary {
+    /// Id of the run that was shrunk.
+    pub original: String,
+    /// The shrunk run, as stored in the history.
+    pub run: RunDetail,
+    /// IRIs of the properties that failed in the original.
+    pub failed: Vec<String>,
+    /// Number of other objects in the original.
+    pub others_before: usize,
+    /// Number of choices that were not nominal in the original.
+    pub special_before: usize,
+    /// Choices that are not nominal now.
+    pub choices: Vec<ShrunkChoice>,
+    /// Whether the scene is minimal: nothing more can be removed.
+    pub minimal: bool,
+    /// Number of simulations for shrinking.
+    pub simulations: u64,
+    /// Number of simulations for the explanation.
+    pub explaining: u64,
+    /// The nearest scene that passes: name and value of the choice that differs.
+    pub neighbour: Option<(String, f64)>,
+    /// Number of failures with fresh noise, and number of repetitions.
+    pub fresh: Option<(u32, u32)>,
+    /// Whether the recorded noise had to be kept.
+    pub noise_kept: bool,
+    /// Explanation of each failed property, as text.
+    pub why: Vec<String>,
+}
+
+/// One choice that is not nominal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShrunkChoice {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Its nominal value.
+    pub nominal: f64,
+    /// Unit of the values; empty for factors and for list indices.
+    pub unit: &'static str,
+    /// Whether the run passes if only this choice is set to its nominal value. `None` if that was not tried.
+    pub matters: Option<bool>,
+    /// Range of values with which the run fails.
+    pub fails: (f64, f64),
+    /// Nearest values with which the run passes, below and above that range.
+    pub passes: (Option<f64>, Option<f64>),
+}
+
+impl ShrunkSummary {
+    /// Number of other objects left.
+    pub fn others(&self) -> usize {
+        self.run.objects.iter().filter(|object| object.role.is_bystander()).count()
+    }
+}

@@ -1,0 +1,23 @@
+//! Flat tables with one record a row, for CSV, JSON and the terminal; one file for each summary.
+//!
+//! Never: computes what it prints (see `summary`), or writes to a stream.
+
+mod answer;
+mod campaign;
+mod compare;
+mod findings;
+mod health;
+mod oracles;
+mod recheck;
+mod render;
+mod shrunk;
+
+pub use answer::answer_table;
+pub use campaign::campaign_table;
+pub use compare::compare_table;
+pub use findings::{findings_table, maps_table};
+pub use health::health_table;
+pub use oracles::oracles_table;
+pub use recheck::recheck_table;
+pub use render::{Table, TableFormat};
+pub use shrunk::with_shrunk;

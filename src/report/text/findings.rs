@@ -1,0 +1,268 @@
+//! Findings of the analysis for the terminal.
+
+use std::fmt::Write as _;
+
+use crate::summary::percent;
+use crate::text::{ruled, scene_rule};
+use crate::{FindingsSummary, PropertyReport, Proportion};
+use actcheck_analysis::{Judged, Pattern, TwoWay, TwoWayCell};
+use actcheck_base::{Outcome, names};
+use actcheck_verdict::Counts;
+
+/// Maximum number of runs or scenes listed in one line; `--format json` has all.
+const MAX_LISTED: usize = 8;
+/// Maximum number of failure modes and of cascades listed.
+const MAX_LINES: usize = 10;
+/// Shades of heat map cells, by failure rate in steps of 20 %.
+const SHADES: [char; 5] = ['·', '░', '▒', '▓', '█'];
+
+/// Formats counts, failure modes and cascades, then each property with its patterns, margins, trend, flaky scenes and
+/// heat maps.
+pub fn findings_text(summary: &FindingsSummary) -> String {
+    let mut out = String::new();
+    let campaigns = list(summary.campaigns.iter().map(String::as_str));
+    let plural = if summary.campaigns.len() == 1 { "" } else { "s" };
+    let _ = writeln!(out, "{} runs of {} campaign{plural} ({campaigns})", summary.runs, summary.campaigns.len());
+    let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
+    modes(&mut out, summary);
+    cascades(&mut out, summary);
+    for report in &summary.properties {
+        property(&mut out, report, summary);
+    }
+    out
+}
+
+fn counts(counts: Counts) -> String {
+    Outcome::ALL.map(|outcome| format!("{} {outcome}", counts.get(outcome))).join(", ")
+}
+
+fn list<'a>(ids: impl ExactSizeIterator<Item = &'a str>) -> String {
+    let more = ids.len().saturating_sub(MAX_LISTED);
+    let shown: Vec<&str> = ids.take(MAX_LISTED).collect();
+    let rest = if more > 0 { format!(", … ({more} more)") } else { String::new() };
+    format!("{}{rest}", shown.join(", "))
+}
+
+fn modes(out: &mut String, summary: &FindingsSummary) {
+    if summary.modes.is_empty() {
+        return;
+    }
+    out.push_str("\nfailure modes\n");
+    let mut table = ruled();
+    table.set_header(["share", "runs", "failed properties", "example"]);
+    for mode in summary.modes.iter().take(MAX_LINES) {
+        let failed: Vec<&str> = mode.failed.iter().map(|iri| names::local(iri)).collect();
+        let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
+        let share =
+            format!("{} [{:.0}–{:.0}]", percent(mode.share.rate), mode.share.low * 100.0, mode.share.high * 100.0);
+        table.add_row([share, mode.runs.len().to_string(), failed, mode.runs.first().cloned().unwrap_or_default()]);
+    }
+    let _ = writeln!(out, "{table}");
+    rest(out, summary.modes.len());
+}
+
+fn rest(out: &mut String, all: usize) {
+    if all > MAX_LINES {
+        let _ = writeln!(out, "and {} more (--format json has all)", all - MAX_LINES);
+    }
+}
+
+fn cascades(out: &mut String, summary: &FindingsSummary) {
+    if summary.cascades.is_empty() {
+        return;
+    }
+    out.push_str("\ncascades\n");
+    let name = |of: &Judged| format!("{} ({} {})", names::local(&of.property), of.step, names::local(&of.action));
+    for cascade in summary.cascades.iter().take(MAX_LINES) {
+        let table = cascade.table;
+        let share = |failed: u64, of: u64| if of == 0 { "none".to_owned() } else { percent(failed as f64 / of as f64) };
+        let _ = writeln!(
+            out,
+            "if {} fails, {} fails in {} of {} runs; if it passes, in {} of {} (adjusted p {})",
+            name(&cascade.first),
+            name(&cascade.later),
+            share(table.failed_in, table.failed_in + table.passed_in),
+            table.failed_in + table.passed_in,
+            share(table.failed_out, table.failed_out + table.passed_out),
+            table.failed_out + table.passed_out,
+            probability(cascade.q)
+        );
+    }
+    rest(out, summary.cascades.len());
+}
+
+fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
+    let found = &report.findings;
+    let _ = write!(out, "\n{} ({}): ", report.name(), names::local(&found.action));
+    match Proportion::new(found.counts.failed, found.counts.decided()) {
+        Some(share) => {
+            let _ = writeln!(out, "fails in {share}");
+        }
+        None => out.push_str("was never decided\n"),
+    }
+    let undecided = found.counts.total() - found.counts.decided();
+    if undecided > 0 {
+        let _ = writeln!(out, "  {}", counts(found.counts));
+    }
+    if found.counts.failed > 0 {
+        patterns(out, report, summary);
+    }
+    margins(out, report);
+    trend(out, report);
+    if !report.flaky.is_empty() {
+        let scenes: Vec<String> = report
+            .flaky
+            .iter()
+            .map(|scene| format!("{} scene {} ({} of {} passed)", scene.campaign, scene.scene, scene.passed, scene.of))
+            .collect();
+        let (flaky, all) = (scenes.len(), report.repeated_scenes);
+        let _ = writeln!(out, "  flaky in {flaky} of {all} scenes: {}", list(scenes.iter().map(String::as_str)));
+    }
+    report.maps.iter().for_each(|shown| map(out, shown));
+}
+
+fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
+    let (found, patterns) = (&report.findings, &report.findings.patterns);
+    for (number, pattern) in patterns.confirmed().enumerate() {
+        let _ = writeln!(out, "  {}. {}", number + 1, report.sentence(pattern));
+        evidence(out, report, pattern);
+        more(out, report, pattern, (number + 1, summary));
+    }
+    let confirmed = patterns.confirmed().count();
+    if confirmed == 0 {
+        out.push_str("  no condition on the scenes is significantly associated with its failures\n");
+    }
+    let unconfirmed = patterns.patterns.len() - confirmed;
+    if unconfirmed > 0 {
+        let _ =
+            writeln!(out, "  {unconfirmed} more were not confirmed on the held-out runs (--format json lists them)");
+    }
+    if patterns.tried == 0 {
+        let _ =
+            writeln!(out, "  (too few runs failed, or passed, to search for one; {} were held out)", patterns.held_out);
+        return;
+    }
+    let _ = writeln!(
+        out,
+        "  (tried {} conditions, up to {} combined, on {} parameters of {} runs; {} were held out to confirm; level {})",
+        patterns.tried,
+        patterns.depth,
+        patterns.parameters,
+        patterns.runs - patterns.held_out,
+        patterns.held_out,
+        summary.level
+    );
+    if patterns.depth == 3 && patterns.combined < patterns.parameters {
+        let _ = writeln!(out, "  (combinations of three only use the {} most promising parameters)", patterns.combined);
+    }
+    if found.twins + found.repeated > 0 {
+        let _ = writeln!(
+            out,
+            "  ({} runs are bit-for-bit duplicates of a later one, {} repeat the scene of an earlier one: each counts once)",
+            found.twins, found.repeated
+        );
+    }
+    if found.weighted_runs > 0 {
+        let _ = writeln!(
+            out,
+            "  (a search chose the scenes of {} runs: rates describe these runs, not the configured ranges)",
+            found.weighted_runs
+        );
+    }
+}
+
+fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
+    let held_out = pattern.held_out;
+    let _ = writeln!(
+        out,
+        "     {:.1} times as often as all runs; WRAcc {:.3}; p {}, adjusted {}; held out: {} of {} fail, p {}",
+        pattern.lift,
+        pattern.wracc,
+        probability(pattern.p),
+        probability(pattern.q),
+        held_out.failed_in,
+        held_out.failed_in + held_out.passed_in,
+        probability(pattern.p_held_out)
+    );
+    let _ = writeln!(out, "     runs: {}", list(report.runs(pattern).into_iter()));
+}
+
+/// Writes the command that generates more scenes of a pattern.
+fn more(out: &mut String, report: &PropertyReport, pattern: &Pattern, (number, summary): (usize, &FindingsSummary)) {
+    let parameters = &report.findings.input.parameters;
+    if scene_rule(&pattern.conditions, parameters, "").is_ok() {
+        let _ = writeln!(
+            out,
+            "     more such scenes: {} analyse --property {} --scene-rule {number}{} > more.rls, and `require = \"more.rls\"` under \
+             `[scene]` of a configuration in the same folder",
+            summary.program,
+            report.name(),
+            summary.options
+        );
+    }
+}
+
+/// Formats a probability, such as `0.030` or `2e-7`.
+fn probability(p: f64) -> String {
+    match p {
+        p if p <= 0.0 => "< 1e-300".to_owned(),
+        p if p < 0.001 => format!("{p:.0e}"),
+        p => format!("{p:.3}"),
+    }
+}
+
+fn margins(out: &mut String, report: &PropertyReport) {
+    if let Some(margins) = report.findings.margins {
+        let unit = report.unit.as_deref().unwrap_or("");
+        let _ = writeln!(
+            out,
+            "  margin {unit}: min {:.4}, 5 % {:.4}, 25 % {:.4}, median {:.4}, 75 % {:.4}, 95 % {:.4}, max {:.4}",
+            margins.least, margins.p05, margins.p25, margins.p50, margins.p75, margins.p95, margins.most
+        );
+    }
+}
+
+fn trend(out: &mut String, report: &PropertyReport) {
+    let points = &report.trend.points;
+    if points.len() < 2 {
+        return;
+    }
+    let shown: Vec<String> = points
+        .iter()
+        .map(|point| format!("{} {}", point.campaign, percent(point.failed as f64 / point.runs.max(1) as f64)))
+        .collect();
+    let _ = writeln!(out, "  over campaigns: {}", list(shown.iter().map(String::as_str)));
+    for change in &report.trend.changes {
+        let _ = writeln!(
+            out,
+            "  changed at {}: from {} to {} (adjusted p {})",
+            points[change.at].campaign,
+            percent(change.before.rate),
+            percent(change.behind.rate),
+            probability(change.p)
+        );
+    }
+}
+
+fn map(out: &mut String, map: &TwoWay) {
+    let (down, across) = (map.by.first().map_or("", String::as_str), map.by.get(1).map_or("", String::as_str));
+    let title = if across.is_empty() { down.to_owned() } else { format!("{down} (down) and {across} (across)") };
+    let _ = writeln!(out, "\n  failures by {title}");
+    let mut table = ruled();
+    table.set_header(std::iter::once(String::new()).chain(map.across.iter().cloned()));
+    for (label, cells) in map.down.iter().zip(&map.cells) {
+        table.add_row(std::iter::once(label.clone()).chain(cells.iter().map(shaded)));
+    }
+    let _ = writeln!(out, "{table}");
+}
+
+/// Formats a heat map cell, such as `▒ 45 % of 40`.
+fn shaded(cell: &TwoWayCell) -> String {
+    match cell.failing {
+        None => String::new(),
+        Some(failing) => {
+            let shade = SHADES[((failing.rate * SHADES.len() as f64) as usize).min(SHADES.len() - 1)];
+            format!("{shade} {} of {}", percent(failing.rate), cell.runs)
+        }
+    }
+}

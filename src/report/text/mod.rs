@@ -1,0 +1,30 @@
+//! Reports for the terminal, one file for each summary; and rules for scenes, which are text too.
+//!
+//! Never: computes what it prints (see `summary`), or writes to a stream.
+
+mod by_action;
+mod campaign;
+mod case;
+mod compare;
+mod findings;
+mod health;
+mod oracles;
+mod recheck;
+mod repeated;
+mod ruled;
+mod run;
+mod scene_rule;
+mod shrunk;
+mod weighted;
+
+pub use campaign::campaign_text;
+pub use case::{case_text, regressions_text};
+pub use compare::compare_text;
+pub use findings::findings_text;
+pub use health::{health_lines, health_text};
+pub use oracles::oracles_text;
+pub use recheck::recheck_text;
+pub(crate) use ruled::ruled;
+pub use run::run_text;
+pub use scene_rule::scene_rule;
+pub use shrunk::shrunk_text;

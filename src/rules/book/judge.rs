@@ -1,0 +1,191 @@
+//! The rules of an ontology, prepared once and used by every worker for every run.
+
+use std::collections::BTreeMap;
+
+use crate::engine::budget::Budget;
+use crate::engine::evaluate::{Layers, Planned, Tables, evaluate, fault};
+use crate::engine::load::Given;
+use crate::engine::meter::Meter;
+use crate::engine::plan::Indexes;
+use crate::engine::reading::{Verdict, findings};
+use crate::model::program::{Predicates, Scope};
+use crate::model::universe::Universe;
+#[cfg(feature = "sparql")]
+use crate::sparql::{dataset::Statements, query::Query, snapshot::snapshot};
+use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Terms};
+
+/// Every property's rules with the libraries, parsed, checked and planned. Shared between threads.
+///
+/// The libraries are evaluated once for an action, then each property. For the rules of one property,
+/// [`Rules`](crate::Rules) is simpler.
+///
+/// ```
+/// use actcheck_base::Source;
+/// use actcheck_ontology::{Ontology, Property, RuleFile};
+/// use actcheck_rules::{Budget, Facts, RuleBook};
+///
+/// let mut ontology = Ontology::default();
+/// for (iri, text) in [
+///     ("http://example.org/onTable", "success(?x) :- after(?x, <http://example.org/on>, <http://example.org/table>) ."),
+///     ("http://example.org/allDry", "violation(?x) :- after(?x, <http://example.org/wet>, true) ."),
+/// ] {
+///     let rule = RuleFile::new(Source::new(format!("{iri}.rls"), text));
+///     ontology.properties.insert(iri.to_owned(), Property::new(iri, rule));
+/// }
+/// let book = RuleBook::prepare(&ontology)?;
+///
+/// let facts = Facts::from_turtle("@prefix : <http://example.org/> . :cup :on :table ; :wet true .")?;
+/// let properties: Vec<String> = ontology.properties.keys().cloned().collect();
+/// let findings = book.judge(&facts.as_action(), &properties, &Budget::default());
+/// let holds = |iri: &str| findings[iri].as_ref().map(|found| found.holds);
+/// assert_eq!(holds("http://example.org/onTable"), Ok(true));
+/// assert_eq!(holds("http://example.org/allDry"), Ok(false));
+/// # Ok::<(), actcheck_base::Diagnostics>(())
+/// ```
+pub struct RuleBook {
+    pub(crate) terms: Terms,
+    pub(crate) predicates: Predicates,
+    pub(crate) indexes: Indexes,
+    pub(crate) given: Given,
+    /// Tuples of the rules that read only the ontology, evaluated when the book is prepared.
+    pub(crate) fixed: Tables,
+    /// The ontology statements that rules read, without derived tuples.
+    pub(crate) fixed_facts: Tables,
+    pub(crate) fixed_rules: Planned,
+    pub(crate) libraries: Planned,
+    pub(crate) properties: BTreeMap<String, Judge>,
+    /// The ontology's statements, for queries.
+    #[cfg(feature = "sparql")]
+    pub(crate) statements: Statements,
+    pub(crate) warnings: Diagnostics,
+}
+
+impl std::fmt::Debug for RuleBook {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RuleBook").field("properties", &self.properties.keys()).finish_non_exhaustive()
+    }
+}
+
+/// The prepared rules of one property.
+pub(crate) struct Judge {
+    pub(crate) digest: String,
+    pub(crate) label: String,
+    pub(crate) rules: JudgeRules,
+}
+
+/// Rules by language.
+pub(crate) enum JudgeRules {
+    Datalog {
+        planned: Box<Planned>,
+        verdict: Verdict,
+        /// Scope of the file's predicates.
+        scope: Scope,
+        /// Prefixes that the file declares.
+        prefixes: Vec<(String, String)>,
+    },
+    #[cfg(feature = "sparql")]
+    Sparql(Box<Query>),
+}
+
+impl RuleBook {
+    /// Judges an action by the given properties (IRIs). Evaluates the libraries once, then each property.
+    ///
+    /// A property that exceeds the budget or meets an invalid value gets a fault instead of findings. The others are
+    /// not affected.
+    pub fn judge(
+        &self,
+        facts: &ActionFacts<'_>,
+        properties: &[String],
+        budget: &Budget,
+    ) -> BTreeMap<String, Result<Findings, RuleFault>> {
+        let mut universe = Universe::new(&self.terms, Some(facts.terms));
+        let derived = match self.enriched(facts, &mut universe, budget) {
+            Ok(derived) => derived,
+            Err(fault) => return properties.iter().map(|iri| (iri.clone(), Err(fault.clone()))).collect(),
+        };
+        #[cfg(feature = "sparql")]
+        let graphs = std::cell::OnceCell::new();
+        let mut results = BTreeMap::new();
+        for iri in properties {
+            let result = match self.properties.get(iri) {
+                None => Err(RuleFault::Value(format!("unknown property {iri}"))),
+                Some(Judge { rules: JudgeRules::Datalog { planned, verdict, .. }, .. }) => {
+                    self.datalog(planned, verdict, &derived, &mut universe, budget)
+                }
+                #[cfg(feature = "sparql")]
+                Some(Judge { rules: JudgeRules::Sparql(query), .. }) => {
+                    let graphs =
+                        graphs.get_or_init(|| snapshot(&self.given, &self.statements, facts, &derived, &mut universe));
+                    query.judge(&self.statements, graphs, &universe, budget)
+                }
+            };
+            results.insert(iri.clone(), result);
+        }
+        results
+    }
+
+    /// Judges the state before an action as if it were also the state after. If a property already holds there, its
+    /// success proves nothing about the action.
+    pub fn held_before(
+        &self,
+        facts: &ActionFacts<'_>,
+        properties: &[String],
+        budget: &Budget,
+    ) -> BTreeMap<String, Result<Findings, RuleFault>> {
+        let unchanged = ActionFacts { after: facts.before, during: &[], ..*facts };
+        self.judge(&unchanged, properties, budget)
+    }
+
+    /// Returns whether a property requires a result (`success`, `ASK`); otherwise it forbids an event (`violation`,
+    /// `SELECT`).
+    ///
+    /// A forbidden event can't have happened before the action, so that such a property held before is not informative.
+    pub fn states_success(&self, property: &str) -> bool {
+        match self.properties.get(property).map(|judge| &judge.rules) {
+            Some(JudgeRules::Datalog { verdict, .. }) => verdict.decisive.as_ref().is_some_and(|it| it.positive),
+            #[cfg(feature = "sparql")]
+            Some(JudgeRules::Sparql(query)) => query.asks,
+            None => false,
+        }
+    }
+
+    /// Returns the digest of a property's rule file and all libraries; empty for an unknown property.
+    pub fn digest(&self, property: &str) -> &str {
+        self.properties.get(property).map_or("", |judge| &judge.digest)
+    }
+
+    /// Returns the warnings about the rules.
+    pub fn warnings(&self) -> &Diagnostics {
+        &self.warnings
+    }
+
+    /// Returns the facts of an action with the tuples that the libraries derive from them.
+    pub(crate) fn enriched(
+        &self,
+        facts: &ActionFacts<'_>,
+        universe: &mut Universe<'_>,
+        budget: &Budget,
+    ) -> Result<Tables, RuleFault> {
+        let own = self.given.load(facts, universe, &self.predicates, &self.indexes);
+        let mut layers = Layers { own, below: vec![&self.fixed] };
+        let mut meter = Meter::new(budget);
+        evaluate(&self.libraries, &self.predicates, &self.indexes, &mut layers, universe, &mut meter)
+            .map_err(|stopped| fault(&meter, stopped, &self.libraries))?;
+        Ok(layers.own)
+    }
+
+    fn datalog(
+        &self,
+        planned: &Planned,
+        verdict: &Verdict,
+        derived: &Tables,
+        universe: &mut Universe<'_>,
+        budget: &Budget,
+    ) -> Result<Findings, RuleFault> {
+        let mut layers = Layers { own: Tables::default(), below: vec![derived, &self.fixed] };
+        let mut meter = Meter::new(budget);
+        evaluate(planned, &self.predicates, &self.indexes, &mut layers, universe, &mut meter)
+            .map_err(|stopped| fault(&meter, stopped, planned))?;
+        findings(verdict, &layers, universe)
+    }
+}

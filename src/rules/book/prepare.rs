@@ -1,0 +1,322 @@
+//! Prepares the rule book of an ontology: parses and checks every file, drops unused rules and plans the rest.
+
+use std::collections::BTreeMap;
+#[cfg(feature = "sparql")]
+use std::collections::BTreeSet;
+
+use crate::book::judge::{Judge, JudgeRules, RuleBook};
+use crate::book::owl::owl_closure_within;
+use crate::book::parts::{extend, gather_state, needed, split_fixed};
+use crate::check::checking::{Checking, Role, unique, used_names};
+use crate::check::ranges::Ranges;
+use crate::check::stratify::stratify;
+use crate::check::units::Units;
+use crate::engine::budget::Budget;
+use crate::engine::evaluate::{Layers, Planned, Tables, evaluate, fault};
+use crate::engine::load::Given;
+use crate::engine::meter::Meter;
+use crate::engine::plan::Indexes;
+use crate::engine::reading::Verdict;
+use crate::model::given::Phases;
+use crate::model::program::{Predicates, Program};
+use crate::model::universe::Universe;
+#[cfg(feature = "sparql")]
+use crate::sparql::{dataset::Statements, query::Query};
+use crate::syntax::{Syntax, parse};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, TermId, Terms};
+use actcheck_ontology::{Ontology, Property, RuleLanguage};
+
+impl RuleBook {
+    /// Parses, checks and plans the rule file of every property with all libraries.
+    ///
+    /// # Errors
+    /// All errors of all files, each with its place.
+    pub fn prepare(ontology: &Ontology) -> Result<Self, Diagnostics> {
+        Self::prepare_within(ontology, &Budget::default())
+    }
+
+    /// Like [`RuleBook::prepare`], with a budget for each evaluation over the ontology alone.
+    ///
+    /// # Errors
+    /// All errors of all files, each with its place, or an exceeded budget.
+    pub fn prepare_within(ontology: &Ontology, budget: &Budget) -> Result<Self, Diagnostics> {
+        Preparing::within(budget).run(ontology)
+    }
+}
+
+/// The state of preparing a book.
+#[derive(Default)]
+pub(crate) struct Preparing {
+    terms: Terms,
+    diagnostics: Diagnostics,
+    /// Properties that libraries derive in the snapshots. Queries may use them.
+    #[cfg(feature = "sparql")]
+    derived: BTreeSet<String>,
+    /// Budget of each evaluation over the ontology alone.
+    budget: Budget,
+}
+
+impl Preparing {
+    pub(crate) fn within(budget: &Budget) -> Self {
+        Self { budget: budget.clone(), ..Self::default() }
+    }
+
+    pub(crate) fn run(mut self, ontology: &Ontology) -> Result<RuleBook, Diagnostics> {
+        let phases = Phases::intern(&mut self.terms);
+        let (libraries, properties) = self.parse(ontology);
+        let vocabulary = Some(&ontology.vocabulary).filter(|vocabulary| !vocabulary.terms.is_empty());
+        let mut checking = Checking::new(&mut self.terms, vocabulary);
+        for syntax in &libraries {
+            checking.define(syntax, Role::Library);
+        }
+        for (scope, _, syntax) in &properties {
+            checking.define(syntax, Role::Property(*scope));
+        }
+        let mut library = Program::default();
+        for syntax in &libraries {
+            extend(&mut library, checking.rules(syntax, Role::Library));
+        }
+        let mut programs = BTreeMap::new();
+        for (scope, _, syntax) in &properties {
+            programs.insert(*scope, checking.rules(syntax, Role::Property(*scope)));
+            warn_unused(&mut checking, syntax, *scope);
+        }
+        let (mut predicates, split, found) = (checking.predicates, checking.split, checking.diagnostics);
+        #[cfg(feature = "sparql")]
+        {
+            self.derived = checking.derived_terms;
+        }
+        self.diagnostics.extend(found);
+        self.types_and_units(ontology, &library, &programs, &properties, &predicates);
+        if split {
+            library.rules.extend(gather_state(&mut predicates));
+        }
+        self.assemble(ontology, phases, library, programs, &properties, predicates)
+    }
+
+    /// Parses all libraries and all Datalog properties. Each property gets a scope, numbered from 1.
+    fn parse<'o>(&mut self, ontology: &'o Ontology) -> (Vec<Syntax>, Vec<(usize, &'o Property, Syntax)>) {
+        let mut libraries = Vec::new();
+        for file in &ontology.libraries {
+            if file.language == RuleLanguage::Sparql {
+                let help = "write it in Datalog, in a file that ends in `.rls`";
+                self.diagnostics.push(
+                    Diagnostic::error("R034", "a rule library can't be a SPARQL query")
+                        .in_source(&file.source)
+                        .help(help),
+                );
+                continue;
+            }
+            let (syntax, found) = parse(&file.source);
+            self.diagnostics.extend(found);
+            libraries.push(syntax);
+        }
+        let mut properties = Vec::new();
+        for (idx, property) in ontology.properties.values().enumerate() {
+            if property.rule.language == RuleLanguage::Datalog {
+                let (syntax, found) = parse(&property.rule.source);
+                self.diagnostics.extend(found);
+                properties.push((idx + 1, property, syntax));
+            }
+        }
+        (libraries, properties)
+    }
+
+    fn assemble(
+        mut self,
+        ontology: &Ontology,
+        phases: Phases,
+        library: Program,
+        mut programs: BTreeMap<usize, Program>,
+        syntaxes: &[(usize, &Property, Syntax)],
+        predicates: Predicates,
+    ) -> Result<RuleBook, Diagnostics> {
+        let triples = self.closed(ontology);
+        let mut indexes = Indexes::new(&predicates);
+        let has_sparql = ontology.properties.values().any(|p| p.rule.language == RuleLanguage::Sparql);
+        let library = self.stratified(library, &predicates);
+        let library = needed(library, programs.values(), has_sparql, &predicates);
+        let (fixed, moving) = split_fixed(library, &predicates);
+        let fixed = self.plan(fixed, &predicates, &mut indexes);
+        let libraries = self.plan(moving, &predicates, &mut indexes);
+        let mut properties = self.queries(ontology);
+        for (scope, property, syntax) in syntaxes {
+            let program = programs.remove(scope).unwrap_or_default();
+            let verdict = Verdict::new(&program, &predicates, *scope);
+            let planned = Box::new(self.plan(program, &predicates, &mut indexes));
+            let rules = JudgeRules::Datalog { planned, verdict, scope: *scope, prefixes: syntax.prefixes.clone() };
+            properties.insert(property.iri.clone(), judge(ontology, property, rules));
+        }
+        self.diagnostics = unique(self.diagnostics);
+        if self.diagnostics.has_errors() {
+            return Err(self.diagnostics);
+        }
+        let given = Given::new(&predicates, phases);
+        let own = given.load_ontology(&triples, &predicates, &indexes);
+        let fixed_facts = given.load_ontology(&triples, &predicates, &indexes);
+        #[cfg(feature = "sparql")]
+        let statements = Statements::new(if has_sparql { &triples } else { &[] }, &mut self.terms);
+        let fixed_tables = self.close_fixed(&fixed, own, &predicates, &indexes)?;
+        Ok(RuleBook {
+            terms: self.terms,
+            predicates,
+            indexes,
+            given,
+            fixed: fixed_tables,
+            fixed_facts,
+            fixed_rules: fixed,
+            libraries,
+            properties,
+            #[cfg(feature = "sparql")]
+            statements,
+            warnings: self.diagnostics,
+        })
+    }
+
+    /// Reports impossible values and mismatched units in the libraries and in every property.
+    fn types_and_units(
+        &mut self,
+        ontology: &Ontology,
+        library: &Program,
+        programs: &BTreeMap<usize, Program>,
+        properties: &[(usize, &Property, Syntax)],
+        predicates: &Predicates,
+    ) {
+        let ranges = Ranges::new(ontology);
+        for program in std::iter::once(library).chain(programs.values()) {
+            ranges.check(&program.rules, predicates, &self.terms, &mut self.diagnostics);
+        }
+        let mut units = Units::new(predicates, &ontology.vocabulary, &self.terms);
+        units.learn(&library.rules);
+        units.check(&library.rules, &mut self.diagnostics);
+        for (scope, property, _) in properties {
+            let Some(program) = programs.get(scope) else { continue };
+            units.learn(&program.rules);
+            units.check(&program.rules, &mut self.diagnostics);
+            if let (Some(margin), Some(unit)) = (predicates.find(*scope, "margin", None), &property.unit) {
+                units.check_margin(&program.rules, margin, unit, &mut self.diagnostics);
+            }
+        }
+    }
+
+    /// Returns the ontology's statements with their OWL 2 RL closure.
+    fn closed(&mut self, ontology: &Ontology) -> Vec<[TermId; 3]> {
+        // Without statements, only the axioms of OWL itself follow.
+        if ontology.triples.is_empty() {
+            return Vec::new();
+        }
+        let closed = owl_closure_within(&ontology.triples, &self.budget).unwrap_or_else(|found| {
+            self.diagnostics.extend(found);
+            Vec::new()
+        });
+        closed.into_iter().map(|triple| triple.map(|term| self.terms.intern(term))).collect()
+    }
+
+    /// Prepares the SPARQL properties.
+    #[cfg(feature = "sparql")]
+    fn queries(&mut self, ontology: &Ontology) -> BTreeMap<String, Judge> {
+        let mut judges = BTreeMap::new();
+        for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
+            match Query::prepare(&property.rule.source, ontology, &self.derived) {
+                Ok(query) => {
+                    let rules = JudgeRules::Sparql(Box::new(query));
+                    judges.insert(property.iri.clone(), judge(ontology, property, rules));
+                }
+                Err(found) => self.diagnostics.extend(found),
+            }
+        }
+        judges
+    }
+
+    /// Reports the SPARQL properties, which need the feature `sparql`.
+    #[cfg(not(feature = "sparql"))]
+    fn queries(&mut self, ontology: &Ontology) -> BTreeMap<String, Judge> {
+        for property in ontology.properties.values().filter(|p| p.rule.language == RuleLanguage::Sparql) {
+            let message = format!("`{}` is a SPARQL query, which this build can't evaluate", property.rule.path);
+            let help = "build `actcheck-rules` with the feature `sparql`, or write the property in Datalog (`.rls`)";
+            let diagnostic = Diagnostic::error("R062", message).in_source(&property.rule.source).help(help);
+            self.diagnostics.push(diagnostic);
+        }
+        BTreeMap::new()
+    }
+
+    /// Checks that the whole library can be stratified, including unused rules. Returns an empty program if it can't.
+    fn stratified(&mut self, library: Program, predicates: &Predicates) -> Program {
+        match stratify(&library.rules, predicates, &Universe::new(&self.terms, None)) {
+            Ok(_) => library,
+            Err(found) => {
+                self.diagnostics.extend(found);
+                Program::default()
+            }
+        }
+    }
+
+    fn plan(&mut self, program: Program, predicates: &Predicates, indexes: &mut Indexes) -> Planned {
+        let universe = Universe::new(&self.terms, None);
+        match stratify(&program.rules, predicates, &universe) {
+            Ok(strata) => Planned::new(program, strata, indexes, &|_| None),
+            Err(found) => {
+                self.diagnostics.extend(found);
+                Planned::new(Program::default(), Vec::new(), indexes, &|_| None)
+            }
+        }
+    }
+
+    /// Evaluates the rules that depend on the ontology only. Terms created here become terms of the book.
+    fn close_fixed(
+        &mut self,
+        fixed: &Planned,
+        own: Tables,
+        predicates: &Predicates,
+        indexes: &Indexes,
+    ) -> Result<Tables, Diagnostics> {
+        let book = self.terms.clone();
+        let mut universe = Universe::new(&book, None);
+        let mut layers = Layers { own, below: Vec::new() };
+        let mut meter = Meter::new(&self.budget);
+        if let Err(stopped) = evaluate(fixed, predicates, indexes, &mut layers, &mut universe, &mut meter) {
+            let message = fault(&meter, stopped, fixed).to_string();
+            let help = "rules that read only the ontology must finish within this budget";
+            self.diagnostics.push(Diagnostic::error("R090", message).help(help));
+            return Err(std::mem::take(&mut self.diagnostics));
+        }
+        // Created terms follow the book's terms in the same order, so their ids stay valid.
+        for term in universe.into_created() {
+            self.terms.intern(term);
+        }
+        Ok(layers.own)
+    }
+}
+
+fn judge(ontology: &Ontology, property: &Property, rules: JudgeRules) -> Judge {
+    let mut digest = Digest::new();
+    digest.update(property.rule.digest.as_bytes());
+    for library in &ontology.libraries {
+        digest.update(library.path.as_bytes());
+        digest.update(library.digest.as_bytes());
+    }
+    Judge { digest: digest.finish(), label: property.label.clone(), rules }
+}
+
+/// Warns about predicates of a property's file that no rule reads and that are not part of the verdict.
+fn warn_unused(checking: &mut Checking<'_>, syntax: &Syntax, scope: usize) {
+    let used = used_names(syntax);
+    let verdict = crate::model::given::VERDICT.map(|(name, _)| name);
+    let mut unused = BTreeMap::new();
+    for statement in &syntax.statements {
+        if let crate::syntax::Statement::Rule(rule) = statement {
+            for head in &rule.heads {
+                if !used.contains(head.predicate.as_str()) && !verdict.contains(&head.predicate.as_str()) {
+                    unused.entry(head.predicate.clone()).or_insert(head.name_span.clone());
+                }
+            }
+        }
+    }
+    for (name, span) in unused {
+        let known = checking.defined.contains_key(&(scope, name.clone()));
+        if known {
+            let help = actcheck_base::did_you_mean(&name, verdict);
+            checking.warning("R040", &syntax.source, &span, format!("`{name}` is never used"), help);
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Syntax trees to checked rules: names, arities, safety, units, ranges and strata. All errors are reported at once.
+//!
+//! Never: reads a fact, or evaluates a rule.
+
+pub(crate) mod checking;
+mod expressions;
+pub(crate) mod options;
+mod predicates;
+pub(crate) mod ranges;
+mod safety;
+pub(crate) mod stratify;
+mod translate;
+pub(crate) mod units;

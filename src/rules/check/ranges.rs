@@ -1,0 +1,121 @@
+//! Reports conditions that no fact can satisfy, because the ontology declares another type for the property's values.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::model::expression::{Expr, Variable};
+use crate::model::program::{Atom, Literal, Operand, Predicates, Rule};
+use crate::syntax::Comparison;
+use actcheck_base::{Diagnostic, Diagnostics, Term, TermId, Terms, names};
+use actcheck_ontology::Ontology;
+
+/// The types of property values, as declared by the ontology.
+pub(crate) struct Ranges {
+    datatypes: BTreeMap<String, String>,
+    /// Object properties: their values are individuals.
+    of_things: BTreeSet<String>,
+}
+
+/// Literal types used in facts: a constant of another type never equals a fact's value.
+const TYPES: [&str; 4] = ["double", "integer", "boolean", "string"];
+
+impl Ranges {
+    pub(crate) fn new(ontology: &Ontology) -> Self {
+        let (range, kind) = (format!("{}range", names::RDFS), format!("{}type", names::RDF));
+        let things = format!("{}ObjectProperty", names::OWL);
+        let mut ranges = Self { datatypes: BTreeMap::new(), of_things: BTreeSet::new() };
+        for [s, p, o] in &ontology.triples {
+            let (Some(s), Some(p), Some(o)) = (s.as_iri(), p.as_iri(), o.as_iri()) else { continue };
+            if p == range && o.strip_prefix(names::XSD).is_some_and(|local| TYPES.contains(&local)) {
+                ranges.datatypes.insert(s.to_owned(), o.to_owned());
+            } else if p == kind && o == things {
+                ranges.of_things.insert(s.to_owned());
+            }
+        }
+        ranges
+    }
+
+    /// Reports `R043` for each condition that can't hold.
+    pub(crate) fn check(&self, rules: &[Rule], predicates: &Predicates, terms: &Terms, diagnostics: &mut Diagnostics) {
+        for rule in rules {
+            // The property that each variable gets its value from, with its datatype.
+            let mut typed: BTreeMap<Variable, (&str, &str)> = BTreeMap::new();
+            for atom in rule.body.iter().filter_map(Literal::atom) {
+                let Some(property) = self.property(atom, predicates, terms) else { continue };
+                match (atom.args.last(), self.datatypes.get(property)) {
+                    (Some(Operand::Constant(id)), datatype) => {
+                        self.constant(rule, property, datatype.map(String::as_str), terms.term(*id), atom, diagnostics);
+                    }
+                    (Some(Operand::Variable(variable)), Some(datatype)) => {
+                        typed.insert(*variable, (property, datatype));
+                    }
+                    _ => {}
+                }
+            }
+            for literal in &rule.body {
+                let Literal::Compare { op: Comparison::Equal, left, right, span } = literal else { continue };
+                let ((Expr::Variable(variable), Expr::Constant(term))
+                | (Expr::Constant(term), Expr::Variable(variable))) = (left, right)
+                else {
+                    continue;
+                };
+                if let Some((property, datatype)) = typed.get(variable)
+                    && crate::model::values::datatype(term) != *datatype
+                    && !same_integer(term, datatype)
+                {
+                    let fault = never(property, datatype, term);
+                    diagnostics.push(fault.at(&rule.origin.source, span.clone()));
+                }
+            }
+        }
+    }
+
+    /// Returns the constant property of an atom, or `None` if its property is a variable.
+    fn property<'t>(&self, atom: &Atom, predicates: &Predicates, terms: &'t Terms) -> Option<&'t str> {
+        let property: TermId = predicates.get(atom.predicate).property?;
+        terms.term(property).as_iri()
+    }
+
+    fn constant(
+        &self,
+        rule: &Rule,
+        property: &str,
+        datatype: Option<&str>,
+        term: &Term,
+        atom: &Atom,
+        diagnostics: &mut Diagnostics,
+    ) {
+        let literal = !matches!(term, Term::Iri(_) | Term::Blank(_));
+        let fault = match datatype {
+            Some(datatype) if crate::model::values::datatype(term) != datatype && !same_integer(term, datatype) => {
+                never(property, datatype, term)
+            }
+            None if literal && self.of_things.contains(property) => {
+                let message =
+                    format!("this can never hold: the values of `{}` are individuals", names::shorten(property));
+                Diagnostic::error("R043", message).help("write an individual, such as `obj:glass_1`, or a variable")
+            }
+            _ => return,
+        };
+        diagnostics.push(fault.at(&rule.origin.source, atom.span.clone()));
+    }
+}
+
+/// Returns whether an integer term matches `xsd:integer`: small integers have narrower datatypes.
+fn same_integer(term: &Term, datatype: &str) -> bool {
+    matches!(term, Term::Integer(_)) && datatype.ends_with("#integer")
+}
+
+fn never(property: &str, datatype: &str, term: &Term) -> Diagnostic {
+    let local = names::shorten(datatype);
+    let message =
+        format!("this can never hold: the values of `{}` are {local}, but `{term}` is not", names::shorten(property));
+    let help = match (datatype.rsplit('#').next(), term) {
+        (Some("double"), Term::Integer(value)) => {
+            format!("`=` compares terms: write `{value}.0`, or compare with `<=` and `>=`")
+        }
+        (Some("boolean"), _) => "write `true` or `false`, without quotes".to_owned(),
+        (Some("string"), _) => "write it in double quotes".to_owned(),
+        _ => format!("write a value of type {local}"),
+    };
+    Diagnostic::error("R043", message).help(help)
+}

@@ -1,0 +1,35 @@
+//! Limits on one evaluation.
+
+use actcheck_base::{Diagnostic, RuleFault};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Returns the diagnostic of an interrupted evaluation.
+pub(crate) fn interrupted() -> Diagnostic {
+    Diagnostic::error("R091", RuleFault::Interrupted.to_string())
+}
+
+/// Limits on one evaluation. Change single limits of the default, so that new ones keep their default:
+///
+/// ```
+/// use actcheck_rules::Budget;
+///
+/// let budget = Budget { secs: 0.5, ..Budget::default() };
+/// assert!(budget.tuples > 1_000_000);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Budget {
+    /// Maximum number of derived tuples.
+    pub tuples: usize,
+    /// Wall time. Unit: seconds.
+    pub secs: f64,
+    /// Set by another thread to stop the evaluation, but not before it has run for 0.2 s: short ones are finished.
+    pub stop: Arc<AtomicBool>,
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        // A pick run derives some hundred tuples in under a millisecond, so both limits are far above realistic rules.
+        Self { tuples: 5_000_000, secs: 10.0, stop: Arc::default() }
+    }
+}

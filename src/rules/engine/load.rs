@@ -1,0 +1,139 @@
+//! Loads the facts of one action directly into rows of the given predicates, without an RDF store.
+
+use std::collections::HashMap;
+
+use crate::engine::evaluate::Tables;
+use crate::engine::plan::Indexes;
+use crate::engine::relation::finished;
+use crate::model::given::Phases;
+use crate::model::program::{PredicateId, Predicates};
+use crate::model::universe::Universe;
+use actcheck_base::{ActionFacts, TermId, Triple};
+
+/// The given predicates that the rules read.
+#[derive(Debug, Clone)]
+pub(crate) struct Given {
+    phases: Phases,
+    /// `state` for one property each.
+    state: HashMap<TermId, PredicateId>,
+    /// `state` for any property.
+    any_state: Option<PredicateId>,
+    parameter: Option<PredicateId>,
+    /// `ontology` for one property each.
+    ontology: HashMap<TermId, PredicateId>,
+    any_ontology: Option<PredicateId>,
+}
+
+impl Given {
+    pub(crate) fn new(predicates: &Predicates, phases: Phases) -> Self {
+        let mut given = Self {
+            phases,
+            state: HashMap::new(),
+            any_state: None,
+            parameter: None,
+            ontology: HashMap::new(),
+            any_ontology: None,
+        };
+        for (id, predicate) in predicates.list.iter().enumerate().filter(|(_, predicate)| predicate.given) {
+            match (predicate.name.as_str(), predicate.property) {
+                ("state", Some(property)) => {
+                    given.state.insert(property, id);
+                }
+                ("state", None) => given.any_state = Some(id),
+                ("ontology", Some(property)) => {
+                    given.ontology.insert(property, id);
+                }
+                ("ontology", None) => given.any_ontology = Some(id),
+                _ => given.parameter = Some(id),
+            }
+        }
+        given
+    }
+
+    /// Loads the ontology's statements.
+    pub(crate) fn load_ontology(&self, triples: &[[TermId; 3]], predicates: &Predicates, indexes: &Indexes) -> Tables {
+        let mut rows: HashMap<PredicateId, Vec<TermId>> = HashMap::new();
+        for [s, p, o] in triples {
+            if let Some(predicate) = self.ontology.get(p) {
+                rows.entry(*predicate).or_default().extend([*s, *o]);
+            }
+            if let Some(predicate) = self.any_ontology {
+                rows.entry(predicate).or_default().extend([*s, *p, *o]);
+            }
+        }
+        tables(rows, predicates, indexes)
+    }
+
+    /// Loads an action's facts into the predicates that some rule reads.
+    pub(crate) fn load(
+        &self,
+        facts: &ActionFacts<'_>,
+        universe: &mut Universe<'_>,
+        predicates: &Predicates,
+        indexes: &Indexes,
+    ) -> Tables {
+        let mut rows: Vec<Vec<TermId>> = vec![Vec::new(); predicates.len()];
+        let mut readers = Readers { given: self, of_property: vec![None; facts.terms.len()] };
+        for (phase, triples) in self.graphs(facts) {
+            for [s, p, o] in triples {
+                let reader = readers.of(*p, universe);
+                if let Some(predicate) = reader {
+                    let (s, o) = (universe.of_run(*s), universe.of_run(*o));
+                    rows[predicate].extend([phase, s, o]);
+                }
+                if let Some(predicate) = self.any_state {
+                    let (s, p, o) = (universe.of_run(*s), universe.of_run(*p), universe.of_run(*o));
+                    rows[predicate].extend([phase, s, p, o]);
+                }
+            }
+        }
+        if let Some(predicate) = self.parameter {
+            for [designator, value] in facts.parameters {
+                rows[predicate].extend([universe.of_run(*designator), universe.of_run(*value)]);
+            }
+        }
+        let mut tables = Tables::new(predicates.len());
+        for (predicate, rows) in rows.into_iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
+            tables.set(predicate, finished(predicates.get(predicate).width, rows, indexes.of(predicate).clone()));
+        }
+        tables
+    }
+
+    /// Returns the three snapshots, each with the id of its phase.
+    pub(crate) fn graphs<'a>(&self, facts: &ActionFacts<'a>) -> [(TermId, &'a [Triple]); 3] {
+        [(self.phases.before, facts.before), (self.phases.after, facts.after), (self.phases.during, facts.during)]
+    }
+
+    /// Returns the `state` predicates for single properties, each with its property.
+    #[cfg(feature = "sparql")]
+    pub(crate) fn states(&self) -> impl Iterator<Item = (TermId, PredicateId)> + '_ {
+        self.state.iter().map(|(property, predicate)| (*property, *predicate))
+    }
+
+    /// Returns `state` for any property, or `None` if no rule reads or derives it.
+    #[cfg(feature = "sparql")]
+    pub(crate) fn any_state(&self) -> Option<PredicateId> {
+        self.any_state
+    }
+}
+
+/// Caches which predicate reads the facts of each property of a run.
+struct Readers<'a> {
+    given: &'a Given,
+    of_property: Vec<Option<Option<PredicateId>>>,
+}
+
+impl Readers<'_> {
+    fn of(&mut self, property: TermId, universe: &mut Universe<'_>) -> Option<PredicateId> {
+        let slot = &mut self.of_property[property as usize];
+        *slot.get_or_insert_with(|| self.given.state.get(&universe.of_run(property)).copied())
+    }
+}
+
+fn tables(rows: HashMap<PredicateId, Vec<TermId>>, predicates: &Predicates, indexes: &Indexes) -> Tables {
+    let mut tables = Tables::new(predicates.len());
+    for (predicate, rows) in rows {
+        tables.set(predicate, finished(predicates.get(predicate).width, rows, indexes.of(predicate).clone()));
+    }
+    tables
+}

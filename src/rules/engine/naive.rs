@@ -1,0 +1,136 @@
+//! A naive evaluator that is obviously correct: nested loops over sets, repeated until there are no new tuples.
+//!
+//! It reads the checked rules without their plans, and serves as the test oracle of the fast evaluator.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::check::stratify::Stratum;
+use crate::engine::aggregate::{aggregate, projection};
+use crate::engine::meter::{Meter, Stop};
+use crate::engine::plan::operand_value;
+use crate::model::expression::holds;
+use crate::model::program::{Atom, Literal, Operand, PredicateId, Rule};
+use crate::model::universe::Universe;
+use actcheck_base::{Term, TermId};
+
+/// Tuples by predicate.
+pub(crate) type Sets = BTreeMap<PredicateId, BTreeSet<Vec<TermId>>>;
+
+/// Adds all tuples that the rules derive to `sets`.
+pub(crate) fn close(
+    rules: &[Rule],
+    strata: &[Stratum],
+    sets: &mut Sets,
+    universe: &mut Universe<'_>,
+    meter: &mut Meter,
+) -> Result<(), Stop> {
+    for stratum in strata {
+        loop {
+            let mut new = Vec::new();
+            for rule in stratum.rules.iter().map(|idx| &rules[*idx]) {
+                for row in derive(rule, sets, universe, meter)? {
+                    if !sets.get(&rule.head.predicate).is_some_and(|set| set.contains(&row)) {
+                        new.push((rule.head.predicate, row));
+                    }
+                }
+            }
+            if new.is_empty() {
+                break;
+            }
+            meter.derived(new.len())?;
+            for (predicate, row) in new {
+                sets.entry(predicate).or_default().insert(row);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns all head rows of one rule.
+fn derive(rule: &Rule, sets: &Sets, universe: &mut Universe<'_>, meter: &mut Meter) -> Result<Vec<Vec<TermId>>, Stop> {
+    let mut bindings = Vec::new();
+    let mut binding = vec![None; rule.variables.len()];
+    matches(&rule.body, sets, universe, &mut binding, &mut bindings, meter)?;
+    let complete = |binding: &[Option<TermId>]| binding.iter().map(|id| id.unwrap_or(0)).collect::<Vec<_>>();
+    let width = rule.head.args.len();
+    Ok(match &rule.aggregation {
+        None => bindings
+            .iter()
+            .map(|binding| rule.head.args.iter().map(|arg| operand_value(*arg, &complete(binding))).collect())
+            .collect(),
+        Some(aggregation) => {
+            let operands = projection(aggregation);
+            let rows: Vec<TermId> = bindings
+                .iter()
+                .flat_map(|binding| {
+                    let binding = complete(binding);
+                    operands.iter().map(|arg| operand_value(*arg, &binding)).collect::<Vec<_>>()
+                })
+                .collect();
+            aggregate(rule, aggregation, &rows, universe, meter)?.chunks(width).map(<[TermId]>::to_vec).collect()
+        }
+    })
+}
+
+/// Collects every binding that satisfies the conditions, which are ordered so that their inputs are bound.
+fn matches(
+    body: &[Literal],
+    sets: &Sets,
+    universe: &mut Universe<'_>,
+    binding: &mut Vec<Option<TermId>>,
+    found: &mut Vec<Vec<Option<TermId>>>,
+    meter: &mut Meter,
+) -> Result<(), Stop> {
+    meter.step()?;
+    let Some((first, rest)) = body.split_first() else {
+        found.push(binding.clone());
+        return Ok(());
+    };
+    let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
+    match first {
+        Literal::Positive(atom) => {
+            for row in sets.get(&atom.predicate).into_iter().flatten() {
+                meter.step()?;
+                let before = binding.clone();
+                if unify(atom, row, binding) {
+                    matches(rest, sets, universe, binding, found, meter)?;
+                }
+                *binding = before;
+            }
+            return Ok(());
+        }
+        Literal::Negative(atom) => {
+            for row in sets.get(&atom.predicate).into_iter().flatten() {
+                meter.step()?;
+                if unify(atom, row, &mut binding.clone()) {
+                    return Ok(());
+                }
+            }
+        }
+        Literal::Assign { variable, value, .. } => {
+            let Some(value) = value.value(&values, universe).map(std::borrow::Cow::into_owned) else { return Ok(()) };
+            binding[*variable] = Some(universe.intern(value));
+        }
+        Literal::Compare { op, left, right, .. } => {
+            let (left, right) = (left.value(&values, universe), right.value(&values, universe));
+            if !matches!((left, right), (Some(left), Some(right)) if holds(*op, &left, &right)) {
+                return Ok(());
+            }
+        }
+        Literal::Test { value, .. } => {
+            if value.value(&values, universe).is_none_or(|value| *value != Term::Boolean(true)) {
+                return Ok(());
+            }
+        }
+    }
+    matches(rest, sets, universe, binding, found, meter)
+}
+
+/// Returns whether a row matches an atom, and binds the atom's unbound variables.
+pub(crate) fn unify(atom: &Atom, row: &[TermId], binding: &mut [Option<TermId>]) -> bool {
+    atom.args.iter().zip(row).all(|(arg, value)| match arg {
+        Operand::Any => true,
+        Operand::Constant(id) => id == value,
+        Operand::Variable(variable) => *binding[*variable].get_or_insert(*value) == *value,
+    })
+}

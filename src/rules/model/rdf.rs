@@ -1,0 +1,18 @@
+//! Terms of the RDF parsers and of oxigraph as our terms.
+
+use oxrdf::Term as RdfTerm;
+
+use crate::model::values;
+use actcheck_base::Term;
+
+/// Converts one of the RDF library's terms to ours.
+pub(crate) fn from_rdf(term: &RdfTerm) -> Term {
+    match term {
+        RdfTerm::NamedNode(node) => Term::iri(node.as_str()),
+        RdfTerm::BlankNode(node) => Term::Blank(node.as_str().into()),
+        RdfTerm::Literal(literal) => match literal.language() {
+            Some(tag) => Term::LangString(literal.value().into(), tag.into()),
+            None => values::literal(literal.value(), literal.datatype().as_str()),
+        },
+    }
+}

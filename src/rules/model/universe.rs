@@ -1,0 +1,82 @@
+//! Common term ids for the rules, the facts of a run, and the terms created by an evaluation.
+
+use actcheck_base::{Term, TermId, Terms};
+
+/// Terms of three origins with common ids. The terms of the rules and of the run are borrowed, not copied.
+#[derive(Debug)]
+pub(crate) struct Universe<'a> {
+    book: &'a Terms,
+    run: Option<&'a Terms>,
+    /// Common id of each term of the run, or [`UNKNOWN`] until first used.
+    run_ids: Vec<TermId>,
+    created: Terms,
+}
+
+const UNKNOWN: TermId = TermId::MAX;
+
+impl<'a> Universe<'a> {
+    /// Creates a universe of the rules' terms and, optionally, the terms of a run.
+    pub(crate) fn new(book: &'a Terms, run: Option<&'a Terms>) -> Self {
+        Self { book, run, run_ids: vec![UNKNOWN; run.map_or(0, Terms::len)], created: Terms::new() }
+    }
+
+    fn run_start(&self) -> usize {
+        self.book.len()
+    }
+
+    fn created_start(&self) -> usize {
+        self.book.len() + self.run_ids.len()
+    }
+
+    /// Returns the common id of a term of the run.
+    pub(crate) fn of_run(&mut self, id: TermId) -> TermId {
+        let known = self.run_ids[id as usize];
+        if known != UNKNOWN {
+            return known;
+        }
+        let Some(run) = self.run else { return id };
+        let found = self.book.id(run.term(id)).unwrap_or_else(|| number(self.run_start() + id as usize));
+        self.run_ids[id as usize] = found;
+        found
+    }
+
+    /// Returns the term of a common id.
+    pub(crate) fn term(&self, id: TermId) -> &Term {
+        let idx = id as usize;
+        if idx < self.run_start() {
+            return self.book.term(id);
+        }
+        match self.run {
+            Some(run) if idx < self.created_start() => run.term(number(idx - self.run_start())),
+            _ => self.created.term(number(idx - self.created_start())),
+        }
+    }
+
+    /// Returns the common id of a term, or `None` if no origin contains it.
+    pub(crate) fn id(&self, term: &Term) -> Option<TermId> {
+        self.book
+            .id(term)
+            .or_else(|| Some(number(self.run_start() + self.run?.id(term)? as usize)))
+            .or_else(|| Some(number(self.created_start() + self.created.id(term)? as usize)))
+    }
+
+    /// Returns the terms created by the evaluation, ordered by id.
+    pub(crate) fn into_created(self) -> Vec<Term> {
+        (0..self.created.len()).map(|idx| self.created.term(number(idx)).clone()).collect()
+    }
+
+    /// Returns the common id of a term, adding the term if it is new.
+    pub(crate) fn intern(&mut self, term: Term) -> TermId {
+        if let Some(id) = self.book.id(&term) {
+            return id;
+        }
+        if let Some(id) = self.run.and_then(|run| run.id(&term)) {
+            return number(self.run_start() + id as usize);
+        }
+        number(self.created_start() + self.created.intern(term) as usize)
+    }
+}
+
+fn number(idx: usize) -> TermId {
+    TermId::try_from(idx).expect("budgets stop an evaluation long before 2^32 terms")
+}

@@ -1,0 +1,9 @@
+//! Properties written in SPARQL (feature `sparql`): prepared once, evaluated over the named graphs of an action.
+//!
+//! Never: copies the ontology for an action, or exceeds the budget of an evaluation.
+
+pub(crate) mod dataset;
+mod ledger;
+pub(crate) mod query;
+mod query_text;
+pub(crate) mod snapshot;

@@ -1,0 +1,192 @@
+//! The syntax tree of a rule text, with source spans. Nothing in it is checked yet.
+
+use actcheck_base::{Source, Span};
+
+/// A parsed rule text.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Syntax {
+    /// The text.
+    pub source: Source,
+    /// Declared prefixes with their namespaces, in order.
+    pub prefixes: Vec<(String, String)>,
+    /// The IRI of the last `@base`.
+    pub base: Option<String>,
+    /// Its statements in order.
+    pub statements: Vec<Statement>,
+    /// Whether the whole text was parsed without errors.
+    pub whole: bool,
+}
+
+/// One statement. The parser resolves `@prefix` and `@base`, so they do not appear here.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Statement {
+    /// A rule, or a fact (a rule without body).
+    Rule(RuleSyntax),
+    /// `@parameter $x = e .`
+    Parameter {
+        /// Name without `$`.
+        name: String,
+        /// Its value; `None` if the text gives no value.
+        value: Option<Expression>,
+        /// The whole directive.
+        span: Span,
+    },
+    /// `@import` or `@export`.
+    Transfer(Transfer),
+    /// `@output p, q .`
+    Output {
+        /// Predicates to write.
+        predicates: Vec<String>,
+    },
+    /// `@declare p(any, any) .`: kept for its predicate's name and arity.
+    Declare {
+        /// Predicate.
+        name: String,
+        /// Number of columns.
+        arity: usize,
+        /// The whole directive.
+        span: Span,
+    },
+}
+
+/// `@import p :- csv{resource="f"}, … .`, or the corresponding `@export`.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Transfer {
+    /// Whether this is an import; otherwise it is an export.
+    pub import: bool,
+    /// Predicate.
+    pub predicate: String,
+    /// File format, for example `csv`.
+    pub format: String,
+    /// Options by name.
+    pub options: Vec<(String, Expression)>,
+    /// Assignments after the options.
+    pub bindings: Vec<(String, Expression)>,
+    /// The whole directive.
+    pub span: Span,
+}
+
+/// A rule as written.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct RuleSyntax {
+    /// `#[name("…")]`.
+    pub name: Option<String>,
+    /// The atoms it derives.
+    pub heads: Vec<AtomSyntax>,
+    /// The conditions that must hold.
+    pub body: Vec<LiteralSyntax>,
+    /// From the first head to the final dot.
+    pub span: Span,
+    /// Comment lines directly above it, joined.
+    pub comment: Option<String>,
+}
+
+/// `p(…)`.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct AtomSyntax {
+    /// Predicate: a bare name or an absolute IRI.
+    pub predicate: String,
+    /// Arguments.
+    pub args: Vec<Expression>,
+    /// The whole atom.
+    pub span: Span,
+    /// The predicate alone.
+    pub name_span: Span,
+}
+
+/// One condition of a body.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum LiteralSyntax {
+    /// An atom, or a call of a built-in, which has the same syntax.
+    Atom(AtomSyntax),
+    /// `~p(…)`.
+    Negated(AtomSyntax),
+    /// `left op right`.
+    Comparison {
+        /// Operator.
+        op: Comparison,
+        /// Left side.
+        left: Expression,
+        /// Right side.
+        right: Expression,
+        /// The whole comparison.
+        span: Span,
+    },
+}
+
+/// Comparison operators.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Comparison {
+    /// `=`: the same term.
+    Equal,
+    /// `!=`: a different term.
+    Unequal,
+    /// `<`, of numbers.
+    Less,
+    /// `<=`, of numbers.
+    LessEqual,
+    /// `>`, of numbers.
+    Greater,
+    /// `>=`, of numbers.
+    GreaterEqual,
+}
+
+impl Comparison {
+    /// Returns the operator as written.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Equal => "=",
+            Self::Unequal => "!=",
+            Self::Less => "<",
+            Self::LessEqual => "<=",
+            Self::Greater => ">",
+            Self::GreaterEqual => ">=",
+        }
+    }
+}
+
+/// A term or a computation.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Expression {
+    /// Its kind, with its operands.
+    pub kind: ExpressionKind,
+    /// Its place in the source.
+    pub span: Span,
+}
+
+/// Kinds of expressions.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum ExpressionKind {
+    /// A constant.
+    Constant(actcheck_base::Term),
+    /// `?x`.
+    Variable(String),
+    /// `_`.
+    Anonymous,
+    /// `$x`.
+    Global(String),
+    /// `NAME(…)`: a built-in by its name as written.
+    Call(String, Vec<Expression>),
+    /// `a + b` and the like: one of `+ - * /`.
+    Arithmetic(char, Box<Expression>, Box<Expression>),
+    /// `-a`.
+    Negative(Box<Expression>),
+    /// An f-string.
+    Format(Vec<Expression>),
+    /// `#count(v, distinct…)`.
+    Aggregate(String, Vec<Expression>),
+    /// `!x`: not supported, but parsed so that a clear error can name it.
+    Existential(String),
+    /// A tuple `(a, b)`, only in options of imports.
+    Tuple(Vec<Expression>),
+    /// Text that could not be parsed; the error has been reported.
+    Broken,
+}
