@@ -121,7 +121,7 @@ fn the_same_choices_give_the_same_pictures_and_percepts() {
     let first = run(&env, Choices::random(3, 0), None);
     let again = run(&env, Choices::recorded(&first.choices), None);
     assert_eq!(first.trace, again.trace);
-    // One choice a picture, and without it the picture has no noise.
+    // One choice for each picture; without it the picture has no noise.
     let frames: Vec<&Choice> = first.choices.iter().filter(|choice| choice.name == ChoiceName::CameraFrame).collect();
     let looks = first.trace.actions[0].phases.iter().filter(|phase| phase.name.starts_with("look")).count();
     assert_eq!(frames.len(), looks);

@@ -68,7 +68,7 @@ pub fn sparql_property(text: &str) {
         match result {
             Ok(findings) => assert!(findings.witness.len() <= findings.witness_count),
             Err(RuleFault::Interrupted) => unreachable!("no stop is requested"),
-            Err(RuleFault::BudgetSpent(reason) | RuleFault::Value(reason)) => assert!(!reason.is_empty()),
+            Err(fault) => assert!(!fault.reason().is_empty()),
         }
     }
 }

@@ -113,7 +113,7 @@ fn read_choices(
 /// Reads the values of one choice: a single value or a list.
 fn read_values(table: &mut Table, key: &str, form: Form<'_>) -> Vec<ChoiceValue> {
     let numbers = match form {
-        Form::Candidate(_) if table.is_number(key) => table.number(key, 0.0..).into_iter().collect(),
+        Form::Candidate(_) if table.is_number(key) => table.number(key, ..).into_iter().collect(),
         Form::Candidate(names) => return read_candidates(table, key, names),
         Form::Count(least) => table
             .integer(key, 0..=i64::from(u32::MAX))

@@ -422,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn steered_decisions_lie_at_their_quantiles_once() {
+    fn steered_choices_take_their_quantiles_once() {
         let quantiles = BTreeMap::from([("model".into(), 0.5), ("yaw".into(), 0.75), ("noise".into(), 0.975)]);
         let mut choices = Choices::steered(&quantiles, 7, 3);
         let (model, yaw, noise) = draw(&mut choices);

@@ -152,4 +152,10 @@ const CODES_S: &[Code] = &[
         "it has no `[case]`",
         "keep only files from `actcheck export` in this folder",
     ),
+    code(
+        "S066",
+        "a candidate in a case is written as an index",
+        "an old version of the program exported the case, and the choice has several candidates",
+        "write the name of the candidate instead, as the help suggests",
+    ),
 ];
