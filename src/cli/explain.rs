@@ -102,16 +102,16 @@ fn unknown(name: &str) -> Diagnostic {
 mod tests {
     use super::*;
 
-    /// Run with `ACTCHECK_BLESS=1` to write the page.
+    /// Run with `UPDATE_EXPECT=1` to write the page.
     #[test]
     fn the_page_of_all_codes_is_up_to_date() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../codes.md");
         let page = page(&codes::all().collect::<Vec<_>>());
-        if std::env::var_os("ACTCHECK_BLESS").is_some() {
+        if std::env::var_os("UPDATE_EXPECT").is_some() {
             std::fs::write(&file, &page).expect("the page can be written");
         }
         let written = std::fs::read_to_string(&file).unwrap_or_default();
-        assert!(written == page, "write it with: ACTCHECK_BLESS=1 cargo test -p actcheck-cli the_page_of_all_codes");
+        assert!(written == page, "write it with: UPDATE_EXPECT=1 cargo test -p actcheck-cli the_page_of_all_codes");
     }
 
     #[test]
