@@ -135,7 +135,7 @@ impl Named {
             run: "k-1",
             test: &env.campaign.tests[0],
             failed: &[],
-            trace: "",
+            trace: "00",
             choices: choices.made(),
             paths: [None, None, None],
             skill: None,

@@ -75,8 +75,6 @@ fn an_exported_run_reproduces_inside_and_outside_the_project() {
 #[test]
 fn a_case_keeps_its_surface_when_another_one_is_put_before_it() {
     let project = project();
-    let config = project.path().join("configs/pick_and_place.toml");
-    edit(&config, "[\"empty_room\", \"apartment\", \"kitchen\"]", "[\"apartment\"]");
     let arguments = ["run", "configs/pick_and_place.toml", "--runs", "1", "--history", "h", "--format", "json"];
     let output = actcheck(project.path(), &arguments);
     let json: Value = serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
