@@ -77,7 +77,7 @@ fn the_failed_runs_of_the_last_campaign_run_again_from_the_same_choices() {
 
     // The present rules judge: with rules that always hold, the fault is gone.
     let holds = "@prefix act: <http://actions#> .\nsuccess(?object) :- parameter(act:pickObject, ?object) .\n";
-    for rule in ["moved_object", "no_grasp_collisions", "object_in_gripper"] {
+    for rule in ["close_object", "moved_object", "no_grasp_collisions", "object_in_gripper"] {
         std::fs::write(folder.join(format!("rules/{rule}.rls")), holds).unwrap();
     }
     std::fs::write(folder.join("rules/object_grasped.rq"), "ASK { }\n").unwrap();
