@@ -100,7 +100,7 @@ impl LastFailed {
         let pool = match workers(jobs) {
             Ok(pool) => pool,
             Err(fault) => {
-                end.ending = Ending::Stopped(fault.into());
+                end.ending = Ending::Stopped(fault);
                 return (end, faults);
             }
         };

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::options::HistoryArgs;
-use crate::{history_dir, since, why};
+use crate::{history_dir, when, why};
 use actcheck_analysis::{Hierarchy, TableFilter};
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean, names};
 use actcheck_history::History;
@@ -22,7 +22,7 @@ pub struct ChosenRuns {
     #[arg(long, value_name = "ID")]
     pub campaign: Vec<String>,
     /// Only runs since this time, such as 2026-11-21, 2026-11-21T18:00:00Z, or 12h for 12 hours ago
-    #[arg(long, value_name = "WHEN", value_parser = since::moment)]
+    #[arg(long, value_name = "WHEN", value_parser = when::parse)]
     pub since: Option<String>,
     /// The ontology with the rules and the hierarchy of object categories [default: ontology/actions.ttl here, or the
     /// shipped one]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::chosen::{self, ChosenRuns};
-use crate::{output, written};
+use crate::{output, output_file};
 use actcheck_analysis::{Dataset, Mirror, export_csv, export_dataset, export_parquet};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign as campaign;
@@ -133,7 +133,7 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
         output::print(&text);
         return Ok(());
     }
-    written::write(&file, text)?;
+    output_file::write(&file, text)?;
     let shown = file.display();
     output::print(&format!("{shown} holds run {}: actcheck run {shown}\n", run.row.run));
     Ok(())
@@ -142,7 +142,7 @@ fn export_run(args: &ExportArgs, history: &History, run: &str) -> Result<(), Dia
 /// Returns the path of a new file in the folder of regressions, which is created if missing.
 fn new_regression(env: &Env, run: &str) -> Result<PathBuf, Diagnostics> {
     let folder = campaign::regressions_folder(&env.campaign.source)?;
-    std::fs::create_dir_all(&folder).map_err(|error| written::unwritten(&folder, error))?;
+    std::fs::create_dir_all(&folder).map_err(|error| output_file::cannot_write(&folder, error))?;
     let file = folder.join(format!("{run}.toml"));
     if file.exists() {
         let fault = Diagnostic::error("X042", format!("{} already exists", file.display()));

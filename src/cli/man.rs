@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Command};
 use clap_mangen::Man;
 
-use crate::{output, written};
+use crate::{output, output_file};
 use actcheck_base::{Diagnostic, Diagnostics};
 
 /// `actcheck man`
@@ -66,13 +66,13 @@ fn with_examples(page: &[u8]) -> String {
 }
 
 fn write_pages(root: &Command, folder: &Path) -> Result<(), Diagnostics> {
-    std::fs::create_dir_all(folder).map_err(|error| written::unwritten(folder, error))?;
+    std::fs::create_dir_all(folder).map_err(|error| output_file::cannot_write(folder, error))?;
     let commands: Vec<&Command> = std::iter::once(root).chain(below(root)).collect();
     for command in &commands {
         let man = manual(command);
         let mut page = Vec::new();
         man.render(&mut page).map_err(unrendered)?;
-        written::write(&folder.join(man.get_filename()), with_examples(&page))?;
+        output_file::write(&folder.join(man.get_filename()), with_examples(&page))?;
     }
     let first = folder.join("actcheck.1");
     output::print(&format!("wrote {} pages: man -l {}\n", commands.len(), first.display()));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::written;
+use crate::output_file;
 use actcheck_base::{Diagnostic, Diagnostics, Files};
 
 /// Files to write, relative to the folder that the program runs in. None may exist.
@@ -45,7 +45,7 @@ impl NewFiles {
         }
         let mut made = Vec::new();
         for (file, bytes) in &self.files {
-            if let Err(faults) = make_folders(file, &mut made).and_then(|()| written::write(file, bytes)) {
+            if let Err(faults) = make_folders(file, &mut made).and_then(|()| output_file::write(file, bytes)) {
                 take_back(&made);
                 return Err(faults);
             }
@@ -75,7 +75,7 @@ fn make_folders(file: &Path, made: &mut Vec<PathBuf>) -> Result<(), Diagnostics>
         file.ancestors().skip(1).take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists()).collect();
     missing.reverse();
     for folder in missing {
-        fs::create_dir(folder).map_err(|error| written::unwritten(folder, error))?;
+        fs::create_dir(folder).map_err(|error| output_file::cannot_write(folder, error))?;
         made.push(folder.to_owned());
     }
     Ok(())

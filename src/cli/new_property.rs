@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::new_files::NewFiles;
-use crate::{configurations, output, why, written};
+use crate::{configurations, output, output_file, why};
 use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
 use actcheck_config::{LinksOntology, link_ontology};
 use actcheck_ontology as ontology;
@@ -90,10 +90,10 @@ fn write_property(path: &Path, rule: &Path, template: &Template) -> Result<(), D
         return Err(is_there(rule));
     }
     let text = Files::Disk.read(path).map_err(|why| {
-        written::unwritten(path, why).help("name an ontology in a writable folder with `--ontology FILE`")
+        output_file::cannot_write(path, why).help("name an ontology in a writable folder with `--ontology FILE`")
     })?;
-    written::write(rule, &template.rule_text)?;
-    written::write(path, with_entry(&text.text, template))?;
+    output_file::write(rule, &template.rule_text)?;
+    output_file::write(path, with_entry(&text.text, template))?;
     output::print(&format!("wrote {} and an entry in {}\n", rule.display(), path.display()));
     Ok(())
 }
@@ -106,7 +106,7 @@ fn write_project(path: &Path, rule: &Path, template: &Template) -> Result<(), Di
     let mut files = NewFiles::default();
     files.add_shipped("ontology")?;
     files.add_shipped("rules")?;
-    let shipped = Files::Shipped.read(path).map_err(|why| written::unwritten(path, why))?;
+    let shipped = Files::Shipped.read(path).map_err(|why| output_file::cannot_write(path, why))?;
     files.add(path, with_entry(&shipped.text, template));
     files.add(rule, template.rule_text.as_str());
     files.write(
@@ -131,7 +131,7 @@ fn link_configurations(ontology: &Path) -> Result<(), Diagnostics> {
         match (link_ontology(&source.text), folder) {
             (LinksOntology::Already, _) => {}
             (LinksOntology::Now(text), None) => {
-                written::write(&file, text)?;
+                output_file::write(&file, text)?;
                 output::print(&format!("{} uses {} from now on\n", file.display(), ontology.display()));
             }
             (_, folder) => {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::written;
+use crate::output_file;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::{History, RunDetail};
 use actcheck_report::{Caption, Drawing, run_picture};
@@ -49,7 +49,7 @@ impl<'a> Picture<'a> {
     /// # Errors
     /// X007: the file can't be written.
     pub(super) fn write(&self, drawing: &Drawing) -> Result<(), Diagnostics> {
-        let bytes = (self.render)(drawing).map_err(|error| written::unwritten(self.file, error))?;
-        written::write(self.file, bytes)
+        let bytes = (self.render)(drawing).map_err(|error| output_file::cannot_write(self.file, error))?;
+        output_file::write(self.file, bytes)
     }
 }

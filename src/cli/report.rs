@@ -7,7 +7,7 @@ use clap::Args;
 use crate::analyse::{Analysed, Question, analysed};
 use crate::chosen::{ChosenRuns, is_meant};
 use crate::report_formats::{self, FormatArgs};
-use crate::{output, report_html, written};
+use crate::{output, output_file, report_html};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::{History, RunDetail};
 use actcheck_report::HTML_COLUMNS;
@@ -100,14 +100,14 @@ pub fn report(args: &ReportArgs) -> Result<(), Diagnostics> {
     let history = args.chosen.open()?;
     let mut told = report_formats::write(args, &history)?;
     if args.html.is_some() || args.rrd.is_some() {
-        told.extend(write_watched(args, &history)?);
+        told.extend(write_reports_with_replays(args, &history)?);
     }
     output::tell(&told, printed);
     Ok(())
 }
 
 /// Writes the reports with replays, which are based on the analysis. Returns the messages to print.
-fn write_watched(args: &ReportArgs, history: &History) -> Result<Vec<String>, Diagnostics> {
+fn write_reports_with_replays(args: &ReportArgs, history: &History) -> Result<Vec<String>, Diagnostics> {
     let found = found(args, history)?;
     let room = args.replay_mb * BYTES_IN_A_MB;
     let mut told = Vec::new();
@@ -116,7 +116,7 @@ fn write_watched(args: &ReportArgs, history: &History) -> Result<Vec<String>, Di
         if file.as_os_str() == "-" {
             output::print(&page);
         } else {
-            written::write(file, &page)?;
+            output_file::write(file, &page)?;
             told.push(format!("{} holds the report ({:.1} MB)", file.display(), page.len() as f64 / 1e6));
         }
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::report::ReportArgs;
-use crate::{chosen, output, watched, written};
+use crate::{chosen, output, output_file, replayed_runs};
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow};
 use actcheck_report::{
@@ -146,7 +146,7 @@ impl<'a> Sinks<'a> {
             if file.as_os_str() == "-" {
                 output::print(&text);
             } else {
-                written::write(file, text)?;
+                output_file::write(file, text)?;
                 told.push(format!("{} holds {what}", file.display()));
             }
         }
@@ -180,7 +180,7 @@ impl<'a> AllureFolder<'a> {
         let budget = Budget::default();
         // If the current rules can't be read, there are no explanations; the outcomes come from the history.
         let rules = RuleBook::prepare_within(&args.chosen.ontology()?, &budget).ok();
-        std::fs::create_dir_all(folder).map_err(|error| written::unwritten(folder, error))?;
+        std::fs::create_dir_all(folder).map_err(|error| output_file::cannot_write(folder, error))?;
         let ids: Vec<String> = campaigns.iter().map(|row| row.id.clone()).collect();
         let made = Self { folder, history, rules, budget, repetitions: Repetitions::new(), results: 0, untraced: 0 };
         made.write(&allure_common(env!("CARGO_PKG_VERSION"), &ids))?;
@@ -205,7 +205,7 @@ impl<'a> AllureFolder<'a> {
             return Vec::new();
         };
         let rules = self.rules.as_ref();
-        let explained = rules.map(|rules| watched::explained(self.history, rules, run, &self.budget));
+        let explained = rules.map(|rules| replayed_runs::explained(self.history, rules, run, &self.budget));
         let mut attachments: Vec<Attachment> = explained
             .unwrap_or_default()
             .into_iter()
@@ -231,7 +231,7 @@ impl<'a> AllureFolder<'a> {
 
     fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Diagnostics> {
         for (name, bytes) in files {
-            written::write(&self.folder.join(name), bytes)?;
+            output_file::write(&self.folder.join(name), bytes)?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use crate::analyse::Analysed;
-use crate::{clock, watched};
+use crate::{clock, replayed_runs};
 use actcheck_base::Diagnostics;
 use actcheck_history::History;
 use actcheck_ontology::Ontology;
@@ -43,7 +43,7 @@ fn replays(history: &History, ontology: &Ontology, order: &[String], room: f64) 
     if room <= 0.0 {
         return Ok(replays);
     }
-    watched::in_order(history, ontology, order, |(run, trace, explained)| {
+    replayed_runs::for_each(history, ontology, order, |(run, trace, explained)| {
         if replays.bytes() as f64 >= room {
             return Ok(ControlFlow::Break(()));
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::analyse::Analysed;
 use crate::report::ReportArgs;
-use crate::{output, watched, written};
+use crate::{output, output_file, replayed_runs};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::History;
 use actcheck_report::{RecordingFault, Recordings, replay_order};
@@ -24,7 +24,7 @@ pub(super) fn write(
 ) -> Result<Option<String>, Diagnostics> {
     let order = order(found);
     let mut recordings = Recordings::new().map_err(unrecorded)?;
-    watched::in_order(history, &found.ontology, &order, |(mut run, trace, explained)| {
+    replayed_runs::for_each(history, &found.ontology, &order, |(mut run, trace, explained)| {
         // The first run is always recorded, however large it is.
         if recordings.runs() > 0 && recordings.bytes() as f64 >= room {
             return Ok(ControlFlow::Break(()));
@@ -39,7 +39,7 @@ pub(super) fn write(
         output::print_bytes(&bytes);
         return Ok(None);
     }
-    written::write(file, &bytes)?;
+    output_file::write(file, &bytes)?;
     let (name, all, size) = (file.display(), order.len(), bytes.len() as f64 / 1e6);
     let more = if runs < all { "; a higher `--replay-mb` includes more" } else { "" };
     Ok(Some(format!("{name} holds {runs} of {all} runs ({size:.1} MB{more}): rerun {name}")))

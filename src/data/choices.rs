@@ -368,9 +368,9 @@ mod tests {
         };
         let value = 1.0;
         let first = Choice { name: ChoiceName::SurfaceName, kind: ChoiceKind::Index { of: 2 }, value };
-        assert_eq!(made(&[first.clone()], &["a", "b"]).candidate(), Some("b"));
+        assert_eq!(made(std::slice::from_ref(&first), &["a", "b"]).candidate(), Some("b"));
         let named = Choice { kind: ChoiceKind::Candidate { names: names(&["a", "b"]) }, ..first };
-        assert_eq!(made(&[named.clone()], &["b", "a"]).candidate(), Some("b"));
+        assert_eq!(made(std::slice::from_ref(&named), &["b", "a"]).candidate(), Some("b"));
         assert_eq!(made(&[named], &["c", "a"]).candidate(), Some("c"), "the nominal one");
     }
 

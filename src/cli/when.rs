@@ -6,7 +6,7 @@ use actcheck_config::duration_secs;
 ///
 /// # Errors
 /// The text is none of these.
-pub fn moment(text: &str) -> Result<String, String> {
+pub fn parse(text: &str) -> Result<String, String> {
     let written = |moment: jiff::Timestamp| format!("{moment:.3}");
     if let Ok(moment) = text.parse::<jiff::Timestamp>() {
         return Ok(written(moment));
@@ -28,11 +28,11 @@ mod tests {
 
     #[test]
     fn times_are_formatted_as_in_histories() {
-        assert_eq!(moment("2026-11-21").as_deref(), Ok("2026-11-21T00:00:00.000Z"));
-        assert_eq!(moment("2026-11-21T18:00:00+02:00").as_deref(), Ok("2026-11-21T16:00:00.000Z"));
-        assert!(moment("12h").is_ok_and(|then| then.ends_with('Z') && then.starts_with("20")));
+        assert_eq!(parse("2026-11-21").as_deref(), Ok("2026-11-21T00:00:00.000Z"));
+        assert_eq!(parse("2026-11-21T18:00:00+02:00").as_deref(), Ok("2026-11-21T16:00:00.000Z"));
+        assert!(parse("12h").is_ok_and(|then| then.ends_with('Z') && then.starts_with("20")));
         for wrong in ["yesterday", "", "2026-13-01", "-5m", "2026-11-21T18:00:00"] {
-            assert!(moment(wrong).is_err(), "{wrong}");
+            assert!(parse(wrong).is_err(), "{wrong}");
         }
     }
 }

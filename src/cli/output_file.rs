@@ -17,11 +17,11 @@ pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnost
         Ok(found) if !found.is_file() => fs::write(&target, bytes),
         _ => write_atomic(&target, bytes.as_ref()),
     };
-    written.map_err(|error| unwritten(file, &error).into())
+    written.map_err(|error| cannot_write(file, &error).into())
 }
 
 /// X007: a file or folder that can't be written.
-pub(super) fn unwritten(file: &Path, why: impl std::fmt::Display) -> Diagnostic {
+pub(super) fn cannot_write(file: &Path, why: impl std::fmt::Display) -> Diagnostic {
     Diagnostic::error("X007", format!("{} can't be written: {why}", file.display()))
         .help("name a file in an existing, writable folder")
 }

@@ -14,22 +14,22 @@ use actcheck_rules::{Budget, RuleBook};
 const RUNS_OF_A_WORKER: usize = 8;
 
 /// A run with its trace and the explanations of its failures.
-pub(super) type Watched = (RunDetail, Option<Trace>, Vec<Explained>);
+pub(super) type ReplayedRun = (RunDetail, Option<Trace>, Vec<Explained>);
 
 /// Reads runs in the given order and passes each to `take`, until `take` returns [`ControlFlow::Break`].
 ///
 /// # Errors
 /// A run can't be read, or `take` fails.
-pub(super) fn in_order(
+pub(super) fn for_each(
     history: &History,
     ontology: &Ontology,
     order: &[String],
-    mut take: impl FnMut(Watched) -> Result<ControlFlow<()>, Diagnostics>,
+    mut take: impl FnMut(ReplayedRun) -> Result<ControlFlow<()>, Diagnostics>,
 ) -> Result<(), Diagnostics> {
     let budget = Budget::default();
     // If the current rules can't be read, there are no explanations; the outcomes come from the history.
     let rules = RuleBook::prepare_within(ontology, &budget).ok();
-    let read = |id: &String| -> Result<Watched, Diagnostics> {
+    let read = |id: &String| -> Result<ReplayedRun, Diagnostics> {
         let run = history.run(id)?;
         // A run that broke before its first state has no trace; everything else about it is reported.
         let trace = history.trace(id).ok();
@@ -38,7 +38,7 @@ pub(super) fn in_order(
     };
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
     for runs in order.chunks(workers * RUNS_OF_A_WORKER) {
-        let shares: Vec<Vec<Result<Watched, Diagnostics>>> = std::thread::scope(|scope| {
+        let shares: Vec<Vec<Result<ReplayedRun, Diagnostics>>> = std::thread::scope(|scope| {
             let share = |runs: &'_ [String]| runs.iter().map(read).collect();
             let started: Vec<_> = runs.chunks(RUNS_OF_A_WORKER).map(|runs| scope.spawn(move || share(runs))).collect();
             started
