@@ -6,12 +6,13 @@ use sha2::{Digest as _, Sha256};
 
 static PROGRAM_DIGEST: OnceLock<&'static str> = OnceLock::new();
 
-/// Sets the digest of the sources that this program was built from, including its dependencies. Only the first call counts.
-pub fn name_program(sources_digest: &'static str) {
+/// Sets the digest of the sources that this program was built from, including its dependencies. Only the first call has
+/// an effect.
+pub fn set_program_digest(sources_digest: &'static str) {
     PROGRAM_DIGEST.get_or_init(|| sources_digest);
 }
 
-/// The digest that was given to [`name_program`]; empty in a program that did not call it.
+/// Returns the digest that [`set_program_digest`] set; empty if it was not called.
 pub fn program_digest() -> &'static str {
     PROGRAM_DIGEST.get().copied().unwrap_or_default()
 }

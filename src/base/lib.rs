@@ -1,4 +1,4 @@
-//! Types shared by all stages: sources and diagnostics, terms, poses, recorded choices, random streams, shipped files.
+//! Types shared by all stages: sources and diagnostics, RDF terms, facts, findings, outcomes, and files.
 //!
 //! Never: reads a configuration, depends on actions, rules or robots, or prints.
 
@@ -18,7 +18,7 @@ mod term;
 mod write_atomic;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
-pub use digest::{Digest, digest_of, name_program, program_digest};
+pub use digest::{Digest, digest_of, program_digest, set_program_digest};
 pub use files::Files;
 pub use findings::{Findings, RuleFault, WitnessRow};
 pub use judgement::{Judgement, Outcome};

@@ -23,7 +23,8 @@ pub const EARL: &str = "http://www.w3.org/ns/earl#";
 /// Provenance.
 pub const PROV: &str = "http://www.w3.org/ns/prov#";
 
-/// Prefixes that shipped queries and messages may use. A namespace precedes its own prefixes.
+/// Prefixes that shipped queries and messages may use. If one namespace begins with another, the longer
+/// one comes first.
 pub const PREFIXES: [(&str, &str); 11] = [
     ("act", ACT),
     ("w", W),

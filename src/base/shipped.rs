@@ -1,9 +1,9 @@
-//! The copy of this repository's ontology, rules and models that the program carries (feature `shipped`).
+//! This repository's ontology, rules and models, embedded in the program (feature `shipped`).
 
 use std::path::PathBuf;
 
 #[cfg(feature = "shipped")]
-mod carried {
+mod embedded {
     #[derive(rust_embed::RustEmbed)]
     #[folder = "shipped/ontology/"]
     #[prefix = "ontology/"]
@@ -20,29 +20,29 @@ mod carried {
     pub(super) struct Models;
 }
 
-/// Bytes of a carried file, by its path from the repository's root. Returns `None` if there is no such file.
+/// Returns the bytes of an embedded file, by its path from the repository's root, or `None` if it does not exist.
 #[cfg(feature = "shipped")]
 pub(crate) fn read(key: &str) -> Option<Vec<u8>> {
-    use carried::{Models, Ontology, Rules};
+    use embedded::{Models, Ontology, Rules};
     let file = Ontology::get(key).or_else(|| Rules::get(key)).or_else(|| Models::get(key))?;
     Some(file.data.into_owned())
 }
 
-/// Paths of all carried files.
+/// Returns the paths of all embedded files.
 #[cfg(feature = "shipped")]
 pub(crate) fn paths() -> Vec<PathBuf> {
-    use carried::{Models, Ontology, Rules};
+    use embedded::{Models, Ontology, Rules};
     let names = Ontology::iter().chain(Rules::iter()).chain(Models::iter());
     names.map(|name| PathBuf::from(name.as_ref())).collect()
 }
 
-/// Returns `None`: without the feature nothing is carried.
+/// Returns `None`: without the feature, no files are embedded.
 #[cfg(not(feature = "shipped"))]
 pub(crate) fn read(_key: &str) -> Option<Vec<u8>> {
     None
 }
 
-/// Returns no paths: without the feature nothing is carried.
+/// Returns no paths: without the feature, no files are embedded.
 #[cfg(not(feature = "shipped"))]
 pub(crate) fn paths() -> Vec<PathBuf> {
     Vec::new()

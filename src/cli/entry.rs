@@ -9,7 +9,7 @@ use crate::{
     check, check_oracles, completions, datalog, explain, export, groups, list, man, new, output, query, recheck, rules,
     show, shrink, stop, why,
 };
-use actcheck_base::name_program;
+use actcheck_base::set_program_digest;
 use actcheck_config::SCHEMA;
 
 /// Parses the process's arguments and runs the command.
@@ -17,7 +17,7 @@ use actcheck_config::SCHEMA;
 /// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed, 2 the command failed, 130
 /// interrupted.
 pub fn run(sources_digest: &'static str) -> ExitCode {
-    name_program(sources_digest);
+    set_program_digest(sources_digest);
     // clap prints help, version and usage errors itself; after a usage error it exits with 2.
     let matches = groups::program().get_matches();
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());

@@ -153,7 +153,7 @@ impl ChoiceName {
         }
     }
 
-    /// Returns the unit of the values; empty for candidates, counts, seeds and factors.
+    /// Returns the unit of the values; empty for candidates, counts, seeds, factors and errors of the wheel odometry.
     pub fn unit(&self) -> &'static str {
         match self {
             Self::Object(_, ObjectAxis::X | ObjectAxis::Y)

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::Pose;
-use crate::SceneMap;
-use crate::{ObjectModel, Physics, RobotProfile, Sensing};
+use crate::{ObjectModel, Physics, Pose, RobotProfile, SceneMap, Sensing};
 
 /// A sampled scene. Frame of all poses: world; z up; the floor at 0.
 #[derive(Debug, Clone)]

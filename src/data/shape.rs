@@ -3,8 +3,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::Mesh;
-use crate::Pose;
+use crate::{Mesh, Pose};
 
 /// One shape of a model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Pose;
-use crate::{Part, SceneMap};
-use crate::{RobotCourse, Snapshot};
+use crate::{Part, Pose, RobotCourse, SceneMap, Snapshot};
 
 /// A whole run as recorded by the simulation.
 ///

@@ -76,14 +76,15 @@ pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: 
         });
     }
     let known = Known { properties: graph.individuals(&names::act("Property")), parameters: parameters(graph) };
-    let mut told: BTreeSet<(String, usize)> = BTreeSet::new();
+    let mut reported: BTreeSet<(String, usize)> = BTreeSet::new();
     for (name, action) in actions {
         for fault in faults_of(graph, &known, name, action) {
             // Report a faulty inherited statement once, not for every action that inherits it.
             let place = fault.span.as_ref().map_or(0, |span| span.start);
             let source = fault.source.as_ref().map_or(String::new(), |source| source.name.to_string());
             let parameter_fault = fault.code == "O007";
-            if told.insert((format!("{source} {} {}", fault.code, if parameter_fault { name } else { "" }), place)) {
+            if reported.insert((format!("{source} {} {}", fault.code, if parameter_fault { name } else { "" }), place))
+            {
                 found.push(fault);
             }
         }

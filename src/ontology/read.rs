@@ -93,7 +93,7 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
 }
 
 /// Returns the statements of a source in Turtle or RDF/XML, in reading order. The file extension of its name determines
-/// the format. Imports are not followed.
+/// the format, or the first characters if the extension is ambiguous. Imports are not followed.
 ///
 /// `document` distinguishes the blank nodes of several sources.
 ///

@@ -71,7 +71,8 @@ impl Facts {
 
     /// Adds the triples of Turtle text.
     ///
-    /// Literals keep their datatype: `0.5` is a decimal, as in Turtle, and `0.5e0` a double. Both are numbers for rules.
+    /// Literals keep their datatype: `0.5` is a decimal, as in Turtle, and `0.5e0` a double. Rules treat both as
+    /// numbers.
     ///
     /// # Errors
     /// `O002` for each syntax error, at most five; then no triple is added.

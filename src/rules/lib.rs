@@ -49,8 +49,8 @@
 //! | [`RuleBook`] | the rules of all properties of an ontology, evaluated together |
 //! | [`standalone::Program`] | a Datalog program with predicates of its own, without actions |
 //!
-//! Two languages query the same facts: Datalog in `.rls` files (Nemo's dialect) and, with the feature `sparql`, SPARQL in
-//! `.rq` files. The stages in order: [`syntax`], `check`, `engine` (with `naive`, its oracle), `book`, [`explain`].
+//! Two languages query the same facts: Datalog in `.rls` files (Nemo's dialect) and, with the feature `sparql`, SPARQL
+//! in `.rq` files. The stages in order: [`syntax`], `check`, `engine` (with `naive`, its oracle), `book`, [`explain`].
 //!
 //! # Features
 //!

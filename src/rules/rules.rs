@@ -1,4 +1,4 @@
-//! The front page: the rules of one property, applied to facts.
+//! The rules of one property, applied to facts: the simplest interface of this crate.
 
 use actcheck_base::{Diagnostics, Findings, Outcome, RuleFault, Source, WitnessRow};
 use actcheck_ontology::{Ontology, Property, RuleFile, triples_of};

@@ -41,7 +41,7 @@ pub struct Discard {
 /// # Errors
 /// No free place was found for an object or the robot.
 pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
-    let mut hand = SceneBuilder {
+    let mut builder = SceneBuilder {
         space,
         choices,
         objects: Vec::new(),
@@ -51,39 +51,39 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
         platform: None,
         front: None,
     };
-    let world = hand.choose_world();
-    hand.choose_names();
+    let world = builder.choose_world();
+    builder.choose_names();
     let surface = match world {
-        Some(world) if world.surfaces().next().is_some() => hand.take_platform(world),
-        _ => hand.set_platform(),
+        Some(world) if world.surfaces().next().is_some() => builder.take_platform(world),
+        _ => builder.set_platform(),
     };
     if let Some(surface) = surface {
         if !space.targets.is_empty() {
-            hand.set_target(&surface)?;
+            builder.set_target(&surface)?;
         }
-        hand.set_others(&surface)?;
+        builder.set_others(&surface)?;
     }
-    hand.set_place(world);
+    builder.set_place(world);
     if let Some(world) = world {
-        hand.surround(world);
+        builder.surround(world);
     }
-    hand.clutter_place()?;
+    builder.clutter_place()?;
     let drive = space.drives.get(test).copied().flatten();
     if drive.is_some() {
-        hand.name_front(world);
+        builder.name_front(world);
     }
     let drives = drive == Some(0);
-    let base = if drives { hand.start_elsewhere(world)? } else { hand.start_robot(surface.as_ref())? };
-    hand.set_obstacles(base, world, drives)?;
-    let name = hand.designators.get("world").and_then(|names| names.first()).cloned();
+    let base = if drives { builder.start_elsewhere(world)? } else { builder.start_robot(surface.as_ref())? };
+    builder.set_obstacles(base, world, drives)?;
+    let name = builder.designators.get("world").and_then(|names| names.first()).cloned();
     let mut map = world.map(Surroundings::scene_map).unwrap_or_default();
-    map.locations.extend(hand.front);
+    map.locations.extend(builder.front);
     Ok(Scene {
         world: name.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),
         map,
-        objects: hand.objects,
+        objects: builder.objects,
         robot: RobotStart { profile: Arc::clone(&space.robot), base, knows: Arc::clone(&space.knows) },
-        designators: hand.designators,
+        designators: builder.designators,
         sensing: space.sensing.clone(),
         physics: space.physics.clone(),
     })
@@ -255,9 +255,9 @@ impl<'a> SceneBuilder<'a> {
             return Ok(());
         }
         let platform = self.platform.replace(pose);
-        let strewn = self.place_others(Role::PlaceOther, counts, &surface);
+        let placed = self.place_others(Role::PlaceOther, counts, &surface);
         self.platform = platform;
-        strewn.map(|_| ())
+        placed.map(|_| ())
     }
 
     /// Places other objects anywhere on a surface and returns their ids. Nominal: the fewest, on a ring around the

@@ -8,7 +8,7 @@ use actcheck_data::{ChoiceName, ObjectAxis, PlacedObject, Range, StartAxis};
 /// A parameter of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Parameter {
-    /// The name of its choice in [`crate::draw`].
+    /// The name of its choice in [`crate::draw()`].
     pub name: ChoiceName,
     /// Its values.
     pub kind: ParameterKind,

@@ -196,7 +196,7 @@ fn placed_models<'a>(
 
 /// Checks that tests name actions with success properties, and that the required designators have candidates.
 fn check_tests(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
-    let mut told: BTreeSet<String> = BTreeSet::new();
+    let mut reported: BTreeSet<String> = BTreeSet::new();
     for (idx, test) in campaign.tests.iter().enumerate() {
         for (step, name) in test.iter().enumerate() {
             let key = format!("tests.{idx}.{step}");
@@ -205,7 +205,7 @@ fn check_tests(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics
                 found.push(campaign.fault("S001", &key, format!("the ontology has no action `{name}`")).help(help));
                 continue;
             };
-            if !told.insert(name.clone()) {
+            if !reported.insert(name.clone()) {
                 continue;
             }
             if action.success_properties.is_empty() {
@@ -253,10 +253,10 @@ fn check_tables(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostic
 
 /// Checks that the categories of models are classes, which rules and analysis need.
 fn check_categories(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
-    let mut told: BTreeSet<&str> = BTreeSet::new();
+    let mut reported: BTreeSet<&str> = BTreeSet::new();
     for designator in SPECIAL.iter().filter(|name| is_of_objects(name)) {
         for (key, model) in placed_models(campaign, designator) {
-            if ontology.has_class(&model.category) || !told.insert(&model.name) {
+            if ontology.has_class(&model.category) || !reported.insert(&model.name) {
                 continue;
             }
             let short = names::shorten(&model.category);

@@ -26,7 +26,10 @@ use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Terms};
 ///
 /// let mut ontology = Ontology::default();
 /// for (iri, text) in [
-///     ("http://example.org/onTable", "success(?x) :- after(?x, <http://example.org/on>, <http://example.org/table>) ."),
+///     (
+///         "http://example.org/onTable",
+///         "success(?x) :- after(?x, <http://example.org/on>, <http://example.org/table>) .",
+///     ),
 ///     ("http://example.org/allDry", "violation(?x) :- after(?x, <http://example.org/wet>, true) ."),
 /// ] {
 ///     let rule = RuleFile::new(Source::new(format!("{iri}.rls"), text));

@@ -1,13 +1,7 @@
 //! Limits on one evaluation.
 
-use actcheck_base::{Diagnostic, RuleFault};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// Returns the diagnostic of an interrupted evaluation.
-pub(crate) fn interrupted() -> Diagnostic {
-    Diagnostic::error("R091", RuleFault::Interrupted.to_string())
-}
 
 /// Limits on one evaluation. Change single limits of the default, so that new ones keep their default:
 ///

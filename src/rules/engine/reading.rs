@@ -80,12 +80,19 @@ pub(crate) fn findings(verdict: &Verdict, layers: &Layers<'_>, universe: &Univer
 fn margin(verdict: &Verdict, layers: &Layers<'_>, universe: &Universe<'_>) -> Result<Option<f64>, RuleFault> {
     let mut smallest: Option<f64> = None;
     for id in verdict.margin.map_or(&[][..], |predicate| layers.rows(predicate)) {
-        let term = universe.term(*id);
-        let number = Number::of(term).map(Number::double).filter(|value| !value.is_nan());
-        let number = number.ok_or_else(|| RuleFault::Value(format!("margin {term} is not a number")))?;
-        smallest = Some(smallest.map_or(number, |least| least.min(number)));
+        smallest = Some(smaller_margin(smallest, universe.term(*id))?);
     }
     Ok(smallest)
+}
+
+/// Returns the value of a margin, or the smallest one so far if that is less.
+///
+/// # Errors
+/// The term is not a number.
+pub(crate) fn smaller_margin(smallest: Option<f64>, term: &Term) -> Result<f64, RuleFault> {
+    let value = Number::of(term).map(Number::double).filter(|value| !value.is_nan());
+    let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is not a number")))?;
+    Ok(smallest.map_or(value, |least| least.min(value)))
 }
 
 fn because(verdict: &Verdict, layers: &Layers<'_>, universe: &Universe<'_>) -> Vec<String> {

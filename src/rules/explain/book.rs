@@ -8,7 +8,7 @@ use crate::engine::reading::{Verdict, findings};
 use crate::explain::goal::{Goal, PROOFS_SHOWN, goal_explained};
 use crate::explain::model::Explanation;
 use crate::explain::proof::Prover;
-use crate::explain::search::ProofContext;
+use crate::explain::search::{ProofContext, stated_facts};
 use crate::model::universe::Universe;
 use actcheck_base::{ActionFacts, Findings, RuleFault};
 
@@ -89,7 +89,7 @@ impl RuleBook {
         evaluate(planned, &mut layers)?;
         let findings = findings(verdict, &layers, &universe);
         let own = layers.own;
-        let stated = given_facts(&[planned, &self.libraries, &self.fixed_rules], self);
+        let stated = stated_facts(&[planned, &self.libraries, &self.fixed_rules], &self.predicates, &self.indexes);
         Ok(Evaluated { universe, rounds, given, stated, enriched: enriched.own, own, findings })
     }
 }
@@ -120,17 +120,6 @@ impl Evaluated<'_> {
             universe: &self.universe,
         }
     }
-}
-
-/// Returns the facts written in the rule texts.
-fn given_facts(programs: &[&Planned], book: &RuleBook) -> Tables {
-    let mut tables = Tables::default();
-    for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
-        let width = book.predicates.get(*predicate).width;
-        let table = crate::engine::relation::finished(width, rows.clone(), book.indexes.of(*predicate).clone());
-        tables.set(*predicate, table);
-    }
-    tables
 }
 
 fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &ProofContext<'_>) -> Explanation {

@@ -3,10 +3,9 @@
 use crate::engine::budget::Budget;
 use crate::engine::evaluate::{Layers, Rounds, Tables, evaluate_recording_rounds, fault};
 use crate::engine::meter::Meter;
-use crate::engine::relation::finished;
 use crate::explain::goal::{Goal, goal_explained};
 use crate::explain::model::Explanation;
-use crate::explain::search::ProofContext;
+use crate::explain::search::{ProofContext, stated_facts};
 use crate::model::universe::Universe;
 use crate::standalone::Program;
 use actcheck_base::RuleFault;
@@ -33,7 +32,7 @@ impl Program {
             Some(&mut rounds),
         )
         .map_err(|stopped| fault(&meter, stopped, planned))?;
-        let facts = self.given_facts();
+        let facts = stated_facts(&[planned], &self.predicates, &self.indexes);
         let known = goal.known(&mut universe);
         let context = ProofContext {
             predicates: &self.predicates,
@@ -44,15 +43,5 @@ impl Program {
             universe: &universe,
         };
         Ok(goal_explained(statement, predicate, &known, &context))
-    }
-
-    /// Returns the program's facts without derived tuples.
-    fn given_facts(&self) -> Tables {
-        let mut facts = Tables::default();
-        for (predicate, rows) in &self.planned.facts {
-            let width = self.predicates.get(*predicate).width;
-            facts.set(*predicate, finished(width, rows.clone(), self.indexes.of(*predicate).clone()));
-        }
-        facts
     }
 }

@@ -53,7 +53,8 @@ impl<'g, 'a> Prover<'g, 'a> {
         Proof { statement, support: Support::Cut }
     }
 
-    /// Returns a binding that satisfies a rule's body using only premises of earlier rounds, or `None` if there is none.
+    /// Returns a binding that satisfies a rule's body using only premises of earlier rounds, or `None` if no binding
+    /// does.
     fn instance(&self, rule: &Rule, mut binding: Binding, round: Option<u32>) -> Option<Binding> {
         let order = reading_order(rule, &binding);
         self.satisfy(rule, &order, &mut binding, round, &mut |_| true).then_some(binding)
@@ -127,8 +128,8 @@ impl<'g, 'a> Prover<'g, 'a> {
         premises
     }
 
-    /// Returns the matches of the group from which an aggregating rule derived a head row, or `None` if the rule did not
-    /// derive the row.
+    /// Returns the matches of the group from which an aggregating rule derived a head row, or `None` if the rule did
+    /// not derive the row.
     fn aggregate(&mut self, rule: &Rule, row: &[TermId], depth: usize) -> Option<Support> {
         let aggregation = rule.aggregation.as_ref()?;
         let mut binding = self.context.head_binding(rule, row)?;

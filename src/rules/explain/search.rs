@@ -1,7 +1,9 @@
 //! Backward search: evaluates rules from their heads over finished tuples.
 
-use crate::engine::evaluate::{Rounds, Tables};
+use crate::engine::evaluate::{Planned, Rounds, Tables};
 use crate::engine::naive::unify;
+use crate::engine::plan::Indexes;
+use crate::engine::relation::finished;
 use crate::model::expression::holds;
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
 use crate::model::universe::Universe;
@@ -21,6 +23,16 @@ pub(crate) struct ProofContext<'a> {
     pub(crate) facts: Vec<&'a Tables>,
     pub(crate) rounds: &'a Rounds,
     pub(crate) universe: &'a Universe<'a>,
+}
+
+/// Returns the facts written in the programs or read by their imports, without derived tuples.
+pub(super) fn stated_facts(programs: &[&Planned], predicates: &Predicates, indexes: &Indexes) -> Tables {
+    let mut facts = Tables::default();
+    for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
+        let width = predicates.get(*predicate).width;
+        facts.set(*predicate, finished(width, rows.clone(), indexes.of(*predicate).clone()));
+    }
+    facts
 }
 
 /// Maximum number of rows read for one explanation, so that it stays fast enough for interactive use.

@@ -1,11 +1,11 @@
-//! Terms of the RDF parsers and of oxigraph as our terms.
+//! Converts terms of `oxrdf`, which the RDF parsers and oxigraph use, to [`Term`].
 
 use oxrdf::Term as RdfTerm;
 
 use crate::model::values;
 use actcheck_base::Term;
 
-/// Converts one of the RDF library's terms to ours.
+/// Converts a term; literals get their canonical form.
 pub(crate) fn from_rdf(term: &RdfTerm) -> Term {
     match term {
         RdfTerm::NamedNode(node) => Term::iri(node.as_str()),

@@ -115,7 +115,8 @@ fn whole(canonical: &str) -> Option<Term> {
 /// Returns whether a term is an integer that does not fit in 64 bits.
 pub(crate) fn is_beyond_64_bits(term: &Term) -> bool {
     matches!(term, Term::Literal(text, datatype)
-        if (datatype.strip_prefix(names::XSD) == Some("integer") || datatype.as_ref() == "xsd:integer") && integer(text).is_some())
+        if (datatype.strip_prefix(names::XSD) == Some("integer") || datatype.as_ref() == "xsd:integer")
+            && integer(text).is_some())
 }
 
 fn xsd_float(text: &str) -> Option<f64> {

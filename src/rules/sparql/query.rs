@@ -8,9 +8,10 @@ use oxrdf::{NamedNode, Term as RdfTerm};
 use crate::builtins;
 use crate::engine::budget::Budget;
 use crate::engine::meter::Stop;
+use crate::engine::reading::smaller_margin;
 use crate::model::rdf::from_rdf;
 use crate::model::universe::Universe;
-use crate::model::values::{Number, lexical};
+use crate::model::values::lexical;
 use crate::sparql::dataset::{Snapshot, Statements, View, to_rdf};
 use crate::sparql::ledger::Ledger;
 use crate::sparql::query_text::{first_group, groups, scan, variables};
@@ -96,11 +97,7 @@ impl Query {
             for (variable, term) in row.iter() {
                 let term = from_rdf(term);
                 match variable.as_str() {
-                    "margin" => {
-                        let value = Number::of(&term).map(Number::double).filter(|value| !value.is_nan());
-                        let value = value.ok_or_else(|| RuleFault::Value(format!("margin {term} is not a number")))?;
-                        margin = Some(margin.map_or(value, |least| least.min(value)));
-                    }
+                    "margin" => margin = Some(smaller_margin(margin, &term)?),
                     "because" => {
                         because.insert(lexical(&term));
                     }

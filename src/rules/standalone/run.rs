@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::engine::budget::{Budget, interrupted};
+use crate::engine::budget::Budget;
 use crate::standalone::export::{exports, write};
 use crate::standalone::program::{Engine, Program};
 use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault};
@@ -36,7 +36,7 @@ pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diag
     }
     let closure = program.close(Engine::Fast, budget).map_err(|fault| {
         if fault == RuleFault::Interrupted {
-            return interrupted().in_source(&source);
+            return Diagnostic::error("R091", fault.to_string()).in_source(&source);
         }
         let help = "a recursive rule that computes new values may never terminate; add a limit such as `?x < 100`";
         Diagnostic::error("R090", fault.to_string()).in_source(&source).help(help)

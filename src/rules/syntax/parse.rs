@@ -19,7 +19,8 @@ pub(crate) struct ErrorReported;
 /// use actcheck_base::Source;
 /// use actcheck_rules::syntax::Statement;
 ///
-/// let (syntax, diagnostics) = actcheck_rules::parse(&Source::new("a.rls", "p(?x) :- q(?x), ?x > 1 .\n p(1 .\n r(2) ."));
+/// let source = Source::new("a.rls", "p(?x) :- q(?x), ?x > 1 .\n p(1 .\n r(2) .");
+/// let (syntax, diagnostics) = actcheck_rules::parse(&source);
 /// assert_eq!(syntax.statements.len(), 2);
 /// assert!(matches!(&syntax.statements[0], Statement::Rule(rule) if rule.body.len() == 2));
 /// assert_eq!(diagnostics.iter().next().and_then(|found| found.place()).as_deref(), Some("a.rls:2:6"));
