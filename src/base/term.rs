@@ -108,7 +108,7 @@ impl Hash for Term {
 }
 
 impl fmt::Display for Term {
-    /// Writes the term in Turtle syntax, with known prefixes.
+    /// Writes the term as in Turtle, with known prefixes. Doubles have no exponent: `0.9`, not `0.9e0`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Iri(iri) => f.write_str(&names::shorten(iri)),

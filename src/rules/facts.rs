@@ -71,8 +71,9 @@ impl Facts {
 
     /// Adds the triples of Turtle text.
     ///
-    /// Literals keep their datatype: `0.5` is a decimal, as in Turtle, and `0.5e0` a double. Rules treat both as
-    /// numbers.
+    /// Literals keep their datatype: `0.5` is a decimal, as in Turtle, and `0.5e0` a double. Both are numbers in
+    /// arithmetic and in comparisons such as `<`. In atoms and with `=`, rules compare terms: `0.5` in a rule is the
+    /// double, which differs from the decimal.
     ///
     /// # Errors
     /// `O002` for each syntax error, at most five; then no triple is added.

@@ -32,7 +32,7 @@ use actcheck_base::Findings;
 pub struct Explanation {
     /// The property's label, or the goal as written.
     pub title: String,
-    /// The property's findings; `None` for a goal of a standalone program.
+    /// The property's findings; `None` if a goal is explained.
     pub findings: Option<Findings>,
     /// Proofs of the first few deciding tuples.
     pub proofs: Vec<Proof>,
