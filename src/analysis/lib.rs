@@ -35,9 +35,7 @@ pub use health::{Health, HealthMeter, HealthProblem};
 pub use holm::holm;
 pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
 pub use paired::{Difference, PairedTable, PairedTest};
-pub use patterns::{
-    Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Values, mine, simplest_between,
-};
+pub use patterns::{Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Values, mine};
 pub use property_rates::{PropertyRate, property_rates};
 pub use score_interval::score_interval;
 pub use tables::{
