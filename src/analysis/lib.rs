@@ -15,7 +15,6 @@ mod holm;
 mod oracles;
 mod paired;
 mod patterns;
-mod property_rates;
 mod score_interval;
 mod tables;
 
@@ -36,7 +35,6 @@ pub use holm::holm;
 pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
 pub use paired::{Difference, PairedTable, PairedTest};
 pub use patterns::{Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Values, mine};
-pub use property_rates::{PropertyRate, property_rates};
 pub use score_interval::score_interval;
 pub use tables::{
     Column, ColumnKind, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter, TextColumn, columns, export_csv,
