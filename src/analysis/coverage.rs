@@ -206,7 +206,7 @@ mod tests {
         choices.into_made()
     }
 
-    /// An index of one of four billion noise images must not allocate four billion counters (34 GB).
+    /// A choice among four billion noise patterns of an image must not allocate four billion counters (34 GB).
     #[test]
     fn a_choice_among_very_many_values_is_counted_as_a_number() {
         let mut choices = Choices::random(5, 0);

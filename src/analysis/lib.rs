@@ -15,7 +15,6 @@ mod holm;
 mod oracles;
 mod paired;
 mod patterns;
-mod property_rates;
 mod score_interval;
 mod tables;
 
@@ -35,10 +34,7 @@ pub use health::{Health, HealthMeter, HealthProblem};
 pub use holm::holm;
 pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
 pub use paired::{Difference, PairedTable, PairedTest};
-pub use patterns::{
-    Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Values, mine, simplest_between,
-};
-pub use property_rates::{PropertyRate, property_rates};
+pub use patterns::{Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Values, mine};
 pub use score_interval::score_interval;
 pub use tables::{
     Column, ColumnKind, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter, TextColumn, columns, export_csv,

@@ -39,7 +39,7 @@ pub struct TraceDifference {
 ///
 /// Of several differences at the same moment, body parameters come before poses, and poses before velocities, because
 /// the earlier ones are likelier causes.
-pub fn first_difference(was: &Trace, is: &Trace) -> Option<TraceDifference> {
+pub(super) fn first_difference(was: &Trace, is: &Trace) -> Option<TraceDifference> {
     let (was, is) = (moments(was), moments(is));
     for (one, other) in was.iter().zip(&is) {
         if one.time_secs.to_bits() != other.time_secs.to_bits() {

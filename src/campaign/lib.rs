@@ -35,7 +35,7 @@ mod workers;
 
 pub use budget::ExhaustedBudget;
 pub use changes::{ChangeKind, InputChange, changes};
-pub use difference::{TraceDifference, first_difference};
+pub use difference::TraceDifference;
 pub use environment::Env;
 pub use export::{export, regressions_folder};
 pub use failure::Failure;

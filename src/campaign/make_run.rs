@@ -9,7 +9,7 @@ use actcheck_history::RunRecord;
 /// Maximum number of scenes drawn for one run; then the campaign stops.
 ///
 /// If one scene in five of a space can be built, one run in 70,000 is left without a scene.
-const SCENES_PER_RUN: u64 = 50;
+pub(super) const SCENES_PER_RUN: u64 = 50;
 
 /// A new run, and why each scene that was drawn before was discarded.
 pub(super) struct MadeRun {

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::attempt::{Attempt, AttemptFault};
+use crate::difference::first_difference;
 use crate::finished_run::FinishedRun;
 use crate::workers::workers;
-use crate::{Env, Failure, InputChange, RunContext, TraceDifference, changes, first_difference};
+use crate::{Env, Failure, InputChange, RunContext, TraceDifference, changes};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ActionEnd, Choice, ChoiceKind, Choices, Trace};
@@ -301,9 +302,9 @@ mod tests {
     fn every_kind_of_mismatch_is_named() {
         let recorded = [real("a", 1.0, 0.5), real("b", 1.0, 0.9), real("b", 1.0, 0.1), real("c", 1.0, 0.2)];
         let made = [real("a", 2.0, 0.5), real("b", 0.8, 0.8), real("d", 1.0, 0.0), real("c", 1.0, 0.2)];
-        let told: Vec<String> = misfits(&recorded, &made).iter().map(Misfit::to_string).collect();
+        let found: Vec<String> = misfits(&recorded, &made).iter().map(Misfit::to_string).collect();
         assert_eq!(
-            told,
+            found,
             [
                 "`a` has another kind or range now",
                 "`b` was 0.9, is 0.8",
@@ -321,13 +322,13 @@ mod tests {
 
     #[test]
     fn candidates_may_be_added_but_not_removed() {
-        let told = |was: Choice, is: Choice| misfits(&[was], &[is]).first().map(Misfit::to_string);
-        assert_eq!(told(candidate(&["a"], 0.0), candidate(&["b", "a"], 1.0)), None);
-        let gone = told(candidate(&["a"], 0.0), candidate(&["b"], 0.0));
+        let misfit_text = |was: Choice, is: Choice| misfits(&[was], &[is]).first().map(Misfit::to_string);
+        assert_eq!(misfit_text(candidate(&["a"], 0.0), candidate(&["b", "a"], 1.0)), None);
+        let gone = misfit_text(candidate(&["a"], 0.0), candidate(&["b"], 0.0));
         assert_eq!(gone.as_deref(), Some("`surface.name` was `a`, which it can't be now, is `b`"));
         let old = |of| Choice { kind: ChoiceKind::Index { of }, ..candidate(&[], 0.0) };
-        assert_eq!(told(old(1), candidate(&["a"], 0.0)), None);
-        let grown = told(old(1), candidate(&["b", "a"], 0.0));
+        assert_eq!(misfit_text(old(1), candidate(&["a"], 0.0)), None);
+        let grown = misfit_text(old(1), candidate(&["b", "a"], 0.0));
         assert_eq!(grown.as_deref(), Some("`surface.name` has another kind or range now"));
     }
 }

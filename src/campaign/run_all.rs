@@ -179,7 +179,7 @@ fn conduct(
     }
 }
 
-/// Writes the runs; nothing else does.
+/// Writes the runs in the order of the schedule, and decides when the campaign ends.
 struct RunWriter<'a> {
     history: &'a History,
     /// Id of the campaign.

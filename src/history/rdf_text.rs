@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn triples_are_written_and_missing_values_omitted() {
+    fn triples_are_written_and_invalid_ones_omitted() {
         let (s, p) = (Term::iri("http://actions#a"), Term::iri("http://actions#b"));
         let triples = [
             [s.clone(), p.clone(), Term::string("line\n\"quoted\" \\ <tag>")],

@@ -154,7 +154,7 @@ pub struct RunRecord {
     pub action_scores: Vec<f64>,
     /// Why each scene that was drawn before was discarded, in order.
     pub discards: Vec<String>,
-    /// Every decision.
+    /// Every choice.
     pub choices: Vec<Choice>,
     /// The scene.
     pub scene: Scene,

@@ -210,7 +210,8 @@ impl History {
         lists::runs(&self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
-    /// Returns the ids of all campaigns without shrunk runs, sorted by start, each with its run ids, sorted as strings.
+    /// Returns the ids of all campaigns except those of [`History::shrunk_campaigns`], sorted by start, each with its
+    /// run ids, sorted as strings.
     ///
     /// # Errors
     /// The store can't be read.
@@ -295,7 +296,7 @@ impl History {
         Ok(self.decoded(&id, trace_file::decode_states)?.1)
     }
 
-    /// Returns every decision of a run, named as in [`History::resolve`].
+    /// Returns every choice of a run, named as in [`History::resolve`].
     ///
     /// # Errors
     /// As [`History::trace`].

@@ -1,4 +1,4 @@
-//! The file of a run: its decisions and its trace, so that the run can be judged again, drawn and replayed.
+//! The file of a run: its choices and its trace, so that the run can be judged again, drawn and replayed.
 //!
 //! It has two compressed parts: first the data from which facts are extracted, then the motion of all bodies, which
 //! only pictures and replay need.
@@ -18,8 +18,8 @@ const MAGIC: &[u8; 8] = b"actrace4";
 /// Magic bytes of files whose choices have the indices of candidates, without their names. All else is the same.
 const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
 
-/// First part: decisions, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies and
-/// the courses of the robot follow it. (Traces of earlier versions end before any of these.)
+/// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies and
+/// the motion of the robot follow it. (Traces of earlier versions end before any of these.)
 type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
 
 /// Encodes a run's file.
@@ -39,7 +39,7 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
     Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
 }
 
-/// Decodes the decisions and the whole trace.
+/// Decodes the choices and the whole trace.
 ///
 /// # Errors
 /// A message that names the damaged part.
@@ -76,7 +76,7 @@ fn decode_motions(mut rest: &[u8], trace: &mut Trace) -> Option<()> {
     Some(())
 }
 
-/// Decodes the decisions and the trace without the rows of its frames: everything from which facts are extracted.
+/// Decodes the choices and the trace without the rows of its frames: everything from which facts are extracted.
 ///
 /// # Errors
 /// A message that names the damaged part.

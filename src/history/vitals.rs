@@ -14,7 +14,7 @@ pub struct RunVitals {
     pub run: String,
     /// Position in the campaign, from 0.
     pub index: u64,
-    /// Every decision, in order.
+    /// Every choice, in order.
     pub choices: Vec<Choice>,
     /// Reasons why scenes were discarded before its own.
     pub discards: Vec<String>,
@@ -31,7 +31,7 @@ pub struct RunVitals {
     pub energy_gain_j: Option<f64>,
 }
 
-/// Reads an existing run. The caller reads its decisions from its trace file.
+/// Reads an existing run. The caller reads its choices from its trace file.
 pub(super) fn read(store: &Store, run: &str, choices: Vec<Choice>) -> Result<RunVitals, StorageError> {
     let node_name = run_node(run);
     let node = Node::read(store, &node_name)?;

@@ -196,7 +196,7 @@ fn service(text: &str) -> Option<Span> {
     None
 }
 
-/// Length of a string in single or triple quotes.
+/// Length of a string, including its quotation marks: one or three at each end.
 fn quoted(rest: &[u8]) -> usize {
     let quote = rest[0];
     let long = rest.len() >= 3 && rest[1] == quote && rest[2] == quote;

@@ -39,7 +39,7 @@ const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' blob
 /// Policy of answers, which are not pages.
 const NO_POLICY: &str = "default-src 'none'; frame-ancestors 'none'; sandbox";
 
-/// ServeOptions of [`serve`].
+/// Options of [`serve`].
 #[derive(Debug, Clone)]
 pub struct ServeOptions {
     /// Folder of the history.
@@ -66,7 +66,7 @@ pub struct ServeOptions {
     pub most_memory: u64,
     /// Maximum number of concurrent queries.
     pub most_queries: usize,
-    /// ExampleQuery queries.
+    /// Example queries of the page.
     pub examples: Vec<ExampleQuery>,
 }
 

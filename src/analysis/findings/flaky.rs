@@ -1,4 +1,4 @@
-//! SceneCounts scenes, which sometimes pass and sometimes fail.
+//! Flaky scenes, which sometimes pass and sometimes fail.
 
 use std::collections::BTreeMap;
 

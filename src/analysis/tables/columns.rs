@@ -160,30 +160,41 @@ const COLUMNS: &[Column] = &[
         Cell::Number(p.scene.obstacle_distance_m)
     })
     .of_scene(),
-    number("position_noise_m", "m", "standard deviation of perceived positions", |p| noise(p, "positionNoise"))
+    number("position_noise_m", "m", "standard deviation of the error of perceived positions", |p| {
+        noise(p, "positionNoise")
+    })
+    .of_scene(),
+    number("height_noise_m", "m", "standard deviation of the error of perceived heights", |p| noise(p, "heightNoise"))
         .of_scene(),
-    number("height_noise_m", "m", "standard deviation of perceived heights", |p| noise(p, "heightNoise")).of_scene(),
-    number("yaw_noise_rad", "rad", "standard deviation of perceived headings", |p| noise(p, "yawNoise")).of_scene(),
-    number("size_noise_m", "m", "standard deviation of perceived sizes", |p| noise(p, "sizeNoise")).of_scene(),
-    number("localisation_noise_m", "m", "standard deviation of the robot's localisation", |p| {
+    number("yaw_noise_rad", "rad", "standard deviation of the error of perceived headings", |p| noise(p, "yawNoise"))
+        .of_scene(),
+    number("size_noise_m", "m", "standard deviation of the error of perceived sizes", |p| noise(p, "sizeNoise"))
+        .of_scene(),
+    number("localisation_noise_m", "m", "standard deviation of the error of the robot's localised position", |p| {
         noise(p, "localisationNoise")
     })
     .of_scene(),
-    number("heading_noise_rad", "rad", "standard deviation of the robot's localised heading", |p| {
+    number("heading_noise_rad", "rad", "standard deviation of the error of the robot's localised heading", |p| {
         noise(p, "headingNoise")
     })
     .of_scene(),
-    number("gripper_noise_m", "m", "standard deviation of the gripper's opening", |p| noise(p, "gripperNoise"))
-        .of_scene(),
-    number("range_noise_m", "m", "standard deviation of the camera's ranges", |p| noise(p, "rangeNoise")).of_scene(),
-    number("odometry_drift", "1", "standard deviation of odometry, as a share of the distance travelled", |p| {
-        noise(p, "odometryDrift")
+    number("gripper_noise_m", "m", "standard deviation of the error of the gripper's opening", |p| {
+        noise(p, "gripperNoise")
     })
+    .of_scene(),
+    number("range_noise_m", "m", "standard deviation of the error of the camera's ranges", |p| noise(p, "rangeNoise"))
+        .of_scene(),
+    number(
+        "odometry_drift",
+        "1",
+        "standard deviation of the error of odometry, as a share of the distance travelled",
+        |p| noise(p, "odometryDrift"),
+    )
     .of_scene(),
     number(
         "heading_drift_rad",
         "rad",
-        "standard deviation of the odometry's heading, for each radian and metre",
+        "standard deviation of the error of the odometry's heading, for each radian and metre",
         |p| noise(p, "odometryHeadingDrift"),
     )
     .of_scene(),
@@ -191,9 +202,11 @@ const COLUMNS: &[Column] = &[
         noise(p, "landmarkDistance")
     })
     .of_scene(),
-    number("landmark_noise_m", "m", "standard deviation of positions from landmarks", |p| noise(p, "landmarkNoise"))
-        .of_scene(),
-    number("landmark_noise_rad", "rad", "standard deviation of headings from landmarks", |p| {
+    number("landmark_noise_m", "m", "standard deviation of the error of positions from landmarks", |p| {
+        noise(p, "landmarkNoise")
+    })
+    .of_scene(),
+    number("landmark_noise_rad", "rad", "standard deviation of the error of headings from landmarks", |p| {
         noise(p, "landmarkHeadingNoise")
     })
     .of_scene(),

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
+use crate::make_run::SCENES_PER_RUN;
 use crate::oracles::Fault;
 use crate::workers::workers;
 use crate::{Env, Planned, RunContext, RunInput, run_line, run_sabotaged};
@@ -14,8 +15,6 @@ use actcheck_base::{Diagnostics, Judgement, Outcome};
 use actcheck_data::{Choice, Choices};
 use actcheck_history::{RunRecord, RunStatus};
 
-/// Maximum number of scenes drawn for one run, as in a campaign; then the run is left out.
-const SCENES_PER_RUN: u64 = 50;
 /// Campaign id of the records, which are never stored.
 const NO_CAMPAIGN: &str = "check-oracles";
 

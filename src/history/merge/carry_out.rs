@@ -43,8 +43,8 @@ pub fn carry_out(
 ) -> Result<Merged, Diagnostics> {
     let renames: Vec<Renames> = (0..sources.len())
         .map(|source| {
-            let of_place = plan.ids.iter().filter(|((of, _), _)| *of == source);
-            Renames::new(of_place.map(|((_, old), new)| (old.clone(), new.clone())))
+            let of_source = plan.ids.iter().filter(|((of, _), _)| *of == source);
+            Renames::new(of_source.map(|((_, old), new)| (old.clone(), new.clone())))
         })
         .collect();
     let mut writer = Writer { sources, renames, into, merged: Merged::default() };

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use oxigraph::model::{BlankNode, GraphName, Literal, NamedNode, NamedOrBlankNode, Quad, Term};
 
+use crate::FAILED_AGAIN;
 use crate::read::text_of;
 use crate::statements::iri;
 use crate::write_run::unique;
@@ -68,8 +69,12 @@ impl Renames {
         Quad::new(subject, quad.predicate.clone(), object, graph)
     }
 
-    /// Renames a campaign's label, which may end in the id of a shrunk run.
+    /// Renames a campaign's label, which may end in the id of a shrunk run, or of a campaign whose failed runs were run
+    /// again.
     fn label(&self, literal: &Literal) -> Literal {
+        if let Some(new) = literal.value().strip_prefix(FAILED_AGAIN).and_then(|old| self.new_ids.get(old)) {
+            return Literal::new_simple_literal(format!("{FAILED_AGAIN}{new}"));
+        }
         match literal.value().rsplit_once(' ') {
             Some((words, run)) => Literal::new_simple_literal(format!("{words} {}", self.run(run))),
             None => literal.clone(),
@@ -174,6 +179,7 @@ mod tests {
         assert_eq!(renames.iri(&names::act("k-1")), names::act("k-1"));
         assert_eq!(renames.run("a-1"), "a-1");
         assert_eq!(renames.label(&Literal::new_simple_literal("shrunk k-3")).value(), "shrunk m-3");
+        assert_eq!(renames.label(&Literal::new_simple_literal("failed runs of k")).value(), "failed runs of m");
         assert_eq!(renames.label(&Literal::new_simple_literal("pick")).value(), "pick");
     }
 }

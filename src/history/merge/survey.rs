@@ -20,7 +20,7 @@ pub(super) struct Found {
     pub(super) row: CampaignRow,
     /// Id that it had when it was run.
     pub(super) first_id: String,
-    /// Whether it holds a shrunk run.
+    /// Whether its scenes were selected because they fail: it holds a shrunk run, or ran failed runs again.
     pub(super) shrunk: bool,
     /// Its runs by index.
     pub(super) runs: BTreeMap<u64, FoundRun>,
