@@ -1,8 +1,8 @@
 //! actcheck: QuickCheck for robot actions.
 //!
-//! Generates randomised tabletop scenes, lets a robot act in them in physics simulation, records the world before, during
-//! and after each action as RDF facts, judges the actions by rules that can be edited without recompiling, and stores every
-//! run.
+//! Generates randomised tabletop scenes, lets a robot act in them in a physics simulation, records the world before,
+//! during and after each action as RDF facts, judges the actions by rules that can be edited without recompiling, and
+//! stores every run.
 //!
 //! # One straight line
 //!
@@ -16,7 +16,7 @@
 //! the stages; [`cli`] handles arguments, the clock, signals and streams.
 //!
 //! Each stage is a crate of its own in the folder of its name (`src/rules` is `actcheck-rules`), so that a part can be used without
-//! the others.
+//! the rest of the program.
 //!
 //! | crate | purpose | libraries |
 //! | --- | --- | --- |

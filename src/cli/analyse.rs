@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::chosen::{self, ChosenRuns, is_meant};
-use crate::options::Format;
+use crate::options::{Format, level};
 use crate::output;
 use crate::picture::Picture;
+use crate::work::all_cores;
 use actcheck_analysis::{
     FINDING_COLUMNS, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns,
     flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
@@ -55,13 +56,6 @@ pub struct AnalyseArgs {
     /// How it is printed (csv: the patterns, or with --by the cells of the map; json: everything)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
-}
-
-fn level(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(level) if level > 0.0 && level < 1.0 => Ok(level),
-        _ => Err("must be a probability above 0 and below 1, such as 0.05".to_owned()),
-    }
 }
 
 /// The result of an analysis.
@@ -172,7 +166,6 @@ fn reports(
     properties: &[JudgedProperty],
     report: impl Fn(&JudgedProperty) -> PropertyReport + Sync,
 ) -> Vec<PropertyReport> {
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
     let at_once = |properties: &[JudgedProperty]| -> Vec<PropertyReport> {
         std::thread::scope(|scope| {
             let started: Vec<_> = properties.iter().map(|of| scope.spawn(|| report(of))).collect();
@@ -180,7 +173,7 @@ fn reports(
             joined.map(|found| found.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
         })
     };
-    properties.chunks(workers).flat_map(at_once).collect()
+    properties.chunks(all_cores()).flat_map(at_once).collect()
 }
 
 fn read(mirror: &Mirror, filter: &TableFilter, further: &[&'static str]) -> Result<OutcomeTable, Diagnostics> {

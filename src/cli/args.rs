@@ -179,7 +179,7 @@ pub enum Command {
     /// elsewhere omits those that are the same as the shipped ones, so that it runs anywhere.
     ///
     /// Tables come from the mirror beside the history (its folder `tables`), which is updated first. They contain no
-    /// shrunk runs.
+    /// shrunk runs, and none of `run --last-failed`.
     #[command(
         after_help = "Examples:\n  actcheck export k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export --parquet tables    (after `actcheck run configs/pick.toml`)\n  actcheck export --nquads history.nq --turtle history.ttl"
     )]

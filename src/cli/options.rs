@@ -1,4 +1,4 @@
-//! Options that several commands have: the history's folder, output formats, durations.
+//! Options that several commands have: the history's folder, output formats, durations, significance levels.
 
 use std::path::PathBuf;
 
@@ -80,9 +80,28 @@ pub fn duration(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses a significance level or false discovery rate.
+///
+/// # Errors
+/// A message if the text is not a number above 0 and below 1.
+pub fn level(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(level) if level > 0.0 && level < 1.0 => Ok(level),
+        _ => Err("must be a probability above 0 and below 1, such as 0.05".to_owned()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn levels_are_probabilities() {
+        for wrong in ["0", "1", "-0.1", "NaN", "5 %", ""] {
+            assert!(level(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(level("0.05"), Ok(0.05));
+    }
 
     #[test]
     fn durations_have_units_and_plain_numbers_are_seconds() {

@@ -3,6 +3,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::work::all_cores;
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_data::Trace;
 use actcheck_history::{History, RunDetail};
@@ -36,8 +37,7 @@ pub(super) fn for_each(
         let explained = rules.as_ref().map(|rules| explained(history, rules, &run, &budget)).unwrap_or_default();
         Ok((run, trace, explained))
     };
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    for runs in order.chunks(workers * RUNS_OF_A_WORKER) {
+    for runs in order.chunks(all_cores() * RUNS_OF_A_WORKER) {
         let shares: Vec<Vec<Result<ReplayedRun, Diagnostics>>> = std::thread::scope(|scope| {
             let share = |runs: &'_ [String]| runs.iter().map(read).collect();
             let started: Vec<_> = runs.chunks(RUNS_OF_A_WORKER).map(|runs| scope.spawn(move || share(runs))).collect();
@@ -46,8 +46,8 @@ pub(super) fn for_each(
                 .map(|share| share.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
                 .collect()
         });
-        for watched in shares.into_iter().flatten() {
-            if take(watched?)?.is_break() {
+        for run in shares.into_iter().flatten() {
+            if take(run?)?.is_break() {
                 return Ok(());
             }
         }

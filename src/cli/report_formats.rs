@@ -68,7 +68,8 @@ pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>,
     sinks.finish(&args.formats, &campaigns)
 }
 
-/// The requested campaigns and runs, in order; shrunk runs only if their campaign is named.
+/// The requested campaigns and runs, in order; shrunk runs, and failed runs that ran again, only if their campaign is
+/// named.
 fn asked_for(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
     let filter = args.chosen.filter(history)?;
     let shrunk = history.shrunk_campaigns()?;

@@ -16,8 +16,8 @@ mod text;
 mod xml;
 
 pub use formats::{
-    Attachment, EarlReport, JunitReport, MarkdownReport, RESULTS_COMMON_FILES, Repetitions, allure_common,
-    allure_results, markdown, observation,
+    Attachment, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common, allure_results, markdown,
+    observation,
 };
 pub use html::{Explained, HTML_COLUMNS, HtmlReport, PropertyWords, Replays, html, replay_order};
 pub use json::{
@@ -39,5 +39,5 @@ pub use table::{
 };
 pub use text::{
     campaign_text, case_text, compare_text, findings_text, health_lines, health_text, oracles_text, recheck_text,
-    regressions_text, run_text, scene_rule, shrunk_text,
+    run_text, scene_rule, shrunk_text,
 };

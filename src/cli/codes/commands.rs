@@ -128,7 +128,12 @@ const CODES_X: &[Code] = &[
         "there is nothing to run again",
         "run the configuration without `--last-failed`",
     ),
-    code("X040", "an option can't be used with a case", "a case has one scene and draws nothing", "remove the option"),
+    code(
+        "X040",
+        "an option can't be used with a case",
+        "a case has one scene, and the option is for campaigns",
+        "remove the option",
+    ),
     code("X041", "the folder `regressions` can't be listed", "it is not readable", "make it readable, or move it away"),
     code(
         "X042",
@@ -210,7 +215,7 @@ const CODES_X: &[Code] = &[
     code(
         "X070",
         "the history has no campaign",
-        "it is empty, or holds only shrunk runs",
+        "it is empty, or holds only shrunk runs and failed runs that ran again",
         "`actcheck run CONFIG` creates one",
     ),
     code(

@@ -13,7 +13,7 @@ use actcheck_data::Role;
 use actcheck_history::{ActionDetail, RunDetail};
 
 /// Names of the files in the results folder that do not belong to a result.
-pub const RESULTS_COMMON_FILES: [&str; 2] = ["categories.json", "environment.properties"];
+const RESULTS_COMMON_FILES: [&str; 2] = ["categories.json", "environment.properties"];
 
 /// A file attached to results.
 #[derive(Debug, Clone, PartialEq)]

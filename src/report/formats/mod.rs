@@ -10,7 +10,7 @@ mod junit;
 mod markdown;
 mod observation;
 
-pub use allure::{Attachment, RESULTS_COMMON_FILES, allure_common, allure_results};
+pub use allure::{Attachment, allure_common, allure_results};
 pub use earl::EarlReport;
 pub use identity::Repetitions;
 pub use junit::JunitReport;

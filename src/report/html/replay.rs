@@ -124,7 +124,7 @@ fn details(pack: &mut Pack, run: &RunDetail) {
     pack.set("objects", objects);
 }
 
-/// Name of a role. Objects at the place location are drawn like other objects.
+/// Name of a role. Objects on the surface for placing are drawn like other objects.
 fn role_name(role: Role) -> &'static str {
     if role == Role::PlaceOther { Role::Other.word() } else { role.word() }
 }

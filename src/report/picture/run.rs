@@ -40,13 +40,13 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
         forms: trace.forms.iter().map(|form| (form.name.as_str(), form)).collect(),
     };
     let close_ups = close_ups(trace, &subjects)?;
-    let base_way: Vec<[f64; 3]> =
+    let base_path: Vec<[f64; 3]> =
         paths.iter().filter(|path| path.mover == Mover::Base).flat_map(|path| path.points.iter().copied()).collect();
     let mut drawing = Drawing::new(WIDTH_PX);
     let inner = WIDTH_PX - 2.0 * GAP_PX;
     let mut y = header::draw(&mut drawing, caption, GAP_PX, GAP_PX - 4.0, inner) + 12.0;
     let side = View { across: across(trace, &close_ups[0]), up: 2 };
-    let whole = overview(trace, &close_ups, &base_way).map(|whole| (View::TOP, [whole; 2], 0));
+    let whole = overview(trace, &close_ups, &base_path).map(|whole| (View::TOP, [whole; 2], 0));
     for (view, bounds, kind) in whole.into_iter().chain([(View::TOP, close_ups, 1), (side, close_ups, 2)]) {
         y = row(&mut drawing, &data, view, &bounds, kind, y);
     }
@@ -58,8 +58,8 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
 /// each other.
 fn across(trace: &Trace, about: &Bounds) -> usize {
     let base = trace.snapshots.first().map_or([0.0; 3], |snapshot| snapshot.robot.base_true);
-    let path = |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();
-    usize::from(path(1) > path(0))
+    let distance = |axis: usize| (f64::midpoint(about.low[axis], about.high[axis]) - base[axis]).abs();
+    usize::from(distance(1) > distance(0))
 }
 
 /// Draws two panels of one view, before and after. Returns their lower end.

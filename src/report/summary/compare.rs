@@ -12,9 +12,9 @@ pub struct ComparedSide {
     pub campaign: String,
     /// Name of its configuration.
     pub config: String,
-    /// Number of runs it has.
+    /// Number of its runs in the history.
     pub runs: u64,
-    /// Number of runs it was asked for.
+    /// Number of planned runs.
     pub planned: u64,
     /// When it started (RFC 3339).
     pub started: String,

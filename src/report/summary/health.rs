@@ -56,7 +56,7 @@ impl HealthSummary {
             )
             .help("the two parameters vary together, so failures can't be attributed to one of them: check whether discards or a case tie them"),
             HealthProblem::Duplicates(times, run, of) => {
-                Diagnostic::warning("Q004", format!("{times} runs make the same decisions as another run: {run} repeats {of}"))
+                Diagnostic::warning("Q004", format!("{times} runs have the same choices as another run: {run} repeats {of}"))
                     .help("widen the ranges of `[physics]`, `[sensing]` or the models, or ask for fewer runs")
             }
             HealthProblem::Slow(run, secs, median) => Diagnostic::warning(

@@ -18,7 +18,8 @@ mod shrunk;
 mod weighted;
 
 pub use campaign::campaign_text;
-pub use case::{case_text, regressions_text};
+pub use case::case_text;
+pub(crate) use case::regressions_text;
 pub use compare::compare_text;
 pub use findings::findings_text;
 pub use health::{health_lines, health_text};
