@@ -38,8 +38,9 @@ const UPRIGHT_COSINE: f64 = 0.999;
 /// are errors.
 ///
 /// # Errors
-/// All faults of the text: it is not XML (W031) or not SDF (W032), includes missing models (W040), has duplicate names
-/// (W041), or contains unsupported elements (W035).
+/// All faults of the text: it is not XML (W031) or not SDF of a supported version (W032), lacks an element (W033), has
+/// an invalid value (W034) or an unsupported element (W035), includes a missing model (W040), or has a duplicate name
+/// (W041).
 pub(crate) fn read<'a>(
     name: &str,
     source: &Source,
