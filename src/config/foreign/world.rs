@@ -9,7 +9,7 @@ use actcheck_base::{Diagnostics, Source, did_you_mean, digest_of};
 use actcheck_data::{Location, ObjectModel, Pose};
 
 /// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
-const WITHOUT_BEARING: [&str; 16] = [
+const KNOWN: [&str; 16] = [
     "include",
     "model",
     "light",
@@ -57,7 +57,7 @@ pub(crate) fn read<'a>(
     if check_version(root, &mut reader).is_some()
         && let Some(world) = reader.required(root, "world")
     {
-        reader.warn_about_unknown_children(world, &WITHOUT_BEARING);
+        reader.warn_about_unknown_children(world, &KNOWN);
         for inline in xml::children(world, "model").filter(|inline| !is_floor(*inline)) {
             let message = "a model defined inside a world is not supported".to_owned();
             reader.error(
