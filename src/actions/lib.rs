@@ -32,4 +32,4 @@ pub use memory::Held;
 pub use operator::{Interrupt, Operator};
 pub use perform::{Interference, perform, perform_with};
 pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
-pub use skills::{UnknownSkill, known_skill, reference_skills};
+pub use skills::{UnknownSkill, known_skill};

@@ -27,10 +27,10 @@ pub struct Interference<'a> {
     /// Injects faults on purpose.
     pub saboteur: Option<&'a mut Saboteur>,
     /// Performs the actions it knows, instead of the reference skills.
-    pub outside: Option<&'a mut dyn ExternalSkill>,
+    pub external: Option<&'a mut dyn ExternalSkill>,
 }
 
-/// Performs the actions as [`perform`] does, with interference from outside.
+/// Performs the actions as [`perform`] does, with interference.
 ///
 /// The trace records the calls as given, not as sabotaged.
 pub fn perform_with(
@@ -45,7 +45,7 @@ pub fn perform_with(
     let mut memory = Memory::default();
     let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
     let mut robot_courses = Vec::with_capacity(calls.len());
-    let mut begun = interference.outside.as_deref_mut().map_or(Ok(()), |outside| outside.begin_run(world));
+    let mut begun = interference.external.as_deref_mut().map_or(Ok(()), |skill| skill.begin_run(world));
     for call in calls {
         let stopped = actions.last().is_some_and(|last| last.end != ActionEnd::Completed);
         if stopped {
@@ -54,7 +54,7 @@ pub fn perform_with(
         }
         let (action, course) = match std::mem::replace(&mut begun, Ok(())) {
             Ok(()) => perform_one(call, (world, choices, &mut memory), budget, &mut interference),
-            Err(fault) => (never_begun(call, ended_outside(fault)), RobotCourse::default()),
+            Err(fault) => (never_begun(call, ended_by(fault)), RobotCourse::default()),
         };
         actions.push(action);
         robot_courses.push(course);
@@ -78,9 +78,9 @@ fn perform_one(
     let understood = misled.as_ref().unwrap_or(call);
     let disturbed = (interference.cut, interference.saboteur.as_deref_mut());
     let mut operator = Operator::new(world, choices, memory, budget.action_secs, disturbed);
-    let outside = interference.outside.as_deref_mut().filter(|outside| outside.performs(&call.action));
-    let outcome = match (outside, skill(&call.action)) {
-        (Some(outside), _) => operator.act(|operator| outside.perform(understood, operator)),
+    let external = interference.external.as_deref_mut().filter(|skill| skill.performs(&call.action));
+    let outcome = match (external, skill(&call.action)) {
+        (Some(external), _) => operator.act(|operator| external.perform(understood, operator)),
         (None, Ok(skill)) => operator.act(|operator| skill(understood, operator)),
         (None, Err(unknown)) => {
             return (never_begun(call, ActionEnd::Broken(unknown.to_string())), RobotCourse::default());
@@ -123,7 +123,7 @@ fn never_begun(call: &ActionCall, end: ActionEnd) -> ActionTrace {
     ActionTrace { end, ..ActionTrace::not_reached(&call.action, &call.parameters) }
 }
 
-fn ended_outside(fault: ExternalFault) -> ActionEnd {
+fn ended_by(fault: ExternalFault) -> ActionEnd {
     if fault.late { ActionEnd::Timeout(fault.reason) } else { ActionEnd::Broken(fault.reason) }
 }
 
@@ -136,7 +136,7 @@ fn ended(
         (_, Some(fault)) => (ActionEnd::Broken(fault.to_string()), None),
         (Ok(report), None) => (ActionEnd::Completed, Some(report)),
         (Err(Interrupt::Cut), None) => (ActionEnd::Cut(cut::REASON.to_owned()), None),
-        (Err(Interrupt::ExternalSkill(fault)), None) => (ended_outside(fault), None),
+        (Err(Interrupt::ExternalSkill(fault)), None) => (ended_by(fault), None),
         (Err(_), None) => {
             let reason = format!("the action took longer than its budget of {} s", budget.action_secs);
             (ActionEnd::Timeout(reason), None)

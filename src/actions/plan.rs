@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use crate::grasp::{Approach, Grasp};
 use crate::motion::Samples;
 use crate::operator::Operator;
-use crate::route::{Block, Ground, Pillar, length};
+use crate::route::{Block, Ground, Pillar, length, wrapped};
 use crate::standing;
 use actcheck_world::{Kinematics, Layout, SelfContact, Sighting, ik};
 
@@ -279,9 +279,4 @@ fn radius(kinematics: &Kinematics, [x, y, _]: [usize; 3], positions: &[f64], poi
         length(point.x - positions[x], point.y - positions[y])
     };
     points.iter().map(far).fold(0.0, f64::max)
-}
-
-/// Wraps an angle to (−π, π]. Unit: radians.
-pub(super) fn wrapped(angle: f64) -> f64 {
-    libm::atan2(libm::sin(angle), libm::cos(angle))
 }

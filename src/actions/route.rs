@@ -159,6 +159,11 @@ pub fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }
 
+/// Wraps an angle to (−π, π]. Unit: radians.
+pub fn wrapped(angle: f64) -> f64 {
+    libm::atan2(libm::sin(angle), libm::cos(angle))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,10 +5,8 @@ use nalgebra::{Isometry3, Vector3};
 use crate::grasp::{Approach, Grasp};
 use crate::motion::{self, ArmSpace, Room, Samples};
 use crate::operator::Operator;
-use crate::plan::{
-    AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, PlanRequest, wrapped,
-};
-use crate::route::{Block, Pillar};
+use crate::plan::{AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, NO_WAY, Plan, PlanRequest};
+use crate::route::{Block, Pillar, wrapped};
 use actcheck_world::{JointKind, Kinematics, Layout, Sighting, ik};
 
 /// Samples allowed for one plan over all grasps: half a second's work together with the limit per grasp.

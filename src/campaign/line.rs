@@ -125,8 +125,8 @@ pub(super) fn simulate(
         let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
         Performance::new(programs, run, context.clock.secs)
     });
-    let outside = program.as_mut().map(|program| program as &mut dyn ExternalSkill);
-    let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, outside };
+    let external = program.as_mut().map(|program| program as &mut dyn ExternalSkill);
+    let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, external };
     let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
     let program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
     finish(env, Simulated { index, scene, trace, quality, choices, program_output }, context, start)

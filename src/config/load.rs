@@ -122,7 +122,7 @@ pub fn in_order_of_place(found: Diagnostics) -> Diagnostics {
 fn read_tests(table: &mut Table) -> (Vec<Vec<String>>, BTreeMap<String, Span>) {
     let mut places = BTreeMap::new();
     let mut tests = Vec::new();
-    for (idx, list) in table.some_lists_of_strings("tests").unwrap_or_default().into_iter().enumerate() {
+    for (idx, list) in table.non_empty_lists_of_strings("tests").unwrap_or_default().into_iter().enumerate() {
         for (step, action) in list.value.iter().enumerate() {
             places.insert(format!("tests.{idx}.{step}"), action.span.clone());
         }

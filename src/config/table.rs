@@ -157,7 +157,7 @@ impl Table {
     }
 
     /// Takes a list of at least one list of at least one string; each inner list has its span.
-    pub fn some_lists_of_strings(&mut self, key: &str) -> Option<Vec<Located<Vec<Located<String>>>>> {
+    pub fn non_empty_lists_of_strings(&mut self, key: &str) -> Option<Vec<Located<Vec<Located<String>>>>> {
         let expected = "a list of lists of strings";
         let place = self.entries.get(key).map(|entry| entry.value.span.clone());
         let outer = self.list(key, expected)?;

@@ -25,7 +25,7 @@ const POLL: Duration = Duration::from_millis(20);
 pub struct Wire {
     stream: UnixStream,
     clock_secs: fn() -> f64,
-    /// Received bytes; only the part of the current frame is valid.
+    /// Received bytes, then unused space: [`Wire::receive`] returns the range of the payload.
     incoming: Vec<u8>,
     outgoing: Vec<u8>,
 }

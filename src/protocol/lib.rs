@@ -17,7 +17,6 @@ mod process;
 mod remember;
 mod session;
 
-pub use frame::{FROM_PROGRAM_LIMIT, TO_PROGRAM_LIMIT};
 pub use message::PROTOCOL;
 pub use performance::{Performance, RunName};
 pub use pool::Programs;

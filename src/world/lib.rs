@@ -1,4 +1,4 @@
-//! Simulates a `Scene`: the only module that uses the physics engine.
+//! Simulates a `Scene`: the only crate that uses the physics engine.
 //!
 //! Never: decides the robot's actions, judges success, or attaches an object to the hand by a constraint.
 
@@ -34,7 +34,6 @@ mod simulation;
 
 pub use body::RobotBody;
 pub use camera::DepthImage;
-pub use contacts::CONTACT_FLOOR_NEWTONS;
 pub use decompose::{decompose, decomposition_key};
 pub use description::{Joint, JointKind};
 pub use error::WorldError;

@@ -1,8 +1,8 @@
 //! Localisation of the base while it drives: wheel odometry drifts, landmarks correct it.
 //!
-//! The relative wheel errors are constant within a stretch of the path. Each stretch has its own choices. A landmark
-//! measures the true pose with noise; its weight depends on the current uncertainty of the estimate (a Kalman filter
-//! with one variance for the position and one for the heading).
+//! The relative wheel errors are constant within a stretch of the path. Each stretch has its own choices,
+//! `sense.odometry.*`. A landmark measures the true pose with noise; its weight depends on the current uncertainty of
+//! the estimate (a Kalman filter with one variance for the position and one for the heading).
 
 use nalgebra::Vector2;
 

@@ -319,9 +319,7 @@ pub(super) mod tests {
     use crate::layout::check_robot;
     use crate::{World, build, ik};
     use actcheck_base::Files;
-    use actcheck_data::Choices;
-    use actcheck_data::Scene;
-    use actcheck_data::{Camera, Odometry, Physics, Sensing};
+    use actcheck_data::{Camera, Choices, Odometry, Physics, Scene, Sensing};
 
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");

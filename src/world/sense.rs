@@ -1,6 +1,6 @@
 //! Perception of objects: ground truth with noise, relative to the robot's pose estimate.
 //!
-//! Every random sample is a recorded choice.
+//! Every random sample is a recorded choice, `sense.*`.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 

@@ -1,6 +1,6 @@
 //! Follows a path: the base pose at each tick, within speed and acceleration limits.
 
-use crate::route::length;
+use crate::route::{length, wrapped};
 
 /// Largest change of velocity at a corner of the path. Unit: m/s.
 const JOLT: f64 = 0.08;
@@ -154,11 +154,6 @@ fn corner_speed(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     let heading = |from: [f64; 2], to: [f64; 2]| libm::atan2(to[1] - from[1], to[0] - from[0]);
     let half = wrapped(heading(b, c) - heading(a, b)).abs() / 2.0;
     JOLT / (2.0 * libm::sin(half)).max(1e-3)
-}
-
-/// Wraps an angle to (−π, π]. Unit: radians.
-pub fn wrapped(angle: f64) -> f64 {
-    libm::atan2(libm::sin(angle), libm::cos(angle))
 }
 
 #[cfg(test)]

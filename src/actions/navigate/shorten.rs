@@ -48,8 +48,7 @@ mod tests {
     use super::*;
     use crate::navigate::grid::Grid;
     use crate::route::length;
-    use actcheck_data::Pose;
-    use actcheck_data::Room;
+    use actcheck_data::{Pose, Room};
     use actcheck_scenario::{FloorPlan, Outline};
 
     /// A room divided by a wall that leaves a door of 90 cm at the upper end.

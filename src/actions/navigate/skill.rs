@@ -3,14 +3,14 @@
 use nalgebra::Point3;
 
 use crate::ActionCall;
-use crate::navigate::follow::{Follower, Limits, wrapped};
+use crate::navigate::follow::{Follower, Limits};
 use crate::navigate::grid::{CELL_M, Grid};
 use crate::navigate::sense::{Size, look};
 use crate::navigate::shorten::way;
 use crate::navigate::terrain::Terrain;
 use crate::operator::{Interrupt, Operator};
 use crate::perceive::towards;
-use crate::route::length;
+use crate::route::{length, wrapped};
 use actcheck_data::ActionReport;
 
 /// Designators of the goal; the first one present is used.

@@ -6,7 +6,7 @@ use crate::foreign::lookup::Lookup;
 use crate::foreign::mesh_file;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Digest};
-use actcheck_data::{Mesh, Shape};
+use actcheck_data::Shape;
 
 /// Reads the shapes of one file.
 pub(crate) struct Shapes<'a> {
@@ -133,7 +133,15 @@ fn primitive<'n>(
     }
 }
 
-/// Whether a mesh has a volume above 1e-12 m³ (a cube of 0.1 mm).
-pub(crate) fn has_volume(mesh: &Mesh) -> bool {
-    mesh.volume() > 1e-12
+/// Smallest volume of a collision mesh: that of a cube of 0.1 mm. Unit: cubic metres.
+const LEAST_VOLUME: f64 = 1e-12;
+
+/// Reports W037 if the shape of a `<collision>` is a mesh without a volume.
+pub(crate) fn check_volume(shape: &Shape, collision: Node, reader: &mut Reader) {
+    let Shape::Mesh { mesh } = shape else { return };
+    if mesh.volume() > LEAST_VOLUME {
+        return;
+    }
+    let message = "the mesh has no volume".to_owned();
+    reader.error("W037", collision, message, "a collision mesh must be a closed surface; use a thin box for a sheet");
 }

@@ -5,11 +5,11 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::{Body, Mass, is_possible};
-use crate::foreign::geometry::{Shapes, has_volume};
+use crate::foreign::geometry::{Shapes, check_volume};
 use crate::foreign::lookup::Lookup;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Digest, Source};
-use actcheck_data::{Part, Pose, Shape};
+use actcheck_data::{Part, Pose};
 
 /// Supported minor versions of SDF 1.
 const VERSIONS: std::ops::RangeInclusive<u32> = 4..=11;
@@ -211,17 +211,7 @@ fn read_collision(collision: Node, link: &Isometry3<f64>, body: &mut Body, shape
         read_surface(surface, body, reader);
     }
     let (Some(at), Some(shape)) = (at, shape) else { return };
-    if let Shape::Mesh { mesh } = &shape
-        && !has_volume(mesh)
-    {
-        let message = "the mesh has no volume".to_owned();
-        reader.error(
-            "W037",
-            collision,
-            message,
-            "a collision mesh must be a closed surface; use a thin box for a sheet",
-        );
-    }
+    check_volume(&shape, collision, reader);
     body.parts.push(Part { pose: Pose::from_isometry(&(link * at)), shape });
 }
 

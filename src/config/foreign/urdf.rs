@@ -5,12 +5,12 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::{Body, Mass};
-use crate::foreign::geometry::{Shapes, has_volume};
+use crate::foreign::geometry::{Shapes, check_volume};
 use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf::{SdfModel, possible};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Digest, Source};
-use actcheck_data::{Part, Pose, Shape};
+use actcheck_data::{Part, Pose};
 
 /// Longest chain of links; a longer one is a cycle.
 const LONGEST_CHAIN: usize = 256;
@@ -91,17 +91,7 @@ fn read_link(link: Node, at: &Isometry3<f64>, body: &mut Body, shapes: &mut Shap
         let placed = origin(collision, reader);
         let shape = reader.required(collision, "geometry").and_then(|geometry| shapes.urdf(geometry, reader));
         let (Some(placed), Some(shape)) = (placed, shape) else { continue };
-        if let Shape::Mesh { mesh } = &shape
-            && !has_volume(mesh)
-        {
-            let message = "the mesh has no volume".to_owned();
-            reader.error(
-                "W037",
-                collision,
-                message,
-                "a collision mesh must be a closed surface; use a thin box for a sheet",
-            );
-        }
+        check_volume(&shape, collision, reader);
         body.parts.push(Part { pose: Pose::from_isometry(&(at * placed)), shape });
     }
     match xml::child(link, "inertial").and_then(|inertial| read_inertial(inertial, at, reader)) {

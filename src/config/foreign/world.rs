@@ -9,7 +9,7 @@ use actcheck_base::{Diagnostics, Source, did_you_mean, digest_of};
 use actcheck_data::{Location, ObjectModel, Pose};
 
 /// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display and time steps.
-const WITHOUT_BEARING: [&str; 16] = [
+const KNOWN: [&str; 16] = [
     "include",
     "model",
     "light",
@@ -38,8 +38,9 @@ const UPRIGHT_COSINE: f64 = 0.999;
 /// are errors.
 ///
 /// # Errors
-/// All faults of the text: it is not XML (W031) or not SDF (W032), includes missing models (W040), has duplicate names
-/// (W041), or contains unsupported elements (W035).
+/// All faults of the text: it is not XML (W031) or not SDF of a supported version (W032), lacks an element (W033), has
+/// an invalid value (W034) or an unsupported element (W035), includes a missing model (W040), or has a duplicate name
+/// (W041).
 pub(crate) fn read<'a>(
     name: &str,
     source: &Source,
@@ -56,7 +57,7 @@ pub(crate) fn read<'a>(
     if check_version(root, &mut reader).is_some()
         && let Some(world) = reader.required(root, "world")
     {
-        reader.warn_about_unknown_children(world, &WITHOUT_BEARING);
+        reader.warn_about_unknown_children(world, &KNOWN);
         for inline in xml::children(world, "model").filter(|inline| !is_floor(*inline)) {
             let message = "a model defined inside a world is not supported".to_owned();
             reader.error(
