@@ -36,7 +36,7 @@ fn main() {
         ["tables", folder] => write_tables(Path::new(folder)),
         _ => {
             planted_patterns();
-            by_lot();
+            false_alarms();
             many_outcomes();
         }
     }
@@ -50,12 +50,12 @@ fn planted_patterns() {
         let start = Instant::now();
         let found = mine(&input, &PatternOptions::default());
         let secs = start.elapsed().as_secs_f64();
-        let told: Vec<String> = found.confirmed().map(|pattern| format!("{:?}", pattern.conditions)).collect();
-        println!("{name:20} {secs:>8.3} {:>10} {:>14}  {}", found.patterns.len(), found.tried, told.join(" "));
+        let conditions: Vec<String> = found.confirmed().map(|pattern| format!("{:?}", pattern.conditions)).collect();
+        println!("{name:20} {secs:>8.3} {:>10} {:>14}  {}", found.patterns.len(), found.tried, conditions.join(" "));
     }
 }
 
-fn by_lot() {
+fn false_alarms() {
     let input = planted::input(RUNS, 1, &planted::plantings().remove(5).1);
     let start = Instant::now();
     let alarms = (0..SHUFFLES)

@@ -1,8 +1,8 @@
 //! Cost of a pick run by stage, simulation speed relative to real time, and size of the history.
 //!
-//! Shares and ratios are within one process, because machines are noisy. Goals: everything but physics takes at most 15
-//! % of the wall time, judging one action at most 2 ms; simulation runs at 20 times real time or faster on one core; a
-//! run takes at most 150 KB.
+//! Shares and ratios are within one process, because machines are noisy. Goals: everything but physics takes at most
+//! 15 % of the wall time, judging one action at most 2 ms; simulation runs at 20 times real time or faster on one core;
+//! a run takes at most 150 KB.
 
 use std::collections::BTreeMap;
 use std::path::Path;

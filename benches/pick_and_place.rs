@@ -150,9 +150,9 @@ fn by_workers(env: &Env, runs: u32) {
 
 /// CPU time of all threads of this process, in the system's ticks of 10 ms; wall time if the system does not report it.
 fn process_secs() -> f64 {
-    let told = std::fs::read_to_string("/proc/self/stat").ok();
+    let stat = std::fs::read_to_string("/proc/self/stat").ok();
     // The name in parentheses may hold spaces; user and system time are the 12th and 13th after it.
-    let ticks = told.as_deref().and_then(|text| text.rsplit_once(')')).map(|(_, rest)| {
+    let ticks = stat.as_deref().and_then(|text| text.rsplit_once(')')).map(|(_, rest)| {
         let mut fields = rest.split_whitespace().skip(11).filter_map(|field| field.parse::<f64>().ok());
         fields.next().unwrap_or(0.0) + fields.next().unwrap_or(0.0)
     });

@@ -48,9 +48,9 @@ fn main() {
     let file = folder.path().join("report.html");
     std::fs::write(&file, &page).expect("the folder is there");
     println!("{RUNS} runs × {} properties, {embedded} of them replayed", PROPERTIES.len());
-    tell("size", page.len() as f64 / 1e6, 10.0, "MB");
-    tell("packing the replays", packed, 5.0, "s");
-    tell("rendering from the tables", secs, 5.0, "s");
+    print_share("size", page.len() as f64 / 1e6, 10.0, "MB");
+    print_share("packing the replays", packed, 5.0, "s");
+    print_share("rendering from the tables", secs, 5.0, "s");
     in_a_browser(&file);
 }
 
@@ -87,7 +87,7 @@ fn replays(watched: &[(RunDetail, Trace)]) -> (Replays, usize) {
     (replays, embedded)
 }
 
-fn tell(name: &str, value: f64, demanded: f64, unit: &str) {
+fn print_share(name: &str, value: f64, demanded: f64, unit: &str) {
     println!("{name:28} {value:>9.2} {unit:3} {:>6.2} of the limit of {demanded} {unit}", value / demanded);
 }
 
@@ -119,9 +119,9 @@ fn in_a_browser(file: &Path) {
         "new Promise((done) => { const poll = () => { const it = performance.getEntriesByName('first-contentful-paint')[0]; \
          if (it) done(it.startTime); else setTimeout(poll, 10); }; poll(); })",
     );
-    tell("first paint", paint.as_f64().unwrap_or(f64::NAN) / 1e3, 1.0, "s");
+    print_share("first paint", paint.as_f64().unwrap_or(f64::NAN) / 1e3, 1.0, "s");
     // The first paint comes before the data.
-    tell(
+    print_share(
         "overview ready",
         browser.value("Number(document.documentElement.dataset.ready)").as_f64().unwrap_or(f64::NAN) / 1e3,
         1.0,
@@ -145,6 +145,6 @@ fn in_a_browser(file: &Path) {
         );
         let mut millis: Vec<f64> = (0..TIMES).map(|_| browser.value(&ask).as_f64().unwrap_or(f64::NAN)).collect();
         millis.sort_by(f64::total_cmp);
-        tell(name, millis[TIMES / 2], 100.0, "ms");
+        print_share(name, millis[TIMES / 2], 100.0, "ms");
     }
 }

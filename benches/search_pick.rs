@@ -41,8 +41,8 @@ fn number(name: &str, default: u32) -> u32 {
     argument(name).and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-fn signature(told: &RunResult) -> Signature {
-    let failed = told.outcomes.iter().filter(|outcome| outcome.outcome == Outcome::Failed);
+fn signature(result: &RunResult) -> Signature {
+    let failed = result.outcomes.iter().filter(|outcome| outcome.outcome == Outcome::Failed);
     failed.map(|outcome| names::local(&outcome.property).to_owned()).collect()
 }
 
@@ -76,19 +76,19 @@ fn campaign(
     };
     let env = Env::prepare(config, &overrides).expect("the configuration is sound");
     let mut schedule = schedule_of(&env);
-    let (mut signatures, mut told): (Vec<Signature>, Vec<RunResult>) = (Vec::new(), Vec::new());
+    let (mut signatures, mut results): (Vec<Signature>, Vec<RunResult>) = (Vec::new(), Vec::new());
     loop {
-        let batch = schedule.next_batch(&told);
+        let batch = schedule.next_batch(&results);
         if batch.is_empty() {
             return signatures;
         }
-        told.clear();
+        results.clear();
         for planned in &batch {
             let steered = planned.steering.iter().flat_map(|steering| steering.quantiles.values());
             let key = (planned.scene, steered.map(|value| value.to_bits()).collect());
             let run = known.entry(key).or_insert_with(|| make(&env, planned)).clone();
             signatures.push(signature(&run));
-            told.push(run);
+            results.push(run);
             if enough(&signatures) {
                 return signatures;
             }

@@ -233,7 +233,7 @@ fn a_second_process_on_the_same_history_is_refused() {
         .spawn()
         .unwrap();
     let start = Instant::now();
-    // A trace is written before its run is committed, so the first runs are committed when there are more traces than workers.
+    // A trace is written before its run is committed, so with more traces than workers at least one run is committed.
     let workers = std::thread::available_parallelism().unwrap().get();
     while std::fs::read_dir(project.path().join("h/traces")).map_or(0, Iterator::count) <= workers {
         assert!(start.elapsed() < Duration::from_secs(120));

@@ -9,104 +9,89 @@ use actcheck::config::{self, CaseText, Overrides};
 use actcheck::data::{Choices, Scene};
 use actcheck::scenario;
 
-/// A choice of a candidate: its name, the list of candidates (table and key) with its only candidate, and another one.
+/// A choice of a candidate.
 struct Named {
+    choice: &'static str,
+    /// The list of candidates: table and key.
+    list: (&'static str, &'static str),
+    /// The only candidate of the list at first.
+    candidate: &'static str,
+    /// Another possible candidate.
+    other: &'static str,
+    /// The other lines of the configuration.
+    rest: &'static [&'static str],
+}
+
+const fn named(
     choice: &'static str,
     list: (&'static str, &'static str),
     candidate: &'static str,
     other: &'static str,
-    /// The rest of the configuration.
-    rest: &'static str,
+    rest: &'static [&'static str],
+) -> Named {
+    Named { choice, list, candidate, other, rest }
 }
 
+const APARTMENT: &str = "world.worlds = [\"apartment\"]\n";
+const EMPTY_ROOM: &str = "world.worlds = [\"empty_room\"]\n";
+const COFFEE_TABLE: &str = "objectSurface.object_surfaces = [\"coffee_table\"]\n";
 const GLASS: &str = "pickObject.model_list = [\"glass\"]\n";
-const TABLE: &str = "objectSurface.object_surfaces = [\"coffee_table\"]\npickObject.model_list = [\"glass\"]\n";
-const APARTMENT: &str = "world.worlds = [\"apartment\"]\npickObject.model_list = [\"glass\"]\n";
 
 /// Every choice of a candidate that a scene can have.
 const NAMED: [Named; 11] = [
-    Named {
-        choice: "world",
-        list: ("world", "worlds"),
-        candidate: "apartment",
-        other: "empty_room",
-        rest: "objectSurface.object_surfaces = [\"coffee_table\"]\npickObject.model_list = [\"glass\"]\n",
-    },
-    Named {
-        choice: "surface.name",
-        list: ("objectSurface", "object_surfaces"),
-        candidate: "coffee_table",
-        other: "dining_table",
-        rest: APARTMENT,
-    },
-    Named {
-        choice: "surface.model",
-        list: ("objectSurface", "object_surfaces"),
-        candidate: "coffee_table",
-        other: "table",
-        rest: GLASS,
-    },
-    Named {
-        choice: "location.name",
-        list: ("objectLocation", "location_list"),
-        candidate: "left_corner",
-        other: "door",
-        rest: "world.worlds = [\"empty_room\"]\nobjectSurface.object_surfaces = [\"coffee_table\"]\n\
-               pickObject.model_list = [\"glass\"]\n",
-    },
-    Named {
-        choice: "objectLocation",
-        list: ("objectLocation", "location_list"),
-        candidate: "here",
-        other: "there",
-        rest: TABLE,
-    },
-    Named {
-        choice: "place.name",
-        list: ("placeSurface", "place_object_surfaces"),
-        candidate: "side_table",
-        other: "dining_table",
-        rest: "world.worlds = [\"apartment\"]\nobjectSurface.object_surfaces = [\"coffee_table\"]\n\
-               pickObject.model_list = [\"glass\"]\n",
-    },
-    Named {
-        choice: "place.model",
-        list: ("placeSurface", "place_object_surfaces"),
-        candidate: "table",
-        other: "mini_coffee_table",
-        rest: TABLE,
-    },
-    Named {
-        choice: "target.model",
-        list: ("pickObject", "model_list"),
-        candidate: "glass",
-        other: "mug",
-        rest: "objectSurface.object_surfaces = [\"coffee_table\"]\n",
-    },
-    Named {
-        choice: "other.1.model",
-        list: ("surfaceObjects", "model_list"),
-        candidate: "mug",
-        other: "can",
-        rest: "objectSurface.object_surfaces = [\"coffee_table\"]\npickObject.model_list = [\"glass\"]\n\
-               surfaceObjects.count = 1\n",
-    },
-    Named {
-        choice: "place_other.1.model",
-        list: ("surfaceObjects", "model_list"),
-        candidate: "mug",
-        other: "can",
-        rest: "objectSurface.object_surfaces = [\"coffee_table\"]\npickObject.model_list = [\"glass\"]\n\
-               surfaceObjects.count = 0\nplaceSurface.place_object_surfaces = [\"table\"]\nplaceSurface.count = 1\n",
-    },
-    Named {
-        choice: "obstacle.1.model",
-        list: ("", "nav_obstacle_list"),
-        candidate: "bowl",
-        other: "bottle",
-        rest: "nav_obstacle_count = 1\nobjectSurface.object_surfaces = [\"coffee_table\"]\n\
-               pickObject.model_list = [\"glass\"]\n",
-    },
+    named("world", ("world", "worlds"), "apartment", "empty_room", &[COFFEE_TABLE, GLASS]),
+    named("surface.name", ("objectSurface", "object_surfaces"), "coffee_table", "dining_table", &[APARTMENT, GLASS]),
+    named("surface.model", ("objectSurface", "object_surfaces"), "coffee_table", "table", &[GLASS]),
+    named(
+        "location.name",
+        ("objectLocation", "location_list"),
+        "left_corner",
+        "door",
+        &[EMPTY_ROOM, COFFEE_TABLE, GLASS],
+    ),
+    named("objectLocation", ("objectLocation", "location_list"), "here", "there", &[COFFEE_TABLE, GLASS]),
+    named(
+        "place.name",
+        ("placeSurface", "place_object_surfaces"),
+        "side_table",
+        "dining_table",
+        &[APARTMENT, COFFEE_TABLE, GLASS],
+    ),
+    named(
+        "place.model",
+        ("placeSurface", "place_object_surfaces"),
+        "table",
+        "mini_coffee_table",
+        &[COFFEE_TABLE, GLASS],
+    ),
+    named("target.model", ("pickObject", "model_list"), "glass", "mug", &[COFFEE_TABLE]),
+    named(
+        "other.1.model",
+        ("surfaceObjects", "model_list"),
+        "mug",
+        "can",
+        &[COFFEE_TABLE, GLASS, "surfaceObjects.count = 1\n"],
+    ),
+    named(
+        "place_other.1.model",
+        ("surfaceObjects", "model_list"),
+        "mug",
+        "can",
+        &[
+            COFFEE_TABLE,
+            GLASS,
+            "surfaceObjects.count = 0\n",
+            "placeSurface.place_object_surfaces = [\"table\"]\n",
+            "placeSurface.count = 1\n",
+        ],
+    ),
+    named(
+        "obstacle.1.model",
+        ("", "nav_obstacle_list"),
+        "bowl",
+        "bottle",
+        &["nav_obstacle_count = 1\n", COFFEE_TABLE, GLASS],
+    ),
 ];
 
 impl Named {
@@ -114,7 +99,8 @@ impl Named {
     fn config(&self) -> String {
         let (table, key) = self.list;
         let dot = if table.is_empty() { "" } else { "." };
-        format!("tests = [[\"Pick\"]]\ntest_count = 1\n{table}{dot}{key} = [\"{}\"]\n{}", self.candidate, self.rest)
+        let (candidate, rest) = (self.candidate, self.rest.concat());
+        format!("tests = [[\"Pick\"]]\ntest_count = 1\n{table}{dot}{key} = [\"{candidate}\"]\n{rest}")
     }
 
     /// The text with other candidates in this list.

@@ -142,8 +142,8 @@ fn a_case_survives_edits_of_rules_comments_and_ontology() {
     let (code, case) = run_case(project.path(), "case.toml");
     assert_eq!((code, &case["recurrence"]), (Some(1), &"otherwise".into()), "{case:#}");
     let output = actcheck(project.path(), &["run", "case.toml", "--history", "h2"]);
-    let printed = "fails differently: MovedObject + NoGraspCollisions (was NoGraspCollisions); same trace";
-    assert!(stdout(&output).contains(printed), "{}", stdout(&output));
+    let expected = "fails differently: MovedObject + NoGraspCollisions (was NoGraspCollisions); same trace";
+    assert!(stdout(&output).contains(expected), "{}", stdout(&output));
 
     let ontology = project.path().join("ontology/actions.ttl");
     let added = "\nact:Extra a owl:Class ; rdfs:label \"extra\" .\n";
@@ -238,8 +238,8 @@ fn a_campaign_runs_its_regressions_first_and_reports_them_separately() {
     assert_eq!(json["runs"].as_array().unwrap().len(), 1, "regressions are not counted among the runs");
     assert_eq!((json["exit_code"].as_i64(), output.status.code()), (Some(1), Some(1)));
     let text = stdout(&campaign(&["--jobs", "1"]));
-    let printed = format!("regressions: 1 ran, 1 fails again: {run}.toml (NoGraspCollisions)\n");
-    assert!(text.starts_with(&printed), "{text}");
+    let expected = format!("regressions: 1 ran, 1 fails again: {run}.toml (NoGraspCollisions)\n");
+    assert!(text.starts_with(&expected), "{text}");
 
     let file = project.path().join(format!("regressions/{run}.toml"));
     edit(&file, "target.model = \"glass\"", "target.model = \"glas\"");

@@ -294,8 +294,8 @@ fn impossible_comparisons_are_refused_with_the_reason() {
     fails(&["a"], &["<B>"]);
 }
 
-/// Regression: if a campaign began in the same second as its regressions, the last id in the alphabet counted as the newest
-/// campaign.
+/// Regression: if a campaign began in the same second as its regressions, the last id in the alphabet counted as the
+/// newest campaign.
 #[test]
 fn a_campaign_is_newer_than_its_regressions() {
     let project = looking();

@@ -1,4 +1,5 @@
-//! Every shipped campaign gives the same outcomes, scores and body states with one worker and with two.
+//! Every shipped campaign gives the same outcomes, scores and body states with one worker and with two. Its physics is
+//! replaced by the coarsest, since the robot does not need to succeed.
 
 use crate::support::{COARSEST, actcheck, project_with, root, stderr, stdout};
 

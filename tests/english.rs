@@ -39,7 +39,7 @@ const PATTERNS: [(&str, &str, &str); 8] = [
     (r"(?i)\b(whoever|lest|till)\b", "write \"a caller that\", \"so that … not\", \"until\"", "it waits till the end"),
 ];
 
-/// Good English that a pattern would match, with the reason. These phrases are removed before the patterns are tried.
+/// Good English that a pattern would match, with the reason. These phrases are blanked out before the search.
 const ALLOWED: [(&str, &str); 7] = [
     (r"(?i)\bthere (is|are|was|were) no\b", "the usual way to say that something is missing"),
     (
@@ -191,7 +191,7 @@ fn docstrings(text: &str) -> Vec<Passage> {
 fn faults(passage: &Passage, patterns: &[(Regex, &'static str)], ignored: &[Regex]) -> Vec<(usize, String)> {
     let mut text = passage.iter().map(|(_, part)| part.as_str()).collect::<Vec<_>>().join("\n");
     for code in ignored {
-        // Of the same length, so that lines are kept.
+        // Line breaks are kept, so that reported lines are right.
         text = code.replace_all(&text, |found: &regex::Captures<'_>| found[0].replace(|c| c != '\n', "·")).into_owned();
     }
     let flat = text.replace('\n', " ");

@@ -1,5 +1,5 @@
-//! Checks the crates under `src/` against the architecture in `src/lib.rs`: a crate depends only on crates above it in the table, and a
-//! library of the field is a dependency only of the crates that the table names.
+//! Checks the crates under `src/` against the architecture in `src/lib.rs`: a crate depends only on crates above it in
+//! the table, and a library of the field is a dependency only of the crates that the table names.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

@@ -72,17 +72,20 @@ fn explain_knows_every_code_and_suggests_the_nearest() {
 /// The value of `--format` and the durations have one spelling in the help of every command.
 #[test]
 fn options_have_one_spelling_in_every_command() {
+    let mut with_format = 0;
     for command in commands() {
         let help = stdout(&actcheck(root(), &[&command, "-h"]));
-        // Lines are wrapped anywhere.
+        // Undoes line wrapping.
         let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(!help.contains("SECONDS") && !help.contains("-secs"), "{command}: {help}");
         if let Some((_, rest)) = help.split_once("--format <FORMAT>") {
             let values = rest.split_once("[possible values: ").unwrap_or_else(|| panic!("{command}: {help}")).1;
             let values: Vec<&str> = values.split(']').next().unwrap().split(',').map(str::trim).collect();
             assert_eq!(values[..3], ["text", "csv", "json"], "{command}: {help}");
+            with_format += 1;
         }
     }
+    assert!(with_format > 0, "no command has `--format <FORMAT>`");
 }
 
 #[test]
@@ -122,7 +125,7 @@ fn completions_list_every_command() {
     assert_eq!(wrong.status.code(), Some(2));
 }
 
-/// The completions that bash offers for a line whose last word is being typed.
+/// Bash completes the last word of a line, which is being typed.
 #[test]
 fn bash_completes_commands_and_options() {
     let script = stdout(&actcheck(root(), &["completions", "bash"]));

@@ -18,6 +18,7 @@ use actcheck::history::{
 use tempfile::TempDir;
 
 use crate::facts::{BODIES, sample_trace};
+use crate::support::foreign::left_out;
 
 fn model(name: &str) -> Arc<ObjectModel> {
     Arc::new(ObjectModel {
@@ -567,7 +568,7 @@ fn on_small_disk(test: impl FnOnce(&Path) + std::panic::UnwindSafe) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().to_str().unwrap();
     if !ran(&["mount", "-t", "tmpfs", "-o", "size=12m", "tmpfs", path]) {
-        eprintln!("a small file system can't be mounted here; test skipped");
+        left_out("a test on a small file system", "it can't be mounted here");
         return;
     }
     let outcome = std::panic::catch_unwind(|| test(folder.path()));

@@ -65,8 +65,8 @@ fn the_failed_runs_of_the_last_campaign_run_again_from_the_same_choices() {
 
     let output = actcheck(folder, &again);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    let told: Value = serde_json::from_str(&stdout(&output)).expect("JSON");
-    let id = told["campaign"].as_str().unwrap();
+    let summary: Value = serde_json::from_str(&stdout(&output)).expect("JSON");
+    let id = summary["campaign"].as_str().unwrap();
     let repeated = rows(folder, &["--campaign", id]);
     assert_eq!(column(&repeated, "trace_hash"), column(&failed, "trace_hash"), "bit for bit the same states");
     assert_eq!(column(&repeated, "run")[0], format!("{id}-1"));
@@ -75,7 +75,7 @@ fn the_failed_runs_of_the_last_campaign_run_again_from_the_same_choices() {
     assert!(!health.contains(id), "{health}");
     refused(folder, &["run", "--history", "h", &format!("--resume={id}")], "X050");
 
-    // The present rules judge: with rules that always hold, the fault is gone.
+    // The current rules judge: with rules that always hold, no run fails.
     let holds = "@prefix act: <http://actions#> .\nsuccess(?object) :- parameter(act:pickObject, ?object) .\n";
     for rule in ["close_object", "moved_object", "no_grasp_collisions", "object_in_gripper"] {
         std::fs::write(folder.join(format!("rules/{rule}.rls")), holds).unwrap();
@@ -83,18 +83,14 @@ fn the_failed_runs_of_the_last_campaign_run_again_from_the_same_choices() {
     std::fs::write(folder.join("rules/object_grasped.rq"), "ASK { }\n").unwrap();
     let output = actcheck(folder, &again);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let told: Value = serde_json::from_str(&stdout(&output)).expect("JSON");
-    assert_eq!(rows(folder, &["--campaign", told["campaign"].as_str().unwrap()]).len(), failed.len());
+    let summary: Value = serde_json::from_str(&stdout(&output)).expect("JSON");
+    assert_eq!(rows(folder, &["--campaign", summary["campaign"].as_str().unwrap()]).len(), failed.len());
     let output = actcheck(folder, &again);
     assert_eq!(output.status.code(), Some(0));
     assert!(stderr(&output).contains("X039") && stdout(&output).is_empty(), "{}", stderr(&output));
 
-    for (wrong, text) in [
-        (vec!["--runs", "3"], "cannot be used with"),
-        (vec!["--shrink"], "cannot be used with"),
-        (vec!["--resume"], "cannot be used with"),
-    ] {
-        refused(folder, &[&again[..], &wrong].concat(), text);
+    for wrong in [&["--runs", "3"][..], &["--shrink"], &["--resume"]] {
+        refused(folder, &[&again[..], wrong].concat(), "cannot be used with");
     }
     refused(folder, &["run", "--last-failed"], "X014");
     std::fs::copy(folder.join("configs/pick.toml"), folder.join("configs/other.toml")).unwrap();

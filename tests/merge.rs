@@ -264,11 +264,11 @@ fn an_interrupted_merge_is_completed_by_the_next() {
         let stop = AtomicBool::new(false);
         let mut runs = 0;
         let plan = plan(&sources, Some(&into), &MergeOptions::default()).unwrap();
-        let printed = || {
+        let progress = || {
             runs += 1;
             stop.store(runs == wanted, Ordering::Relaxed);
         };
-        let merged = carry_out(&plan, &sources, &into, &stop, printed).unwrap();
+        let merged = carry_out(&plan, &sources, &into, &stop, progress).unwrap();
         assert!(merged.interrupted && merged.runs == wanted, "{merged:?}");
         let row = into.campaigns().unwrap().remove(0);
         assert!(row.interrupted && row.ended.is_none(), "{row:?}");
@@ -376,9 +376,9 @@ fn later_judgements_and_shrunk_runs_are_merged_under_new_names() {
         let query =
             "SELECT ?original ?label WHERE { ?r act:shrunkFrom ?original ; act:campaign ?c . ?c rdfs:label ?label }";
         let rows = table(&new, query);
-        let printed = format!("{rows:?}");
-        assert_eq!(rows.len(), 1, "{printed}");
-        assert!(printed.matches(&format!("{id}-{}", index + 1)).count() == 2, "{printed} {id} {index}");
+        let text = format!("{rows:?}");
+        assert_eq!(rows.len(), 1, "{text}");
+        assert!(text.matches(&format!("{id}-{}", index + 1)).count() == 2, "{text} {id} {index}");
     }
 }
 
@@ -392,15 +392,15 @@ fn a_single_history_is_copied_completely() {
         (0..3).for_each(|index| history.commit(&sample_run(id, index)).unwrap());
     }
     let everything = "SELECT ?g ?s ?p ?o WHERE { { ?s ?p ?o } UNION { GRAPH ?g { ?s ?p ?o } } }";
-    let printed =
+    let quads =
         |history: &History| table(history, everything).iter().map(|row| format!("{row:?}")).collect::<BTreeSet<_>>();
-    let wanted = printed(&history);
+    let wanted = quads(&history);
     drop(history);
     std::fs::create_dir(folder.join("elsewhere")).unwrap();
     copy(&folder.join("a"), &folder.join("b"));
     let output = actcheck(folder, &["merge", "a", "b", "a", "--into", "all"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    assert!(printed(&open(folder, "all")) == wanted);
+    assert!(quads(&open(folder, "all")) == wanted);
     std::fs::remove_file(folder.join("b/traces/z2-1.trace")).unwrap();
     let output = actcheck(folder, &["merge", "b", "--into", "lossy"]);
     assert_eq!(output.status.code(), Some(0));

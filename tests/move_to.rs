@@ -126,8 +126,8 @@ fn pretend(_: u64, world: &mut World) {
 fn the_robot_knows_only_the_obstacles_it_sees() {
     let hit = from_afar(IN_THE_WAY, Some(hide));
     assert_eq!(outcomes(&hit)["NoDriveCollisions"], Outcome::Failed);
-    let printed = hit.judgements[0].iter().find(|judgement| judgement.property.ends_with("NoDriveCollisions")).unwrap();
-    assert!(printed.witness.contains("mini_coffee_table_1"), "{}", printed.witness);
+    let found = hit.judgements[0].iter().find(|judgement| judgement.property.ends_with("NoDriveCollisions")).unwrap();
+    assert!(found.witness.contains("mini_coffee_table_1"), "{}", found.witness);
     let deceived = from_afar(ASIDE, Some(pretend));
     assert_eq!(report(&deceived).message, "table_front: the goal is occupied");
     assert_eq!(outcomes(&deceived)["NoDriveCollisions"], Outcome::Passed);

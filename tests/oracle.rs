@@ -161,8 +161,8 @@ fn checked(
                     return Err(format!("{pattern} is not absent"));
                 }
             }
-            // Computed values.
-            _ => {}
+            Premise::Computed(_) => {}
+            other => return Err(format!("{other:?} is not checked")),
         }
     }
     above.pop();

@@ -73,10 +73,10 @@ fn a_python_pick_is_the_same_with_any_number_of_workers() {
     let (two, again) = campaign(folder.path(), "pick.py", &["--runs", "3", "--jobs", "2"]);
     assert_eq!(hashes.lines().count(), 4, "{hashes}");
     assert_eq!(hashes, again);
-    let text = |campaign: &Value| {
+    let actions = |campaign: &Value| {
         campaign["runs"].as_array().unwrap().iter().map(|run| run["actions"].clone()).collect::<Vec<_>>()
     };
-    assert_eq!(text(&one), text(&two));
+    assert_eq!(actions(&one), actions(&two));
     // It succeeds in most scenes of any campaign.
     let score = one["runs"].as_array().unwrap().iter().map(|run| run["score"].as_f64().unwrap()).sum::<f64>() / 3.0;
     assert!(score > 0.5, "{one:#}");
@@ -87,8 +87,8 @@ fn a_python_pick_is_the_same_with_any_number_of_workers() {
 fn the_other_examples_perform_their_actions() {
     let folder = project();
     for (example, words) in [("clumsy_pick.py", "of course"), ("learned_pick.py", "hold")] {
-        let (text, _) = campaign(folder.path(), example, &["--runs", "2"]);
-        for run in text["runs"].as_array().unwrap() {
+        let (summary, _) = campaign(folder.path(), example, &["--runs", "2"]);
+        for run in summary["runs"].as_array().unwrap() {
             assert_eq!((&run["status"], &run["reason"]), (&"completed".into(), &Value::Null), "{example}: {run:#}");
         }
         let messages = "SELECT ?message { [] act:ofRun ?run ; act:message ?message }";

@@ -171,7 +171,7 @@ fn judge(history: &History, rules: &RuleSet, jobs: usize, batches: usize) -> (Re
     let stop = AtomicBool::new(false);
     let runs = history.runs(&RunFilter::default()).unwrap();
     let options = RecheckOptions { jobs, batch: 4, at: "2026-08-02T12:00:00Z".to_owned() };
-    let (mut printed, mut seen) = (Vec::new(), 0);
+    let (mut judged, mut seen) = (Vec::new(), 0);
     let end = recheck(
         history,
         &runs,
@@ -179,12 +179,12 @@ fn judge(history: &History, rules: &RuleSet, jobs: usize, batches: usize) -> (Re
         &options,
         &stop,
         |_, batch| {
-            printed.extend(batch.to_vec());
+            judged.extend(batch.to_vec());
             seen += 1;
             stop.store(seen >= batches, Ordering::Relaxed);
         },
     );
-    (end, printed)
+    (end, judged)
 }
 
 fn kept(history: &History) -> u64 {
@@ -198,14 +198,14 @@ fn kept(history: &History) -> u64 {
 fn a_stopped_recheck_keeps_whole_batches_and_can_continue() {
     let (_folder, history, rules) = filled(14);
     let rules = rules.only(&["StaysUpright".to_owned()]).unwrap();
-    let (end, printed) = judge(&history, &rules, 2, 1);
+    let (end, judged) = judge(&history, &rules, 2, 1);
     assert!(matches!(end.ending, Ending::Interrupted), "{end:?}");
     assert!(end.judged >= 4 && end.judged < 14, "{end:?}");
-    assert_eq!((printed.len() as u64, kept(&history)), (end.judged, end.judged));
+    assert_eq!((judged.len() as u64, kept(&history)), (end.judged, end.judged));
     let (end, again) = judge(&history, &rules, 1, usize::MAX);
     assert!(matches!(end.ending, Ending::Finished) && end.judged == 14, "{end:?}");
     assert_eq!(kept(&history), 14);
-    assert_eq!(again.iter().filter(|recheck| recheck.is_news()).count() as u64, 14 - printed.len() as u64);
+    assert_eq!(again.iter().filter(|recheck| recheck.is_news()).count() as u64, 14 - judged.len() as u64);
     let order: Vec<&str> = again.iter().map(|recheck| recheck.run.as_str()).collect();
     assert_eq!(order, (1..=14).map(|number| format!("k-{number}")).collect::<Vec<_>>());
 }
@@ -214,8 +214,8 @@ fn a_stopped_recheck_keeps_whole_batches_and_can_continue() {
 fn a_recheck_is_the_same_with_any_number_of_workers() {
     let (_folder, history, rules) = filled(9);
     let (_other_folder, other, _) = filled(9);
-    let printed = |history, jobs| judge(history, &rules, jobs, usize::MAX).1;
-    assert_eq!(printed(&history, 1), printed(&other, 3));
+    let judged = |history, jobs| judge(history, &rules, jobs, usize::MAX).1;
+    assert_eq!(judged(&history, 1), judged(&other, 3));
     assert_eq!(kept(&history), kept(&other));
 }
 
@@ -229,8 +229,8 @@ fn broken_and_timed_out_actions_keep_their_outcomes() {
     record.status = RunStatus::Broken;
     record.judgements[0].iter_mut().for_each(|judgement| judgement.outcome = Outcome::Broken);
     history.commit(&record).unwrap();
-    let (_, printed) = judge(&history, &rules, 1, usize::MAX);
-    let broken: Vec<&Recheck> = printed.iter().filter(|recheck| recheck.run == "k-8").collect();
+    let (_, judged) = judge(&history, &rules, 1, usize::MAX);
+    let broken: Vec<&Recheck> = judged.iter().filter(|recheck| recheck.run == "k-8").collect();
     assert_eq!(broken.len(), 6);
     assert!(broken.iter().all(|recheck| recheck.now.outcome == Outcome::Broken));
     let news: Vec<&&Recheck> = broken.iter().filter(|recheck| recheck.is_news()).collect();
@@ -244,11 +244,11 @@ fn an_unreadable_run_does_not_stop_the_others() {
     let (folder, history, rules) = filled(6);
     std::fs::remove_file(folder.path().join("h/traces/k-3.trace")).unwrap();
     std::fs::write(folder.path().join("h/traces/k-5.trace"), "no trace").unwrap();
-    let (end, printed) = judge(&history, &rules, 2, usize::MAX);
+    let (end, judged) = judge(&history, &rules, 2, usize::MAX);
     assert!(matches!(end.ending, Ending::Finished) && end.judged == 4, "{end:?}");
     let codes: Vec<&str> = end.faults.iter().map(|fault| fault.code).collect();
     assert_eq!(codes, ["H009", "H007"]);
-    assert!(printed.iter().all(|recheck| !["k-3", "k-5"].contains(&recheck.run.as_str())));
+    assert!(judged.iter().all(|recheck| !["k-3", "k-5"].contains(&recheck.run.as_str())));
     drop(history);
     let output = actcheck(folder.path(), &["recheck", "--history", "h", "--format", "csv"]);
     assert_eq!(output.status.code(), Some(2));

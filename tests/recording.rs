@@ -139,10 +139,11 @@ mod with_recordings {
             let expected: Vec<i64> =
                 (0..frames.rows.len()).map(|idx| (idx as f64 * period_nanos).round() as i64).collect();
             assert_eq!(moments(course), expected);
-            let printed: Vec<[f32; 3]> = course.iter_slices::<[f32; 3]>(translation).map(|at| at[0]).collect();
+            let recorded: Vec<[f32; 3]> = course.iter_slices::<[f32; 3]>(translation).map(|at| at[0]).collect();
             let traced: Vec<&[f32]> = frames.rows.iter().map(|row| &row[7 * slot..7 * slot + 3]).collect();
             assert!(
-                printed.iter().zip(&traced).all(|(printed, traced)| printed == traced) && printed.len() == traced.len()
+                recorded.iter().zip(&traced).all(|(recorded, traced)| recorded == traced)
+                    && recorded.len() == traced.len()
             );
         }
         let bodies =
@@ -159,8 +160,8 @@ mod with_recordings {
             assert_eq!(text.matches(&format!(": **{}**", outcome.word())).count(), count, "{text}");
         }
         let not_passed = judged.iter().filter(|judgement| judgement.outcome != Outcome::Passed).count();
-        let printed = at(chunks, "/events/outcomes", false);
-        assert_eq!(printed.iter().map(|chunk| chunk.num_rows()).sum::<usize>(), not_passed);
+        let outcomes = at(chunks, "/events/outcomes", false);
+        assert_eq!(outcomes.iter().map(|chunk| chunk.num_rows()).sum::<usize>(), not_passed);
     }
 
     /// A project with a history of two runs.
@@ -199,8 +200,8 @@ mod with_recordings {
             holds_the_trace(chunks, trace);
             holds_the_outcomes(chunks, run);
             let [actions] = at(chunks, "/events/actions", false)[..] else { panic!("actions are recorded once") };
-            let printed = texts(actions, TextLog::descriptor_text().component);
-            assert!(printed[0].ends_with("PerceivePlane begins") && moments(actions).is_sorted(), "{printed:?}");
+            let lines = texts(actions, TextLog::descriptor_text().component);
+            assert!(lines[0].ends_with("PerceivePlane begins") && moments(actions).is_sorted(), "{lines:?}");
             let mut ids: Vec<ChunkId> = chunks.iter().map(Chunk::id).collect();
             let mut rows: Vec<RowId> = chunks.iter().flat_map(Chunk::row_ids).collect();
             let (all_ids, all_rows) = (ids.len(), rows.len());
@@ -234,9 +235,9 @@ mod with_recordings {
             let mut recordings = Recordings::new().unwrap();
             recordings.add(&run, trace, std::slice::from_ref(&why)).unwrap();
             assert_eq!(recordings.runs(), 1);
-            let printed = recordings.bytes();
+            let size = recordings.bytes();
             let bytes = recordings.finish().unwrap();
-            assert!(printed > 0 && printed <= bytes.len() as u64);
+            assert!(size > 0 && size <= bytes.len() as u64);
             read(&bytes).remove(&run.row.run).unwrap()
         };
         let chunks = recorded(Some(&trace));

@@ -1,10 +1,10 @@
 //! The rule engine as a library: a program outside the workspace uses it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Returns the target folder of this test program, in which the compiled dependencies can be reused.
-fn target() -> std::path::PathBuf {
+fn target() -> PathBuf {
     let program = std::env::current_exe().unwrap();
     // `<target>/release/deps/all-…`
     program.ancestors().nth(3).unwrap().to_path_buf()
@@ -17,7 +17,8 @@ fn a_program_outside_the_workspace_judges_and_explains() {
         .args(["run", "--quiet", "--release", "--locked", "--offline", "--manifest-path"])
         .arg(&manifest)
         .env("CARGO_TARGET_DIR", target())
-        // `.ci/timed` sets it for the test program. Build scripts would notice it and rebuild dependencies, here and in the next build.
+        // `.ci/timed` sets it for the test program. Build scripts would notice it and rebuild dependencies, here and in
+        // the next build.
         .env_remove("RUSTC_BOOTSTRAP")
         .output()
         .unwrap();

@@ -97,11 +97,11 @@ fn chosen_scenes_depend_on_the_seed_and_the_results() {
             results = asked
                 .iter()
                 .map(|planned| {
-                    let mut results = made_up(&env, planned);
-                    results.outcomes.iter_mut().for_each(|outcome| {
+                    let mut result = made_up(&env, planned);
+                    result.outcomes.iter_mut().for_each(|outcome| {
                         (outcome.outcome, outcome.margin) = (Outcome::Passed, Some(1.0 + planned.index as f64));
                     });
-                    results
+                    result
                 })
                 .collect();
         }

@@ -157,8 +157,9 @@ fn named_queries_answer(here: &Path) {
         "the first campaign's runs are judged by the new rule now"
     );
     let failures = json(here, &["query", "--named", "first-failure-after-rule-change", "--format", "json"]);
-    let printed: Vec<&str> = failures.as_array().unwrap().iter().map(|row| row["property"].as_str().unwrap()).collect();
-    assert_eq!(printed, ["http://actions#MovedObject"], "{failures}");
+    let properties: Vec<&str> =
+        failures.as_array().unwrap().iter().map(|row| row["property"].as_str().unwrap()).collect();
+    assert_eq!(properties, ["http://actions#MovedObject"], "{failures}");
     let unknown = actcheck(here, &["query", "--named", "first-failure"]);
     assert_eq!(unknown.status.code(), Some(2));
     assert!(stderr(&unknown).contains("did you mean `first-failures`?"), "{}", stderr(&unknown));

@@ -7,8 +7,8 @@ static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// CPU time of this thread; wall time if the system does not report it (other than Linux). Unit: seconds.
 pub fn thread_secs() -> f64 {
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let nanoseconds = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+    let stat = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let nanoseconds = stat.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
     nanoseconds.map_or_else(wall_secs, |nanoseconds| nanoseconds * 1e-9)
 }
 
