@@ -21,7 +21,7 @@
 //! | crate | purpose | libraries |
 //! | --- | --- | --- |
 //! | [`base`] | sources and diagnostics, terms, facts, findings and outcomes, shipped files | |
-//! | [`data`] | poses, recorded choices, models, scenes, traces | nalgebra |
+//! | [`data`] | poses, recorded choices, models, scenes, traces | |
 //! | [`search`] | adaptive sampling of the unit cube, guided by margins; failure rates by importance weighting | statrs |
 //! | [`config`] | TOML text to a fully checked `Campaign`; models in our own and in third-party formats | toml, roxmltree, mesh-loader, shlex |
 //! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxrdf, oxrdfio (parsers) |
@@ -30,7 +30,7 @@
 //! | [`actions`] | the robot's actions through commands and observations; the `Trace` | |
 //! | [`protocol`] | actions performed by an external program, in lockstep over a socket | nix |
 //! | [`facts`] | a `Trace` to RDF facts, interned once | |
-//! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxrdfio (imports), oxigraph (evaluator, feature `sparql`) |
+//! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxrdf, oxrdfio (imports), oxigraph (evaluator, feature `sparql`) |
 //! | [`verdict`] | findings to outcomes with witness and margin; the scores | |
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store) |
 //! | [`campaign`] | runs the stages of a campaign; the only crate that calls many stages | rayon |
@@ -45,21 +45,39 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::unwrap_used)]
 
-pub use actcheck_actions as actions;
-pub use actcheck_analysis as analysis;
+// In the order of the table; blank lines keep rustfmt from sorting them.
 pub use actcheck_base as base;
-pub use actcheck_campaign as campaign;
-pub use actcheck_cli as cli;
-pub use actcheck_config as config;
+
 pub use actcheck_data as data;
-pub use actcheck_facts as facts;
-pub use actcheck_history as history;
-pub use actcheck_ontology as ontology;
-pub use actcheck_protocol as protocol;
-pub use actcheck_report as report;
-pub use actcheck_rules as rules;
-pub use actcheck_scenario as scenario;
+
 pub use actcheck_search as search;
-pub use actcheck_serve as serve;
-pub use actcheck_verdict as verdict;
+
+pub use actcheck_config as config;
+
+pub use actcheck_ontology as ontology;
+
+pub use actcheck_scenario as scenario;
+
 pub use actcheck_world as world;
+
+pub use actcheck_actions as actions;
+
+pub use actcheck_protocol as protocol;
+
+pub use actcheck_facts as facts;
+
+pub use actcheck_rules as rules;
+
+pub use actcheck_verdict as verdict;
+
+pub use actcheck_history as history;
+
+pub use actcheck_campaign as campaign;
+
+pub use actcheck_analysis as analysis;
+
+pub use actcheck_report as report;
+
+pub use actcheck_serve as serve;
+
+pub use actcheck_cli as cli;

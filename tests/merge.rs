@@ -349,7 +349,7 @@ fn later_judgements_and_shrunk_runs_are_merged_under_new_names() {
         history.newest_outcomes(&filter).unwrap()
     };
     let (old, new) = (open(folder, "together"), open(folder, "all"));
-    let shrunk = new.shrunk_campaigns().unwrap();
+    let shrunk = new.selected_campaigns().unwrap();
     let id = new.campaigns().unwrap().into_iter().map(|row| row.id).find(|id| !shrunk.contains(id)).unwrap();
     let mut rows: Vec<_> = old
         .campaigns()

@@ -163,7 +163,7 @@ impl Side {
 /// # Errors
 /// `X070` there is no such campaign.
 pub(super) fn newest(history: &History) -> Result<String, Diagnostics> {
-    let shrunk = history.shrunk_campaigns()?;
+    let shrunk = history.selected_campaigns()?;
     let mut ids = history.campaigns()?.into_iter().map(|row| row.id).rev();
     ids.find(|id| !shrunk.contains(id)).ok_or_else(|| {
         Diagnostic::error("X070", format!("the history `{}` has no campaign", history.dir().display()))

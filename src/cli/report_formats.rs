@@ -72,7 +72,7 @@ pub(super) fn write(args: &ReportArgs, history: &History) -> Result<Vec<String>,
 /// named.
 fn asked_for(args: &ReportArgs, history: &History) -> Result<(Vec<CampaignRow>, Vec<RunRow>), Diagnostics> {
     let filter = args.chosen.filter(history)?;
-    let shrunk = history.shrunk_campaigns()?;
+    let shrunk = history.selected_campaigns()?;
     let wanted = |id: &String| match &filter.campaigns {
         Some(named) => named.contains(id),
         None => !shrunk.contains(id),

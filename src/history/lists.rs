@@ -53,7 +53,7 @@ SELECT ?run ?campaign ?index ?test ?status ?step ?action ?property ?outcome ?mar
 }";
 
 /// Campaigns whose scenes were selected because they fail. The prefix is [`FAILED_AGAIN`].
-const SHRUNK: &str = "
+const SELECTED: &str = "
 SELECT DISTINCT ?campaign WHERE {
     { ?run act:shrunkFrom ?original ; act:campaign ?campaign }
     UNION
@@ -129,8 +129,8 @@ fn campaign(id: String, runs: u64, node: &Node) -> CampaignRow {
 }
 
 /// Ids of the campaigns that hold a shrunk run, or that ran failed runs again.
-pub(super) fn shrunk_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
-    Ok(select(store, SHRUNK, Vec::new())?.iter().map(|row| id(row, 0)).collect())
+pub(super) fn selected_campaigns(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
+    Ok(select(store, SELECTED, Vec::new())?.iter().map(|row| id(row, 0)).collect())
 }
 
 /// Ids of all campaigns, sorted by start.

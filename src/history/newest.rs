@@ -45,7 +45,7 @@ impl History {
     ///
     /// # Errors
     /// The store can't be read.
-    pub fn shrunk_campaigns(&self) -> Result<BTreeSet<String>, Diagnostics> {
-        lists::shrunk_campaigns(&self.store()?).map_err(|error| self.query_fault(&error))
+    pub fn selected_campaigns(&self) -> Result<BTreeSet<String>, Diagnostics> {
+        lists::selected_campaigns(&self.store()?).map_err(|error| self.query_fault(&error))
     }
 }

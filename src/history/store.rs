@@ -210,14 +210,14 @@ impl History {
         lists::runs(&self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
-    /// Returns the ids of all campaigns except those of [`History::shrunk_campaigns`], sorted by start, each with its
+    /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by start, each with its
     /// run ids, sorted as strings.
     ///
     /// # Errors
     /// The store can't be read.
     pub fn run_ids(&self) -> Result<Vec<(String, Vec<String>)>, Diagnostics> {
         let store = self.store()?;
-        let shrunk = self.shrunk_campaigns()?;
+        let shrunk = self.selected_campaigns()?;
         let campaigns = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
         let mut found = Vec::new();
         for id in campaigns.into_iter().filter(|id| !shrunk.contains(id)) {

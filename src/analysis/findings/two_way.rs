@@ -1,6 +1,7 @@
 //! Failure rates by one or two parameters, for heat maps.
 
-use crate::{Interval, Parameter, PatternInput, Values, simplest_between, wilson};
+use crate::patterns::simplest_between;
+use crate::{Interval, Parameter, PatternInput, Values, wilson};
 
 /// Maximum number of cells along a numeric axis.
 const MOST_CELLS: usize = 8;

@@ -37,7 +37,7 @@ impl Mirror {
     /// Updates the mirror of a history: writes missing runs, and rewrites files that can't be read or hold runs that
     /// the store lacks.
     ///
-    /// The campaigns of [`History::shrunk_campaigns`] are left out, because their scenes were selected to fail.
+    /// The campaigns of [`History::selected_campaigns`] are left out, because their scenes were selected to fail.
     ///
     /// # Errors
     /// `A001` if it can't be written; errors of reading the history. All existing files are complete.

@@ -76,7 +76,7 @@ impl Found {
 /// # Errors
 /// It can't be read.
 pub(super) fn survey(history: &History, source: Option<usize>) -> Result<Vec<Found>, Diagnostics> {
-    let shrunk = history.shrunk_campaigns()?;
+    let shrunk = history.selected_campaigns()?;
     let store = history.store()?;
     let mut later: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for (run, judgement) in lists::later_judgements(&store).map_err(|error| history.query_fault(&error))? {
