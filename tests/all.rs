@@ -8,6 +8,7 @@ mod campaign;
 mod case_candidates;
 mod cases;
 mod check_oracles;
+mod collisions;
 mod commands;
 mod compare;
 mod config;

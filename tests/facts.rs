@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use actcheck::base::{RunFacts, Term, TermId, names};
 use actcheck::data::{
-    ActionEnd, ActionReport, ActionTrace, BodyState, Choices, ContactEpisode, Extremes, Frames, JointState, Percept,
-    Phase, Pose, RobotState, SceneMap, Snapshot, Trace,
+    ActionEnd, ActionReport, ActionTrace, BodyState, Choices, ContactEpisode, Extremes, Frames, JointState, LinkState,
+    Look, Percept, Phase, Pose, RobotState, SceneMap, Snapshot, Trace,
 };
 use actcheck::facts::extract;
 
@@ -45,6 +45,8 @@ fn body(id: &str, asleep: bool, choices: &mut Choices) -> BodyState {
         touches: strings(if fixed { &["floor"] } else { &["coffee_table_1"] }),
         rests_on: strings(if fixed { &["floor"] } else { &["coffee_table_1"] }),
         asleep,
+        size_m: Some(three(choices, 0.05, 0.2)),
+        grasp_distance_m: (!fixed).then(|| single(choices, -0.01, 1.0)),
     }
 }
 
@@ -87,12 +89,14 @@ fn snapshot(time_secs: f64, bodies: Vec<BodyState>, holding: bool, choices: &mut
             gripper_opening_m: single(choices, 0.0, 0.1),
             left_touches: strings(if holding { &["glass_1"] } else { &[] }),
             right_touches: strings(if holding { &["glass_1"] } else { &[] }),
+            links: vec![LinkState { name: "hand".to_owned(), pose: Pose::upright(three(choices, 0.0, 1.0), 0.4) }],
         },
     }
 }
 
 fn contact(a: &str, b: &str, start_secs: f64, max_force_n: f64) -> ContactEpisode {
-    ContactEpisode { pair: [a.to_owned(), b.to_owned()], start_secs, end_secs: start_secs + 0.5, max_force_n }
+    let pair = [a.to_owned(), b.to_owned()];
+    ContactEpisode { pair, start_secs, end_secs: start_secs + 0.5, max_force_n, point_m: Some([0.1, start_secs, 0.7]) }
 }
 
 fn contacts(choices: &mut Choices) -> Vec<ContactEpisode> {
@@ -154,6 +158,12 @@ pub fn sample_trace(seed: u64) -> Trace {
             id: "glass_1".to_owned(),
             pose: Pose::upright([0.1, 0.2, 0.7], 0.3),
             size_m: [0.09, 0.09, 0.15],
+            look: Some(Look {
+                time_secs: 1.5,
+                base_true: [0.1, 0.2, 0.3],
+                base_believed: [0.11, 0.19, 0.31],
+                camera: Pose::upright([0.1, 0.2, 1.1], 0.3),
+            }),
         }],
         perceived: None,
         base: None,

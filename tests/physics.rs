@@ -51,7 +51,7 @@ fn immovable_objects_are_known_only_if_they_are_on_the_map() {
 }
 
 /// A box of 1 kg, unless the scene says otherwise.
-fn block(size: [f64; 3]) -> Arc<ObjectModel> {
+pub(crate) fn block(size: [f64; 3]) -> Arc<ObjectModel> {
     let pose = Pose::upright([0.0, 0.0, size[2] / 2.0], 0.0);
     Arc::new(ObjectModel {
         name: "block".to_owned(),
@@ -69,12 +69,19 @@ fn block(size: [f64; 3]) -> Arc<ObjectModel> {
     })
 }
 
-fn object(id: &str, model: Arc<ObjectModel>, role: Role, pose: Pose, mass_kg: f64, friction: f64) -> SceneObject {
+pub(crate) fn object(
+    id: &str,
+    model: Arc<ObjectModel>,
+    role: Role,
+    pose: Pose,
+    mass_kg: f64,
+    friction: f64,
+) -> SceneObject {
     SceneObject { id: id.to_owned(), restitution: model.restitution, model, role, pose, mass_kg, friction }
 }
 
 /// A scene with the robot far away.
-fn scene(objects: Vec<SceneObject>) -> Scene {
+pub(crate) fn scene(objects: Vec<SceneObject>) -> Scene {
     Scene {
         map: actcheck::data::SceneMap::default(),
         world: "empty".to_owned(),
@@ -227,7 +234,7 @@ fn a_grip_holds_below_its_friction_limit_and_slips_above_it() {
         let thing = &after.bodies[1];
         let risen = thing.pose.position[2] - trace.snapshots[0].bodies[1].pose.position[2];
         assert_eq!(thing.rests_on == ["robot"], holds, "{share} of the limit: rests on {:?}", thing.rests_on);
-        assert_eq!(risen > 0.15, holds, "{share} of the limit: rose by {risen} m");
+        assert_eq!(risen > 0.11, holds, "{share} of the limit: rose by {risen} m");
         let slipped = (after.robot.gripper.position[2] - thing.pose.position[2] - 0.075).abs();
         assert!(!holds || slipped < 0.008, "{share} of the limit: slipped by {slipped} m");
         let report = trace.actions[0].report.as_ref().expect("the skill reports");
@@ -245,7 +252,7 @@ fn a_joint_limit_holds_under_load() {
     let mut command = world.hold();
     let lift = world.layout().arm[0];
     let lift_joint = world.kinematics().joints()[lift].clone();
-    command.positions[lift] = 0.3;
+    command.positions[lift] = 0.2;
     for _ in 0..180 {
         world.step(&command);
     }
@@ -258,7 +265,7 @@ fn a_joint_limit_holds_under_load() {
     for _ in 0..180 {
         world.step(&command);
     }
-    assert!((world.observe().positions[lift] - 0.3).abs() < 0.002);
+    assert!((world.observe().positions[lift] - 0.2).abs() < 0.002);
 }
 
 /// Commands beyond the limits end at the limits, and no joint exceeds its velocity limit.
@@ -267,6 +274,11 @@ fn joint_limits_of_position_and_velocity_override_commands() {
     let mut world = world(Vec::new());
     let mut command = world.hold();
     let arm = world.layout().arm.clone();
+    // The head looks down to its right, out of the way of the lift.
+    for joint in world.layout().head.clone() {
+        command.positions[joint] = -1.57;
+    }
+    (0..120).for_each(|_| world.step(&command));
     // The lift goes up first and down last, when the arm is upright again: it would hit the floor.
     let courses: [[f64; 5]; 4] = [
         [100.0, 100.0, 100.0, 100.0, 100.0],

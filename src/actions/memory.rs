@@ -134,7 +134,7 @@ mod tests {
     fn recalled(things: Vec<PerceivedThing>) -> Result<(Sighting, Vec<Sighting>), String> {
         let plane = PerceivedPlane { pose: Pose::upright([1.0, 0.0, 0.7], 0.3), size_m: [0.6, 0.5] };
         let kind = KnownKind { name: "glass".into(), category: GLASS.into(), size_m: [0.088, 0.088, 0.146] };
-        recall(&Perceived { plane: Some(plane), things }, "glass_1", &kind, &Vector3::zeros())
+        recall(&Perceived { plane: Some(plane), things, look: None }, "glass_1", &kind, &Vector3::zeros())
     }
 
     #[test]
@@ -157,7 +157,7 @@ mod tests {
             furniture: true,
         };
         let plane = PerceivedPlane { pose: Pose::upright([1.0, 0.0, 0.7], 0.3), size_m: [0.6, 0.5] };
-        let perceived = Perceived { plane: Some(plane), things: Vec::new() };
+        let perceived = Perceived { plane: Some(plane), things: Vec::new(), look: None };
         assert_eq!(elsewhere(vec![table(1.1), table(3.0)], &perceived), [table(3.0)]);
         assert_eq!(elsewhere(vec![table(1.1)], &Perceived::default()).len(), 1);
     }

@@ -7,9 +7,9 @@ use crate::grip::GripWatch;
 use crate::memory::{Held, Memory, Standing};
 use crate::sabotage::IDLE_SECS;
 use crate::{Cut, ExternalFault, Saboteur};
-use actcheck_data::{ActionReport, ChoiceName, Choices, KnownKind, Perceived, Percept, Phase, RobotProfile};
+use actcheck_data::{ActionReport, ChoiceName, Choices, KnownKind, Look, Perceived, Percept, Phase, RobotProfile};
 use actcheck_scenario::FloorPlan;
-use actcheck_world::{Command, DepthImage, Kinematics, Layout, Observation, Sighting, World};
+use actcheck_world::{Command, DepthImage, JointKind, Kinematics, Layout, Observation, Sighting, World};
 
 /// Reason why a skill has to stop.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,6 +18,8 @@ pub enum Interrupt {
     Fault,
     /// The action's time budget is exhausted.
     Budget,
+    /// Something holds back a joint of the robot.
+    HeldUp(String),
     /// The run is cut off.
     Cut,
     /// A fault of the external skill.
@@ -28,6 +30,13 @@ pub enum Interrupt {
 const SPEED_SHARE: f64 = 0.9;
 /// Peak over mean speed of a motion that starts and ends at rest (of 3s² − 2s³).
 const PEAK_OVER_MEAN: f64 = 1.5;
+
+/// A joint this far behind its target is held back. Unit: metres. Three times the lag of a joint that carries a load.
+const HELD_BACK_M: f64 = 0.03;
+/// As [`HELD_BACK_M`], for revolute joints. Unit: radians.
+const HELD_BACK_RAD: f64 = 0.1;
+/// Time for a robot that gives up to come to rest. Unit: seconds.
+const GIVE_UP_SECS: f64 = 0.5;
 
 /// The robot as a skill sees it, for the duration of one action.
 pub struct Operator<'a> {
@@ -50,6 +59,8 @@ pub struct Operator<'a> {
     pub percepts: Vec<Percept>,
     /// Interpretation of the pictures so far.
     pub perceived: Option<Perceived>,
+    /// The moment of the last picture; `None` before the first.
+    last_look: Option<Look>,
 }
 
 impl<'a> Operator<'a> {
@@ -82,6 +93,7 @@ impl<'a> Operator<'a> {
             phases,
             percepts,
             perceived: None,
+            last_look: None,
         }
     }
 
@@ -97,12 +109,23 @@ impl<'a> Operator<'a> {
             self.wait(IDLE_SECS)?;
             ActionReport { succeeded: false, message: "did nothing".to_owned() }
         } else {
-            skill(self)?
+            match skill(self) {
+                Err(Interrupt::HeldUp(joint)) => self.give_up(&joint)?,
+                done => done?,
+            }
         };
         Ok(match &mut self.saboteur {
             None => believed,
             Some(saboteur) => saboteur.report(believed),
         })
+    }
+
+    /// Stops all joints where they are, and reports that one of them is held back.
+    fn give_up(&mut self, joint: &str) -> Result<ActionReport, Interrupt> {
+        self.begin("held back");
+        self.command.positions = self.observe().positions;
+        self.wait(GIVE_UP_SECS)?;
+        Ok(ActionReport { succeeded: false, message: format!("something holds back the robot's {joint}") })
     }
 
     /// Begins a phase with this name.
@@ -174,6 +197,7 @@ impl<'a> Operator<'a> {
 
     /// Takes a picture with the camera.
     pub fn look(&mut self) -> DepthImage {
+        self.last_look = Some(self.world.current_look());
         self.world.look(self.choices)
     }
 
@@ -187,8 +211,9 @@ impl<'a> Operator<'a> {
         self.memory
     }
 
-    /// Keeps the interpretation of pictures for later actions and for the trace.
+    /// Keeps the interpretation of pictures for later actions and for the trace, with the moment of the last picture.
     pub fn remember(&mut self, perceived: Perceived) {
+        let perceived = Perceived { look: self.last_look, ..perceived };
         self.memory.perceived = Some(perceived.clone());
         self.perceived = Some(perceived);
     }
@@ -226,9 +251,14 @@ impl<'a> Operator<'a> {
         self.world.map_of_furniture()
     }
 
-    /// Records a percept.
+    /// Records a percept from the pictures of this action or, without any, from those of an earlier action.
     pub fn record_percept(&mut self, seen: &Sighting) {
-        self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m });
+        let recalled = self.memory.perceived.as_ref().and_then(|perceived| perceived.look);
+        self.record_percept_of(seen, self.last_look.or(recalled));
+    }
+
+    fn record_percept_of(&mut self, seen: &Sighting, look: Option<Look>) {
+        self.percepts.push(Percept { id: seen.id.clone(), pose: seen.pose, size_m: seen.size_m, look });
     }
 
     /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection. Returns
@@ -238,7 +268,7 @@ impl<'a> Operator<'a> {
         if let Some(saboteur) = &mut self.saboteur {
             seen = saboteur.sighting(seen);
         }
-        self.record_percept(&seen);
+        self.record_percept_of(&seen, Some(self.world.current_look()));
         Some(seen)
     }
 
@@ -294,11 +324,26 @@ impl<'a> Operator<'a> {
             let s = (time / secs).min(1.0);
             self.command.positions = along(&course, &legs, shortest * s * s * (3.0 - 2.0 * s));
             self.tick()?;
+            if let Some(joint) = self.held_back() {
+                return Err(Interrupt::HeldUp(joint));
+            }
             if enough(self) {
                 return Ok(true);
             }
         }
         Ok(false)
+    }
+
+    /// The name of a joint that is far behind its target, because something holds it back.
+    fn held_back(&self) -> Option<String> {
+        let (layout, positions) = (self.layout(), self.observe().positions);
+        let moved = layout.arm.iter().chain(layout.base.iter().flatten());
+        moved.copied().find_map(|idx| {
+            let joint = &self.kinematics().joints()[idx];
+            let most = if joint.kind == JointKind::Prismatic { HELD_BACK_M } else { HELD_BACK_RAD };
+            let off = (positions[idx] - self.command.positions[idx]).abs();
+            (off > most).then(|| joint.name.clone())
+        })
     }
 
     /// Control period. Unit: seconds.

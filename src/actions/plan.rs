@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use crate::grasp::{Approach, Grasp};
-use crate::motion::Samples;
+use crate::motion::{Samples, moved_links};
 use crate::operator::Operator;
 use crate::route::{Block, Ground, Pillar, length, wrapped};
 use crate::standing;
@@ -36,8 +36,13 @@ pub(super) const APPROACH_M: f64 = 0.12;
 const OFF_EDGE_M: f64 = 0.1;
 /// Longest distance from there to the object. Unit: metres.
 const LONGEST_WAY_M: f64 = 1.2;
-/// Minimum clearance to furniture: fingertips go down to it to grasp flat objects. Unit: metres.
+/// Minimum clearance of the hand to furniture: fingertips go down to it to grasp flat objects. Unit: metres.
 pub(super) const FURNITURE_CLEAR_M: f64 = 0.002;
+/// Minimum clearance of the base and the arm to furniture, which only the hand has to come close to. Unit: metres.
+pub(super) const BODY_CLEAR_M: f64 = 0.03;
+/// Clearance of the base and the arm to furniture beyond which more brings no benefit. Unit: metres. Three times the
+/// position error of perceived furniture.
+pub(super) const AMPLE_BODY_CLEAR_M: f64 = 0.08;
 /// Clearance to other objects beyond which more brings no benefit. Unit: metres.
 pub(super) const AMPLE_CLEAR_M: f64 = 0.04;
 /// Minimum clearance to other objects: below it, the hand would go through their middle. Unit: metres.
@@ -124,6 +129,8 @@ pub(super) struct Planner<'a> {
     pub(super) start: Vec<f64>,
     postures: Vec<Vec<f64>>,
     pub(super) points: Vec<(usize, Point3<f64>)>,
+    /// Whether each link is part of the hand.
+    pub(super) is_hand: Vec<bool>,
     pub(super) furniture: Vec<Block>,
     pub(super) things: Vec<Pillar>,
     ground: Ground,
@@ -143,7 +150,8 @@ impl<'a> Planner<'a> {
         let mut postures = operator.profile().postures.clone();
         postures.push(operator.profile().home.clone());
         let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
-        Self { kinematics, layout, base, start, postures, points, furniture, things, ground, itself }
+        let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
+        Self { kinematics, layout, base, start, postures, points, is_hand, furniture, things, ground, itself }
     }
 
     /// A plan near the seed that costs less than `bound`, if there is one.
@@ -155,6 +163,9 @@ impl<'a> Planner<'a> {
             return None;
         }
         let at_thing = self.solve(seed, &grasp.pose, 1.0)?;
+        if self.touches_itself(&at_thing) {
+            return None;
+        }
         let lift = LIFTS_M.iter().find_map(|height| self.vertically(&at_thing, *height))?;
         let lifted = lift.last()?.clone();
         let (near, approach) = match grasp.approach {
@@ -241,7 +252,13 @@ impl<'a> Planner<'a> {
         positions
     }
 
-    /// Postures a few centimetres apart on a straight path up, with a fixed base.
+    /// Whether links of the robot are too close to each other.
+    pub(super) fn touches_itself(&self, posture: &[f64]) -> bool {
+        self.itself.touches(&self.kinematics.links(posture))
+    }
+
+    /// Postures a few centimetres apart on a straight path up, with a fixed base. Returns `None` if the arm can't follow
+    /// or would collide with the robot.
     fn vertically(&self, positions: &[f64], height: f64) -> Option<Vec<Vec<f64>>> {
         let from = self.kinematics.grasp(positions);
         let mut path: Vec<Vec<f64>> = Vec::new();
@@ -249,7 +266,7 @@ impl<'a> Planner<'a> {
             let mut target = from;
             target.translation.vector.z += height * f64::from(step) / 6.0;
             let seed = path.last().map_or(positions, Vec::as_slice);
-            path.push(self.solve(seed, &target, 0.0)?);
+            path.push(self.solve(seed, &target, 0.0).filter(|posture| !self.touches_itself(posture))?);
         }
         Some(path)
     }

@@ -1,11 +1,15 @@
 //! The cost of a mobile robot's plan, and arm paths around obstacles.
 
 use crate::motion::{self, ArmSpace, Room, Samples};
-use crate::plan::{AMPLE_CLEAR_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, Plan, Planner};
+use crate::plan::{AMPLE_BODY_CLEAR_M, AMPLE_CLEAR_M, BODY_CLEAR_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, Plan, Planner};
 use crate::route::length;
 
 /// Number of postures checked along the path of an unfolding arm.
 const N_CHECKS: usize = 12;
+/// Cost of each metre that the clearance to objects lacks.
+const THING_COST: f64 = 50.0;
+/// As [`THING_COST`], for the clearance of the base and the arm to furniture.
+const FURNITURE_COST: f64 = 30.0;
 /// Samples allowed per grasp.
 const SAMPLES_A_GRASP: u32 = 400;
 
@@ -36,9 +40,12 @@ impl Planner<'_> {
 
     /// Cost of one leg. Returns `None` if something is in the way.
     fn leg_cost(&self, from: &[f64], to: &[f64], travel: f64) -> Option<f64> {
-        let (furniture, things) = self.clearance(from, to);
-        let is_free = furniture >= FURNITURE_CLEAR_M && things >= LEAST_CLEAR_M;
-        is_free.then(|| travel + (AMPLE_CLEAR_M - things).max(0.0) * 50.0)
+        let nearest = self.clearance(from, to);
+        let lack_of_room = (AMPLE_BODY_CLEAR_M - nearest.body_m).max(0.0);
+        let is_free =
+            nearest.hand_m >= FURNITURE_CLEAR_M && nearest.body_m >= BODY_CLEAR_M && nearest.things_m >= LEAST_CLEAR_M;
+        is_free
+            .then(|| travel + (AMPLE_CLEAR_M - nearest.things_m).max(0.0) * THING_COST + lack_of_room * FURNITURE_COST)
     }
 
     /// Whether the path is free of self-collisions.
@@ -47,7 +54,7 @@ impl Planner<'_> {
         (1..=N_CHECKS).all(|step| {
             let share = step as f64 / N_CHECKS as f64;
             let positions: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
-            !self.itself.touches(&self.kinematics.links(&positions))
+            !self.touches_itself(&positions)
         })
     }
 
@@ -63,6 +70,7 @@ impl Planner<'_> {
             &self.things,
             std::slice::from_ref(&self.start),
         );
+        let space = space.farther(BODY_CLEAR_M - FURNITURE_CLEAR_M);
         let least = Room { furniture_m: FURNITURE_CLEAR_M, things_m: LEAST_CLEAR_M };
         motion::way(&space, from, to, least, samples)
     }
@@ -75,24 +83,34 @@ impl Planner<'_> {
         legs.zip(drive).map(|(a, b)| way(a, b)).sum::<f64>() - way(&self.start, end)
     }
 
-    /// Smallest distances to furniture and to objects along the path between two postures. Unit: metres; negative
-    /// inside.
-    fn clearance(&self, from: &[f64], to: &[f64]) -> (f64, f64) {
-        let mut least = (f64::INFINITY, f64::INFINITY);
+    /// Smallest distances to furniture and to objects along the path between two postures.
+    fn clearance(&self, from: &[f64], to: &[f64]) -> Nearest {
+        let mut nearest = Nearest { hand_m: f64::INFINITY, body_m: f64::INFINITY, things_m: f64::INFINITY };
         for step in 0..=N_CHECKS {
             let share = step as f64 / N_CHECKS as f64;
             let positions: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
             let links = self.kinematics.links(&positions);
             for (link, point) in &self.points {
                 let point = links[*link] * point;
+                let of_furniture = if self.is_hand[*link] { &mut nearest.hand_m } else { &mut nearest.body_m };
                 for block in &self.furniture {
-                    least.0 = least.0.min(block.distance(&point));
+                    *of_furniture = of_furniture.min(block.distance(&point));
                 }
                 for pillar in &self.things {
-                    least.1 = least.1.min(pillar.distance(&point));
+                    nearest.things_m = nearest.things_m.min(pillar.distance(&point));
                 }
             }
         }
-        least
+        nearest
     }
+}
+
+/// Smallest distances on a path. Unit: metres; negative inside.
+struct Nearest {
+    /// Of the hand to furniture.
+    hand_m: f64,
+    /// Of the other links to furniture.
+    body_m: f64,
+    /// Of all links to objects.
+    things_m: f64,
 }

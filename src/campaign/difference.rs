@@ -290,6 +290,8 @@ mod tests {
             touches: vec![],
             rests_on: vec!["table_1".into()],
             asleep: true,
+            size_m: None,
+            grasp_distance_m: None,
         }
     }
 
@@ -302,6 +304,7 @@ mod tests {
             gripper_opening_m: 0.05,
             left_touches: vec![],
             right_touches: vec![],
+            links: vec![],
         };
         Snapshot { time_secs, bodies: vec![body("mug_1", x), body("mug_2", 0.3)], robot }
     }

@@ -13,6 +13,9 @@ pub struct RobotCourse {
     pub self_contacts: Vec<SelfCollision>,
     /// Objects that both fingers touched at the same time, in scene order.
     pub held: Vec<HeldCourse>,
+    /// Objects that the robot came near, in scene order. Empty in traces of earlier versions.
+    #[serde(skip)]
+    pub clearances: Vec<Clearance>,
     /// Its measurements and commands. Stored with the bodies' tracks, which not every reader needs.
     #[serde(skip)]
     pub motion: Motion,
@@ -40,6 +43,15 @@ pub struct SelfCollision {
     pub start_secs: f64,
     /// Largest penetration depth. Unit: metres.
     pub max_depth_m: f64,
+}
+
+/// The smallest distance of the robot to an object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Clearance {
+    /// Id of the object.
+    pub id: String,
+    /// Smallest distance of any link to its surface; 0 if they touched. Unit: metres.
+    pub smallest_m: f64,
 }
 
 /// An object held between both fingers.

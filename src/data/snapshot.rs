@@ -48,6 +48,13 @@ pub struct BodyState {
     pub rests_on: Vec<String>,
     /// Whether physics has put it to sleep.
     pub asleep: bool,
+    /// Dimensions along its own axes, in its scaled size. Unit: metres. `None` in traces of earlier versions.
+    #[serde(skip)]
+    pub size_m: Option<[f64; 3]>,
+    /// Distance from the grasp point to the surface of its shapes; negative inside. Unit: metres. `None` for static
+    /// bodies and in traces of earlier versions.
+    #[serde(skip)]
+    pub grasp_distance_m: Option<f64>,
 }
 
 /// The robot.
@@ -67,6 +74,18 @@ pub struct RobotState {
     pub left_touches: Vec<String>,
     /// Ids of objects that the right finger touches, sorted.
     pub right_touches: Vec<String>,
+    /// Poses of all links. Empty in traces of earlier versions.
+    #[serde(skip)]
+    pub links: Vec<LinkState>,
+}
+
+/// One link of the robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LinkState {
+    /// Name in the URDF.
+    pub name: String,
+    /// Its pose.
+    pub pose: Pose,
 }
 
 /// One actuated joint. Units: metres or radians, newtons or newton metres, by kind.

@@ -118,6 +118,22 @@ pub struct ContactEpisode {
     pub end_secs: f64,
     /// Largest normal force. Unit: newtons.
     pub max_force_n: f64,
+    /// Position of the contact at its largest force. Unit: metres. Frame: world. `None` in traces of earlier versions.
+    #[serde(skip)]
+    pub point_m: Option<[f64; 3]>,
+}
+
+/// The moment at which the robot took a picture or perceived an object.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Look {
+    /// Simulated time since the scene was built. Unit: seconds.
+    pub time_secs: f64,
+    /// True base pose: x, y, heading.
+    pub base_true: [f64; 3],
+    /// Believed base pose: x, y, heading.
+    pub base_believed: [f64; 3],
+    /// True pose of the camera.
+    pub camera: Pose,
 }
 
 /// One object as perceived. Frame: world, by the base's belief.
@@ -129,6 +145,9 @@ pub struct Percept {
     pub pose: Pose,
     /// Perceived dimensions. Unit: metres.
     pub size_m: [f64; 3],
+    /// The moment of perception. `None` in traces of earlier versions.
+    #[serde(skip)]
+    pub look: Option<Look>,
 }
 
 /// Perception's interpretation of the pictures. Frame: world, by the base's belief.
@@ -138,6 +157,9 @@ pub struct Perceived {
     pub plane: Option<PerceivedPlane>,
     /// The objects perceived on it, in no particular order.
     pub things: Vec<PerceivedThing>,
+    /// The moment of the last picture. `None` in traces of earlier versions.
+    #[serde(skip)]
+    pub look: Option<Look>,
 }
 
 /// A level surface as perceived.

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::writer::Writer;
-use actcheck_base::names;
-use actcheck_data::{ActionTrace, ContactEpisode, Extremes, Perceived, Percept};
+use actcheck_base::{TermId, names};
+use actcheck_data::{ActionTrace, ContactEpisode, Extremes, Look, Perceived, Percept};
 
 /// Number of contact episodes that become facts for each pair: the strongest ones.
 ///
@@ -12,9 +12,9 @@ use actcheck_data::{ActionTrace, ContactEpisode, Extremes, Perceived, Percept};
 /// contact above some force, and the largest force. The trace keeps all episodes.
 const EPISODES_OF_A_PAIR: usize = 3;
 
-/// Writes the report, contacts, extremes and percepts of one action, and the plane and objects that the action itself
-/// perceived.
-pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
+/// Writes the report, contacts, extremes and percepts of one action that began at this time, and the plane and objects
+/// that the action itself perceived. Unit: seconds since the scene was built.
+pub(super) fn write(action: &ActionTrace, began_secs: f64, writer: &mut Writer) {
     let subject = writer.w("action");
     if let Some(report) = &action.report {
         writer.text(subject, "reported", if report.succeeded { "succeeded" } else { "failed" });
@@ -28,10 +28,10 @@ pub(super) fn write(action: &ActionTrace, writer: &mut Writer) {
         write_extremes(extremes, writer);
     }
     for (idx, percept) in action.percepts.iter().enumerate() {
-        write_percept(idx + 1, percept, writer);
+        write_percept(idx + 1, percept, began_secs, writer);
     }
     if let Some(perceived) = &action.perceived {
-        write_perceived(perceived, writer);
+        write_perceived(perceived, began_secs, writer);
     }
 }
 
@@ -66,6 +66,9 @@ fn write_contact(number: usize, contact: &ContactEpisode, writer: &mut Writer) {
         writer.state(subject, property, thing);
     }
     writer.numbers(subject, ["start", "end", "maxForce"], [contact.start_secs, contact.end_secs, contact.max_force_n]);
+    if let Some(point) = contact.point_m {
+        writer.numbers(subject, ["x", "y", "z"], point);
+    }
 }
 
 fn write_extremes(extremes: &Extremes, writer: &mut Writer) {
@@ -77,7 +80,7 @@ fn write_extremes(extremes: &Extremes, writer: &mut Writer) {
     );
 }
 
-fn write_percept(number: usize, percept: &Percept, writer: &mut Writer) {
+fn write_percept(number: usize, percept: &Percept, began_secs: f64, writer: &mut Writer) {
     let subject = writer.named("percept", &number.to_string());
     writer.class(subject, &names::w("Percept"));
     let seen = writer.thing(&percept.id);
@@ -85,15 +88,26 @@ fn write_percept(number: usize, percept: &Percept, writer: &mut Writer) {
     writer.numbers(subject, ["x", "y", "z"], percept.pose.position);
     writer.number(subject, "yaw", percept.pose.yaw());
     writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], percept.size_m);
+    write_look(subject, percept.look.as_ref(), began_secs, writer);
 }
 
-fn write_perceived(perceived: &Perceived, writer: &mut Writer) {
+/// Writes the moment of perception: the time, the base's true and believed pose, the camera's position.
+fn write_look(subject: TermId, look: Option<&Look>, began_secs: f64, writer: &mut Writer) {
+    let Some(look) = look else { return };
+    writer.number(subject, "takenAt", look.time_secs - began_secs);
+    writer.numbers(subject, ["takenBaseX", "takenBaseY", "takenBaseYaw"], look.base_true);
+    writer.numbers(subject, ["takenBelievedX", "takenBelievedY", "takenBelievedYaw"], look.base_believed);
+    writer.numbers(subject, ["cameraX", "cameraY", "cameraZ"], look.camera.position);
+}
+
+fn write_perceived(perceived: &Perceived, began_secs: f64, writer: &mut Writer) {
     if let Some(plane) = &perceived.plane {
         let subject = writer.w("perceivedPlane");
         writer.class(subject, &names::w("PerceivedPlane"));
         writer.numbers(subject, ["x", "y", "z"], plane.pose.position);
         writer.numbers(subject, ["yaw", "tilt"], [plane.pose.yaw(), plane.pose.tilt()]);
         writer.numbers(subject, ["extentX", "extentY"], plane.size_m);
+        write_look(subject, perceived.look.as_ref(), began_secs, writer);
     }
     for (idx, thing) in perceived.things.iter().enumerate() {
         let subject = writer.named("perceivedObject", &(idx + 1).to_string());
@@ -101,6 +115,7 @@ fn write_perceived(perceived: &Perceived, writer: &mut Writer) {
         writer.numbers(subject, ["x", "y", "z"], thing.pose.position);
         writer.number(subject, "yaw", thing.pose.yaw());
         writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], thing.size_m);
+        write_look(subject, perceived.look.as_ref(), began_secs, writer);
         if let Some(category) = &thing.category {
             writer.iri(subject, "seenAs", category);
         }

@@ -23,7 +23,8 @@ pub fn extract(trace: &Trace) -> RunFacts {
     let bodies: BTreeSet<&str> = trace.snapshots.iter().flat_map(|s| s.bodies.iter().map(|b| b.id.as_str())).collect();
     for (idx, action) in trace.actions.iter().enumerate() {
         if action.end != ActionEnd::NotReached {
-            during::write(action, &mut writer);
+            let began_secs = trace.snapshots.get(idx).map_or(0.0, |before| before.time_secs);
+            during::write(action, began_secs, &mut writer);
             if let (Some(base), false) = (&action.base, trace.map.rooms.is_empty()) {
                 during::write_base(base, &mut writer);
             }

@@ -7,7 +7,7 @@ use actcheck_data::RobotCourse;
 /// A joint that used less than this share of its maximum speed counts as unmoved: its speed is not written.
 const MIN_SPEED_SHARE: f64 = 0.01;
 
-/// Writes how close joints came to their limits, self-contacts and held objects. Marks the robot as measured, so that
+/// Writes how close joints came to their limits, self-contacts, clearances and held objects. Marks the robot as measured, so that
 /// rules don't take missing facts for a pass.
 pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
     let action = writer.w("action");
@@ -33,6 +33,10 @@ pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
             writer.state(subject, property, link);
         }
         writer.numbers(subject, ["seenAt", "maxDepth"], [contact.start_secs, contact.max_depth_m]);
+    }
+    for near in &course.clearances {
+        let subject = writer.thing(&near.id);
+        writer.number(subject, "clearance", near.smallest_m);
     }
     for held in &course.held {
         let subject = writer.thing(&held.id);

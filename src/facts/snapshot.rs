@@ -29,6 +29,12 @@ fn write_body(body: &BodyState, writer: &mut Writer) {
     writer.numbers(subject, ["minX", "minY", "minZ"], body.aabb_min);
     writer.numbers(subject, ["maxX", "maxY", "maxZ"], body.aabb_max);
     writer.numbers(subject, ["mass", "friction", "restitution"], [body.mass_kg, body.friction, body.restitution]);
+    if let Some(size_m) = body.size_m {
+        writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], size_m);
+    }
+    if let Some(distance) = body.grasp_distance_m {
+        writer.number(subject, "gripperDistance", distance);
+    }
     writer.things(subject, "touches", &body.touches);
     writer.things(subject, "restsOn", &body.rests_on);
     writer.boolean(subject, "asleep", body.asleep);

@@ -24,6 +24,7 @@ mod statements;
 mod store;
 mod syntax_fault;
 mod terms;
+mod trace_details;
 mod trace_file;
 mod vitals;
 mod wire;

@@ -10,6 +10,7 @@ use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
 use crate::frames;
+use crate::trace_details::Details;
 use actcheck_data::{ActionTrace, Choice, Form, Frames, RobotCourse, SceneMap, Snapshot, Trace};
 
 /// Magic bytes at the start of each file. The last one is the format version; it increases whenever a type of the trace
@@ -18,8 +19,8 @@ const MAGIC: &[u8; 8] = b"actrace4";
 /// Magic bytes of files whose choices have the indices of candidates, without their names. All else is the same.
 const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
 
-/// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies and
-/// the motion of the robot follow it. (Traces of earlier versions end before any of these.)
+/// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the forms of bodies, the
+/// courses of the robot and [`Details`] follow it. (Traces of earlier versions end before any of these.)
 type Head = (Vec<Choice>, Vec<Snapshot>, Vec<ActionTrace>, f64, Vec<String>, String);
 
 /// Encodes a run's file.
@@ -30,9 +31,8 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
     let frames = &trace.frames;
     let head = (choices, &trace.snapshots, &trace.actions, frames.period_secs, &frames.names, &trace.hash);
     let mut head = postcard::to_stdvec(&head).map_err(|error| error.to_string())?;
-    head.extend(
-        postcard::to_stdvec(&(&trace.map, &trace.forms, &trace.robot_courses)).map_err(|error| error.to_string())?,
-    );
+    let later = (&trace.map, &trace.forms, &trace.robot_courses, Details::of(trace));
+    head.extend(postcard::to_stdvec(&later).map_err(|error| error.to_string())?);
     let head = compressed(&head)?;
     let course = compressed(&[frames::encode(&frames.rows), encode_motions(trace)?].concat())?;
     let length = u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
@@ -90,20 +90,13 @@ fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
     let (head, rest): (Head, &[u8]) = postcard::take_from_bytes(&head).map_err(read)?;
     let (map, rest): (SceneMap, &[u8]) = part_of(rest).map_err(read)?;
     let (forms, rest): (Vec<Form>, &[u8]) = part_of(rest).map_err(read)?;
-    let (robot_courses, _): (Vec<RobotCourse>, &[u8]) = part_of(rest).map_err(read)?;
+    let (robot_courses, rest): (Vec<RobotCourse>, &[u8]) = part_of(rest).map_err(read)?;
+    let (details, _): (Details, &[u8]) = part_of(rest).map_err(read)?;
     let (choices, snapshots, actions, period_secs, names, hash) = head;
-    Ok((
-        choices,
-        Trace {
-            snapshots,
-            actions,
-            frames: Frames { period_secs, names, rows: Vec::new() },
-            hash,
-            map,
-            forms,
-            robot_courses,
-        },
-    ))
+    let frames = Frames { period_secs, names, rows: Vec::new() };
+    let mut trace = Trace { snapshots, actions, frames, hash, map, forms, robot_courses };
+    details.fill(&mut trace);
+    Ok((choices, trace))
 }
 
 /// The next part, or an empty one if the file ends before it.

@@ -202,7 +202,8 @@ impl Performed<'_, '_> {
     fn stop(&mut self, interrupt: Interrupt) -> Interrupt {
         let reason = match interrupt {
             Interrupt::ExternalSkill(_) => return interrupt,
-            Interrupt::Fault => "fault",
+            // The steps of an external skill are not watched for joints that are held back.
+            Interrupt::Fault | Interrupt::HeldUp(_) => "fault",
             Interrupt::Budget => "budget",
             Interrupt::Cut => "stopped",
         };

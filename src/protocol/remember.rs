@@ -93,7 +93,7 @@ fn perceived(end: &End) -> Result<Perceived, ExternalFault> {
         let pose = upright(&thing.pose)?;
         Ok(PerceivedThing { category: thing.category.clone(), pose: Pose::from_isometry(&pose), size_m: thing.size_m })
     });
-    Ok(Perceived { plane: plane.transpose()?, things: things.collect::<Result<_, ExternalFault>>()? })
+    Ok(Perceived { plane: plane.transpose()?, things: things.collect::<Result<_, ExternalFault>>()?, look: None })
 }
 
 /// Reduces a pose to position and yaw: objects are upright on their foot.

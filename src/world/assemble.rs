@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
-    GenericJoint, InteractionGroups, JointAxesMask, JointAxis, MassProperties, MotorModel, PhysicsWorld,
+    ActiveHooks, GenericJoint, InteractionGroups, JointAxesMask, JointAxis, MassProperties, MotorModel, PhysicsWorld,
     RigidBodyBuilder, RigidBodyHandle, SpringCoefficients,
 };
 
@@ -21,8 +21,8 @@ const SATURATION_M: f64 = 1e-3;
 const SATURATION_RAD: f64 = 0.02;
 /// Ratio of a motor's damping to its stiffness. Unit: seconds.
 const DAMPING_SECS: f64 = 0.02;
-/// As [`DAMPING_SECS`], for fingers, which are light.
-const FINGER_DAMPING_SECS: f64 = 0.01;
+/// As [`DAMPING_SECS`], for fingers, which close with their full force up to nearly their largest speed.
+const FINGER_DAMPING_SECS: f64 = 0.1;
 /// Friction of the robot's links other than the fingers: painted metal and plastic.
 const LINK_FRICTION: f64 = 0.4;
 /// Natural frequency of the joint limits. Unit: hertz. The engine's default limits make a loaded joint bounce back.
@@ -77,6 +77,7 @@ pub(super) fn insert_links(
         for solid in &link.solids {
             if let Some(collider) = collider(solid, Owner::Link(idx), friction, 0.0) {
                 let groups = if on_floor[idx] { off_floor() } else { InteractionGroups::all() };
+                let collider = collider.active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS);
                 engine.insert_collider(collider.density(0.0).collision_groups(groups), Some(body));
             }
         }
@@ -116,7 +117,8 @@ pub(super) fn insert_joints(
                 }
             })?;
         if let Some((multibody, link)) = engine.multibody_joints.get_mut(handle) {
-            multibody.set_self_contacts_enabled(false);
+            // `LinkPairs` decides which links collide.
+            multibody.set_self_contacts_enabled(true);
             let dof = multibody.link(link).map(rapier3d::prelude::MultibodyLink::assembly_id);
             if let Some(dof) = dof {
                 multibody.damping_mut()[dof] = to_real(joint.damping);
@@ -136,6 +138,8 @@ pub(super) fn insert_joints(
             setpoint: 0.0,
             setpoint_velocity: 0.0,
             push: None,
+            began: 0.0,
+            effort: 0.0,
         });
     }
     Ok(motors)

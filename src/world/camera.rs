@@ -13,7 +13,7 @@ use crate::World;
 use crate::convert::{from_pose, to_real};
 use crate::engine::Owner;
 use crate::rays::{Lens, Solids};
-use actcheck_data::{Camera, ChoiceName, Choices, Stream};
+use actcheck_data::{Camera, ChoiceName, Choices, Look, Pose, Stream};
 
 /// Number of noise seeds, including 0 (no noise).
 const FRAMES: usize = 1 << 32;
@@ -63,6 +63,17 @@ impl World {
         let image = picture(camera, &solids, noise.as_ref());
         self.looked(began_secs);
         image
+    }
+
+    /// Returns the data by which a percept of this moment can be compared with the truth.
+    pub fn current_look(&self) -> Look {
+        let base_true = self.base_true();
+        Look {
+            time_secs: self.time_secs(),
+            base_true,
+            base_believed: self.believed(base_true),
+            camera: Pose::from_isometry(&self.robot.kinematics.camera(&self.robot.state(&self.engine).0)),
+        }
     }
 
     /// All shapes at the poses where sensors see them.

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use rapier3d::prelude::PhysicsWorld;
 
-use crate::convert::from_vector;
+use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
 
 /// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model. Unit: newtons.
@@ -20,6 +20,15 @@ pub struct Touch {
     pub depth_m: f64,
     /// Sum of normal and friction forces on the second of the pair. Unit: newtons. Frame: world.
     pub force_n: Vector3<f64>,
+    /// Position of the contact point with the largest normal force. Unit: metres. Frame: world.
+    pub point_m: [f64; 3],
+    /// Normal force at that point. Unit: newtons.
+    strongest_n: f64,
+}
+
+impl Touch {
+    const NONE: Self =
+        Self { normal_n: 0.0, depth_m: 0.0, force_n: Vector3::new(0.0, 0.0, 0.0), point_m: [0.0; 3], strongest_n: 0.0 };
 }
 
 /// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`], by ordered pair of owners.
@@ -27,8 +36,9 @@ pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
     let mut found: BTreeMap<(Owner, Owner), Touch> = BTreeMap::new();
     let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
     for pair in engine.narrow_phase.contact_pairs() {
-        let owner = |handle| engine.colliders.get(handle).map(|collider| Owner::from_tag(collider.user_data));
-        let (Some(first), Some(second)) = (owner(pair.collider1), owner(pair.collider2)) else { continue };
+        let of = |handle| engine.colliders.get(handle);
+        let (Some(one), Some(other)) = (of(pair.collider1), of(pair.collider2)) else { continue };
+        let [first, second] = [one, other].map(|collider| Owner::from_tag(collider.user_data));
         let (key, sign) = if first <= second { ((first, second), 1.0) } else { ((second, first), -1.0) };
         for manifold in pair.solver_manifolds() {
             let normal = from_vector(manifold.data.normal);
@@ -41,10 +51,14 @@ pub fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
                 let last = f64::from(point.data.warmstart_impulse);
                 let share = if last > 0.0 { impulse / last } else { 0.0 };
                 let friction = from_vector(point.data.warmstart_tangent_world) * -share;
-                let touch =
-                    found.entry(key).or_insert(Touch { normal_n: 0.0, depth_m: 0.0, force_n: Vector3::zeros() });
+                let touch = found.entry(key).or_insert(Touch::NONE);
                 touch.depth_m = touch.depth_m.max(-f64::from(point.dist));
                 touch.normal_n += impulse * per_second;
+                if impulse * per_second > touch.strongest_n {
+                    touch.strongest_n = impulse * per_second;
+                    touch.point_m =
+                        (from_pose(one.position()) * Point3::from(from_vector(point.local_p1))).coords.into();
+                }
                 touch.force_n += (normal * impulse + friction) * (sign * per_second);
             }
         }

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::Point3;
+
 use crate::World;
 use crate::contacts::touches;
 use crate::convert::from_vector;
 use crate::engine::Owner;
 use crate::simulation::Object;
-use actcheck_data::{BodyState, Pose, RobotState, Snapshot};
+use actcheck_data::{BodyState, LinkState, Pose, RobotState, Snapshot};
 
 /// Share of a body's weight that a contact must carry for the body to rest on it. Low enough for several supports.
 const CARRIED_SHARE: f64 = 0.1;
@@ -16,8 +18,13 @@ impl World {
     /// Returns the true state of the world.
     pub fn snapshot(&self) -> Snapshot {
         let pairs = self.pairs();
-        let bodies = self.objects.iter().enumerate().map(|(idx, object)| self.body(idx, object, &pairs)).collect();
-        Snapshot { time_secs: self.time_secs(), bodies, robot: self.robot_state(&pairs) }
+        let robot = self.robot_state(&pairs);
+        let grasp = Point3::from(robot.gripper.position);
+        let bodies = self.objects.iter().enumerate().map(|(idx, object)| {
+            let grasp_distance_m = (!object.fixed).then(|| self.distance_to(object, &grasp));
+            BodyState { grasp_distance_m, ..self.body(idx, object, &pairs) }
+        });
+        Snapshot { time_secs: self.time_secs(), bodies: bodies.collect(), robot }
     }
 
     fn pairs(&self) -> Vec<Pair> {
@@ -67,6 +74,8 @@ impl World {
             touches: touching.into_iter().collect(),
             rests_on: carriers.into_iter().collect(),
             asleep: body.is_some_and(rapier3d::prelude::RigidBody::is_sleeping),
+            size_m: Some(object.model.size_m),
+            grasp_distance_m: None,
         }
     }
 
@@ -108,7 +117,14 @@ impl World {
             left_touches: touched_by(left),
             right_touches: touched_by(right),
             joints,
+            links: self.link_states(&positions),
         }
+    }
+
+    fn link_states(&self, positions: &[f64]) -> Vec<LinkState> {
+        let poses = self.robot.kinematics.links(positions);
+        let links = self.robot.model.links.iter().zip(poses);
+        links.map(|(link, pose)| LinkState { name: link.name.clone(), pose: Pose::from_isometry(&pose) }).collect()
     }
 
     /// Returns the name of an owner in snapshots; all links are `robot`.

@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::RigidBodyHandle;
 
 use crate::World;
+use crate::clearance::ClearanceMeter;
 use crate::contacts::{Touch, touches};
 use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
@@ -35,6 +36,8 @@ pub struct Contact {
     pub end_secs: f64,
     /// Largest normal force. Unit: newtons.
     pub max_force_n: f64,
+    /// Position of the contact at its largest force. Unit: metres. Frame: world.
+    pub point_m: [f64; 3],
 }
 
 /// Extremes of one object's motion. See the fields of the same names in a trace.
@@ -76,12 +79,19 @@ pub struct Tracks {
     pub rows: Vec<Vec<f32>>,
 }
 
-/// A contact episode: its first and latest tick, and its largest force.
+/// A contact episode: its first and latest tick, and its largest force with the position.
 #[derive(Debug, Clone, Copy)]
 struct Episode {
     start: u64,
     latest: u64,
     max_force_n: f64,
+    point_m: [f64; 3],
+}
+
+impl Episode {
+    fn begin(tick: u64) -> Self {
+        Self { start: tick, latest: tick, max_force_n: 0.0, point_m: [0.0; 3] }
+    }
 }
 
 /// The recorder of a world.
@@ -101,6 +111,7 @@ pub struct Recorder {
     pub(super) quality: QualityMeter,
     pub(super) robot: RobotMeter,
     pub(super) motion: MotionMeter,
+    pub(super) clearance: ClearanceMeter,
 }
 
 impl Recorder {
@@ -124,6 +135,7 @@ impl Recorder {
             quality: QualityMeter::default(),
             robot: RobotMeter::default(),
             motion: MotionMeter::default(),
+            clearance: ClearanceMeter::default(),
         }
     }
 
@@ -153,6 +165,7 @@ impl World {
             self.frame();
         }
         self.begin_robot_course();
+        self.begin_clearance();
         self.begin_motion();
     }
 
@@ -168,7 +181,8 @@ impl World {
                 pair.sort();
                 // A contact is detected at the end of its tick.
                 let start_secs = secs(episode.start.saturating_sub(1));
-                Contact { pair, start_secs, end_secs: secs(episode.latest), max_force_n: episode.max_force_n }
+                let Episode { latest, max_force_n, point_m, .. } = *episode;
+                Contact { pair, start_secs, end_secs: secs(latest), max_force_n, point_m }
             })
             .collect();
         contacts.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs).then_with(|| a.pair.cmp(&b.pair)));
@@ -186,16 +200,22 @@ impl World {
             contacts,
             courses,
             base: self.recorder.base,
-            robot: RobotCourse { motion: self.end_motion(), ..self.end_robot_course() },
+            robot: RobotCourse { clearances: self.clearances(), motion: self.end_motion(), ..self.end_robot_course() },
         }
     }
 
-    /// Returns the poses of all moving bodies since the first record began.
+    /// Returns the poses of all moving bodies since the first record began. Furniture is among them if it moved.
     pub fn tracks(&self) -> Tracks {
+        let Recorder { tracked, rows, .. } = &self.recorder;
+        let poses = |row: &[f32], idx: usize| row.get(7 * idx..7 * idx + 7).unwrap_or_default().to_vec();
+        let stayed = |idx: &usize| rows.windows(2).all(|pair| poses(&pair[0], *idx) == poses(&pair[1], *idx));
+        let is_furniture = |name: &str| self.objects.iter().any(|object| object.slides && object.id == name);
+        let kept: Vec<usize> =
+            (0..tracked.len()).filter(|idx| !(is_furniture(&tracked[*idx].0) && stayed(idx))).collect();
         Tracks {
             period_secs: self.recorder.ticks_per_frame as f64 * self.recorder.tick_secs,
-            names: self.recorder.tracked.iter().map(|(name, _)| name.clone()).collect(),
-            rows: self.recorder.rows.clone(),
+            names: kept.iter().map(|idx| tracked[*idx].0.clone()).collect(),
+            rows: rows.iter().map(|row| kept.iter().flat_map(|idx| poses(row, *idx)).collect()).collect(),
         }
     }
 
@@ -227,8 +247,11 @@ impl World {
             let touches = touches(&self.engine);
             self.record_contacts(&touches);
             self.record_robot(&touches);
+            self.record_touched(&touches);
+            self.move_furniture(&touches);
             if (self.recorder.n_ticks - self.recorder.began).is_multiple_of(self.recorder.ticks_per_frame) {
                 self.frame();
+                self.record_clearance();
                 self.record_motion();
             }
         }
@@ -278,14 +301,15 @@ impl World {
         let mut deepest_m = 0.0f64;
         for (pair, touch) in touches {
             deepest_m = deepest_m.max(touch.depth_m);
-            let episode =
-                self.recorder.open.entry(*pair).or_insert(Episode { start: now, latest: now, max_force_n: 0.0 });
+            let episode = self.recorder.open.entry(*pair).or_insert(Episode::begin(now));
             if (now - episode.latest) as f64 > patience {
                 self.recorder.closed.push((*pair, *episode));
-                *episode = Episode { start: now, latest: now, max_force_n: 0.0 };
+                *episode = Episode::begin(now);
             }
             episode.latest = now;
-            episode.max_force_n = episode.max_force_n.max(touch.normal_n);
+            if touch.normal_n > episode.max_force_n {
+                (episode.max_force_n, episode.point_m) = (touch.normal_n, touch.point_m);
+            }
         }
         let energies = self.free_energies();
         self.recorder.quality.tick(deepest_m, energies);

@@ -27,16 +27,41 @@ pub(super) struct Motor {
     pub(super) setpoint_velocity: f64,
     /// Commanded effort, instead of a position.
     pub(super) push: Option<f64>,
+    /// Position at the start of the step.
+    pub(super) began: f64,
+    /// Mean effort in the last control tick, without gravity compensation.
+    pub(super) effort: f64,
 }
 
 /// Share of the largest speed over which an effort-controlled motor reduces its effort, to limit its speed.
 const SLACK: f64 = 0.02;
 
 impl Motor {
-    /// Returns its effort by its control law, without gravity compensation.
-    fn load(&self, position: f64, velocity: f64) -> f64 {
-        let law = || self.stiffness * (self.setpoint - position) + self.damping * (self.setpoint_velocity - velocity);
-        self.push.unwrap_or_else(law)
+    /// Returns its mean effort in a step that ended at this position, without gravity compensation (`held`).
+    ///
+    /// The engine applies the control law in each of `n_substeps`, with the target position ahead by the way of one
+    /// substep at the target velocity, and does not report the motor's impulse. The mean over the substeps follows from
+    /// the positions at both ends of the step.
+    fn effort_of_step(&self, position: f64, held: f64, dt: f64, n_substeps: f64) -> f64 {
+        if let Some(effort) = self.push {
+            return effort;
+        }
+        let ahead = self.setpoint_velocity * dt / n_substeps * (n_substeps + 1.0) / 2.0;
+        let velocity = (position - self.began) / dt;
+        let law =
+            self.stiffness * (self.setpoint + ahead - position) + self.damping * (self.setpoint_velocity - velocity);
+        let given = (law + held).clamp(-self.max_effort, self.max_effort) - held;
+        given.clamp(-self.max_effort, self.max_effort)
+    }
+
+    /// Keeps the setpoint near the joint's position: a setpoint that ran ahead of a blocked joint would make it shoot
+    /// off, once it is free. The joint catches up at a speed at which damping balances stiffness; together with the
+    /// setpoint's velocity this must not exceed its largest speed.
+    fn keep_near(&mut self, position: f64, fastest: f64) {
+        let most = (self.damping * fastest).max(self.max_effort) / self.stiffness;
+        self.setpoint = self.setpoint.clamp(position - most, position + most);
+        let catching_up = self.stiffness * (self.setpoint - position) / self.damping;
+        self.setpoint_velocity = self.setpoint_velocity.clamp(-fastest - catching_up, fastest - catching_up);
     }
 
     /// Applies an effort for a step: a velocity motor with the target speed `top` and `effort` as its limit gives this
@@ -157,25 +182,32 @@ impl Robot {
         })
     }
 
-    /// Returns the effort of each joint's motor by its control law, without gravity compensation: for holding, pushing
-    /// and braking. Units: newtons or newton metres.
-    pub fn loads(&self, positions: &[f64], velocities: &[f64]) -> Vec<f64> {
-        let joints = self.motors.iter().zip(positions.iter().zip(velocities));
-        joints.map(|(motor, (position, velocity))| motor.load(*position, *velocity)).collect()
+    /// Returns the effort that each joint's motor gave in the last control tick, within its limit and without gravity
+    /// compensation: for holding, pushing and braking. Units: newtons or newton metres.
+    pub fn loads(&self) -> Vec<f64> {
+        self.motors.iter().map(|motor| motor.effort).collect()
     }
 
-    /// Returns the effort of each motor by its control law, as a share of the joint's limit, before clamping. Gravity
-    /// compensation is not included.
-    pub fn effort_shares(&self, positions: &[f64], velocities: &[f64]) -> Vec<f64> {
-        let states = positions.iter().zip(velocities);
-        let motors = self.motors.iter().zip(&self.model.joints).zip(states);
-        let shares =
-            motors.map(
-                |((motor, joint), (position, velocity))| {
-                    if joint.effort > 0.0 { motor.load(*position, *velocity).abs() / joint.effort } else { 0.0 }
-                },
-            );
-        shares.collect()
+    /// Returns the effort of each motor in the last control tick as a share of the joint's limit.
+    pub fn effort_shares(&self) -> Vec<f64> {
+        let motors = self.motors.iter().zip(&self.model.joints);
+        motors.map(|(motor, joint)| if joint.effort > 0.0 { motor.effort.abs() / joint.effort } else { 0.0 }).collect()
+    }
+
+    /// Starts measuring the efforts of a control tick.
+    pub fn begin_tick(&mut self) {
+        self.motors.iter_mut().for_each(|motor| motor.effort = 0.0);
+    }
+
+    /// Measures the efforts of a step that is this share of its control tick.
+    pub fn measure(&mut self, engine: &PhysicsWorld, holding: &[f64], share: f64) {
+        let parameters = &engine.integration_parameters;
+        let (dt, n_substeps) = (f64::from(parameters.dt), parameters.num_solver_iterations as f64);
+        let (positions, _) = self.state(engine);
+        for (idx, (motor, position)) in self.motors.iter_mut().zip(positions).enumerate() {
+            let held = holding.get(idx).copied().unwrap_or(0.0);
+            motor.effort += share * motor.effort_of_step(position, held, dt, n_substeps);
+        }
     }
 
     /// Sets a joint's target position, clamped to its limits.
@@ -224,6 +256,8 @@ impl Robot {
             motor.setpoint_velocity = change / dt;
             let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
             let Some(link) = multibody.link_mut(link) else { continue };
+            motor.began = f64::from(link.joint.coords()[motor.axis as usize]);
+            motor.keep_near(motor.began, self.model.joints[idx].velocity);
             let position = motor.setpoint + held / motor.stiffness;
             let data = &mut link.joint.data;
             data.set_motor(

@@ -1,10 +1,10 @@
 //! Measures the robot's course: joints at their limits, self-collisions, held objects.
 //!
-//! In the simulation the robot's links pass through each other (a self-colliding posture is not a fault of physics), so
-//! self-collisions are detected separately, from the links' shapes and poses.
+//! Self-collisions are measured from the links' shapes and poses: contact forces don't show how deep a motor presses
+//! one link into another.
 
 use actcheck_data::{HeldCourse, JointCourse, Motion, Pose, RobotCourse, SelfCollision};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Point3};
 use parry3d::query::contact;
@@ -21,7 +21,7 @@ const TICKS_PER_LOOK: u64 = 3;
 /// A motor above this share of its effort limit is overloaded.
 const OVERLOAD_SHARE: f64 = 0.99;
 /// Links that penetrate each other by no more than this only touch. Unit: metres.
-const TOUCH_M: f64 = 1e-4;
+pub(super) const TOUCH_M: f64 = 1e-4;
 
 /// Measures a [`RobotCourse`].
 #[derive(Default)]
@@ -31,8 +31,6 @@ pub(super) struct RobotMeter {
     self_contacts: BTreeMap<(usize, usize), (u64, f64)>,
     /// Number of ticks, and largest tilt.
     held: BTreeMap<usize, (u64, f64)>,
-    /// Pairs of links that could collide, found when the first record begins.
-    pairs: Option<Vec<(usize, usize)>>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -54,11 +52,8 @@ impl RobotMeter {
 }
 
 impl World {
-    /// Resets the measurement. The first call determines the pairs of links that could collide.
+    /// Resets the measurement.
     pub(super) fn begin_robot_course(&mut self) {
-        if self.recorder.robot.pairs.is_none() {
-            self.recorder.robot.pairs = Some(self.pairs_apart());
-        }
         self.recorder.robot.begin(self.robot.model.joints.len());
     }
 
@@ -92,12 +87,18 @@ impl World {
             held_secs: *ticks as f64 * tick_secs,
             max_tilt_rad: *tilt,
         });
-        RobotCourse { joints: joints.collect(), self_contacts, held: held.collect(), motion: Motion::default() }
+        RobotCourse {
+            joints: joints.collect(),
+            self_contacts,
+            held: held.collect(),
+            clearances: Vec::new(),
+            motion: Motion::default(),
+        }
     }
 
     fn record_joints(&mut self) {
         let (positions, velocities) = self.robot.state(&self.engine);
-        let efforts = self.robot.effort_shares(&positions, &velocities);
+        let efforts = self.robot.effort_shares();
         let joints = self.robot.model.joints.iter().zip(&mut self.recorder.robot.joints);
         for (idx, (joint, course)) in joints.enumerate() {
             let (Some(position), Some(velocity)) = (positions.get(idx), velocities.get(idx)) else { continue };
@@ -127,42 +128,19 @@ impl World {
     }
 
     fn record_self_contacts(&mut self) {
-        let pairs = self.recorder.robot.pairs.take().unwrap_or_default();
         let now = self.recorder.n_ticks();
-        for (first, second) in &pairs {
-            let depth = self.depth_of(*first, *second);
+        for (first, second) in self.link_pairs.iter() {
+            let depth = self.depth_of(first, second);
             if depth > TOUCH_M {
-                let (_, most) = self.recorder.robot.self_contacts.entry((*first, *second)).or_insert((now, 0.0));
+                let (_, most) = self.recorder.robot.self_contacts.entry((first, second)).or_insert((now, 0.0));
                 *most = most.max(depth);
             }
         }
-        self.recorder.robot.pairs = Some(pairs);
-    }
-
-    /// Returns the pairs of links that are apart now and are not neighbours in the tree.
-    fn pairs_apart(&self) -> Vec<(usize, usize)> {
-        let links = &self.robot.model.links;
-        let solid: Vec<usize> = (0..links.len()).filter(|idx| !links[*idx].solids.is_empty()).collect();
-        let mut neighbours = BTreeSet::new();
-        for idx in &solid {
-            // Skip links without shapes, such as the stages of the base.
-            let mut at = *idx;
-            while at > 0 {
-                at = self.robot.model.joints[at - 1].parent;
-                if !links[at].solids.is_empty() {
-                    neighbours.insert((at, *idx));
-                    break;
-                }
-            }
-        }
-        let later = |first: &usize| solid.iter().copied().filter(|second| second > first).collect::<Vec<_>>();
-        let pairs = solid.iter().flat_map(|first| later(first).into_iter().map(|second| (*first, second)));
-        pairs.filter(|pair| !neighbours.contains(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M).collect()
     }
 
     /// Returns the penetration depth of two links; 0 if they are apart. Unit: metres.
-    fn depth_of(&self, first: usize, second: usize) -> f64 {
-        let balls = |idx: usize| self.solids_of(self.robot.bodies[idx]).map(|solid| (ball(solid), solid));
+    pub(super) fn depth_of(&self, first: usize, second: usize) -> f64 {
+        let balls = |idx: usize| self.colliders_of(self.robot.bodies[idx]).map(|solid| (ball(solid), solid));
         let mut deepest = 0.0f64;
         for ((middle, radius), a) in balls(first) {
             for ((other, other_radius), b) in balls(second) {
@@ -176,7 +154,8 @@ impl World {
         deepest
     }
 
-    fn solids_of(&self, body: RigidBodyHandle) -> impl Iterator<Item = &Collider> {
+    /// Returns the colliders of a body.
+    pub(super) fn colliders_of(&self, body: RigidBodyHandle) -> impl Iterator<Item = &Collider> {
         let handles = self.engine.bodies.get(body).map(rapier3d::prelude::RigidBody::colliders).unwrap_or_default();
         handles.iter().filter_map(|handle| self.engine.colliders.get(*handle))
     }

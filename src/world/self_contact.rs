@@ -1,7 +1,7 @@
-//! Detects postures with self-collisions. Physics ignores them, so motion plans must avoid them.
+//! Detects postures in which links of the robot are too close to each other, for motion planning.
 
 use nalgebra::{Isometry3, Point3};
-use parry3d::query::intersection_test;
+use parry3d::query::distance;
 use rapier3d::math::Pose as EnginePose;
 use rapier3d::prelude::SharedShape;
 
@@ -9,11 +9,23 @@ use crate::Kinematics;
 use crate::convert::to_pose;
 use crate::engine::{Owner, collider};
 
+/// Distance that links keep from each other. Unit: metres. The tracking error of a moving arm.
+const CLEAR_M: f64 = 0.01;
+/// Share of their distance in a valid posture that links keep if that distance is smaller.
+const KEPT_SHARE: f64 = 0.9;
+
 /// The shapes of a robot's links, and the pairs of links that could collide.
 #[derive(Clone)]
 pub struct SelfContact {
     links: Vec<Form>,
-    pairs: Vec<(usize, usize)>,
+    pairs: Vec<Pair>,
+}
+
+/// Two links and the distance that they have to keep. Unit: metres.
+#[derive(Clone, Copy)]
+struct Pair {
+    links: (usize, usize),
+    clear_m: f64,
 }
 
 /// The convex solids of one link, in its frame.
@@ -28,47 +40,49 @@ struct Form {
 impl SelfContact {
     /// Finds the pairs of links that could collide. Leaves out neighbours, whose shapes overlap at their joint, and
     /// pairs that overlap in one of the `right` postures, which are known to be valid, such as the one for driving.
+    /// Pairs that are close in one of these may come as close in others.
     pub fn new(kinematics: &Kinematics, right: &[Vec<f64>]) -> Self {
         let links: Vec<Form> = kinematics.solids_of_links().map(Form::new).collect();
-        let neighbour = |link: usize| bearer(kinematics, &links, link);
+        let right: Vec<Vec<Isometry3<f64>>> = right.iter().map(|posture| kinematics.links(posture)).collect();
         let is_solid = |link: &usize| !links[*link].solids.is_empty();
-        let pairs = (0..links.len()).filter(is_solid).flat_map(|second| {
-            (0..second)
-                .filter(is_solid)
-                .filter(move |first| neighbour(second) != Some(*first))
-                .map(move |first| (first, second))
-        });
-        let mut found = Self { pairs: pairs.collect(), links: links.clone() };
-        for posture in right {
-            let poses = kinematics.links(posture);
-            let meeting: Vec<(usize, usize)> =
-                found.pairs.iter().copied().filter(|pair| found.meet(*pair, &poses)).collect();
-            found.pairs.retain(|pair| !meeting.contains(pair));
+        let mut pairs = Vec::new();
+        for second in (0..links.len()).filter(is_solid) {
+            let neighbour = bearer(kinematics, &links, second);
+            for first in (0..second).filter(is_solid).filter(|first| neighbour != Some(*first)) {
+                let pair = Pair { links: (first, second), clear_m: CLEAR_M };
+                let nearest = right.iter().map(|poses| gap(&links, pair, poses)).fold(CLEAR_M, f64::min);
+                let clear_m = if nearest < CLEAR_M { nearest * KEPT_SHARE } else { CLEAR_M };
+                if clear_m > 0.0 {
+                    pairs.push(Pair { clear_m, ..pair });
+                }
+            }
         }
-        found
+        Self { links, pairs }
     }
 
-    /// Whether any two links collide at these link poses (see [`Kinematics::links`]).
+    /// Whether any two links collide, or nearly so, at these link poses (see [`Kinematics::links`]).
     pub fn touches(&self, poses: &[Isometry3<f64>]) -> bool {
-        self.pairs.iter().any(|pair| self.meet(*pair, poses))
+        self.pairs.iter().any(|pair| gap(&self.links, *pair, poses) < pair.clear_m)
     }
+}
 
-    fn meet(&self, (first, second): (usize, usize), poses: &[Isometry3<f64>]) -> bool {
-        let (a, b) = (&self.links[first], &self.links[second]);
-        let apart = poses[first] * a.middle - poses[second] * b.middle;
-        if apart.norm_squared() > (a.radius + b.radius).powi(2) {
-            return false;
-        }
-        let (at_a, at_b) = (to_pose(&poses[first]), to_pose(&poses[second]));
-        a.solids.iter().any(|(on_a, solid_a)| {
-            let solids_b = b.solids.iter();
-            // Convex solids are always supported; an unsupported pair would count as a collision.
-            solids_b.into_iter().any(|(on_b, solid_b)| {
-                intersection_test(&(at_a * *on_a), solid_a.as_ref(), &(at_b * *on_b), solid_b.as_ref())
-                    .map_or(true, |found| found.intersecting)
-            })
-        })
+/// Returns the distance of two links at these link poses, or their clearance if they are farther apart. Unit: metres.
+fn gap(links: &[Form], Pair { links: (first, second), clear_m }: Pair, poses: &[Isometry3<f64>]) -> f64 {
+    let (a, b) = (&links[first], &links[second]);
+    let apart = poses[first] * a.middle - poses[second] * b.middle;
+    if apart.norm() > a.radius + b.radius + clear_m {
+        return clear_m;
     }
+    let (at_a, at_b) = (to_pose(&poses[first]), to_pose(&poses[second]));
+    let mut nearest = clear_m;
+    for (on_a, solid_a) in &a.solids {
+        for (on_b, solid_b) in &b.solids {
+            // Convex solids are always supported; an unsupported pair would count as a collision.
+            let found = distance(&(at_a * *on_a), solid_a.as_ref(), &(at_b * *on_b), solid_b.as_ref());
+            nearest = nearest.min(found.map_or(0.0, |found| f64::from(found.distance)));
+        }
+    }
+    nearest
 }
 
 impl Form {

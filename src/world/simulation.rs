@@ -9,6 +9,8 @@ use rapier3d::prelude::{CoefficientCombineRule, MassProperties, PhysicsWorld, Ri
 
 use crate::convert::{from_pose, from_vector, to_pose, to_real, to_vector};
 use crate::engine::{Owner, add_floor, collider, engine};
+use crate::furniture::{Sliding, slides};
+use crate::link_pairs::LinkPairs;
 use crate::odometry::Tracker;
 use crate::recorder::Recorder;
 use crate::robot::Robot;
@@ -61,6 +63,8 @@ pub(super) struct Object {
     pub(super) model: Arc<ObjectModel>,
     /// Whether it is static.
     pub(super) fixed: bool,
+    /// Whether it slides when it is pushed hard, although it is static otherwise.
+    pub(super) slides: bool,
     /// Whether it is on the robot's floor plan, like furniture and unlike other objects.
     pub(super) on_map: bool,
     pub(super) body: RigidBodyHandle,
@@ -82,6 +86,10 @@ pub struct World {
     pub(super) tracker: Tracker,
     pub(super) recorder: Recorder,
     pub(super) fault: Option<Fault>,
+    /// The furniture that slides at the moment, by its index.
+    pub(super) sliding: BTreeMap<usize, Sliding>,
+    /// The links of the robot that collide with each other.
+    pub(super) link_pairs: LinkPairs,
     /// Poses at which sensors see objects, by their index, if they differ from the true poses.
     pub(super) decoys: BTreeMap<usize, Isometry3<f64>>,
     knows: Arc<[KnownKind]>,
@@ -116,7 +124,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
     let steps_per_tick = (steps_per_second / CONTROL_HZ).max(1);
     let tick_secs = f64::from(steps_per_tick) / f64::from(steps_per_second);
     let tracks = tracks(&objects, &robot);
-    Ok(World {
+    let mut world = World {
         engine,
         recorder: Recorder::new(objects.len(), tracks, tick_secs),
         objects,
@@ -125,6 +133,8 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         believed_from_true: Isometry3::identity(),
         tracker: Tracker::default(),
         fault: None,
+        sliding: BTreeMap::new(),
+        link_pairs: LinkPairs::default(),
         decoys: BTreeMap::new(),
         knows: Arc::clone(&scene.robot.knows),
         has_map: !scene.map.is_empty(),
@@ -133,7 +143,9 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         steps_per_tick,
         steps_per_second,
         watch: None,
-    })
+    };
+    world.link_pairs = world.find_link_pairs();
+    Ok(world)
 }
 
 /// Adds one object with the shapes of its model.
@@ -164,6 +176,7 @@ fn insert(engine: &mut PhysicsWorld, idx: usize, object: &SceneObject) -> Object
         id: object.id.clone(),
         model: object.model.clone(),
         fixed,
+        slides: slides(object.role, object.model.fixed),
         on_map: object.role == Role::Platform,
         body,
         mass_kg: object.mass_kg,
@@ -182,9 +195,9 @@ fn mass_properties(inertia: &Inertia, object: &SceneObject) -> MassProperties {
     MassProperties::with_inertia_matrix(to_vector(&Vector3::from(inertia.com_m)), to_real(object.mass_kg), about_com)
 }
 
-/// Returns the moving bodies with their names in traces: objects, then links with shapes.
+/// Returns the bodies that can move with their names in traces: objects, then links with shapes.
 fn tracks(objects: &[Object], robot: &Robot) -> Vec<(String, RigidBodyHandle)> {
-    let objects = objects.iter().filter(|object| !object.fixed).map(|o| (o.id.clone(), o.body));
+    let objects = objects.iter().filter(|object| !object.fixed || object.slides).map(|o| (o.id.clone(), o.body));
     let links = robot.model.links.iter().zip(&robot.bodies).skip(1).filter(|(link, _)| !link.solids.is_empty());
     objects.chain(links.map(|(link, body)| (format!("robot/{}", link.name), *body))).collect()
 }
@@ -253,9 +266,11 @@ impl World {
         }
         let holding = self.robot.kinematics.holding_efforts(&self.robot.state(&self.engine).0);
         let dt = 1.0 / f64::from(self.steps_per_second);
+        self.robot.begin_tick();
         for step in 0..self.steps_per_tick {
             self.robot.control(&mut self.engine, &holding, dt, self.steps_per_tick - step);
             self.step_engine();
+            self.robot.measure(&self.engine, &holding, 1.0 / f64::from(self.steps_per_tick));
             self.n_steps += 1;
             self.fault = self.find_fault();
             if self.fault.is_some() {
@@ -267,7 +282,7 @@ impl World {
 
     fn step_engine(&mut self) {
         let start = self.watch.as_ref().map(|watch| (watch.clock_secs)());
-        self.engine.step();
+        self.engine.step_with_events(&self.link_pairs, &());
         if let (Some(watch), Some(start)) = (&mut self.watch, start) {
             watch.spent_secs += (watch.clock_secs)() - start;
         }
@@ -304,7 +319,7 @@ impl World {
     pub fn observe(&self) -> Observation {
         let (mut positions, velocities) = self.robot.state(&self.engine);
         let gripper_opening_m = self.robot.layout.fingers.iter().map(|idx| positions[*idx]).sum();
-        let loads = self.robot.loads(&positions, &velocities);
+        let loads = self.robot.loads();
         if let Some(base) = self.robot.layout.base {
             let believed = self.believed(base.map(|idx| positions[idx]));
             for (idx, value) in base.into_iter().zip(believed) {

@@ -11,4 +11,4 @@ mod tests;
 
 pub use connect::way;
 pub use samples::Samples;
-pub use space::{ArmSpace, Room};
+pub use space::{ArmSpace, Room, moved_links};

@@ -44,6 +44,10 @@ pub struct ArmSpace<'a> {
     furniture: &'a [Block],
     things: &'a [Pillar],
     itself: SelfContact,
+    /// Whether each link is part of the hand.
+    is_hand: Vec<bool>,
+    /// How much farther from furniture the arm stays than the hand. Unit: metres.
+    arm_farther_m: f64,
     /// Largest movement of a point per unit of each arm joint's movement. Unit: metres, or 1.
     levers: Vec<f64>,
 }
@@ -62,7 +66,14 @@ impl<'a> ArmSpace<'a> {
             kinematics.surface_points(CHECK_M).into_iter().filter(|(link, _)| moved[*link]).collect();
         let levers = layout.arm.iter().map(|joint| lever(kinematics, *joint, &points)).collect();
         let itself = SelfContact::new(kinematics, right);
-        Self { kinematics, arm: &layout.arm, points, furniture, things, itself, levers }
+        let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
+        let (arm, arm_farther_m) = (layout.arm.as_slice(), 0.0);
+        Self { kinematics, arm, points, furniture, things, itself, is_hand, arm_farther_m, levers }
+    }
+
+    /// The same space for an arm that stays this much farther from furniture than its hand. Unit: metres.
+    pub fn farther(self, arm_farther_m: f64) -> Self {
+        Self { arm_farther_m, ..self }
     }
 
     /// The same space with other objects.
@@ -107,10 +118,11 @@ impl<'a> ArmSpace<'a> {
         let mut room = Room { furniture_m: f64::INFINITY, things_m: f64::INFINITY };
         for (link, point) in &self.points {
             let point = links[*link] * point;
+            let farther_m = if self.is_hand[*link] { 0.0 } else { self.arm_farther_m };
             room.furniture_m = self
                 .furniture
                 .iter()
-                .fold(room.furniture_m.min(point.z), |least, block| least.min(block.distance(&point)));
+                .fold(room.furniture_m.min(point.z), |least, block| least.min(block.distance(&point) - farther_m));
             room.things_m = self.things.iter().fold(room.things_m, |least, pillar| least.min(pillar.distance(&point)));
         }
         room
@@ -136,11 +148,11 @@ pub(super) fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
     from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect()
 }
 
-/// Whether each link is moved by the arm.
-fn moved_links(kinematics: &Kinematics, arm: &[usize]) -> Vec<bool> {
+/// Whether each link is moved by these joints.
+pub fn moved_links(kinematics: &Kinematics, joints: &[usize]) -> Vec<bool> {
     let mut moved = vec![false];
     for (idx, joint) in kinematics.joints().iter().enumerate() {
-        moved.push(arm.contains(&idx) || moved[joint.parent]);
+        moved.push(joints.contains(&idx) || moved[joint.parent]);
     }
     moved
 }

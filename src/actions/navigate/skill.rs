@@ -9,7 +9,7 @@ use crate::navigate::sense::{Size, look};
 use crate::navigate::shorten::way;
 use crate::navigate::terrain::Terrain;
 use crate::operator::{Interrupt, Operator};
-use crate::perceive::towards;
+use crate::perceive::safely_towards;
 use crate::route::{length, wrapped};
 use actcheck_data::ActionReport;
 
@@ -47,8 +47,13 @@ const N_ASIDE: u32 = 16;
 const DETOUR: f64 = 1.3;
 /// Distance ahead of the goal that the robot faces there. Unit: metres. The middle of a table.
 const FACED_M: f64 = 1.0;
-/// Time for the base to come to rest. Unit: seconds.
-const ARRIVE_SECS: f64 = 0.5;
+/// Shortest and longest time for the base to come to rest: it follows the corrections of its pose estimate.
+/// Unit: seconds.
+const ARRIVE_SECS: [f64; 2] = [0.5, 4.0];
+/// Time for which the base has to be at rest. Unit: seconds.
+const AT_REST_SECS: f64 = 0.3;
+/// A base slower than this is at rest. Units: m/s and rad/s.
+const AT_REST: f64 = 2e-3;
 
 /// Drives to the designated place and reports whether the robot believes it is there.
 ///
@@ -240,7 +245,7 @@ impl<'r, 'o> Drive<'r, 'o> {
     }
 
     fn look_towards(&mut self, point: &Point3<f64>) {
-        let posture = towards(self.robot.kinematics(), self.robot.layout(), self.robot.commanded(), point);
+        let posture = safely_towards(self.robot, point);
         let head = self.robot.layout().head.clone();
         let positions: Vec<f64> = head.iter().map(|joint| posture[*joint]).collect();
         self.robot.aim(&head, &positions);
@@ -265,9 +270,23 @@ impl<'r, 'o> Drive<'r, 'o> {
         length(positions[self.base[0]] - x, positions[self.base[1]] - y) > HELD_UP_M
     }
 
+    /// Waits until the base is at rest.
+    fn come_to_rest(&mut self) -> Result<(), Interrupt> {
+        let [shortest, longest] = ARRIVE_SECS;
+        let (tick, mut waited, mut still) = (self.robot.tick_secs(), 0.0, 0.0);
+        while waited < shortest || (still < AT_REST_SECS && waited < longest) {
+            self.robot.wait(tick / 2.0)?;
+            waited += tick;
+            let velocities = self.robot.observe().velocities;
+            let moves = self.base.iter().any(|joint| velocities[*joint].abs() > AT_REST);
+            still = if moves { 0.0 } else { still + tick };
+        }
+        Ok(())
+    }
+
     fn report(&mut self, place: &str) -> Result<ActionReport, Interrupt> {
         self.robot.begin("arrive");
-        self.robot.wait(ARRIVE_SECS)?;
+        self.come_to_rest()?;
         let positions = self.robot.observe().positions;
         let [x, y, heading] = self.base.map(|joint| positions[joint]);
         let off = length(x - self.goal[0], y - self.goal[1]);

@@ -2,13 +2,16 @@
 
 use nalgebra::{Matrix2, Point3, Vector2};
 
-use actcheck_world::{Kinematics, Layout};
+use crate::operator::Operator;
+use actcheck_world::{Kinematics, Layout, SelfContact};
 
 /// Joint displacement used to measure its effect on the gaze. Unit: radians.
 const PROBE_RAD: f64 = 1e-4;
 /// Damping of the least squares: joints that do not turn the gaze stay in place.
 const DAMPING: f64 = 1e-6;
 const N_ROUNDS: usize = 12;
+/// Number of postures checked on the way.
+const N_CHECKS: u32 = 8;
 /// A point this close to the image centre counts as looked at. Unit: radians.
 const SEEN_RAD: f64 = 0.05;
 /// Largest change of a joint per round. Unit: radians.
@@ -30,6 +33,20 @@ pub fn towards(kinematics: &Kinematics, layout: &Layout, positions: &[f64], poin
     let other = self::turned(kinematics, layout, ahead, point);
     let miss = |posture: &[f64]| off(kinematics, posture, point).norm();
     if miss(&other) < miss(&turned) { other } else { turned }
+}
+
+/// The posture with the head turned towards a point like [`towards`], but only as far as the head does not collide with
+/// the arm.
+pub fn safely_towards(robot: &Operator<'_>, point: &Point3<f64>) -> Vec<f64> {
+    let (kinematics, start) = (robot.kinematics(), robot.commanded());
+    let turned = towards(kinematics, robot.layout(), start, point);
+    let itself = SelfContact::new(kinematics, &[start.to_vec()]);
+    let at = |step: u32| -> Vec<f64> {
+        let share = f64::from(step) / f64::from(N_CHECKS);
+        start.iter().zip(&turned).map(|(from, to)| from + (to - from) * share).collect()
+    };
+    let free = (1..=N_CHECKS).take_while(|step| !itself.touches(&kinematics.links(&at(*step))));
+    free.last().map_or_else(|| start.to_vec(), at)
 }
 
 /// The result of turning the head towards a point from a given posture.

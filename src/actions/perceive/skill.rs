@@ -57,7 +57,7 @@ pub fn perceive_plane(call: &ActionCall, robot: &mut Operator<'_>) -> Result<Act
     let surface = sight.take_in(surface, MOST_VIEWS, find, robot)?;
     robot.begin("interpret");
     let things = surface.things(&sight.points, &sight.eye(), robot.known_kinds());
-    let perceived = Perceived { plane: Some(surface.perceived()), things };
+    let perceived = Perceived { plane: Some(surface.perceived()), things, look: None };
     let report = report(&perceived, sight.unseen(&surface).is_none());
     robot.remember(perceived);
     Ok(match expected.filter(|expected| report.succeeded && !is_of_size(&surface, expected)) {

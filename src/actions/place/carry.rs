@@ -98,7 +98,8 @@ fn stays_upright(robot: &Operator<'_>, held: &Held, itself: &SelfContact, way: &
     })
 }
 
-/// Postures on a straight path of the hand with fixed orientation and a fixed base, as far as the arm reaches.
+/// Postures on a straight path of the hand with fixed orientation and a fixed base, as far as the arm reaches without
+/// colliding with the robot.
 pub fn straight(robot: &Operator<'_>, from: &[f64], by: &Vector3<f64>) -> Vec<Vec<f64>> {
     let (kinematics, layout) = (robot.kinematics(), robot.layout());
     let mut mobility = vec![0.0; from.len()];
@@ -108,6 +109,7 @@ pub fn straight(robot: &Operator<'_>, from: &[f64], by: &Vector3<f64>) -> Vec<Ve
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few dozen steps")]
     let n_steps = (by.norm() / STEP_M).ceil().clamp(0.0, 100.0) as usize;
     let start = kinematics.grasp(from);
+    let itself = SelfContact::new(kinematics, &[from.to_vec()]);
     let mut path: Vec<Vec<f64>> = Vec::with_capacity(n_steps);
     for step in 1..=n_steps {
         let mut target = start;
@@ -116,6 +118,9 @@ pub fn straight(robot: &Operator<'_>, from: &[f64], by: &Vector3<f64>) -> Vec<Ve
         let Some(posture) = ik::solve(kinematics, seed, &ik::Reach { target, mobility: mobility.clone() }) else {
             break;
         };
+        if itself.touches(&kinematics.links(&posture)) {
+            break;
+        }
         path.push(posture);
     }
     path

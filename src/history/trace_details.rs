@@ -1,0 +1,90 @@
+//! The fields of a trace that its first format did not have. They follow that format in the file, so that traces of
+//! earlier versions can still be read.
+
+use serde::{Deserialize, Serialize};
+
+use actcheck_data::{ActionTrace, Clearance, LinkState, Look, RobotCourse, Snapshot, Trace};
+
+/// The later fields of a whole trace, in the order of its parts.
+#[derive(Default, Serialize, Deserialize)]
+pub(super) struct Details {
+    snapshots: Vec<SnapshotDetails>,
+    actions: Vec<ActionDetails>,
+    clearances: Vec<Vec<Clearance>>,
+}
+
+/// The later fields of a snapshot.
+#[derive(Serialize, Deserialize)]
+struct SnapshotDetails {
+    /// For each body: its size and its distance from the grasp point.
+    bodies: Vec<(Option<[f64; 3]>, Option<f64>)>,
+    links: Vec<LinkState>,
+}
+
+/// The later fields of an action.
+#[derive(Serialize, Deserialize)]
+struct ActionDetails {
+    contact_points: Vec<Option<[f64; 3]>>,
+    percept_looks: Vec<Option<Look>>,
+    perceived_look: Option<Look>,
+}
+
+impl Details {
+    /// Collects these fields of a trace.
+    pub(super) fn of(trace: &Trace) -> Self {
+        Self {
+            snapshots: trace.snapshots.iter().map(SnapshotDetails::of).collect(),
+            actions: trace.actions.iter().map(ActionDetails::of).collect(),
+            clearances: trace.robot_courses.iter().map(|course| course.clearances.clone()).collect(),
+        }
+    }
+
+    /// Sets these fields of a trace. Does nothing for traces of earlier versions, which have none.
+    pub(super) fn fill(self, trace: &mut Trace) {
+        for (snapshot, details) in trace.snapshots.iter_mut().zip(self.snapshots) {
+            details.fill(snapshot);
+        }
+        for (action, details) in trace.actions.iter_mut().zip(self.actions) {
+            details.fill(action);
+        }
+        for (course, clearances) in trace.robot_courses.iter_mut().zip(self.clearances) {
+            *course = RobotCourse { clearances, ..std::mem::take(course) };
+        }
+    }
+}
+
+impl SnapshotDetails {
+    fn of(snapshot: &Snapshot) -> Self {
+        let bodies = snapshot.bodies.iter().map(|body| (body.size_m, body.grasp_distance_m));
+        Self { bodies: bodies.collect(), links: snapshot.robot.links.clone() }
+    }
+
+    fn fill(self, snapshot: &mut Snapshot) {
+        for (body, details) in snapshot.bodies.iter_mut().zip(self.bodies) {
+            (body.size_m, body.grasp_distance_m) = details;
+        }
+        snapshot.robot.links = self.links;
+    }
+}
+
+impl ActionDetails {
+    fn of(action: &ActionTrace) -> Self {
+        Self {
+            contact_points: action.contacts.iter().map(|contact| contact.point_m).collect(),
+            percept_looks: action.percepts.iter().map(|percept| percept.look).collect(),
+            perceived_look: action.perceived.as_ref().and_then(|perceived| perceived.look),
+        }
+    }
+
+    fn fill(self, action: &mut ActionTrace) {
+        for (contact, point) in action.contacts.iter_mut().zip(self.contact_points) {
+            contact.point_m = point;
+        }
+        for (percept, look) in action.percepts.iter_mut().zip(self.percept_looks) {
+            percept.look = look;
+        }
+        if let Some(perceived) = &mut action.perceived {
+            perceived.look = self.perceived_look;
+        }
+    }
+}
