@@ -18,7 +18,7 @@ pub enum Interrupt {
     Fault,
     /// The action's time budget is exhausted.
     Budget,
-    /// Something holds back a joint of the robot.
+    /// Something holds back a joint of the robot, as the sentence says.
     HeldUp(String),
     /// The run is cut off.
     Cut,
@@ -110,7 +110,7 @@ impl<'a> Operator<'a> {
             ActionReport { succeeded: false, message: "did nothing".to_owned() }
         } else {
             match skill(self) {
-                Err(Interrupt::HeldUp(joint)) => self.give_up(&joint)?,
+                Err(Interrupt::HeldUp(behind)) => self.give_up(&behind)?,
                 done => done?,
             }
         };
@@ -121,11 +121,11 @@ impl<'a> Operator<'a> {
     }
 
     /// Stops all joints where they are, and reports that one of them is held back.
-    fn give_up(&mut self, joint: &str) -> Result<ActionReport, Interrupt> {
+    fn give_up(&mut self, behind: &str) -> Result<ActionReport, Interrupt> {
         self.begin("held back");
         self.command.positions = self.observe().positions;
         self.wait(GIVE_UP_SECS)?;
-        Ok(ActionReport { succeeded: false, message: format!("something holds back the robot's {joint}") })
+        Ok(ActionReport { succeeded: false, message: format!("something holds the robot back: {behind}") })
     }
 
     /// Begins a phase with this name.
@@ -324,8 +324,8 @@ impl<'a> Operator<'a> {
             let s = (time / secs).min(1.0);
             self.command.positions = along(&course, &legs, shortest * s * s * (3.0 - 2.0 * s));
             self.tick()?;
-            if let Some(joint) = self.held_back() {
-                return Err(Interrupt::HeldUp(joint));
+            if let Some(behind) = self.held_back() {
+                return Err(Interrupt::HeldUp(behind));
             }
             if enough(self) {
                 return Ok(true);
@@ -334,7 +334,7 @@ impl<'a> Operator<'a> {
         Ok(false)
     }
 
-    /// The name of a joint that is far behind its target, because something holds it back.
+    /// A sentence about a joint that is far behind its target, because something holds it back.
     fn held_back(&self) -> Option<String> {
         let (layout, positions) = (self.layout(), self.observe().positions);
         let moved = layout.arm.iter().chain(layout.base.iter().flatten());
@@ -342,7 +342,13 @@ impl<'a> Operator<'a> {
             let joint = &self.kinematics().joints()[idx];
             let most = if joint.kind == JointKind::Prismatic { HELD_BACK_M } else { HELD_BACK_RAD };
             let off = (positions[idx] - self.command.positions[idx]).abs();
-            (off > most).then(|| joint.name.clone())
+            (off > most).then(|| {
+                let (off, unit) = match joint.kind {
+                    JointKind::Prismatic => (off * 100.0, "cm"),
+                    JointKind::Revolute => (off.to_degrees(), "degrees"),
+                };
+                format!("{} is {off:.1} {unit} behind its target", joint.name)
+            })
         })
     }
 

@@ -39,7 +39,7 @@ const LONGEST_WAY_M: f64 = 1.2;
 /// Minimum clearance of the hand to furniture: fingertips go down to it to grasp flat objects. Unit: metres.
 pub(super) const FURNITURE_CLEAR_M: f64 = 0.002;
 /// Minimum clearance of the base and the arm to furniture, which only the hand has to come close to. Unit: metres.
-pub(super) const BODY_CLEAR_M: f64 = 0.03;
+pub(super) const BODY_CLEAR_M: f64 = 0.01;
 /// Clearance of the base and the arm to furniture beyond which more brings no benefit. Unit: metres. Three times the
 /// position error of perceived furniture.
 pub(super) const AMPLE_BODY_CLEAR_M: f64 = 0.08;
@@ -49,6 +49,8 @@ pub(super) const AMPLE_CLEAR_M: f64 = 0.04;
 pub(super) const LEAST_CLEAR_M: f64 = -0.025;
 /// Distance between points and between postures checked for clearance. Unit: metres.
 const CHECK_M: f64 = 0.03;
+/// The head is turned aside by at most this. Unit: radians.
+const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 /// Postures sampled if the arm can't unfold straight to any grasp.
 const MOST_SAMPLES: u32 = 4000;
 /// Reason reported if there is no plan.
@@ -136,6 +138,8 @@ pub(super) struct Planner<'a> {
     ground: Ground,
     /// Self-collision checks.
     pub(super) itself: SelfContact,
+    /// Positions of the head's joints, the present ones first.
+    heads: Vec<Vec<f64>>,
 }
 
 impl<'a> Planner<'a> {
@@ -151,7 +155,8 @@ impl<'a> Planner<'a> {
         postures.push(operator.profile().home.clone());
         let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
-        Self { kinematics, layout, base, start, postures, points, is_hand, furniture, things, ground, itself }
+        let heads = heads(kinematics, layout, &start);
+        Self { kinematics, layout, base, start, postures, points, is_hand, furniture, things, ground, itself, heads }
     }
 
     /// A plan near the seed that costs less than `bound`, if there is one.
@@ -163,10 +168,7 @@ impl<'a> Planner<'a> {
             return None;
         }
         let at_thing = self.solve(seed, &grasp.pose, 1.0)?;
-        if self.touches_itself(&at_thing) {
-            return None;
-        }
-        let lift = LIFTS_M.iter().find_map(|height| self.vertically(&at_thing, *height))?;
+        let (at_thing, lift) = self.lifted(at_thing)?;
         let lifted = lift.last()?.clone();
         let (near, approach) = match grasp.approach {
             Approach::Side => {
@@ -257,8 +259,26 @@ impl<'a> Planner<'a> {
         self.itself.touches(&self.kinematics.links(posture))
     }
 
-    /// Postures a few centimetres apart on a straight path up, with a fixed base. Returns `None` if the arm can't follow
-    /// or would collide with the robot.
+    /// A posture and the path straight up from it, with the head out of the arm's way. Returns `None` if the arm would
+    /// collide with the robot in every posture of the head.
+    fn lifted(&self, at_thing: Vec<f64>) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+        LIFTS_M.iter().filter_map(|height| self.vertically(&at_thing, *height)).find_map(|lift| {
+            self.heads.iter().find_map(|head| {
+                let at_thing = self.with_head(&at_thing, head);
+                let lift: Vec<Vec<f64>> = lift.iter().map(|posture| self.with_head(posture, head)).collect();
+                let is_free = std::iter::once(&at_thing).chain(&lift).all(|posture| !self.touches_itself(posture));
+                is_free.then_some((at_thing, lift))
+            })
+        })
+    }
+
+    fn with_head(&self, posture: &[f64], head: &[f64]) -> Vec<f64> {
+        let mut posture = posture.to_vec();
+        self.layout.head.iter().zip(head).for_each(|(joint, position)| posture[*joint] = *position);
+        posture
+    }
+
+    /// Postures a few centimetres apart on a straight path up, with a fixed base.
     fn vertically(&self, positions: &[f64], height: f64) -> Option<Vec<Vec<f64>>> {
         let from = self.kinematics.grasp(positions);
         let mut path: Vec<Vec<f64>> = Vec::new();
@@ -266,19 +286,23 @@ impl<'a> Planner<'a> {
             let mut target = from;
             target.translation.vector.z += height * f64::from(step) / 6.0;
             let seed = path.last().map_or(positions, Vec::as_slice);
-            path.push(self.solve(seed, &target, 0.0).filter(|posture| !self.touches_itself(posture))?);
+            path.push(self.solve(seed, &target, 0.0)?);
         }
         Some(path)
     }
 
-    /// The base's path to its pose in `to`, with the arm's initial posture.
+    /// The base's path to its pose in `to`, with the arm's initial posture. The head is turned as in `to`.
     fn drive(&self, to: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let head: Vec<f64> = self.layout.head.iter().map(|joint| to[*joint]).collect();
+        if !self.keeps_off_itself(&self.start, &self.with_head(&self.start, &head)) {
+            return None;
+        }
         let [x, y, heading] = self.base;
         let route = self.ground.route(Point2::new(self.start[x], self.start[y]), Point2::new(to[x], to[y]))?;
         let n_legs = route.len() as f64;
         let legs = route.iter().enumerate().map(|(idx, point)| {
             let share = (idx + 1) as f64 / n_legs;
-            let mut positions = self.start.clone();
+            let mut positions = self.with_head(&self.start, &head);
             positions[x] = point.x;
             positions[y] = point.y;
             positions[heading] += (to[heading] - self.start[heading]) * share;
@@ -286,6 +310,21 @@ impl<'a> Planner<'a> {
         });
         Some(legs.collect())
     }
+}
+
+/// Positions of the head's joints that plans try: the present ones, then each joint in the middle and at both ends of its
+/// range.
+fn heads(kinematics: &Kinematics, layout: &Layout, start: &[f64]) -> Vec<Vec<f64>> {
+    let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
+    for idx in &layout.head {
+        let joint = &kinematics.joints()[*idx];
+        let lower = joint.lower.max(-QUARTER).min(joint.upper);
+        let upper = joint.upper.min(QUARTER).max(joint.lower);
+        let positions = [0.0_f64.clamp(lower, upper), lower, upper];
+        grid = grid.iter().flat_map(|head| positions.map(|position| [head.as_slice(), &[position]].concat())).collect();
+    }
+    grid.insert(0, layout.head.iter().map(|joint| start[*joint]).collect());
+    grid
 }
 
 /// Radius of the circle around the base that contains the whole robot. Unit: metres.

@@ -26,8 +26,9 @@ impl Planner<'_> {
             cost = cost.max(self.leg_cost(pair[0], pair[1], travel).filter(|cost| *cost < bound)?);
         }
         let stand = plan.drive.last()?;
-        let straight = self.leg_cost(stand, plan.reach.last()?, travel);
-        if let Some(leg) = straight.filter(|_| self.keeps_off_itself(stand, plan.reach.last())) {
+        let unfolded = plan.reach.last()?;
+        let straight = self.leg_cost(stand, unfolded, travel);
+        if let Some(leg) = straight.filter(|_| self.keeps_off_itself(stand, unfolded)) {
             return Some(cost.max(leg)).filter(|cost| *cost < bound);
         }
         let mut samples = samples.share(SAMPLES_A_GRASP);
@@ -49,8 +50,7 @@ impl Planner<'_> {
     }
 
     /// Whether the path is free of self-collisions.
-    fn keeps_off_itself(&self, from: &[f64], to: Option<&Vec<f64>>) -> bool {
-        let Some(to) = to else { return true };
+    pub(super) fn keeps_off_itself(&self, from: &[f64], to: &[f64]) -> bool {
         (1..=N_CHECKS).all(|step| {
             let share = step as f64 / N_CHECKS as f64;
             let positions: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
