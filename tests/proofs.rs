@@ -432,8 +432,10 @@ fn shipped() -> Vec<(String, Case, actcheck::rules::explain::Explanation)> {
 fn every_shipped_proof_consists_of_rule_instances_and_facts() {
     let (mut proofs, mut steps) = (0, 0);
     for (name, case, explanation) in shipped() {
+        // A statement can be proved in an earlier proof of the same explanation.
+        let mut proved = Vec::new();
         for proof in &explanation.proofs {
-            steps += case.check(proof, &mut Vec::new()).unwrap_or_else(|why| panic!("{name}: {why}"));
+            steps += case.check(proof, &mut proved).unwrap_or_else(|why| panic!("{name}: {why}"));
             proofs += 1;
         }
         // The checker derives the explanation's conclusion by itself.
