@@ -7,8 +7,9 @@
 use std::collections::BTreeMap;
 
 use actcheck::base::{RunFacts, Term, TermId, names};
+use actcheck::ontology::Ontology;
 use actcheck::rules::explain::{Premise, Proof, Support};
-use actcheck::rules::{Budget, RuleBook};
+use actcheck::rules::{Budget, RuleBook, owl_closure};
 
 use crate::rules::{TESTED, cases, facts_of, ontology_of};
 
@@ -115,6 +116,14 @@ fn given(facts: &RunFacts) -> Vec<(String, Vec<Value>)> {
     });
     let parameters = action.parameters.iter().map(|pair| ("parameter".to_owned(), pair.iter().map(value).collect()));
     states.chain(parameters).collect()
+}
+
+/// The class hierarchy with its OWL 2 RL closure, as facts: the checker does not prove it again.
+fn hierarchy(ontology: &Ontology) -> Vec<(String, Vec<Value>)> {
+    let closed = owl_closure(&ontology.triples).unwrap();
+    let subclasses =
+        closed.iter().filter(|[_, property, _]| property.as_iri().is_some_and(|p| p.ends_with("#subClassOf")));
+    subclasses.map(|triple| ("ontology".to_owned(), triple.iter().map(shown).collect())).collect()
 }
 
 /// Extends a binding so that the written arguments equal the values. Returns `None` if they do not match.
@@ -419,11 +428,15 @@ fn shipped() -> Vec<(String, Case, actcheck::rules::explain::Explanation)> {
             continue;
         }
         let facts = facts_of(&folder);
+        let mut known = given(&facts);
+        if text.contains("ontology(") {
+            known.extend(hierarchy(&ontology));
+        }
         let book = RuleBook::prepare(&ontology).unwrap();
         let explanation = book.explain(&facts.action(0).unwrap(), TESTED, &Budget::default()).unwrap();
         let texts = ontology.libraries.iter().chain(ontology.properties.values().map(|property| &property.rule));
         let rules = texts.flat_map(|file| rules(&file.source.text)).collect();
-        found.push((folder.display().to_string(), Case { facts: given(&facts), rules }, explanation));
+        found.push((folder.display().to_string(), Case { facts: known, rules }, explanation));
     }
     found
 }
