@@ -1,12 +1,14 @@
-//! Margins agree with outcomes and vary with the measured quantities, for thousands of outcomes of every shipped property.
+//! Margins agree with outcomes and vary with the measured quantities, for thousands of outcomes of the shipped
+//! properties.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use actcheck::base::{Outcome, RunFacts, Term, Triple};
+use actcheck::base::{Outcome, RunFacts, Term, Triple, names};
 use actcheck::rules::{Budget, RuleBook};
 
 use crate::rules::{TESTED, cases, facts_of, ontology_of};
 use crate::support::planted::Dice;
+use crate::support::{actcheck, shipped, stdout};
 
 /// Variations of the facts of each rule case.
 const VARIATIONS: u64 = 120;
@@ -77,5 +79,29 @@ fn margins_are_negative_if_failed_positive_if_passed_and_never_all_equal() {
         for outcome in [Outcome::Passed, Outcome::Failed] {
             assert!(n_outcomes.contains_key(&(rule.clone(), outcome)), "{rule} is never {outcome:?}");
         }
+    }
+}
+
+#[test]
+fn margins_of_the_shipped_campaign_differ_from_run_to_run() {
+    let project = shipped("pick").copied();
+    let query = "SELECT ?property ?outcome ?margin WHERE { ?a earl:test ?property ; earl:result ?r . \
+        ?r act:outcome ?outcome ; act:margin ?margin }";
+    let table = stdout(&actcheck(project.path(), &["query", "--history", "h", "--format", "csv", query]));
+    let mut passing: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    let mut n_passed: BTreeMap<&str, usize> = BTreeMap::new();
+    for line in table.lines().skip(1) {
+        let [property, outcome, margin] = line.split(',').collect::<Vec<_>>()[..] else { panic!("{line}") };
+        let negative = margin.starts_with('-');
+        assert_eq!(outcome == "failed", negative, "{line}");
+        if outcome == "passed" {
+            passing.entry(property).or_default().insert(margin);
+            *n_passed.entry(property).or_default() += 1;
+        }
+    }
+    let with_margin = ["CloseObject", "MovedObject", "NoGraspCollisions"].map(names::act);
+    assert!(passing.keys().copied().eq(with_margin.iter().map(String::as_str)), "{passing:?}");
+    for (property, margins) in &passing {
+        assert!(margins.len() * 10 > n_passed[property] * 9, "{property}: {margins:?}");
     }
 }
