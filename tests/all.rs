@@ -26,6 +26,7 @@ mod health;
 mod help;
 mod history;
 mod last_failed;
+mod margins;
 mod merge;
 mod models;
 mod more_scenes;

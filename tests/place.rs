@@ -4,6 +4,7 @@ use actcheck::base::Outcome;
 use actcheck::campaign::{Disturbance, Env};
 use actcheck::data::{ChoiceName, Choices, ObjectAxis, PlacedObject, Pose};
 use actcheck::history::RunRecord;
+use actcheck::verdict::action_score;
 use actcheck::world::{Perturbation, Poison, World};
 use serde_json::Value;
 
@@ -73,8 +74,14 @@ fn an_empty_hand_reports_failure_at_once() {
     assert!(run.trace.actions[0].duration_secs < 1.0);
     let outcomes = outcomes(&run, 0);
     assert_eq!((outcomes["PlaceReported"], outcomes["ObjectOnSurface"]), (Outcome::Failed, Outcome::Failed));
-    // An object that was not held can't be released.
-    assert_eq!((outcomes["ObjectReleased"], outcomes["NoPlaceCollisions"]), (Outcome::Inapplicable, Outcome::Passed));
+    // An object that was not held can't be released, and a robot that does not move can't hit anything: neither counts
+    // for the score.
+    let inapplicable = (Outcome::Inapplicable, Outcome::Inapplicable);
+    assert_eq!((outcomes["ObjectReleased"], outcomes["NoPlaceCollisions"]), inapplicable);
+    assert_eq!(action_score(outcomes.values().copied()), 0.0);
+    let witness = |name: &str| &run.judgements[0].iter().find(|found| found.property.ends_with(name)).unwrap().witness;
+    assert_eq!(witness("NoPlaceCollisions"), "the robot did not move");
+    assert_eq!(witness("ObjectReleased"), "the gripper did not hold glass_1 before the action");
 }
 
 /// Sensors see the goal table half a metre farther to the side and 5 cm higher than it is.

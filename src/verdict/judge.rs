@@ -94,7 +94,7 @@ fn words(found: &Findings, property: Option<&Property>) -> String {
         }
         return rows.join("; ");
     }
-    let unit = property.and_then(|p| p.unit.as_deref()).unwrap_or("");
+    let unit = property.and_then(|p| p.unit.as_deref()).filter(|unit| *unit != "1").unwrap_or("");
     match (found.holds, found.margin) {
         (true, _) => "nothing violates it".to_owned(),
         (false, Some(margin)) => {

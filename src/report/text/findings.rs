@@ -213,10 +213,11 @@ fn probability(p: f64) -> String {
 
 fn margins(out: &mut String, report: &PropertyReport) {
     if let Some(margins) = report.findings.margins {
-        let unit = report.unit.as_deref().unwrap_or("");
+        let unit = report.unit.as_deref().filter(|unit| *unit != "1");
+        let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
         let _ = writeln!(
             out,
-            "  margin {unit}: min {:.4}, 5 % {:.4}, 25 % {:.4}, median {:.4}, 75 % {:.4}, 95 % {:.4}, max {:.4}",
+            "  margin{unit}: min {:.4}, 5 % {:.4}, 25 % {:.4}, median {:.4}, 75 % {:.4}, 95 % {:.4}, max {:.4}",
             margins.least, margins.p05, margins.p25, margins.p50, margins.p75, margins.p95, margins.most
         );
     }

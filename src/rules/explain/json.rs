@@ -10,6 +10,7 @@ impl Explanation {
         json!({
             "title": self.title,
             "holds": self.findings.as_ref().map(|findings| findings.holds),
+            "applicable": self.findings.as_ref().map(|findings| findings.applicable),
             "margin": self.findings.as_ref().and_then(|findings| findings.margin),
             "because": self.findings.as_ref().map(|findings| findings.because.clone()),
             "proofs": self.proofs.iter().map(proof).collect::<Vec<_>>(),

@@ -8,10 +8,10 @@ impl Explanation {
     /// Formats the explanation as indented text, one statement per line.
     pub fn to_text(&self) -> String {
         let mut out = String::new();
-        let holds = self.findings.as_ref().map(|findings| findings.holds);
-        let verdict = match (holds, self.miss.is_some()) {
-            (Some(true), _) => "holds",
-            (Some(false), _) => "does not hold",
+        let verdict = match (&self.findings, self.miss.is_some()) {
+            (Some(findings), _) if !findings.applicable => "is inapplicable",
+            (Some(findings), _) if findings.holds => "holds",
+            (Some(_), _) => "does not hold",
             (None, true) => "is not derived",
             (None, false) => "is derived",
         };

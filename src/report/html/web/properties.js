@@ -18,7 +18,7 @@ function properties({ runs, summary, filter }, chosen) {
         disabled: !property.outcomes[word] }, sign(word), ` ${count(property.outcomes[word])} ${word}`))),
       make("div", { class: "maps" },
         margins.some((value) => !Number.isNaN(value)) && make("figure", {},
-          make("figcaption", {}, `Margins${unit ? ` in ${unit}` : ""}: how far from flipping; below 0 it failed`), histogram(margins, unit, local(property.property))),
+          make("figcaption", {}, `Margins${unit && unit !== "1" ? ` in ${unit}` : ""}: how far from flipping; below 0 it failed`), histogram(margins, unit, local(property.property))),
         property.maps.map(heatMap)),
       property.flaky.scenes > 0 && make("p", {}, `Of ${count(property.flaky.scenes)} scenes that were run more than once, ${count(property.flaky.both_ways.length)} both passed and failed.`));
     return card;
