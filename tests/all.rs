@@ -34,6 +34,7 @@ mod move_to;
 mod new_project;
 mod no_panic;
 mod notebooks;
+mod obstacles;
 mod ontology;
 mod oracle;
 mod patterns;

@@ -10,9 +10,15 @@ use serde_json::{Value, json};
 
 use crate::support::chromium::Chromium;
 use crate::support::planted::Dice;
-use crate::support::{actcheck, made_up, paged, shipped, stderr, stdout};
+use crate::support::{actcheck, made_up, paged, project, shipped, stderr, stdout};
 
+use actcheck::actions::Saboteur;
 use actcheck::base::Outcome;
+use actcheck::campaign::oracles::FAULTS;
+use actcheck::campaign::{Clock, Env, RunContext, RunInput, run_sabotaged};
+use actcheck::config::Overrides;
+use actcheck::data::Choices;
+use actcheck::history::{CampaignEnd, History};
 use actcheck::report::{Explained, PropertyWords, Replays};
 use actcheck::verdict::wilson;
 
@@ -247,5 +253,41 @@ fn texts_of_models_rules_and_messages_never_become_markup() {
     browser.until("document.querySelector('.details .failure')");
     let text = browser.value("document.querySelector('.details').textContent");
     assert!(text.as_str().unwrap().contains(HOSTILE), "the hostile text is shown as text");
+    assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
+}
+
+/// Stores a run in which the robot was pushed against a table. Returns its id.
+fn pushed(folder: &Path) -> String {
+    let now = || "2026-08-01T12:00:00Z".to_owned();
+    let env = Env::prepare(&folder.join("configs/pick.toml"), &Overrides::default()).unwrap();
+    let fault = FAULTS.into_iter().find(|fault| fault.name == "base-pushed").unwrap();
+    let context = RunContext { clock: Clock { now, secs: || 0.0 }, disturb: None };
+    let input = RunInput { campaign: "k", index: 0, choices: Choices::random(env.campaign.seed, 0) };
+    let run = run_sabotaged(&env, input, &context, &mut Saboteur::new(fault.sabotage)).unwrap();
+    let history = History::open(&folder.join("h")).unwrap();
+    history.begin_campaign(&env.record("k".to_owned(), "pushed".to_owned(), now())).unwrap();
+    history.commit(&run).unwrap();
+    history.finish_campaign("k", &CampaignEnd { ended: now(), ..CampaignEnd::default() }).unwrap();
+    run.id
+}
+
+/// The failure, the player and the scene show where the robot was jammed.
+#[test]
+fn a_replay_marks_the_hardest_contact() {
+    let project = project();
+    let id = pushed(project.path());
+    let file = reported(project.path());
+    let mut browser = Chromium::start();
+    browser.size(DESKTOP.0, DESKTOP.1);
+    browser.open(&file, &format!("/run/{id}"));
+    browser.until("document.querySelector('.watch').dataset.ready");
+    for place in [".player .pressed", ".failure .pressed"] {
+        let text = browser.value(&format!("document.querySelector('{place}').textContent"));
+        let told = text.as_str().unwrap();
+        let parts = [" presses coffee_table_1: ", " N, from ", ", at x = "];
+        assert!(parts.iter().all(|part| told.contains(part)), "{place}: {told}");
+    }
+    browser.value("document.querySelector('.player .pressed button').click()");
+    keep(&mut browser, "pressed");
     assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
 }

@@ -66,7 +66,8 @@ fn sure(folder: &Path) {
 
 /// The faults that can occur in a pick.
 fn of_pick() -> usize {
-    FAULTS.iter().filter(|fault| fault.concerns(&["Pick".to_owned()])).count()
+    let robot = env(root(), 1).campaign.robot;
+    FAULTS.iter().filter(|fault| fault.concerns(&["Pick".to_owned()], &robot)).count()
 }
 
 /// In the scenes of the shipped campaign: every fault is noticed, every property notices one, and an idle robot
@@ -102,6 +103,24 @@ fn the_shipped_properties_notice_every_fault() {
     assert!(!noticing("false-success").contains(&"ObjectGrasped"));
     assert_eq!(noticing("false-failure"), ["ObjectGrasped"]);
     assert_eq!(noticing("neighbour-falls"), ["NoGraspCollisions"]);
+    // The robot is back in place when its skill begins, so that only the collision shows.
+    assert_eq!(noticing("base-pushed"), ["NoGraspCollisions"]);
+    assert_eq!(noticing("arm-through-head"), ["NoGraspCollisions"]);
+    assert!(noticing("percepts-swapped").contains(&"ObjectInGripper"));
+    assert!(noticing("runaway-motor").contains(&"CloseObject"));
+}
+
+/// A robot without a base can't be pushed against furniture, and one without a head has no head to hit.
+#[test]
+fn faults_that_a_robot_can_not_have_are_left_out() {
+    let robots = ["pick", "fixed_arm"].map(|name| {
+        let config = root().join(format!("configs/{name}.toml"));
+        Env::prepare(&config, &Overrides::default()).unwrap().campaign.robot
+    });
+    let pick = ["Pick".to_owned()];
+    let left_out =
+        FAULTS.iter().filter(|fault| fault.concerns(&pick, &robots[0]) && !fault.concerns(&pick, &robots[1]));
+    assert_eq!(left_out.map(|fault| fault.name).collect::<Vec<_>>(), ["base-pushed", "arm-through-head"]);
 }
 
 /// The actions of the whole task, each with its preceding actions, in a room with nothing unusual. (An object
@@ -122,7 +141,7 @@ fn every_property_of_the_whole_task_notices_a_fault() {
     let faults: Vec<Fault> = FAULTS
         .into_iter()
         .filter(|fault| {
-            let of_pick = fault.sabotage.action == Some("Pick") && fault.name != "neighbour-falls";
+            let of_pick = fault.sabotage.actions == ["Pick"] && fault.name != "neighbour-falls";
             !of_pick && fault.name != "frozen-sensors"
         })
         .collect();
@@ -156,6 +175,9 @@ fn every_property_of_the_whole_task_notices_a_fault() {
     assert_eq!(noticing("placed-and-fallen"), ["ObjectOnSurface"]);
     assert!(noticing("hand-jams").contains(&"ObjectReleased"));
     assert_eq!(noticing("place-neighbour-falls"), ["NoPlaceCollisions"]);
+    assert_eq!(noticing("other-kind"), ["ObjectsDetected"]);
+    let swapped = noticing("percepts-swapped");
+    assert!(swapped.contains(&"ObjectsDetected") && swapped.contains(&"ObjectInGripper"), "{swapped:?}");
 }
 
 /// Adds a variant of the shipped rule that ignores reported failures, so it notices no false report of one.
@@ -211,7 +233,7 @@ fn false_reports_do_not_change_the_physics() {
     let env = env(root(), 2);
     let choices = || Choices::random(env.campaign.seed, 0);
     let sound = run_line(&env, "k", 0, choices(), &CONTEXT).unwrap();
-    let mut saboteur = Saboteur::new(Sabotage { action: None, robot: None, world: None, report: Some(false) });
+    let mut saboteur = Saboteur::new(Sabotage { actions: &[], robot: None, world: None, report: Some(false) });
     let lied =
         run_sabotaged(&env, RunInput { campaign: "k", index: 0, choices: choices() }, &CONTEXT, &mut saboteur).unwrap();
     assert_eq!(lied.trace.hash, sound.trace.hash);

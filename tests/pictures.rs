@@ -2,6 +2,12 @@
 
 use std::path::Path;
 
+use actcheck::actions::Saboteur;
+use actcheck::campaign::oracles::FAULTS;
+use actcheck::campaign::{Clock, Env, RunContext, RunInput, run_sabotaged};
+use actcheck::config::Overrides;
+use actcheck::data::Choices;
+use actcheck::report::{Caption, run_picture};
 use tiny_skia::Pixmap;
 
 use crate::support::{actcheck, edit, project, stderr, stdout};
@@ -63,6 +69,29 @@ fn a_world_is_drawn_with_its_rooms_places_and_walls() {
         assert!(words.contains(&word), "{word}: {words:?}");
     }
     assert!(words.iter().any(|word| word.starts_with("seen: ")), "{words:?}");
+}
+
+/// A robot that was pushed against a table: the picture shows where.
+#[test]
+fn the_hardest_contact_is_marked_with_its_time_and_position() {
+    let project = project();
+    let env = Env::prepare(&project.path().join("configs/pick.toml"), &Overrides::default()).unwrap();
+    let fault = FAULTS.into_iter().find(|fault| fault.name == "base-pushed").unwrap();
+    let context = RunContext { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
+    let input = RunInput { campaign: "k", index: 0, choices: Choices::random(env.campaign.seed, 0) };
+    let run = run_sabotaged(&env, input, &context, &mut Saboteur::new(fault.sabotage)).unwrap();
+    let roles = run.scene.objects.iter().map(|object| (object.id.clone(), object.role)).collect();
+    let drawing = run_picture(&Caption { roles, ..Caption::default() }, &run.trace).unwrap();
+    let lines = drawing.to_svg();
+    let tree = roxmltree::Document::parse(&lines).unwrap();
+    let words: Vec<&str> = tree.descendants().filter_map(|node| node.text()).collect();
+    let marks: Vec<&&str> = words.iter().filter(|word| word.contains(" presses coffee_table_1: ")).collect();
+    let headed = marks.iter().find(|word| word.starts_with("hardest contact: ")).expect("the header has the contact");
+    assert!(headed.contains(" N, from ") && headed.contains(", at x = "), "{headed}");
+    let label = marks.iter().find(|word| word.ends_with(" N")).expect("the mark has a label");
+    let force: f64 = label.trim_end_matches(" N").rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(force >= 70.0, "{label}");
+    assert!(words.contains(&"hardest unwanted contact"), "{words:?}");
 }
 
 #[test]

@@ -23,6 +23,7 @@ ontology = "ROOT/ontology/actions.ttl"
 model_dir = "ROOT/models"
 nav_obstacle_list = ["box", "bottle"]
 nav_obstacle_count = 2
+nav = { may_block = true }
 skill = { args = ["--slow"], dir = ".", privileged = true, startup_s = 20.0, timeout_s = 5.0, memory_mb = 512, cpu_s = 60, max_broken = 3, env = { SPEED = "0.5" } }
 search = { strategy = "halton" }
 scene = { require = "ROOT/rules/scene/reachable.rls" }
@@ -86,6 +87,7 @@ placeSurface = { place_object_surfaces = ["table"] }
 pickObject = { model_list = ["glass"] }
 surfaceObjects = { model_list = ["mug"] }
 robot = {}
+nav = {}
 physics = {}
 sensing = {}
 camera = {}

@@ -213,7 +213,10 @@ impl<'a> Operator<'a> {
 
     /// Keeps the interpretation of pictures for later actions and for the trace, with the moment of the last picture.
     pub fn remember(&mut self, perceived: Perceived) {
-        let perceived = Perceived { look: self.last_look, ..perceived };
+        let mut perceived = Perceived { look: self.last_look, ..perceived };
+        if let Some(saboteur) = &mut self.saboteur {
+            perceived = saboteur.perceived(perceived, self.world.known_kinds());
+        }
         self.memory.perceived = Some(perceived.clone());
         self.perceived = Some(perceived);
     }
@@ -264,10 +267,13 @@ impl<'a> Operator<'a> {
     /// Looks at one object with an abstract detector: the true pose with noise, and never a missed detection. Returns
     /// `None` if the scene has no object with this id.
     pub fn see(&mut self, id: &str) -> Option<Sighting> {
-        let mut seen = self.world.perceive(id, self.choices)?;
-        if let Some(saboteur) = &mut self.saboteur {
-            seen = saboteur.sighting(seen);
-        }
+        let seen = match &mut self.saboteur {
+            None => self.world.perceive(id, self.choices)?,
+            Some(saboteur) => {
+                let seen = self.world.perceive(&saboteur.seen_instead(id), self.choices)?;
+                saboteur.sighting(Sighting { id: id.to_owned(), ..seen })
+            }
+        };
         self.record_percept_of(&seen, Some(self.world.current_look()));
         Some(seen)
     }

@@ -3,8 +3,9 @@
 //!
 //! The skill is unmodified and the recorder sees only physics: neither is informed of the fault.
 
-use crate::ActionCall;
-use actcheck_data::{ActionReport, BodyState, Pose, Snapshot};
+use crate::whereabouts::{before, body, box_distance, farther, holds, is_above, mistaken, others_by_distance, outside};
+use crate::{ActionCall, forced, misperception};
+use actcheck_data::{ActionReport, KnownKind, Perceived, RobotProfile, Snapshot};
 use actcheck_world::{Command, Observation, Perturbation, Sighting, World};
 
 /// Designators of the object that the action handles and of the surface it is placed on.
@@ -16,30 +17,16 @@ const REACHING_M: f64 = 0.1;
 /// Height above its place from which an object touched only by the hand counts as carried. Unit: metres. More than half
 /// of the lowest lift: an object dropped there ends far from the hand.
 const CARRIED_M: f64 = 0.05;
-/// Distance a teleported object moves. Unit: metres. Out of any hand, but still within the world.
-const TELEPORT_M: f64 = 0.5;
 /// A base that has moved this far is driving. Unit: metres.
 const DRIVEN_M: f64 = 0.5;
-/// How far outside the rooms a robot is carried off, or how far backwards if there are no rooms. Unit: metres. Beyond
-/// the walls.
-const CARRIED_OFF_M: f64 = 1.0;
-/// Gap between a base and an object put in front of it. Unit: metres. Too short for the base to stop when it sees the
-/// object.
-const BEFORE_BASE_M: f64 = 0.03;
-/// Radius of a base: that of a slim mobile manipulator. Unit: metres.
-const BASE_RADIUS_M: f64 = 0.22;
-/// Height of an object's foot above its new place at which the fast part of lowering ends. Unit: metres.
-const LOWERED_M: f64 = 0.05;
 /// Duration of an action in which the robot does nothing. Unit: seconds.
 pub(super) const IDLE_SECS: f64 = 1.0;
-/// Margin that the widest opening must leave beside another object for it to be picked by mistake. Unit: metres.
-const ROOM_M: f64 = 0.02;
 
 /// A combination of faults: every field that is `Some` applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sabotage {
-    /// The sabotaged action; `None` for every action.
-    pub action: Option<&'static str>,
+    /// The sabotaged actions; empty for every action.
+    pub actions: &'static [&'static str],
     /// Fault of the robot.
     pub robot: Option<Defect>,
     /// Accident in the world, and its moment.
@@ -58,11 +45,18 @@ pub enum Defect {
     /// Its joint and force sensors are frozen at their values at the start of the action; its camera repeats the first
     /// sighting of each object.
     FrozenSensors,
+    /// It exchanges its percepts of the named object and of another one: the nearest, or the nearest of another kind if
+    /// the camera perceives them.
+    SwappedPercepts,
+    /// The camera perceives an object, the named one if there is one, as an object of another kind.
+    MistakenKind,
 }
 
 /// When an accident happens: once per run, at the first control tick at which this holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moment {
+    /// Before the skill begins.
+    Starting,
     /// The hand is within reach of the object.
     Reaching,
     /// Both fingers hold the object in the air, and nothing else touches it.
@@ -94,6 +88,23 @@ pub enum Accident {
     InTheWay,
     /// The robot is carried out of its rooms without noticing.
     CarriedOff,
+    /// The base is pushed against the nearest furniture and back.
+    PushedIntoFurniture,
+    /// The arm moves through the robot's head and back.
+    ArmThroughHead,
+    /// The motor of the arm's last joint runs away with a multiple of its largest effort.
+    RunawayMotor,
+}
+
+impl Sabotage {
+    /// Whether it can happen to a robot: one without a base can't be pushed against furniture.
+    pub fn suits(&self, robot: &RobotProfile) -> bool {
+        match self.world {
+            Some((_, Accident::PushedIntoFurniture)) => robot.base_joints.is_some(),
+            Some((_, Accident::ArmThroughHead)) => !robot.head_joints.is_empty(),
+            _ => true,
+        }
+    }
 }
 
 /// Carries out sabotage in one run and records whether it took effect.
@@ -111,6 +122,12 @@ pub struct Saboteur {
     first_sights: Vec<Sighting>,
     /// Forced gap between the fingers, regardless of the command. Unit: metres.
     opening_m: Option<f64>,
+    /// A joint whose motor runs away, and its effort. Unit: newtons or newton metres.
+    runaway: Option<(usize, f64)>,
+    /// The kind of the named object.
+    kind: Option<KnownKind>,
+    /// The object whose percept is exchanged with that of the named object.
+    swapped: Option<String>,
     defective: bool,
     happened: bool,
     lied: bool,
@@ -128,6 +145,9 @@ impl Saboteur {
             frozen: None,
             first_sights: Vec::new(),
             opening_m: None,
+            runaway: None,
+            kind: None,
+            swapped: None,
             defective: false,
             happened: false,
             lied: false,
@@ -142,12 +162,16 @@ impl Saboteur {
     }
 
     /// Begins an action and returns the call as the robot understands it.
-    pub(super) fn begin(&mut self, call: &ActionCall, world: &World) -> ActionCall {
+    pub(super) fn begin(&mut self, call: &ActionCall, world: &mut World) -> ActionCall {
+        self.armed = self.sabotage.actions.is_empty() || self.sabotage.actions.contains(&call.action.as_str());
+        if let (Some((Moment::Starting, accident)), true, false) = (self.sabotage.world, self.armed, self.happened) {
+            self.happened = self.happen(accident, world);
+        }
         let start = world.snapshot();
         self.object = call.value(OBJECT).map(str::to_owned);
         self.place = call.value(PLACE).map(str::to_owned);
-        self.armed = self.sabotage.action.is_none_or(|action| action == call.action);
-        self.frozen = None;
+        self.kind = self.object.as_deref().and_then(|object| world.kind_of(object));
+        (self.frozen, self.swapped, self.runaway) = (None, None, None);
         let mut understood = call.clone();
         match self.sabotage.robot.filter(|_| self.armed) {
             Some(Defect::WrongObject) => {
@@ -163,7 +187,11 @@ impl Saboteur {
                 self.defective = true;
             }
             Some(Defect::Idle) => self.defective = true,
-            None => {}
+            Some(Defect::SwappedPercepts) => {
+                let object = self.object.as_deref().unwrap_or_default();
+                self.swapped = others_by_distance(&start, object).first().map(|other| other.id.clone());
+            }
+            Some(Defect::MistakenKind) | None => {}
         }
         self.start = Some(start);
         understood
@@ -181,10 +209,37 @@ impl Saboteur {
         {
             self.happened = self.happen(accident, world);
         }
-        match self.opening_m {
-            Some(gripper_opening_m) => world.step(&Command { gripper_opening_m, ..command.clone() }),
-            None => world.step(command),
+        let mut forced = command.clone();
+        if let Some(opening_m) = self.opening_m {
+            forced.gripper_opening_m = opening_m;
         }
+        forced.efforts.extend(self.runaway);
+        world.step(&forced);
+    }
+
+    /// The object that the robot sees in place of the requested one.
+    pub(super) fn seen_instead(&mut self, id: &str) -> String {
+        let (Some(object), Some(other)) = (&self.object, &self.swapped) else { return id.to_owned() };
+        if id == object {
+            self.defective = true;
+            other.clone()
+        } else if id == other {
+            object.clone()
+        } else {
+            id.to_owned()
+        }
+    }
+
+    /// The interpretation of pictures that the robot gets, given the honest one.
+    pub(super) fn perceived(&mut self, mut honest: Perceived, kinds: &[KnownKind]) -> Perceived {
+        let category = self.kind.as_ref().map(|kind| kind.category.as_str());
+        let changed = match self.sabotage.robot.filter(|_| self.armed) {
+            Some(Defect::SwappedPercepts) => misperception::swap(&mut honest.things, category),
+            Some(Defect::MistakenKind) => misperception::mistake(&mut honest.things, category, kinds),
+            _ => false,
+        };
+        self.defective |= changed;
+        honest
     }
 
     /// The robot's measurements, given the honest ones.
@@ -239,7 +294,7 @@ impl Saboteur {
                 hangs && place.is_some_and(|place| is_above(is, place))
             }
             Moment::LetGo => holds(start, object) && !is.touches.iter().any(|other| other == "robot"),
-            Moment::Driving => false,
+            Moment::Starting | Moment::Driving => false,
         }
     }
 
@@ -266,81 +321,15 @@ impl Saboteur {
                 return there.is_some_and(|(id, there)| world.perturb(&id, Perturbation::Pose(there)));
             }
             Accident::CarriedOff => return world.kidnap(outside(world, now.robot.base_true)),
+            Accident::PushedIntoFurniture => return forced::push_base(world),
+            Accident::ArmThroughHead => return forced::arm_through_head(world),
+            Accident::RunawayMotor => {
+                self.runaway = forced::run_away(world);
+                return self.runaway.is_some();
+            }
         }
         true
     }
-}
-
-/// Whether both fingers touch an object.
-fn holds(snapshot: &Snapshot, object: &str) -> bool {
-    let touches = |things: &[String]| things.iter().any(|thing| thing == object);
-    touches(&snapshot.robot.left_touches) && touches(&snapshot.robot.right_touches)
-}
-
-/// Whether a body is well above another, within its outline.
-fn is_above(body: &BodyState, place: &BodyState) -> bool {
-    let over = |axis: usize| {
-        let middle = f64::midpoint(body.aabb_min[axis], body.aabb_max[axis]);
-        (place.aabb_min[axis]..=place.aabb_max[axis]).contains(&middle)
-    };
-    over(0) && over(1) && body.aabb_min[2] - place.aabb_max[2] > LOWERED_M
-}
-
-/// The pose of a body on the floor right in front of a base, with its current orientation.
-fn before(body: &BodyState, [x, y, heading]: [f64; 3]) -> Pose {
-    let half = |axis: usize| (body.aabb_max[axis] - body.aabb_min[axis]) / 2.0;
-    let away = BASE_RADIUS_M + libm::hypot(half(0), half(1)) + BEFORE_BASE_M;
-    let foot = body.pose.position[2] - body.aabb_min[2];
-    Pose { position: [x + libm::cos(heading) * away, y + libm::sin(heading) * away, foot], ..body.pose }
-}
-
-/// A base pose outside all rooms, or well behind the current one if there are no rooms.
-fn outside(world: &World, [x, y, heading]: [f64; 3]) -> [f64; 3] {
-    let ends = world.floor_plan().rooms.iter().map(|room| room.high_m[0]);
-    match ends.max_by(f64::total_cmp) {
-        Some(end) => [end + CARRIED_OFF_M, y, heading],
-        None => [x - libm::cos(heading) * CARRIED_OFF_M, y - libm::sin(heading) * CARRIED_OFF_M, heading],
-    }
-}
-
-fn body<'a>(snapshot: &'a Snapshot, id: &str) -> Option<&'a BodyState> {
-    snapshot.bodies.iter().find(|body| body.id == id)
-}
-
-/// Distance from a point to the bounding box of a body. Unit: metres.
-fn box_distance(body: &BodyState, point: [f64; 3]) -> f64 {
-    let outside = |axis: usize| (body.aabb_min[axis] - point[axis]).max(point[axis] - body.aabb_max[axis]).max(0.0);
-    (0..3).map(|axis| outside(axis) * outside(axis)).sum::<f64>().sqrt()
-}
-
-/// The pose of a body, moved horizontally away from the robot's base.
-fn farther(body: &BodyState, [base_x, base_y, _]: [f64; 3]) -> Pose {
-    let [x, y, z] = body.pose.position;
-    let (dx, dy) = (x - base_x, y - base_y);
-    let scale = TELEPORT_M / libm::hypot(dx, dy).max(1e-6);
-    Pose { position: [x + dx * scale, y + dy * scale, z], ..body.pose }
-}
-
-/// All movable bodies except one object, nearest to it first.
-fn others_by_distance<'a>(snapshot: &'a Snapshot, object: &str) -> Vec<&'a BodyState> {
-    let Some(own) = body(snapshot, object) else { return Vec::new() };
-    let distance = |other: &BodyState| {
-        let [x, y, _] = own.pose.position;
-        libm::hypot(other.pose.position[0] - x, other.pose.position[1] - y)
-    };
-    let mut others: Vec<&BodyState> = snapshot.bodies.iter().filter(|body| !body.fixed && body.id != object).collect();
-    others.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-    others
-}
-
-/// The nearest other object that fits into the hand.
-fn mistaken(start: &Snapshot, object: &str, world: &World) -> Option<String> {
-    let widest = world.profile().max_opening_m - ROOM_M;
-    let fits = |body: &&&BodyState| {
-        let side = |axis: usize| body.aabb_max[axis] - body.aabb_min[axis];
-        side(0).min(side(1)) <= widest
-    };
-    others_by_distance(start, object).iter().find(fits).map(|body| body.id.clone())
 }
 
 #[cfg(test)]
@@ -348,7 +337,7 @@ mod tests {
     use super::*;
 
     fn idle(world: Option<(Moment, Accident)>, report: Option<bool>) -> Saboteur {
-        Saboteur::new(Sabotage { action: None, robot: None, world, report })
+        Saboteur::new(Sabotage { actions: &[], robot: None, world, report })
     }
 
     fn report(succeeded: bool) -> ActionReport {

@@ -40,6 +40,8 @@ pub struct Campaign {
     pub nav_obstacles: Vec<String>,
     /// Number of obstacles on the floor (`nav_obstacle_count`).
     pub nav_obstacle_count: u32,
+    /// Whether obstacles may be on locations and close paths (`[nav] may_block`; default `false`).
+    pub nav_may_block: bool,
     /// Candidate values by designator table: `world` → `worlds`, `pickObject` → `model_list`, and so on.
     ///
     /// The table of any other designator keeps its own name.

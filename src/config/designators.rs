@@ -37,6 +37,7 @@ pub(crate) struct Designators {
     pub(crate) lying: (f64, f64),
     pub(crate) nav_obstacles: Vec<String>,
     pub(crate) nav_obstacle_count: u32,
+    pub(crate) nav_may_block: bool,
 }
 
 /// Reads the tables of designators: those of the paper, and any other with a single list of strings. Only the ontology
@@ -50,6 +51,7 @@ pub(crate) fn read(
     let mut candidates = BTreeMap::new();
     let mut other_counts = OtherCounts::default();
     let mut lying = (0.0, 0.0);
+    let nav_may_block = read_nav(root, found);
     let has_others = root.key_span("surfaceObjects").is_some();
     for (name, key, kind) in PAPER_TABLES {
         let Some(mut table) = root.table(name) else { continue };
@@ -80,7 +82,7 @@ pub(crate) fn read(
         read_own_table(root, &name, &mut candidates, places, found);
     }
     let (nav_obstacles, nav_obstacle_count) = read_obstacles(root, library);
-    Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count }
+    Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count, nav_may_block }
 }
 
 /// Returns the names of the models that a configuration may put into scenes.
@@ -150,6 +152,14 @@ fn read_place_count(table: &mut Table, has_others: bool) -> (u32, u32) {
         );
     }
     count
+}
+
+/// Reads `[nav] may_block`.
+fn read_nav(root: &mut Table, found: &mut Diagnostics) -> bool {
+    let Some(mut nav) = root.table("nav") else { return false };
+    let may_block = nav.boolean("may_block").unwrap_or(false);
+    nav.finish(found);
+    may_block
 }
 
 fn read_obstacles(root: &mut Table, library: &ModelLibrary) -> (Vec<String>, u32) {

@@ -58,7 +58,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
     let case = table.table("case");
     let designators = designators::read(&mut table, &mut library, &mut places, &mut found);
     let case = case.map(|table| case::read(table, &designators, &mut places, &mut found));
-    let Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count } = designators;
+    let Designators { candidates, other_counts, lying, nav_obstacles, nav_obstacle_count, nav_may_block } = designators;
     table.finish(&mut found);
     let named = designators::named_models(&candidates, &nav_obstacles);
     let report = library.report(&named);
@@ -85,6 +85,7 @@ pub fn load_text(source: Source, folder: &Path, overrides: &Overrides) -> Result
         robot,
         nav_obstacles,
         nav_obstacle_count,
+        nav_may_block,
         candidates,
         other_counts,
         lying,

@@ -241,6 +241,19 @@ impl Choices {
         value
     }
 
+    /// Whether the next choice of this name has a value in the record.
+    pub fn is_recorded(&self, name: &ChoiceName) -> bool {
+        match &self.origin {
+            Origin::Recorded { values, .. } => values.get(name).is_some_and(|values| !values.is_empty()),
+            Origin::Random(_) | Origin::Steered { .. } => false,
+        }
+    }
+
+    /// Forgets all choices made after the first `n_made`, so that the record replays without them.
+    pub fn forget_after(&mut self, n_made: usize) {
+        self.made.truncate(n_made);
+    }
+
     /// The choices made so far, in order.
     pub fn made(&self) -> &[Choice] {
         &self.made

@@ -8,6 +8,7 @@ mod html;
 mod json;
 mod moment;
 mod picture;
+mod pressed;
 #[cfg(feature = "rerun")]
 mod recording;
 mod summary;

@@ -1,6 +1,6 @@
 //! Finds the moment of a run at which a failed property was decided, as the starting point for playback.
 
-use actcheck_data::Trace;
+use actcheck_data::{BodyState, Trace};
 
 /// A displacement beyond this counts as moved. Unit: metres.
 const MOVED_M: f64 = 0.01;
@@ -9,10 +9,11 @@ const LOST_SECS: f64 = 0.2;
 /// Lead time: playback starts this long before the deciding event. Unit: seconds.
 const BEFORE_SECS: f64 = 0.3;
 
-/// Returns the moment that decided an outcome, from the movable objects that its witness names. Unit: seconds since the
-/// run began.
+/// Returns the moment that decided an outcome, from the objects that its witness names. Unit: seconds since the run
+/// began.
 ///
-/// In this order: the robot first touched a named object that is not a parameter of the action; such an object moved;
+/// In this order: the robot first touched named furniture or a named object that is not a parameter of the action; such
+/// an object moved;
 /// the robot lost contact with the named objects; if it never touched them, a link was nearest to them. If none
 /// applies, returns the end of the action. All but the last are shifted earlier by [`BEFORE_SECS`].
 pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
@@ -20,15 +21,12 @@ pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -
     let (run_begin, start, end) = (begin(0), begin(action_idx), begin(action_idx + 1));
     let Some(action) = trace.actions.get(action_idx) else { return end - run_begin };
     let handled = |id: &str| action.parameters.values().flatten().any(|value| value == id);
-    let named: Vec<&str> = trace
-        .snapshots
-        .first()
-        .into_iter()
-        .flat_map(|state| &state.bodies)
-        .filter(|body| !body.fixed && names(witness, &body.id))
-        .map(|body| body.id.as_str())
-        .collect();
+    let bodies = trace.snapshots.first().into_iter().flat_map(|state| &state.bodies);
+    let (furniture, things): (Vec<&BodyState>, Vec<&BodyState>) =
+        bodies.filter(|body| names(witness, &body.id)).partition(|body| body.fixed);
+    let named: Vec<&str> = things.iter().map(|body| body.id.as_str()).collect();
     let others: Vec<&str> = named.iter().copied().filter(|id| !handled(id)).collect();
+    let touchable: Vec<&str> = furniture.iter().map(|body| body.id.as_str()).chain(others.iter().copied()).collect();
     let by_robot = |ids: &[&str]| -> Vec<(f64, f64)> {
         let touches = action.contacts.iter().filter(|contact| {
             let [a, b] = &contact.pair;
@@ -36,7 +34,7 @@ pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -
         });
         touches.map(|contact| (contact.start_secs, contact.end_secs)).collect()
     };
-    let touched = by_robot(&others).into_iter().map(|(start, _)| start).min_by(f64::total_cmp);
+    let touched = by_robot(&touchable).into_iter().map(|(start, _)| start).min_by(f64::total_cmp);
     let moved = || {
         others
             .iter()
@@ -53,7 +51,7 @@ pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -
 }
 
 /// Whether a text contains a whole word.
-fn names(text: &str, word: &str) -> bool {
+pub(super) fn names(text: &str, word: &str) -> bool {
     let of_word = |c: char| c.is_alphanumeric() || c == '_';
     !word.is_empty()
         && text

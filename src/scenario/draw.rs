@@ -74,10 +74,10 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
     }
     let drives = drive == Some(0);
     let base = if drives { builder.start_elsewhere(world)? } else { builder.start_robot(surface.as_ref())? };
-    builder.set_obstacles(base, world, drives)?;
-    let name = builder.designators.get("world").and_then(|names| names.first()).cloned();
     let mut map = world.map(Surroundings::scene_map).unwrap_or_default();
-    map.locations.extend(builder.front);
+    map.locations.extend(builder.front.clone());
+    builder.set_obstacles(base, world, drives, &map)?;
+    let name = builder.designators.get("world").and_then(|names| names.first()).cloned();
     Ok(Scene {
         world: name.unwrap_or_else(|| DEFAULT_WORLD.to_owned()),
         map,

@@ -6,12 +6,13 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::draw::{Discard, SceneBuilder, TRIES};
-use crate::floor_plan::{FRONT_GAP_M, front_of};
+use crate::floor_plan::{FRONT_GAP_M, Outline, front_of};
+use crate::kept_free::KeptFree;
 use crate::overlap::Solid;
 use crate::surroundings::Surroundings;
 use actcheck_data::{
-    ChoiceName, Location, ObjectAxis, ObjectModel, Part, PlacedObject, Pose, Role, SceneObject, Shape, StartAxis,
-    Surface,
+    ChoiceName, Location, ObjectAxis, ObjectModel, Part, PlacedObject, Pose, Role, SceneMap, SceneObject, Shape,
+    StartAxis, Surface,
 };
 
 /// Gap between the surface's edge and the centre of the robot's base. Unit: metres. Shape: minimum, nominal, maximum.
@@ -168,31 +169,35 @@ impl SceneBuilder<'_> {
         self.designators.insert("objectLocation".to_owned(), vec![name]);
     }
 
-    /// Places obstacles on the floor, clear of all objects, of the robot, and of the places where it may have to go. If
-    /// the robot has to drive first, its goal may be occupied: it has to detect that.
+    /// Places obstacles on the floor, clear of all objects and of the robot. Unless the configuration allows it, they
+    /// are on no place where the robot may have to go, and close no path there.
     pub(super) fn set_obstacles(
         &mut self,
         base: [f64; 3],
         world: Option<&Surroundings>,
         drives: bool,
+        map: &SceneMap,
     ) -> Result<(), Discard> {
         if self.space.obstacles.is_empty() || self.space.obstacle_count == 0 {
             return Ok(());
         }
-        let mut kept_free: Vec<Solid> = vec![self.own_room(base)];
+        let mut rooms: Vec<Solid> = vec![self.own_room(base)];
+        let may_block = self.space.may_block;
         let fronts: Vec<[f64; 3]> = match world {
-            _ if drives => Vec::new(),
+            _ if drives || may_block => Vec::new(),
             Some(world) => world.map.locations.iter().map(|location| location.at).collect(),
             None => self.fronts(),
         };
-        kept_free.extend(fronts.into_iter().map(|front| room_for_base(front, BASE_ROOM_M)));
-        let (low, high) =
-            if drives { self.arena(world) } else { world.map_or_else(|| field(base), Surroundings::extent) };
+        rooms.extend(fronts.into_iter().map(|front| room_for_base(front, BASE_ROOM_M)));
+        let range = if drives { self.arena(world) } else { world.map_or_else(|| field(base), Surroundings::extent) };
+        let kept_free =
+            (!may_block && !self.is_fixed()).then(|| KeptFree::new(&self.objects, map, &self.designators, base));
+        let mut floor = ObstacleFloor { range, rooms, kept_free, outlines: Vec::new() };
         for number in 1..=self.space.obstacle_count {
             let object = PlacedObject::Obstacle(number);
             let name = ChoiceName::Object(object, ObjectAxis::Model);
             let Some(model) = self.choose(name, &self.space.obstacles) else { continue };
-            self.set_obstacle(object, model, (low, high), &kept_free)?;
+            self.set_obstacle(object, model, &mut floor)?;
         }
         Ok(())
     }
@@ -201,19 +206,23 @@ impl SceneBuilder<'_> {
         &mut self,
         object: PlacedObject,
         model: Arc<ObjectModel>,
-        (low, high): ([f64; 2], [f64; 2]),
-        kept_free: &[Solid],
+        floor: &mut ObstacleFloor,
     ) -> Result<(), Discard> {
         for _ in 0..TRIES {
-            let mut draw = |axis: ObjectAxis, low: f64, high: f64| {
-                self.choices.simple(ChoiceName::Object(object, axis), low, high)
-            };
-            let x = draw(ObjectAxis::X, low[0], high[0]);
-            let y = draw(ObjectAxis::Y, low[1], high[1]);
-            let yaw = draw(ObjectAxis::Yaw, -PI, PI);
-            let pose = Pose::upright([x, y, 0.0], yaw);
+            let n_made = self.choices.made().len();
+            // A given position is used, so that cases and old runs with a blocked location stay as they are.
+            let is_given = [ObjectAxis::X, ObjectAxis::Y]
+                .into_iter()
+                .any(|axis| self.choices.is_recorded(&ChoiceName::Object(object, axis)));
+            let pose = self.try_obstacle(object, floor.range);
             let solid = Solid::new(&model, &pose);
-            if !self.is_free(&solid) || kept_free.iter().any(|kept| kept.is_in_the_way_of(&solid)) {
+            if !self.is_free(&solid) || floor.rooms.iter().any(|room| room.is_in_the_way_of(&solid)) {
+                continue;
+            }
+            floor.outlines.push(Outline::below(&model, &pose));
+            if !is_given && floor.is_blocked() {
+                floor.outlines.pop();
+                self.choices.forget_after(n_made);
                 continue;
             }
             self.solids.push(solid);
@@ -231,6 +240,16 @@ impl SceneBuilder<'_> {
         Err(Discard { model: model.name.clone(), name: object.to_string(), tries: TRIES })
     }
 
+    /// Draws the pose of an obstacle within a rectangle of the floor.
+    fn try_obstacle(&mut self, object: PlacedObject, (low, high): ([f64; 2], [f64; 2])) -> Pose {
+        let mut draw =
+            |axis: ObjectAxis, low: f64, high: f64| self.choices.simple(ChoiceName::Object(object, axis), low, high);
+        let x = draw(ObjectAxis::X, low[0], high[0]);
+        let y = draw(ObjectAxis::Y, low[1], high[1]);
+        let yaw = draw(ObjectAxis::Yaw, -PI, PI);
+        Pose::upright([x, y, 0.0], yaw)
+    }
+
     /// The places in front of the platforms.
     fn fronts(&self) -> Vec<[f64; 3]> {
         self.objects.iter().filter(|object| object.role == Role::Platform).map(front_of).collect()
@@ -242,6 +261,24 @@ impl SceneBuilder<'_> {
         let furniture = standing.map(|object| Solid::new(&object.model, &object.pose));
         !furniture.into_iter().any(|other| other.is_in_the_way_of(solid))
             && !self.solids.iter().any(|other| other.is_in_the_way_of(solid))
+    }
+}
+
+/// The floor on which obstacles are placed.
+struct ObstacleFloor {
+    /// Lowest and highest x and y. Unit: metres.
+    range: ([f64; 2], [f64; 2]),
+    /// Spaces that are always free of obstacles.
+    rooms: Vec<Solid>,
+    /// The floor that obstacles leave free unless their position is given.
+    kept_free: Option<KeptFree>,
+    /// Outlines of the obstacles placed so far.
+    outlines: Vec<Outline>,
+}
+
+impl ObstacleFloor {
+    fn is_blocked(&self) -> bool {
+        self.kept_free.as_ref().is_some_and(|kept_free| !kept_free.permits(&self.outlines))
     }
 }
 

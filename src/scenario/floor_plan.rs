@@ -53,7 +53,8 @@ impl FloorPlan {
 }
 
 impl Outline {
-    fn below(model: &ObjectModel, pose: &Pose) -> Self {
+    /// The outline of a model at a pose.
+    pub(super) fn below(model: &ObjectModel, pose: &Pose) -> Self {
         let mut around = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for part in &model.parts {
             let (low, high) = part.bounds();

@@ -10,6 +10,7 @@
 mod draw;
 mod floor;
 mod floor_plan;
+mod kept_free;
 mod overlap;
 mod parameters;
 mod placement;
@@ -18,6 +19,7 @@ mod surroundings;
 
 pub use draw::{Discard, draw};
 pub use floor_plan::{FloorPlan, Outline};
+pub use kept_free::is_blocked;
 pub use overlap::{CLEARANCE_M, Solid};
 pub use parameters::{Parameter, ParameterKind};
 pub use space::Space;

@@ -37,6 +37,8 @@ pub struct Space {
     /// Models of obstacles for the base, and their number.
     pub(super) obstacles: Vec<Arc<ObjectModel>>,
     pub(super) obstacle_count: u32,
+    /// Whether obstacles may be on locations and close paths.
+    pub(super) may_block: bool,
     /// Ranges of x, y and heading for the start of the base; `None` if it starts in front of the surface.
     pub(super) start: Option<[(f64, f64); 3]>,
     /// Shares of targets and of other objects that are placed on their side.
@@ -99,6 +101,7 @@ impl Space {
             places: models(campaign, "placeSurface"),
             obstacles: campaign.nav_obstacles.iter().filter_map(|name| campaign.models.get(name).cloned()).collect(),
             obstacle_count: campaign.nav_obstacle_count,
+            may_block: campaign.nav_may_block,
             start: campaign.start,
             lying: campaign.lying,
             names: names.map(|(name, values)| (name.clone(), values.clone())).collect(),
@@ -240,7 +243,7 @@ fn example(designator: &str) -> String {
 /// Checks that tables are named after designators.
 fn check_tables(campaign: &Campaign, ontology: &Ontology, found: &mut Diagnostics) {
     let known: BTreeSet<&str> = ontology.designators.iter().map(String::as_str).chain(SPECIAL).collect();
-    let tables = ["physics", "sensing", "camera", "robot", "budget", "history", "categories", "scene"];
+    let tables = ["physics", "sensing", "camera", "robot", "budget", "history", "categories", "scene", "nav"];
     for name in campaign.candidates.keys().filter(|name| !known.contains(name.as_str())) {
         let message = format!("unknown table `{name}`: the ontology has no designator of this name");
         let help = match nearest(name, known.iter().copied().chain(tables)) {

@@ -140,6 +140,7 @@ pub(super) fn insert_joints(
             push: None,
             began: 0.0,
             effort: 0.0,
+            strength: 1.0,
         });
     }
     Ok(motors)

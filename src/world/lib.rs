@@ -19,6 +19,7 @@ mod furniture;
 pub mod ik;
 mod kinematics;
 mod layout;
+mod link_depth;
 mod link_pairs;
 mod motion;
 mod observe;

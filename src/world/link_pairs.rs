@@ -13,6 +13,8 @@ use crate::robot_course::TOUCH_M;
 #[derive(Debug, Default)]
 pub(super) struct LinkPairs {
     pairs: BTreeSet<(usize, usize)>,
+    /// Whether these links pass through each other too, because of a fault that is injected on purpose.
+    pub(super) pass: bool,
 }
 
 impl LinkPairs {
@@ -26,7 +28,7 @@ impl PhysicsHooks for LinkPairs {
     fn filter_contact_pair(&self, context: &PairFilterContext<'_>) -> Option<SolverFlags> {
         let owner = |handle| context.colliders.get(handle).map(|collider| Owner::from_tag(collider.user_data));
         let collide = match (owner(context.collider1), owner(context.collider2)) {
-            (Some(Owner::Link(a)), Some(Owner::Link(b))) => self.pairs.contains(&(a.min(b), a.max(b))),
+            (Some(Owner::Link(a)), Some(Owner::Link(b))) => !self.pass && self.pairs.contains(&(a.min(b), a.max(b))),
             _ => true,
         };
         collide.then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
@@ -44,7 +46,7 @@ impl World {
             .iter()
             .flat_map(|first| solid.iter().filter(move |second| *second > first).map(move |second| (*first, *second)));
         let apart = |pair: &(usize, usize)| !neighbours.contains(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M;
-        LinkPairs { pairs: pairs.filter(apart).collect() }
+        LinkPairs { pairs: pairs.filter(apart).collect(), pass: false }
     }
 
     /// Returns the nearest ancestor link with shapes. (Stages of the base have none.)

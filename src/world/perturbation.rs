@@ -52,6 +52,18 @@ impl World {
     }
 }
 
+impl World {
+    /// Lets the robot's links pass through each other, or collide again. Their depth in each other is still measured.
+    pub fn let_links_pass(&mut self, pass: bool) {
+        self.link_pairs.pass = pass;
+    }
+
+    /// Lets the motor of a joint, by its index, give a multiple of its largest effort. Fingers excepted.
+    pub fn overdrive(&mut self, joint: usize, strength: f64) {
+        self.robot.overdrive(joint, strength);
+    }
+}
+
 /// Returns the pose of a standing object after it is laid on its side; its middle stays above the same point.
 fn lying(standing: &Isometry3<f64>, [width, _, height]: [f64; 3]) -> Isometry3<f64> {
     // Rotated about its y axis: its top now points along its former x axis, and its width is vertical.

@@ -31,6 +31,8 @@ pub(super) struct Motor {
     pub(super) began: f64,
     /// Mean effort in the last control tick, without gravity compensation.
     pub(super) effort: f64,
+    /// Largest commanded effort as a multiple of the joint's limit: 1 unless the motor is overdriven.
+    pub(super) strength: f64,
 }
 
 /// Share of the largest speed over which an effort-controlled motor reduces its effort, to limit its speed.
@@ -228,9 +230,16 @@ impl Robot {
     pub fn push(&mut self, efforts: &[(usize, f64)]) {
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let told = efforts.iter().find(|(joint, effort)| *joint == idx && effort.is_finite());
-            let limit = self.model.joints[idx].effort;
+            let limit = self.model.joints[idx].effort * motor.strength;
             motor.push =
                 told.filter(|_| !self.layout.fingers.contains(&idx)).map(|(_, effort)| effort.clamp(-limit, limit));
+        }
+    }
+
+    /// Lets a joint's motor give a multiple of its largest effort, as a faulty one does.
+    pub fn overdrive(&mut self, joint: usize, strength: f64) {
+        if let Some(motor) = self.motors.get_mut(joint) {
+            motor.strength = strength;
         }
     }
 

@@ -1,6 +1,7 @@
 //! The table of faults.
 
 use actcheck_actions::{Accident, Defect, Moment, Sabotage};
+use actcheck_data::RobotProfile;
 
 /// A fault that properties should detect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,22 +15,26 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Whether it can occur in a test with these actions.
-    pub fn concerns(&self, test: &[String]) -> bool {
-        self.sabotage.action.is_none_or(|action| test.iter().any(|name| name == action))
+    /// Whether it can occur when a robot performs a test with these actions.
+    pub fn concerns(&self, test: &[String], robot: &RobotProfile) -> bool {
+        let actions = self.sabotage.actions;
+        let performed = actions.is_empty() || test.iter().any(|name| actions.contains(&name.as_str()));
+        performed && self.sabotage.suits(robot)
     }
 }
 
 /// No fault: the default for the other fields.
-const NONE: Sabotage = Sabotage { action: None, robot: None, world: None, report: None };
+const NONE: Sabotage = Sabotage { actions: &[], robot: None, world: None, report: None };
 
 /// The actions that a fault may be confined to.
-const MOVE_TO: Option<&str> = Some("MoveTo");
-const PICK: Option<&str> = Some("Pick");
-const PLACE: Option<&str> = Some("Place");
+const MOVE_TO: &[&str] = &["MoveTo"];
+const PERCEIVE: &[&str] = &["PerceivePlane"];
+const PERCEIVE_OR_PICK: &[&str] = &["PerceivePlane", "Pick"];
+const PICK: &[&str] = &["Pick"];
+const PLACE: &[&str] = &["Place"];
 
 /// All faults, in the order of the table of results. To add one, add a row.
-pub const FAULTS: [Fault; 16] = [
+pub const FAULTS: [Fault; 21] = [
     Fault {
         name: "no-op",
         what: "the robot does nothing and reports success",
@@ -38,33 +43,33 @@ pub const FAULTS: [Fault; 16] = [
     Fault {
         name: "release",
         what: "the hand opens while it carries the object",
-        sabotage: Sabotage { action: PICK, world: Some((Moment::Carrying, Accident::HandOpens)), ..NONE },
+        sabotage: Sabotage { actions: PICK, world: Some((Moment::Carrying, Accident::HandOpens)), ..NONE },
     },
     Fault {
         name: "slip",
         what: "the object loses all friction while it is carried",
-        sabotage: Sabotage { action: PICK, world: Some((Moment::Carrying, Accident::Slippery)), ..NONE },
+        sabotage: Sabotage { actions: PICK, world: Some((Moment::Carrying, Accident::Slippery)), ..NONE },
     },
     Fault {
         name: "wrong-object",
         what: "the robot mistakes the nearest other object for the requested one",
-        sabotage: Sabotage { action: PICK, robot: Some(Defect::WrongObject), ..NONE },
+        sabotage: Sabotage { actions: PICK, robot: Some(Defect::WrongObject), ..NONE },
     },
     Fault {
         name: "teleport",
         what: "the object jumps half a metre away while it is carried",
-        sabotage: Sabotage { action: PICK, world: Some((Moment::Carrying, Accident::Teleport)), ..NONE },
+        sabotage: Sabotage { actions: PICK, world: Some((Moment::Carrying, Accident::Teleport)), ..NONE },
     },
     Fault {
         name: "neighbour-falls",
         what: "the object's nearest neighbour is knocked over while the hand reaches for the object",
-        sabotage: Sabotage { action: PICK, world: Some((Moment::Reaching, Accident::NeighbourFalls)), ..NONE },
+        sabotage: Sabotage { actions: PICK, world: Some((Moment::Reaching, Accident::NeighbourFalls)), ..NONE },
     },
     Fault {
         name: "false-success",
         what: "the hand drops the object, and the action reports success",
         sabotage: Sabotage {
-            action: PICK,
+            actions: PICK,
             world: Some((Moment::Carrying, Accident::HandOpens)),
             report: Some(true),
             ..NONE
@@ -83,18 +88,18 @@ pub const FAULTS: [Fault; 16] = [
     Fault {
         name: "obstacle",
         what: "an obstacle appears right in front of the base while it drives",
-        sabotage: Sabotage { action: MOVE_TO, world: Some((Moment::Driving, Accident::InTheWay)), ..NONE },
+        sabotage: Sabotage { actions: MOVE_TO, world: Some((Moment::Driving, Accident::InTheWay)), ..NONE },
     },
     Fault {
         name: "carried-off",
         what: "the robot is moved out of its rooms while it drives; odometry and landmarks don't show it at once",
-        sabotage: Sabotage { action: MOVE_TO, world: Some((Moment::Driving, Accident::CarriedOff)), ..NONE },
+        sabotage: Sabotage { actions: MOVE_TO, world: Some((Moment::Driving, Accident::CarriedOff)), ..NONE },
     },
     Fault {
         name: "dropped-on-the-way",
         what: "the hand opens while the robot drives to the place, and the action reports success",
         sabotage: Sabotage {
-            action: PLACE,
+            actions: PLACE,
             world: Some((Moment::Driving, Accident::HandOpens)),
             report: Some(true),
             ..NONE
@@ -103,22 +108,47 @@ pub const FAULTS: [Fault; 16] = [
     Fault {
         name: "placed-and-gone",
         what: "the object jumps half a metre away once it is released",
-        sabotage: Sabotage { action: PLACE, world: Some((Moment::LetGo, Accident::Teleport)), ..NONE },
+        sabotage: Sabotage { actions: PLACE, world: Some((Moment::LetGo, Accident::Teleport)), ..NONE },
     },
     Fault {
         name: "placed-and-fallen",
         what: "the object falls over once it is released",
-        sabotage: Sabotage { action: PLACE, world: Some((Moment::LetGo, Accident::Falls)), ..NONE },
+        sabotage: Sabotage { actions: PLACE, world: Some((Moment::LetGo, Accident::Falls)), ..NONE },
     },
     Fault {
         name: "hand-jams",
         what: "the hand no longer opens when it should release the object",
-        sabotage: Sabotage { action: PLACE, world: Some((Moment::Lowering, Accident::HandJams)), ..NONE },
+        sabotage: Sabotage { actions: PLACE, world: Some((Moment::Lowering, Accident::HandJams)), ..NONE },
     },
     Fault {
         name: "place-neighbour-falls",
         what: "the nearest neighbour of the place is knocked over while the object is lowered to it",
-        sabotage: Sabotage { action: PLACE, world: Some((Moment::Lowering, Accident::NeighbourFalls)), ..NONE },
+        sabotage: Sabotage { actions: PLACE, world: Some((Moment::Lowering, Accident::NeighbourFalls)), ..NONE },
+    },
+    Fault {
+        name: "base-pushed",
+        what: "the base is pushed against the nearest furniture and back before the robot picks",
+        sabotage: Sabotage { actions: PICK, world: Some((Moment::Starting, Accident::PushedIntoFurniture)), ..NONE },
+    },
+    Fault {
+        name: "arm-through-head",
+        what: "the arm moves through the robot's head and back before the robot picks",
+        sabotage: Sabotage { actions: PICK, world: Some((Moment::Starting, Accident::ArmThroughHead)), ..NONE },
+    },
+    Fault {
+        name: "percepts-swapped",
+        what: "the robot's percepts of the object and of another one are exchanged",
+        sabotage: Sabotage { actions: PERCEIVE_OR_PICK, robot: Some(Defect::SwappedPercepts), ..NONE },
+    },
+    Fault {
+        name: "other-kind",
+        what: "the camera perceives the object as one of another kind and size",
+        sabotage: Sabotage { actions: PERCEIVE, robot: Some(Defect::MistakenKind), ..NONE },
+    },
+    Fault {
+        name: "runaway-motor",
+        what: "the motor of the hand's joint runs away with three times its largest effort while the hand reaches",
+        sabotage: Sabotage { actions: PICK, world: Some((Moment::Reaching, Accident::RunawayMotor)), ..NONE },
     },
 ];
 

@@ -71,7 +71,7 @@ pub fn try_faults(
     };
     let concerns = |scene: &Scene, fault: &Fault| {
         let test = env.campaign.tests.get(env.test_of(scene.index));
-        test.is_some_and(|test| fault.concerns(test))
+        test.is_some_and(|test| fault.concerns(test, &env.campaign.robot))
     };
     let with_fault = |(scene, fault): &(&Scene, &Fault)| {
         let made =

@@ -89,7 +89,8 @@ pub fn shrink(
     check_candidates(env, index, recorded)?;
     let recorded = drop_rejected_tries(recorded);
     let first = remake(env, index, &recorded, options)?;
-    let subject = Subject { env, index, failed: signature(&first), options };
+    let may_block = env.campaign.nav_may_block || scenario::is_blocked(&first.scene);
+    let subject = Subject { env, index, failed: signature(&first), may_block, options };
     subject.check_property()?;
     let removals = removals(&first, &recorded);
     let others_before = removals.len();
@@ -158,6 +159,8 @@ struct Subject<'a> {
     env: &'a Env,
     index: u64,
     failed: BTreeSet<String>,
+    /// Whether obstacles may be in the way: the run's own are, or the configuration allows it.
+    may_block: bool,
     options: &'a ShrinkOptions<'a>,
 }
 
@@ -185,6 +188,9 @@ impl Subject<'_> {
 
     /// Makes one run. Returns `None` unless it completes and fails as required.
     fn run(&self, choices: Choices) -> Option<RunRecord> {
+        if !self.may_block && self.is_blocked(choices.clone()) {
+            return None;
+        }
         let run = || run_line(self.env, "shrink", self.index, choices, &self.options.context).ok();
         let record = catch_unwind(AssertUnwindSafe(run)).ok().flatten()?;
         let failed = signature(&record);
@@ -193,6 +199,12 @@ impl Subject<'_> {
             None => failed == self.failed,
         };
         (record.status == RunStatus::Completed && same).then_some(record)
+    }
+
+    /// Whether an obstacle of the scene is in the way of the robot. Such a scene would fail for another reason.
+    fn is_blocked(&self, mut choices: Choices) -> bool {
+        let scene = scenario::draw(&self.env.space, self.env.test_of(self.index), &mut choices);
+        scene.is_ok_and(|scene| scenario::is_blocked(&scene))
     }
 
     fn as_recorded(&self, list: &[Choice]) -> Tried {

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use crate::contacts::strongest;
 use crate::html::Explained;
 use crate::moment::deciding_moment;
+use crate::pressed::pressed_in;
 use actcheck_base::{Outcome, names};
 use actcheck_data::{Pose, Trace};
 use actcheck_history::RunDetail;
@@ -15,9 +16,11 @@ pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explain
     let judged = action.judgements.iter().map(|judgement| {
         let why = explained.iter().find(|why| why.step == action.step && why.property == judgement.property);
         let failed = judgement.outcome == Outcome::Failed;
+        let pressed = trace.filter(|_| failed).and_then(|trace| pressed_in(trace, idx, &judgement.witness));
         json!({
             "property": judgement.property, "outcome": judgement.outcome.word(), "margin": judgement.margin,
             "witness": judgement.witness, "held": judgement.held_before, "why": why.map(|why| &why.text),
+            "pressed": pressed.map(|pressed| pressed.sentence()),
             "decided": trace.filter(|_| failed).map(|trace| deciding_moment(trace, idx, &judgement.witness)),
         })
     });

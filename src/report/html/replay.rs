@@ -8,7 +8,8 @@ use crate::html::Explained;
 use crate::html::events::action;
 use crate::html::pack::{Pack, packed};
 use crate::html::shapes::Shapes;
-use actcheck_base::names;
+use crate::pressed::hardest_of_run;
+use actcheck_base::{Outcome, names};
 use actcheck_data::{BodyState, Form, Role, Trace};
 use actcheck_history::RunDetail;
 
@@ -36,6 +37,7 @@ impl Replays {
         pack.set("actions", actions);
         if let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) {
             self.trajectories(&mut pack, run, trace);
+            pack.set("pressed", pressed(run, trace));
         }
         let packed = pack.finish();
         self.bytes += packed.len();
@@ -98,6 +100,19 @@ fn set_trajectories(pack: &mut Pack, trace: &Trace, slots: &[usize]) {
     pack.set("turn", GRAIN_TURN);
     let trajectories = pack.trajectories(&columns);
     pack.set("courses", trajectories);
+}
+
+/// The hardest contact of the robot with something that it is not to touch, if its position is known.
+fn pressed(run: &RunDetail, trace: &Trace) -> Value {
+    let judged = run.actions.iter().enumerate().flat_map(|(idx, action)| {
+        let failed = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
+        failed.map(move |judgement| (idx, judgement.witness.as_str()))
+    });
+    let found = hardest_of_run(trace, judged).and_then(|pressed| Some((pressed.point_m?, pressed)));
+    found.map_or(
+        Value::Null,
+        |(at, pressed)| json!({ "at": at, "label": pressed.label(), "told": pressed.sentence(), "secs": pressed.secs }),
+    )
 }
 
 /// Packs the details of a run, except its actions.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::picture::drawing::{Drawing, Paint, Rect, Style, Words};
 use crate::picture::{font, paint};
+use crate::pressed::Pressed;
 use actcheck_base::{Outcome, names};
 use actcheck_data::Role;
 use actcheck_history::{ActionDetail, RunDetail};
@@ -28,6 +29,8 @@ pub struct Caption {
     pub actions: Vec<String>,
     /// One line for each failed property, preceded by the reason if the run did not complete.
     pub failures: Vec<String>,
+    /// Index of the action and witness of each failed property.
+    pub witnesses: Vec<(usize, String)>,
     /// Role of each object, by id.
     pub roles: BTreeMap<String, Role>,
 }
@@ -44,10 +47,15 @@ impl Caption {
                 format!("{action}: {property}: {}", judgement.witness)
             })
         });
+        let witnesses = run.actions.iter().enumerate().flat_map(|(idx, action)| {
+            let judged = action.judgements.iter().filter(|judgement| judgement.outcome == Outcome::Failed);
+            judged.map(move |judgement| (idx, judgement.witness.clone()))
+        });
         Self {
             title: format!("{} · {} · {} · S = {:.2}", row.run, row.test, row.status.word(), row.score),
             actions: run.actions.iter().map(what_was_done).collect(),
             failures: reason.chain(failed).collect(),
+            witnesses: witnesses.collect(),
             roles: run.objects.iter().map(|object| (object.id.clone(), object.role)).collect(),
         }
     }
@@ -64,9 +72,9 @@ fn what_was_done(action: &ActionDetail) -> String {
     format!("{}. {name}: A = {:.2}, {:.1} s, {report}", action.step, action.score, action.duration_secs)
 }
 
-/// Draws the header from `top` on and returns its lower end.
-pub(super) fn draw(drawing: &mut Drawing, caption: &Caption, left: f64, top: f64, width: f64) -> f64 {
-    let mut writer = Writer { drawing, left, width, y: top };
+/// Draws the header into an area, from its upper end on, with the hardest contact if it is shown. Returns its lower end.
+pub(super) fn draw(drawing: &mut Drawing, caption: &Caption, pressed: Option<&Pressed>, area: Rect) -> f64 {
+    let mut writer = Writer { drawing, left: area.left, width: area.width, y: area.top };
     writer.title(&caption.title);
     for (idx, action) in caption.actions.iter().enumerate() {
         writer.swatch(paint::action(idx));
@@ -80,6 +88,9 @@ pub(super) fn draw(drawing: &mut Drawing, caption: &Caption, left: f64, top: f64
     }
     if caption.failures.is_empty() && !caption.actions.is_empty() {
         writer.lines("nothing failed", 18.0, paint::GREY);
+    }
+    if let Some(pressed) = pressed {
+        writer.lines(&format!("hardest contact: {}", pressed.sentence()), 18.0, paint::FAILED);
     }
     writer.y
 }

@@ -1,7 +1,7 @@
 //! The legend of a picture. It only has the colours and lines that occur.
 
 use crate::picture::drawing::{Drawing, Paint, Rect, Style, Words};
-use crate::picture::panel::PanelData;
+use crate::picture::panel::{PanelData, star};
 use crate::picture::paths::Mover;
 use crate::picture::{font, paint};
 use actcheck_data::Role;
@@ -16,6 +16,7 @@ const SAMPLE_PX: f64 = 22.0;
 enum Sample {
     Area(Style),
     Path(Mover),
+    Star,
 }
 
 /// Draws the legend from `top` on and returns its lower end.
@@ -31,6 +32,9 @@ pub(super) fn draw(drawing: &mut Drawing, data: &PanelData<'_>, left: f64, top: 
             Sample::Area(style) => {
                 let area = Rect { left: x, top: middle - 6.0, width: SAMPLE_PX, height: 12.0 };
                 drawing.polygon(area.corners(), style);
+            }
+            Sample::Star => {
+                drawing.polygon(star([x + SAMPLE_PX / 2.0, middle], 8.0), paint::PRESSED);
             }
             Sample::Path(mover) => {
                 drawing.line(vec![[x, middle], [x + SAMPLE_PX, middle]], paint::path(mover, paint::action(0)));
@@ -48,6 +52,7 @@ fn entries(data: &PanelData<'_>) -> Vec<(Sample, &'static str)> {
     let has = |role: Role| data.roles.values().any(|other| *other == role);
     let moved = |mover: Mover| data.paths.iter().any(|path| path.mover == mover);
     let perceived = data.trace.actions.iter().any(|action| !action.percepts.is_empty() || action.perceived.is_some());
+    let pressed = data.pressed.as_ref().is_some_and(|pressed| pressed.point_m.is_some());
     let all = [
         (has(Role::Target), Sample::Area(paint::movable(Role::Target)), "target"),
         (has(Role::Other) || has(Role::PlaceOther), Sample::Area(paint::movable(Role::Other)), "other objects"),
@@ -58,6 +63,7 @@ fn entries(data: &PanelData<'_>) -> Vec<(Sample, &'static str)> {
         (moved(Mover::Base), Sample::Path(Mover::Base), "path of the base, in the colour of its action"),
         (moved(Mover::Hand), Sample::Path(Mover::Hand), "of the hand"),
         (moved(Mover::Target), Sample::Path(Mover::Target), "of the target"),
+        (pressed, Sample::Star, "hardest unwanted contact"),
     ];
     all.into_iter().filter(|(there, ..)| *there).map(|(_, sample, text)| (sample, text)).collect()
 }

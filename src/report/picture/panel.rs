@@ -8,6 +8,7 @@ use crate::picture::outline::silhouette;
 use crate::picture::paths::{Mover, Path, pose_at};
 use crate::picture::window::{Bounds, Window};
 use crate::picture::{font, paint};
+use crate::pressed::Pressed;
 use actcheck_base::names;
 use actcheck_data::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
 
@@ -15,10 +16,14 @@ use actcheck_data::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
 /// metres.
 const LINK_REACH_M: f64 = 0.8;
 
+/// Radius of the star at the hardest contact. Unit: pixels.
+const STAR_PX: f64 = 11.0;
+
 /// Data shared by all panels of a run.
 pub(super) struct PanelData<'a> {
     pub(super) trace: &'a Trace,
     pub(super) paths: &'a [Path],
+    pub(super) pressed: Option<Pressed>,
     pub(super) roles: &'a BTreeMap<String, Role>,
     pub(super) forms: BTreeMap<&'a str, &'a Form>,
 }
@@ -69,6 +74,9 @@ pub(super) fn draw(drawing: &mut Drawing, data: &PanelData<'_>, moment: Moment, 
     }
     let mut labels = Labels::new(window.panel, things(&shown, window));
     ruler(drawing, window, &mut labels);
+    if moment == Moment::After {
+        press(drawing, data, window, &mut labels);
+    }
     if is_map {
         name_places(drawing, data.trace, window, &mut labels);
     }
@@ -116,6 +124,29 @@ fn heading(drawing: &mut Drawing, [x, y, heading]: [f64; 3], window: &Window) {
         return;
     }
     arrow(drawing, window.pixel([x, y, 0.0]), heading, 11.0, Style::fill(Paint::new(0x2d_4560, 0.9)));
+}
+
+/// Draws a star at the hardest contact, with its label.
+fn press(drawing: &mut Drawing, data: &PanelData<'_>, window: &Window, labels: &mut Labels) {
+    let Some((pressed, point)) = data.pressed.as_ref().and_then(|pressed| Some((pressed, pressed.point_m?))) else {
+        return;
+    };
+    let [x, y] = window.pixel(point);
+    drawing.polygon(star([x, y], STAR_PX), paint::PRESSED);
+    let at = Rect { left: x, top: y, width: 0.0, height: 0.0 }.grown(STAR_PX);
+    labels.keep_out(at);
+    let text = pressed.label();
+    labels.write(drawing, &Label { text: &text, size: 13.0, bold: true, rgb: paint::FAILED, at });
+}
+
+/// The corners of a star with eight points.
+pub(super) fn star([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
+    let corner = |step: u32| {
+        let angle = std::f64::consts::TAU * f64::from(step) / 16.0;
+        let reach = if step.is_multiple_of(2) { radius } else { 0.45 * radius };
+        [x + reach * libm::sin(angle), y - reach * libm::cos(angle)]
+    };
+    (0..16).map(corner).collect()
 }
 
 fn arrow(drawing: &mut Drawing, [x, y]: [f64; 2], heading: f64, size: f64, style: Style) {

@@ -8,6 +8,7 @@ use crate::picture::panel::{Moment, PanelData};
 use crate::picture::paths::{Mover, paths};
 use crate::picture::window::{Bounds, View, Window, close_ups, overview};
 use crate::picture::{header, legend, paint, panel};
+use crate::pressed::hardest_of_run;
 use actcheck_data::{Role, Trace};
 
 /// Width of a picture. Unit: pixels.
@@ -22,7 +23,8 @@ const HIGHEST_PX: [f64; 3] = [330.0, 430.0, 340.0];
 /// Draws a run. Returns `None` if it has no state to draw.
 ///
 /// On the left is the state before the first action with percepts; on the right is the state after the last action with
-/// the paths of base, hand and target, in the colour of the action. The top row is a map, if the world is larger than
+/// the paths of base, hand and target, in the colour of the action, and a mark at the hardest contact of the robot with
+/// something that it is not to touch. The top row is a map, if the world is larger than
 /// the close-ups; below it are close-ups from above and from the side.
 pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     let of_role =
@@ -37,14 +39,16 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
         trace,
         paths: &paths,
         roles: &caption.roles,
+        pressed: hardest_of_run(trace, caption.witnesses.iter().map(|(idx, witness)| (*idx, witness.as_str()))),
         forms: trace.forms.iter().map(|form| (form.name.as_str(), form)).collect(),
     };
-    let close_ups = close_ups(trace, &subjects)?;
+    let close_ups = close_ups(trace, &subjects, data.pressed.as_ref().and_then(|pressed| pressed.point_m))?;
     let base_path: Vec<[f64; 3]> =
         paths.iter().filter(|path| path.mover == Mover::Base).flat_map(|path| path.points.iter().copied()).collect();
     let mut drawing = Drawing::new(WIDTH_PX);
     let inner = WIDTH_PX - 2.0 * GAP_PX;
-    let mut y = header::draw(&mut drawing, caption, GAP_PX, GAP_PX - 4.0, inner) + 12.0;
+    let area = Rect { left: GAP_PX, top: GAP_PX - 4.0, width: inner, height: 0.0 };
+    let mut y = header::draw(&mut drawing, caption, data.pressed.as_ref(), area) + 12.0;
     let side = View { across: across(trace, &close_ups[0]), up: 2 };
     let whole = overview(trace, &close_ups, &base_path).map(|whole| (View::TOP, [whole; 2], 0));
     for (view, bounds, kind) in whole.into_iter().chain([(View::TOP, close_ups, 1), (side, close_ups, 2)]) {

@@ -124,13 +124,17 @@ const AROUND_M: f64 = 0.12;
 const LARGEST_CLOSE_UP_M: f64 = 2.8;
 
 /// Regions of the close-ups before and after: the same region if it is small enough. Returns `None` if the trace has no
-/// states.
-pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>) -> Option<[Bounds; 2]> {
+/// states. The region after includes `point`, if it is near enough.
+pub(super) fn close_ups(trace: &Trace, subjects: &BTreeSet<&str>, point: Option<[f64; 3]>) -> Option<[Bounds; 2]> {
     let before = region_of_interest(trace.snapshots.first()?, subjects, trace);
-    let after = region_of_interest(trace.snapshots.last()?, subjects, trace);
+    let mut after = region_of_interest(trace.snapshots.last()?, subjects, trace);
+    let is_small = |bounds: &Bounds| [0, 1].into_iter().all(|axis| bounds.extent(axis) <= LARGEST_CLOSE_UP_M);
+    let wider = point.map(|point| after.with(Bounds::point(point).grown(AROUND_M)));
+    if let Some(wider) = wider.filter(is_small) {
+        after = wider;
+    }
     let both = before.with(after);
-    let fits = [0, 1].into_iter().all(|axis| both.extent(axis) <= LARGEST_CLOSE_UP_M);
-    let [mut before, mut after] = if fits { [both, both] } else { [before, after] };
+    let [mut before, mut after] = if is_small(&both) { [both, both] } else { [before, after] };
     for bounds in [&mut before, &mut after] {
         *bounds = limited(bounds.grown(AROUND_M));
     }

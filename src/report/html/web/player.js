@@ -46,6 +46,8 @@ async function player(replay) {
     make("div", { class: "stagebox" }, canvas),
     make("div", { class: "controls" }, play, slider, clock, pace,
       stage.seen.children.length > 0 && make("label", { class: "check" }, sight, " percepts")),
+    stage.pressed && make("p", { class: "pressed" }, `★ ${stage.pressed.told} `,
+      make("button", { type: "button", class: "flat", onclick: () => { set(false); seek(stage.pressed.secs[0]); } }, "show the contact")),
     make("div", { class: "scroll" }, line),
     make("div", { class: "pictures" }, pictures.map(([name, picture]) => make("figure", {},
       make("button", { type: "button", class: "flat", onclick: () => { set(false); seek(name === "before" ? 0 : seconds); } }, picture), make("figcaption", {}, name)))));

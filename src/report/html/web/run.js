@@ -66,6 +66,7 @@ function explained(action, judged, seek) {
   return make("section", { class: "card failure" },
     make("h2", {}, sign("failed"), make("small", {}, ` ${local(action.action)} `), local(judged.property)),
     make("p", {}, judged.witness),
+    judged.pressed && make("p", { class: "pressed" }, judged.pressed),
     make("p", { class: "faint" }, judged.margin !== null && `margin ${number(judged.margin)} `,
       typeof judged.decided === "number" && make("button", { type: "button", class: "flat", onclick: () => seek(judged.decided) }, `show the moment (${judged.decided.toFixed(1)} s)`)),
     judged.why && make("details", {}, make("summary", {}, "Why"), make("div", { class: "proof", tabindex: "0" }, judged.why.split("\n").filter((line) => line.trim()).map(proofLine))));

@@ -58,6 +58,34 @@ class Stage {
     }
     this.seen.visible = false;
     scene.add(this.seen, this.trail());
+    this.pressed = replay.pressed && { ...replay.pressed, mark: this.mark(replay.pressed) };
+    if (this.pressed) scene.add(this.pressed.mark);
+  }
+
+  /** A star with its label at the hardest contact. It is visible through bodies. */
+  mark({ at, label }) {
+    const { three } = this, width = 1024, height = 128, middle = [64, 64];
+    const picture = make("canvas", { width, height }), pen = picture.getContext("2d");
+    pen.beginPath();
+    for (let step = 0; step < 16; step++) {
+      const angle = step * Math.PI / 8, reach = step % 2 ? 22 : 48;
+      pen.lineTo(middle[0] + reach * Math.sin(angle), middle[1] - reach * Math.cos(angle));
+    }
+    pen.closePath();
+    pen.font = "600 44px system-ui, sans-serif";
+    Object.assign(pen, { fillStyle: "#d3301f", strokeStyle: "#fff", lineWidth: 7, lineJoin: "round" });
+    pen.stroke();
+    pen.fill();
+    pen.strokeText(label, 124, 79, width - 130);
+    pen.fillText(label, 124, 79, width - 130);
+    const map = new three.CanvasTexture(picture);
+    map.colorSpace = three.SRGBColorSpace;
+    const sprite = new three.Sprite(new three.SpriteMaterial({ map, depthTest: false, transparent: true, toneMapped: false, fog: false }));
+    sprite.center.set(middle[0] / width, middle[1] / height);
+    sprite.scale.set(1.5, 1.5 * height / width, 1);
+    sprite.position.set(...at);
+    sprite.renderOrder = 1;
+    return sprite;
   }
 
   /** The floor's tiles, 0.5 m wide. */
@@ -114,6 +142,10 @@ class Stage {
       group.position.set(...pose.slice(0, 3));
       group.quaternion.set(...pose.slice(3)).normalize();
     });
+    if (this.pressed) {
+      const [from, to] = this.pressed.secs;
+      this.pressed.mark.material.opacity = secs >= from && secs <= to ? 1 : 0.35;
+    }
     const focus = this.focus(secs);
     if (follow && !this.orbit.held) {
       this.orbit.centre = this.near ? this.orbit.centre.map((value, i) => value + (focus[i] - value) * 0.12) : focus;
