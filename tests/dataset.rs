@@ -103,6 +103,9 @@ fn complete_exports_have_every_fact_in_tables_and_in_rdf() {
     }
     assert!(!folder.path().join("tables/joints.parquet").exists());
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    // The description of outcomes is in the same place as without the other tables.
+    let schema: Value = serde_json::from_str(&read("tables/schema.json")).unwrap();
+    assert_eq!(schema["columns"], schema["tables"].as_array().unwrap().last().unwrap()["columns"]);
     let count =
         |text: &str, parts: [&str; 2]| text.lines().filter(|line| parts.iter().all(|part| line.contains(part))).count();
     let all = read("all.nq");

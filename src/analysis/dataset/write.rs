@@ -115,14 +115,15 @@ fn export(
     Ok(dataset)
 }
 
-/// Returns the description of the tables and their columns, and of the table of outcomes.
+/// Returns the description of the tables and their columns. `rows` and `columns` describe the table of outcomes, as in
+/// an export of only that table.
 fn schema(tables: &[&TableSpec]) -> Value {
-    let mut outcomes = outcomes_schema();
-    if let Some(outcomes) = outcomes.as_object_mut() {
-        outcomes.insert("file".to_owned(), json!("outcomes.parquet"));
-    }
+    let mut schema = outcomes_schema();
+    let mut outcomes = schema.clone();
+    outcomes["file"] = json!("outcomes.parquet");
     let frames = "positions are in the world frame, Z up; those of percepts, planes, the base's joints, base_* of \
                   robot.parquet and believed_* are the robot's estimates, all others are ground truth";
-    let tables: Vec<Value> = tables.iter().map(|table| json!(table)).chain([outcomes]).collect();
-    json!({ "frames": frames, "tables": tables })
+    schema["frames"] = json!(frames);
+    schema["tables"] = tables.iter().map(|table| json!(table)).chain([outcomes]).collect();
+    schema
 }
