@@ -57,6 +57,7 @@ mod rules_library;
 mod scenario;
 mod schema;
 mod search;
+mod second_judge;
 mod serve;
 mod set_up;
 mod shrink;

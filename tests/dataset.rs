@@ -5,7 +5,23 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::support::{actcheck, copy_made_history, foreign, root, stderr, stdout};
+use crate::support::{actcheck, copy_made_history, foreign, made_history, root, stderr, stdout};
+
+/// The tables of facts from which outcomes follow.
+const FACTS: [&str; 12] = [
+    "actions",
+    "percepts",
+    "planes",
+    "states",
+    "bodies",
+    "links",
+    "contacts",
+    "self_contacts",
+    "extremes",
+    "joint_extremes",
+    "shapes",
+    "places",
+];
 
 /// Exports a history into the folder `data` of a temporary folder.
 fn export(arguments: &[&str]) -> (tempfile::TempDir, Output) {
@@ -32,10 +48,10 @@ fn every_table_is_listed_and_described() {
     let schema = schema(folder.path());
     let files: Vec<&str> =
         schema["tables"].as_array().unwrap().iter().map(|table| table["file"].as_str().unwrap()).collect();
-    assert_eq!(
-        files,
-        ["actions", "joints", "robot", "objects", "percepts", "outcomes"].map(|name| format!("{name}.parquet"))
-    );
+    let courses = ["joints", "robot", "objects"];
+    let expected: Vec<String> =
+        FACTS.iter().chain(&courses).chain(&["outcomes"]).map(|name| format!("{name}.parquet")).collect();
+    assert_eq!(files, expected);
     for file in files {
         assert!(folder.path().join("data").join(file).is_file() && printed.contains(file), "{printed}");
     }
@@ -64,4 +80,85 @@ fn the_dataset_has_only_the_requested_runs() {
     let (_folder, printed) = exported(&["--since", "2999-01-01"]);
     assert!(printed.contains("joints.parquet holds 0 rows") && printed.contains("of 0 runs"), "{printed}");
     assert_eq!(export(&["--campaign", "none"]).1.status.code(), Some(2));
+}
+
+/// The number of rows that the program printed for a table.
+fn rows(printed: &str, table: &str) -> usize {
+    let name = format!("{table}.parquet holds ");
+    let line = printed.lines().find_map(|line| line.split_once(&name)).expect(table);
+    line.1.split(' ').next().and_then(|count| count.parse().ok()).expect(line.1)
+}
+
+#[test]
+fn complete_exports_have_every_fact_in_tables_and_in_rdf() {
+    let folder = made_history();
+    let export = |words: &[&str]| {
+        let output = actcheck(folder.path(), &[&["export", "--history", "."], words].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        stdout(&output)
+    };
+    let printed = export(&["--complete", "--parquet", "tables", "--nquads", "all.nq"]);
+    for table in FACTS {
+        assert!(folder.path().join(format!("tables/{table}.parquet")).is_file(), "{printed}");
+    }
+    assert!(!folder.path().join("tables/joints.parquet").exists());
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    // The description of outcomes is in the same place as without the other tables.
+    let schema: Value = serde_json::from_str(&read("tables/schema.json")).unwrap();
+    assert_eq!(schema["columns"], schema["tables"].as_array().unwrap().last().unwrap()["columns"]);
+    let count =
+        |text: &str, parts: [&str; 2]| text.lines().filter(|line| parts.iter().all(|part| line.contains(part))).count();
+    let all = read("all.nq");
+    let type_of = |class: &str| format!("#type> <https://w3id.org/actcheck/world#{class}> ");
+    let property = |name: &str| format!(" <https://w3id.org/actcheck/world#{name}> ");
+    assert_eq!(count(&all, [&type_of("Contact"), "/during> ."]), rows(&printed, "contacts"));
+    for name in ["minX", "mass"] {
+        assert_eq!(count(&all, [&property(name), "/state/"]), rows(&printed, "bodies"), "{name}");
+    }
+    assert_eq!(count(&all, [&property("baseX"), "/state/"]), rows(&printed, "states"));
+    // The store has only facts that queries ask for.
+    export(&["--nquads", "stored.nq"]);
+    let stored = read("stored.nq");
+    assert_eq!(count(&stored, [&property("minX"), "/state/"]), 0);
+    // Everything else is the same.
+    let rest = |text: &str| {
+        let mut lines: Vec<String> = text.lines().filter(|line| !is_fact(line)).map(str::to_owned).collect();
+        lines.sort();
+        lines
+    };
+    assert!(rest(&all) == rest(&stored) && rest(&all).len() > 100);
+}
+
+#[test]
+fn complete_tables_and_rdf_have_the_same_numbers() {
+    let Some(python) = foreign::python() else { return };
+    let folder = made_history();
+    let output = actcheck(
+        folder.path(),
+        &["export", "--history", ".", "--complete", "--parquet", "tables", "--nquads", "all.nq"],
+    );
+    assert!(output.status.success(), "{}", stderr(&output));
+    let output = Command::new(python)
+        .arg(root().join("tests/foreign/check_complete.py"))
+        .args(["all.nq", "tables"])
+        .current_dir(folder.path())
+        .env("PYTHONPATH", root().join("notebooks"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}{}", stdout(&output), stderr(&output));
+}
+
+/// Whether a quad is in the graph of a state or an action.
+fn is_fact(line: &str) -> bool {
+    let graph = line.rsplit('<').next().unwrap_or_default();
+    graph.contains("/state/") || graph.ends_with("/during> .")
+}
+
+#[test]
+fn complete_needs_a_format_with_facts() {
+    let folder = made_history();
+    let output = actcheck(folder.path(), &["export", "--history", ".", "--complete", "--csv", "tables"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("--parquet"), "{}", stderr(&output));
 }

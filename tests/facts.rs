@@ -7,7 +7,7 @@ use actcheck::data::{
     ActionEnd, ActionReport, ActionTrace, BodyState, Choices, ContactEpisode, Extremes, Frames, JointState, LinkState,
     Look, Percept, Phase, Pose, RobotState, SceneMap, Snapshot, Trace,
 };
-use actcheck::facts::extract;
+use actcheck::facts::{extract, extract_complete};
 
 /// A number in single precision, as the physics engine has it.
 fn single(choices: &mut Choices, low: f64, high: f64) -> f64 {
@@ -303,10 +303,21 @@ fn a_broken_world_still_has_facts() {
 }
 
 #[test]
+fn complete_facts_have_every_contact() {
+    let trace = sample_trace(1);
+    let contacts = |facts: &RunFacts| {
+        let class = facts.terms.id(&Term::iri(names::w("Contact"))).unwrap();
+        facts.during[0].iter().filter(|triple| triple[2] == class).count()
+    };
+    assert_eq!(contacts(&extract_complete(&trace)), trace.actions[0].contacts.len());
+    assert!(contacts(&extract(&trace)) < trace.actions[0].contacts.len());
+}
+
+#[test]
 fn every_term_of_the_facts_is_described_in_the_vocabulary() {
     let text = std::fs::read_to_string(crate::support::root().join("ontology/world.ttl")).unwrap();
     let described: BTreeSet<&str> = text.lines().filter_map(|line| Some(line.split_once(" a ")?.0)).collect();
-    let facts = extract(&sample_trace(1));
+    let facts = extract_complete(&sample_trace(1));
     let named = |term: &Term| term.to_string().strip_prefix("w:").map(|local| format!("w:{local}"));
     let missing: Vec<String> = (0..facts.terms.len())
         .filter_map(|id| named(facts.terms.term(id as TermId)))

@@ -21,7 +21,7 @@ mod tables;
 pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, compared_runs};
 pub use consistency::{Consistency, PassPower, Repeated, SceneCounts, SceneRuns, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
-pub use dataset::{Dataset, export_dataset};
+pub use dataset::{Dataset, DatasetRuns, export_dataset, export_facts};
 pub use failure_modes::{FailureMode, failure_modes};
 pub use false_discovery::benjamini_hochberg;
 pub use findings::{

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 
 use crate::chosen::{self, ChosenRuns};
 use crate::{output, output_file};
-use actcheck_analysis::{Dataset, Mirror, export_csv, export_dataset, export_parquet};
+use actcheck_analysis::{Dataset, DatasetRuns, Mirror, export_csv, export_dataset, export_facts, export_parquet};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign as campaign;
 use actcheck_campaign::Env;
@@ -14,6 +14,7 @@ use actcheck_history::History;
 
 /// `actcheck export`
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("with_facts").args(["parquet", "nquads"]).multiple(true)))]
 pub struct ExportArgs {
     /// Id of the run to write as a configuration, or a unique prefix
     #[arg(required_unless_present_any = ["parquet", "csv", "dataset", "nquads", "turtle", "rebuild_mirror"])]
@@ -36,13 +37,18 @@ pub struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     pub csv: Option<PathBuf>,
     /// Write runs as a learning dataset into this folder, in Parquet: `joints` and `robot` (observations and commands
-    /// over time), `objects` (ground truth), `percepts`, `actions` and `outcomes`, and `schema.json`, which describes
+    /// over time), `objects` (ground truth), all tables of `--parquet --complete`, and `schema.json`, which describes
     /// the columns
     #[arg(long, value_name = "DIR")]
     pub dataset: Option<PathBuf>,
     /// Write the whole history as RDF, with facts in their named graphs (N-Quads)
     #[arg(long, value_name = "FILE.nq")]
     pub nquads: Option<PathBuf>,
+    /// With `--nquads`: all facts from the traces, not only those in the history. With `--parquet`: also the tables from
+    /// which outcomes follow: `actions`, `percepts`, `planes`, `states`, `bodies`, `links`, `contacts`, `self_contacts`,
+    /// `extremes`, `joint_extremes`, `shapes` and `places`
+    #[arg(long, requires = "with_facts")]
+    pub complete: bool,
     /// Write campaigns, runs, scenes and outcomes as RDF, without the facts in named graphs (Turtle)
     #[arg(long, value_name = "FILE.ttl")]
     pub turtle: Option<PathBuf>,
@@ -61,8 +67,14 @@ pub fn export(args: &ExportArgs) -> Result<(), Diagnostics> {
         export_run(args, &history, run)?;
     }
     if let Some(file) = &args.nquads {
-        history.write_nquads(file)?;
-        output::print(&format!("{} holds the whole history\n", file.display()));
+        let contents = if args.complete {
+            history.write_complete_nquads(file)?;
+            "the whole history with all facts"
+        } else {
+            history.write_nquads(file)?;
+            "the whole history"
+        };
+        output::print(&format!("{} holds {contents}\n", file.display()));
     }
     if let Some(file) = &args.turtle {
         history.write_turtle(file)?;
@@ -82,9 +94,13 @@ fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics
         let runs = change.added;
         output::print(&format!("{} holds the outcomes of {runs} runs\n", mirror.folder().display()));
     }
+    let runs = DatasetRuns { history, mirror: &mirror, filter: &filter, hierarchy: &hierarchy };
+    if let (Some(folder), true) = (&args.parquet, args.complete) {
+        print_dataset(&export_facts(&runs, folder)?);
+    }
     let wanted = [
-        (&args.parquet, export_parquet as fn(&_, &_, &_, &_) -> _),
-        (&args.csv, export_csv as fn(&_, &_, &_, &_) -> _),
+        (args.parquet.as_ref().filter(|_| !args.complete), export_parquet as fn(&_, &_, &_, &_) -> _),
+        (args.csv.as_ref(), export_csv as fn(&_, &_, &_, &_) -> _),
     ];
     for (folder, write) in wanted {
         let Some(folder) = folder else { continue };
@@ -94,7 +110,7 @@ fn export_tables(args: &ExportArgs, history: &History) -> Result<(), Diagnostics
         output::print(&told);
     }
     if let Some(folder) = &args.dataset {
-        print_dataset(&export_dataset(history, &mirror, &filter, &hierarchy, folder)?);
+        print_dataset(&export_dataset(&runs, folder)?);
     }
     Ok(())
 }

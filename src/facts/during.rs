@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use crate::extract::Extent;
 use crate::writer::Writer;
 use actcheck_base::{TermId, names};
 use actcheck_data::{ActionTrace, ContactEpisode, Extremes, Look, Perceived, Percept};
 
-/// Number of contact episodes that become facts for each pair: the strongest ones.
+/// Number of contact episodes that become facts for rules for each pair: the strongest ones.
 ///
 /// A body that chatters on a surface makes and breaks contact many times a second. Rules use the pair, the first
 /// contact above some force, and the largest force. The trace keeps all episodes.
@@ -14,14 +15,14 @@ const EPISODES_OF_A_PAIR: usize = 3;
 
 /// Writes the report, contacts, extremes and percepts of one action that began at this time, and the plane and objects
 /// that the action itself perceived. Unit: seconds since the scene was built.
-pub(super) fn write(action: &ActionTrace, began_secs: f64, writer: &mut Writer) {
+pub(super) fn write(action: &ActionTrace, began_secs: f64, extent: Extent, writer: &mut Writer) {
     let subject = writer.w("action");
     if let Some(report) = &action.report {
         writer.text(subject, "reported", if report.succeeded { "succeeded" } else { "failed" });
         writer.text(subject, "message", &report.message);
     }
     writer.number(subject, "duration", action.duration_secs);
-    for (idx, contact) in kept(&action.contacts).into_iter().enumerate() {
+    for (idx, contact) in kept(&action.contacts, extent).into_iter().enumerate() {
         write_contact(idx + 1, contact, writer);
     }
     for extremes in &action.extremes {
@@ -42,8 +43,8 @@ pub(super) fn write_base([low, high]: &[[f64; 2]; 2], writer: &mut Writer) {
     writer.numbers(subject, ["baseMaxX", "baseMaxY"], *high);
 }
 
-/// Returns the strongest episodes of each pair, sorted by start, then by pair.
-fn kept(contacts: &[ContactEpisode]) -> Vec<&ContactEpisode> {
+/// Returns all episodes, or the strongest ones of each pair for rules, sorted by start, then by pair.
+fn kept(contacts: &[ContactEpisode], extent: Extent) -> Vec<&ContactEpisode> {
     let mut by_pair: BTreeMap<&[String; 2], Vec<&ContactEpisode>> = BTreeMap::new();
     for contact in contacts {
         by_pair.entry(&contact.pair).or_default().push(contact);
@@ -51,7 +52,9 @@ fn kept(contacts: &[ContactEpisode]) -> Vec<&ContactEpisode> {
     let mut kept = Vec::new();
     for mut episodes in by_pair.into_values() {
         episodes.sort_by(|a, b| b.max_force_n.total_cmp(&a.max_force_n).then(a.start_secs.total_cmp(&b.start_secs)));
-        episodes.truncate(EPISODES_OF_A_PAIR);
+        if extent == Extent::Rules {
+            episodes.truncate(EPISODES_OF_A_PAIR);
+        }
         kept.extend(episodes);
     }
     kept.sort_by(|a, b| a.start_secs.total_cmp(&b.start_secs).then_with(|| a.pair.cmp(&b.pair)));
@@ -98,6 +101,22 @@ fn write_look(subject: TermId, look: Option<&Look>, began_secs: f64, writer: &mu
     writer.numbers(subject, ["takenBaseX", "takenBaseY", "takenBaseYaw"], look.base_true);
     writer.numbers(subject, ["takenBelievedX", "takenBelievedY", "takenBelievedYaw"], look.base_believed);
     writer.numbers(subject, ["cameraX", "cameraY", "cameraZ"], look.camera.position);
+}
+
+/// Writes the rotations of the camera when it took the pictures of each percept.
+pub(super) fn write_cameras(action: &ActionTrace, writer: &mut Writer) {
+    let percepts = action.percepts.iter().enumerate().map(|(idx, seen)| (format!("percept/{}", idx + 1), &seen.look));
+    let perceived = action.perceived.iter().flat_map(|perceived| {
+        let plane = perceived.plane.iter().map(|_| "perceivedPlane".to_owned());
+        let things = (1..=perceived.things.len()).map(|number| format!("perceivedObject/{number}"));
+        plane.chain(things).map(|name| (name, &perceived.look))
+    });
+    for (name, look) in percepts.chain(perceived) {
+        if let Some(look) = look {
+            let subject = writer.w(&name);
+            writer.numbers(subject, ["cameraQx", "cameraQy", "cameraQz", "cameraQw"], look.camera.rotation);
+        }
+    }
 }
 
 fn write_perceived(perceived: &Perceived, began_secs: f64, writer: &mut Writer) {

@@ -13,10 +13,32 @@ use actcheck_data::{ActionEnd, SceneMap, Trace};
 /// The same trace gives the same facts with the same term IDs. An action that was never reached has designators but no
 /// events. Every number is the shortest decimal of its f32.
 pub fn extract(trace: &Trace) -> RunFacts {
+    extract_to(trace, Extent::Rules)
+}
+
+/// Extracts the facts of a run like [`extract`], with those that rules don't use: the poses of links, the rotations
+/// of the camera, the base's path also without rooms, and all contacts instead of the strongest ones of each pair.
+pub fn extract_complete(trace: &Trace) -> RunFacts {
+    extract_to(trace, Extent::Complete)
+}
+
+/// How much of a trace becomes facts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Extent {
+    /// The facts that rules use.
+    Rules,
+    /// Everything that the vocabulary describes.
+    Complete,
+}
+
+fn extract_to(trace: &Trace, extent: Extent) -> RunFacts {
     let mut writer = Writer::default();
     let mut facts = RunFacts::default();
     for state in &trace.snapshots {
         snapshot::write(state, &mut writer);
+        if extent == Extent::Complete {
+            snapshot::write_links(&state.robot, &mut writer);
+        }
         places::write(&trace.map, &mut writer);
         facts.snapshots.push(writer.take());
     }
@@ -24,8 +46,13 @@ pub fn extract(trace: &Trace) -> RunFacts {
     for (idx, action) in trace.actions.iter().enumerate() {
         if action.end != ActionEnd::NotReached {
             let began_secs = trace.snapshots.get(idx).map_or(0.0, |before| before.time_secs);
-            during::write(action, began_secs, &mut writer);
-            if let (Some(base), false) = (&action.base, trace.map.rooms.is_empty()) {
+            during::write(action, began_secs, extent, &mut writer);
+            if extent == Extent::Complete {
+                during::write_cameras(action, &mut writer);
+            }
+            if let Some(base) = &action.base
+                && (extent == Extent::Complete || !trace.map.rooms.is_empty())
+            {
                 during::write_base(base, &mut writer);
             }
             if let Some(course) = trace.robot_courses.get(idx) {

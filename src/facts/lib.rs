@@ -9,5 +9,5 @@ mod robot_course;
 mod snapshot;
 mod writer;
 
-pub use extract::extract;
+pub use extract::{extract, extract_complete};
 pub use writer::thing_iri;

@@ -55,6 +55,14 @@ fn write_robot(robot: &RobotState, writer: &mut Writer) {
     }
 }
 
+/// Writes the poses of all links.
+pub(super) fn write_links(robot: &RobotState, writer: &mut Writer) {
+    for link in &robot.links {
+        let subject = writer.named("link", &link.name);
+        write_pose(subject, &link.pose, writer);
+    }
+}
+
 fn write_joint(joint: &JointState, writer: &mut Writer) {
     let subject = writer.named("joint", &joint.name);
     writer.class(subject, &names::w("Joint"));

@@ -4,12 +4,14 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use oxigraph::io::RdfFormat;
+use oxigraph::io::{RdfFormat, RdfSerializer};
 use oxigraph::model::GraphNameRef;
 
 use crate::rdf_text::serializer;
-use crate::{History, RdfSyntax};
+use crate::write_run::run_node;
+use crate::{History, RdfSyntax, graphs};
 use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_facts::extract_complete;
 
 impl History {
     /// Writes the whole history as N-Quads, including facts and later judgements in their named graphs.
@@ -24,6 +26,31 @@ impl History {
             writer.flush().map_err(|error| error.to_string())
         };
         write().map_err(|why| unwritten(file, &why))
+    }
+
+    /// Writes the whole history as N-Quads like [`History::write_nquads`], but with complete facts from the traces in
+    /// place of those in the store, which has only facts that queries ask for.
+    ///
+    /// # Errors
+    /// As [`History::write_nquads`], and as [`History::trace`] for each run.
+    pub fn write_complete_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
+        let store = self.store()?;
+        let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
+        let writer = BufWriter::new(File::create(file).map_err(|error| failed(&error))?);
+        let mut writer = RdfSerializer::from_format(RdfFormat::NQuads).for_writer(writer);
+        for quad in store.iter() {
+            let quad = quad.map_err(|error| failed(&error))?;
+            if !graphs::holds_facts(quad.graph_name.as_ref()) {
+                writer.serialize_quad(&quad).map_err(|error| failed(&error))?;
+            }
+        }
+        for run in self.ids("act:Run")? {
+            let facts = extract_complete(&self.states(&run)?);
+            for quad in graphs::complete(&facts, &run_node(&run)) {
+                writer.serialize_quad(&quad).map_err(|error| failed(&error))?;
+            }
+        }
+        writer.finish().and_then(|mut writer| writer.flush()).map_err(|error| failed(&error))
     }
 
     /// Writes the default graph as Turtle: campaigns, runs, executions, scenes and outcomes. Turtle can't represent the

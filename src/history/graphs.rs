@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
+use oxigraph::model::{GraphName, GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term};
 
 use crate::terms::to_store;
 use actcheck_base::{RunFacts, TermId, Terms, Triple, names};
@@ -49,20 +49,40 @@ pub(super) fn during_graph(run: &NamedNode, step: usize) -> NamedNode {
     below(run, &format!("{}/during", step + 1))
 }
 
-/// Writes the facts of a run into its graphs.
+/// Returns whether the name of a graph is that of a state or of the events during an action.
+pub(super) fn holds_facts(graph: GraphNameRef<'_>) -> bool {
+    let GraphNameRef::NamedNode(node) = graph else { return false };
+    let Some((run, part)) = node.as_str().rsplit_once('/') else { return false };
+    run.starts_with(names::RUN) && (part == "during" || run.ends_with("/state"))
+}
+
+/// Writes the facts of a run that queries ask for into its graphs.
 pub(super) fn write(facts: &RunFacts, run: &NamedNode, quads: &mut Vec<Quad>) {
-    let terms: Vec<Term> = (0u32..).take(facts.terms.len()).map(|id| to_store(facts.terms.term(id))).collect();
     let kept = Kept::of(&facts.terms);
-    let mut write = |triples: &[Triple], graph: NamedNode| {
+    let stored = |triples: &[Triple]| {
         let weak = weak_contacts(triples, &facts.terms);
+        triples.iter().filter(|triple| kept.keeps(triple) && !weak.contains(&triple[0])).copied().collect()
+    };
+    write_graphs(facts, run, stored, quads);
+}
+
+/// Returns all facts of a run in its graphs.
+pub(super) fn complete(facts: &RunFacts, run: &NamedNode) -> Vec<Quad> {
+    let mut quads = Vec::new();
+    write_graphs(facts, run, <[Triple]>::to_vec, &mut quads);
+    quads
+}
+
+/// Writes the triples of each state and action that `select` returns into the graph of that state or action.
+fn write_graphs(facts: &RunFacts, run: &NamedNode, select: impl Fn(&[Triple]) -> Vec<Triple>, quads: &mut Vec<Quad>) {
+    let terms: Vec<Term> = (0u32..).take(facts.terms.len()).map(|id| to_store(facts.terms.term(id))).collect();
+    let mut write = |triples: &[Triple], graph: NamedNode| {
         let graph = GraphName::NamedNode(graph);
-        quads.extend(triples.iter().filter(|triple| kept.keeps(triple) && !weak.contains(&triple[0])).filter_map(
-            |[s, p, o]| {
-                let subject = NamedOrBlankNode::try_from(terms[*s as usize].clone()).ok()?;
-                let Term::NamedNode(property) = &terms[*p as usize] else { return None };
-                Some(Quad::new(subject, property.clone(), terms[*o as usize].clone(), graph.clone()))
-            },
-        ));
+        quads.extend(select(triples).into_iter().filter_map(|[s, p, o]| {
+            let subject = NamedOrBlankNode::try_from(terms[s as usize].clone()).ok()?;
+            let Term::NamedNode(property) = &terms[p as usize] else { return None };
+            Some(Quad::new(subject, property.clone(), terms[o as usize].clone(), graph.clone()))
+        }));
     };
     for (state, triples) in facts.snapshots.iter().enumerate() {
         write(triples, state_graph(run, state));

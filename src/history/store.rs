@@ -370,8 +370,8 @@ impl History {
             .map_err(|error| self.fault("reading", &error))
     }
 
-    /// Ids of all instances of a class, sorted.
-    fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
+    /// Returns the ids of all individuals of a class, sorted as strings.
+    pub(super) fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
         let class = iri(class);
         let found =
             subjects(&self.store()?, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;

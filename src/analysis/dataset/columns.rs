@@ -1,4 +1,4 @@
-//! The tables of a dataset, with descriptions of their columns.
+//! The tables of a dataset about actions, percepts and motion over time, with descriptions of their columns.
 
 use serde::Serialize;
 
@@ -22,26 +22,53 @@ pub(super) struct TableSpec {
     pub columns: &'static [ColumnSpec],
 }
 
-const fn text(name: &'static str, description: &'static str) -> ColumnSpec {
+pub(super) const fn text(name: &'static str, description: &'static str) -> ColumnSpec {
     ColumnSpec { name, kind: ColumnKind::Text, unit: "", description }
 }
 
-const fn count(name: &'static str, description: &'static str) -> ColumnSpec {
+pub(super) const fn count(name: &'static str, description: &'static str) -> ColumnSpec {
     ColumnSpec { name, kind: ColumnKind::Count, unit: "", description }
 }
 
-const fn bool(name: &'static str, description: &'static str) -> ColumnSpec {
+pub(super) const fn bool(name: &'static str, description: &'static str) -> ColumnSpec {
     ColumnSpec { name, kind: ColumnKind::Bool, unit: "", description }
 }
 
-const fn number(name: &'static str, unit: &'static str, description: &'static str) -> ColumnSpec {
+pub(super) const fn number(name: &'static str, unit: &'static str, description: &'static str) -> ColumnSpec {
     ColumnSpec { name, kind: ColumnKind::Number, unit, description }
 }
 
-const RUN: ColumnSpec = text("run", "id of the run");
-const STEP: ColumnSpec = count("step", "position of the action in the test, from 1");
+pub(super) const RUN: ColumnSpec = text("run", "id of the run");
+pub(super) const STEP: ColumnSpec = count("step", "position of the action in the test, from 1");
 const TIME: ColumnSpec =
     number("time_s", "s", "time since the action began; ten rows a second, the first at its start");
+
+pub(super) const TAKEN_AT: ColumnSpec = number(
+    "taken_at_s",
+    "s",
+    "time of the picture since the action began; negative if an earlier action took it, missing in older runs",
+);
+pub(super) const TAKEN_BASE_X: ColumnSpec = number("taken_base_x_m", "m", "true x of the base at that time");
+pub(super) const TAKEN_BASE_Y: ColumnSpec = number("taken_base_y_m", "m", "true y of the base at that time");
+pub(super) const TAKEN_BASE_HEADING: ColumnSpec =
+    number("taken_base_heading_rad", "rad", "true heading of the base at that time");
+pub(super) const TAKEN_BELIEVED_X: ColumnSpec =
+    number("taken_believed_x_m", "m", "localised x of the base at that time");
+pub(super) const TAKEN_BELIEVED_Y: ColumnSpec =
+    number("taken_believed_y_m", "m", "localised y of the base at that time");
+pub(super) const TAKEN_BELIEVED_HEADING: ColumnSpec =
+    number("taken_believed_heading_rad", "rad", "localised heading of the base at that time");
+pub(super) const CAMERA_X: ColumnSpec = number("camera_x_m", "m", "true position of the camera at that time");
+pub(super) const CAMERA_Y: ColumnSpec = number("camera_y_m", "m", "true position of the camera");
+pub(super) const CAMERA_Z: ColumnSpec = number("camera_z_m", "m", "true position of the camera");
+pub(super) const CAMERA_QX: ColumnSpec = number(
+    "camera_qx",
+    "1",
+    "true rotation of the camera, as a unit quaternion; x is forwards, z is up in the picture",
+);
+pub(super) const CAMERA_QY: ColumnSpec = number("camera_qy", "1", "true rotation of the camera");
+pub(super) const CAMERA_QZ: ColumnSpec = number("camera_qz", "1", "true rotation of the camera");
+pub(super) const CAMERA_QW: ColumnSpec = number("camera_qw", "1", "true rotation of the camera");
 
 /// Actions with their results.
 pub(super) const ACTIONS: TableSpec = TableSpec {
@@ -61,6 +88,10 @@ pub(super) const ACTIONS: TableSpec = TableSpec {
         count("properties_passed", "number of success properties that passed; see outcomes.parquet for each"),
         count("properties", "number of success properties"),
         number("score", "1", "share of the success properties that passed"),
+        number("base_min_x_m", "m", "truth: smallest x of the base during the action; missing for a fixed base"),
+        number("base_min_y_m", "m", "truth: smallest y of the base during the action"),
+        number("base_max_x_m", "m", "truth: largest x of the base during the action"),
+        number("base_max_y_m", "m", "truth: largest y of the base during the action"),
     ],
 };
 
@@ -146,5 +177,19 @@ pub(super) const PERCEPTS: TableSpec = TableSpec {
         number("width_m", "m", "perceived size along the object's x"),
         number("depth_m", "m", "perceived size along the object's y"),
         number("height_m", "m", "perceived height"),
+        TAKEN_AT,
+        TAKEN_BASE_X,
+        TAKEN_BASE_Y,
+        TAKEN_BASE_HEADING,
+        TAKEN_BELIEVED_X,
+        TAKEN_BELIEVED_Y,
+        TAKEN_BELIEVED_HEADING,
+        CAMERA_X,
+        CAMERA_Y,
+        CAMERA_Z,
+        CAMERA_QX,
+        CAMERA_QY,
+        CAMERA_QZ,
+        CAMERA_QW,
     ],
 };

@@ -3,8 +3,11 @@
 //! Never: simulates, renders an image, decides successes (the rules do), or leaves out failed runs.
 
 mod columns;
+mod fact_columns;
+mod fact_source;
 mod sheet;
+mod sheets;
 mod source;
 mod write;
 
-pub use write::{Dataset, export_dataset};
+pub use write::{Dataset, DatasetRuns, export_dataset, export_facts};

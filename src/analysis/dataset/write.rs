@@ -5,13 +5,34 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use crate::dataset::columns::{ACTIONS, JOINTS, OBJECTS, PERCEPTS, ROBOT};
-use crate::dataset::sheet::Sheet;
-use crate::dataset::source::Sheets;
+use crate::dataset::columns::{ACTIONS, JOINTS, OBJECTS, PERCEPTS, ROBOT, TableSpec};
+use crate::dataset::fact_columns::{
+    BODIES, CONTACTS, EXTREMES, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS, SHAPES, STATES,
+};
+use crate::dataset::sheets::Sheets;
+use crate::dataset::{fact_source, source};
 use crate::tables::{outcomes_schema, unwritten};
 use crate::{Hierarchy, Mirror, TableFilter, export_parquet};
 use actcheck_base::Diagnostics;
-use actcheck_history::History;
+use actcheck_history::{History, RunDetail};
+
+/// Tables with the facts from which outcomes follow.
+const FACTS: [&TableSpec; 12] = [
+    &ACTIONS,
+    &PERCEPTS,
+    &PLANES,
+    &STATES,
+    &BODIES,
+    &LINKS,
+    &CONTACTS,
+    &SELF_CONTACTS,
+    &EXTREMES,
+    &JOINT_EXTREMES,
+    &SHAPES,
+    &PLACES,
+];
+/// Tables of motion over time.
+const COURSES: [&TableSpec; 3] = [&JOINTS, &ROBOT, &OBJECTS];
 
 /// A written dataset.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -26,55 +47,83 @@ pub struct Dataset {
     pub schema: PathBuf,
 }
 
+/// The runs of an export and the source of their outcomes.
+#[derive(Clone, Copy)]
+pub struct DatasetRuns<'a> {
+    /// The history with the traces.
+    pub history: &'a History,
+    /// Its outcomes.
+    pub mirror: &'a Mirror,
+    /// Selects the runs.
+    pub filter: &'a TableFilter,
+    /// Superclasses of the objects' classes.
+    pub hierarchy: &'a Hierarchy,
+}
+
 /// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder, creating it if needed.
 ///
 /// # Errors
 /// `A001` if it can't be written; errors of reading the history or a trace.
-pub fn export_dataset(
-    history: &History,
-    mirror: &Mirror,
-    filter: &TableFilter,
-    hierarchy: &Hierarchy,
+pub fn export_dataset(runs: &DatasetRuns<'_>, folder: &Path) -> Result<Dataset, Diagnostics> {
+    let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).collect();
+    export(runs, &tables, folder, |run, sheets| {
+        let trace = runs.history.trace(&run.row.run)?;
+        source::add(run, &trace, sheets);
+        fact_source::add(run, &trace, runs.hierarchy, sheets);
+        Ok(source::add_courses(&run.row.run, &trace, sheets))
+    })
+}
+
+/// Writes the outcomes of runs and the facts from which they follow into a folder, creating it if needed.
+///
+/// # Errors
+/// As [`export_dataset`].
+pub fn export_facts(runs: &DatasetRuns<'_>, folder: &Path) -> Result<Dataset, Diagnostics> {
+    export(runs, &FACTS, folder, |run, sheets| {
+        let trace = runs.history.states(&run.row.run)?;
+        source::add(run, &trace, sheets);
+        fact_source::add(run, &trace, runs.hierarchy, sheets);
+        Ok(true)
+    })
+}
+
+/// Writes tables whose rows come from `add`, which returns `false` for a run without motion.
+fn export(
+    runs: &DatasetRuns<'_>,
+    tables: &[&TableSpec],
     folder: &Path,
+    mut add: impl FnMut(&RunDetail, &mut Sheets) -> Result<bool, Diagnostics>,
 ) -> Result<Dataset, Diagnostics> {
-    let (_, outcomes) = export_parquet(mirror, filter, hierarchy, folder)?;
+    let (_, outcomes) = export_parquet(runs.mirror, runs.filter, runs.hierarchy, folder)?;
     let mut dataset = Dataset { schema: folder.join("schema.json"), ..Dataset::default() };
-    let mut sheets = Sheets {
-        actions: Sheet::begin(ACTIONS, folder)?,
-        joints: Sheet::begin(JOINTS, folder)?,
-        robot: Sheet::begin(ROBOT, folder)?,
-        objects: Sheet::begin(OBJECTS, folder)?,
-        percepts: Sheet::begin(PERCEPTS, folder)?,
-    };
-    for (campaign, runs) in history.run_ids()? {
-        for run in runs.iter().filter(|_| filter.takes_campaign(&campaign)) {
-            let detail = history.run(run)?;
-            if filter.since.as_ref().is_some_and(|since| detail.row.started < *since) {
+    let mut sheets = Sheets::begin(tables, folder)?;
+    for (campaign, ids) in runs.history.run_ids()? {
+        for run in ids.iter().filter(|_| runs.filter.takes_campaign(&campaign)) {
+            let detail = runs.history.run(run)?;
+            if runs.filter.since.as_ref().is_some_and(|since| detail.row.started < *since) {
                 continue;
             }
             dataset.runs += 1;
-            dataset.without_course += usize::from(!sheets.add(&detail, &history.trace(run)?));
-            for sheet in [&mut sheets.joints, &mut sheets.robot, &mut sheets.objects, &mut sheets.percepts] {
-                sheet.make_room()?;
-            }
+            dataset.without_course += usize::from(!add(&detail, &mut sheets)?);
+            sheets.make_room()?;
         }
     }
-    let Sheets { actions, joints, robot, objects, percepts } = sheets;
-    for sheet in [actions, joints, robot, objects, percepts] {
-        dataset.tables.push(sheet.finish()?);
-    }
+    dataset.tables = sheets.finish()?;
     dataset.tables.push((folder.join("outcomes.parquet"), outcomes));
-    fs::write(&dataset.schema, format!("{:#}\n", schema())).map_err(|error| unwritten(&dataset.schema, &error))?;
+    fs::write(&dataset.schema, format!("{:#}\n", schema(tables)))
+        .map_err(|error| unwritten(&dataset.schema, &error))?;
     Ok(dataset)
 }
 
-/// Returns the description of every table and column.
-fn schema() -> Value {
-    let mut outcomes = outcomes_schema();
-    if let Some(outcomes) = outcomes.as_object_mut() {
-        outcomes.insert("file".to_owned(), json!("outcomes.parquet"));
-    }
-    let frames = "positions are in the world frame, Z up; those of percepts, the base's joints and base_* are the \
-                  robot's estimates, those of objects and true_base_* are ground truth";
-    json!({ "frames": frames, "tables": [json!(ACTIONS), json!(JOINTS), json!(ROBOT), json!(OBJECTS), json!(PERCEPTS), outcomes] })
+/// Returns the description of the tables and their columns. `rows` and `columns` describe the table of outcomes, as in
+/// an export of only that table.
+fn schema(tables: &[&TableSpec]) -> Value {
+    let mut schema = outcomes_schema();
+    let mut outcomes = schema.clone();
+    outcomes["file"] = json!("outcomes.parquet");
+    let frames = "positions are in the world frame, Z up; those of percepts, planes, the base's joints, base_* of \
+                  robot.parquet and believed_* are the robot's estimates, all others are ground truth";
+    schema["frames"] = json!(frames);
+    schema["tables"] = tables.iter().map(|table| json!(table)).chain([outcomes]).collect();
+    schema
 }

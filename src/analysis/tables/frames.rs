@@ -98,7 +98,8 @@ pub(super) fn kinds_columns() -> impl Iterator<Item = (&'static str, String)> {
     KINDS.into_iter().map(|(from, to)| (to, format!("local names of {from} and its superclasses, nearest first")))
 }
 
-fn kinds_of(category: &str, hierarchy: &Hierarchy) -> String {
+/// Returns the local names of a category and its superclasses, nearest first, joined by spaces.
+pub(crate) fn kinds_of(category: &str, hierarchy: &Hierarchy) -> String {
     let above = hierarchy.get(category).into_iter().flatten().map(String::as_str);
     std::iter::once(names::local(category)).chain(above).collect::<Vec<&str>>().join(" ")
 }

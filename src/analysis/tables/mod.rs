@@ -15,7 +15,7 @@ mod write;
 
 pub(super) use cell::Cell;
 pub use columns::{Column, ColumnKind, columns};
-pub(super) use frames::series;
+pub(super) use frames::{kinds_of, series};
 pub(super) use mirror::unwritten;
 pub use mirror::{Mirror, MirrorChange};
 pub use outcomes::{OutcomeTable, TableFilter, TextColumn};
