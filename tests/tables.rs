@@ -126,7 +126,7 @@ fn findings_are_reported(here: &Path) {
     assert!(patterns.starts_with("action,property,conditions,sentence,runs,failed,"), "{patterns}");
     for (arguments, printed) in [
         (vec!["analyse", "--property", "MovdObject"], "did you mean `MovedObject`?"),
-        (vec!["analyse", "--by", "friction"], "scenes have no parameter `friction`"),
+        (vec!["analyse", "--by", "friction"], "runs have no parameter `friction`"),
         (vec!["analyse", "--campaign", "nope"], "H014"),
         (vec!["analyse", "--since", "2999-01-01"], "X044"),
         (vec!["analyse", "--since", "yesterday"], "a day (2026-11-21)"),

@@ -46,8 +46,16 @@ fn number_runs(findings: &mut Value, places: &BTreeMap<&str, usize>) {
     let modes = findings["failure_modes"].as_array_mut().into_iter().flatten();
     modes.for_each(|mode| number(&mut mode["runs"]));
     for property in findings["properties"].as_array_mut().into_iter().flatten() {
-        let patterns = property["patterns"]["found"].as_array_mut().into_iter().flatten();
-        patterns.for_each(|pattern| number(&mut pattern["runs"]));
+        for causes in ["patterns", "effects"] {
+            let patterns = property[causes]["found"].as_array_mut().into_iter().flatten();
+            patterns.for_each(|pattern| number(&mut pattern["runs"]));
+        }
+    }
+    for action in findings["collisions"].as_array_mut().into_iter().flatten() {
+        action["kinds"].as_array_mut().into_iter().flatten().for_each(|kind| number(&mut kind["runs"]));
+        for thing in action["things"].as_array_mut().into_iter().flatten() {
+            thing["run"] = json!(thing["run"].as_str().and_then(|run| places.get(run)));
+        }
     }
 }
 
