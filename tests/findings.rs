@@ -147,7 +147,7 @@ fn without_a_significant_condition_the_strongest_are_shown_as_unsure() {
     }
     assert!(patterns.strongest.windows(2).all(|pair| pair[0].condition.parameter() != pair[1].condition.parameter()));
     let text = findings_text(&summary_of(&table, report(&table, found)));
-    assert!(text.contains("none is beyond chance; the strongest (perhaps by chance):"), "{text}");
+    assert!(text.contains("none is confirmed beyond chance; the strongest (perhaps by chance):"), "{text}");
     assert!(text.contains("if it is real, about "), "{text}");
 }
 

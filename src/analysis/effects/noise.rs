@@ -8,7 +8,7 @@ pub struct RealisedNoise {
     /// First error of the perceived target, in the order of [`SightingAxis::ALL`]. Units: metres, radians.
     pub target: [Option<f64>; SightingAxis::ALL.len()],
     /// Largest horizontal error of any other perceived object. Unit: metres.
-    pub others_off_m: Option<f64>,
+    pub others_xy_m: Option<f64>,
     /// Error of the initial localisation, in the order of [`PlanarAxis::ALL`]. Units: metres, radians.
     pub localisation: [Option<f64>; PlanarAxis::ALL.len()],
     /// Mean error of the wheel odometry over the stretches of the path, in the order of [`WheelAxis::ALL`].
@@ -27,7 +27,7 @@ impl RealisedNoise {
         let largest = |name| values(name).max_by(|a, b| a.abs().total_cmp(&b.abs()));
         Self {
             target: SightingAxis::ALL.map(|axis| first(ChoiceName::sighting(target?, axis))),
-            others_off_m: others_off_m(choices, target),
+            others_xy_m: others_xy_m(choices, target),
             localisation: PlanarAxis::ALL.map(|axis| first(ChoiceName::Localisation(axis))),
             odometry: WheelAxis::ALL.map(|axis| mean(values(ChoiceName::Odometry(axis)))),
             landmark: PlanarAxis::ALL.map(|axis| largest(ChoiceName::Landmark(axis))),
@@ -36,13 +36,13 @@ impl RealisedNoise {
     }
 
     /// Horizontal error of the perceived target. Unit: metres.
-    pub fn target_off_m(&self) -> Option<f64> {
+    pub fn target_xy_m(&self) -> Option<f64> {
         let [x, y, ..] = self.target;
         Some(libm::hypot(x?, y?))
     }
 
     /// Horizontal error of the initial localisation. Unit: metres.
-    pub fn localisation_off_m(&self) -> Option<f64> {
+    pub fn localisation_xy_m(&self) -> Option<f64> {
         let [x, y, _] = self.localisation;
         Some(libm::hypot(x?, y?))
     }
@@ -50,7 +50,7 @@ impl RealisedNoise {
 
 /// Returns the largest horizontal error of a perceived object other than the target. The draws of one object's x and y
 /// follow each other.
-fn others_off_m(choices: &[Choice], target: Option<&str>) -> Option<f64> {
+fn others_xy_m(choices: &[Choice], target: Option<&str>) -> Option<f64> {
     let mut largest: Option<f64> = None;
     let mut along: Option<(&str, f64)> = None;
     for choice in choices {
@@ -103,9 +103,9 @@ mod tests {
         ]);
         let near = |found: Option<f64>, expected: f64| assert!((found.unwrap_or(f64::NAN) - expected).abs() < 1e-12);
         let noise = RealisedNoise::of(&choices, Some("glass_1"));
-        near(noise.target_off_m(), 0.13);
-        near(noise.others_off_m, 0.02);
-        near(noise.localisation_off_m(), 0.05);
+        near(noise.target_xy_m(), 0.13);
+        near(noise.others_xy_m, 0.02);
+        near(noise.localisation_xy_m(), 0.05);
         near(noise.odometry[0], -0.1);
         near(noise.gripper_m, -0.002);
         assert_eq!((noise.target[2], noise.landmark), (None, [None; 3]));

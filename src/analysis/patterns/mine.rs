@@ -36,7 +36,7 @@ pub struct PatternOptions {
 
 impl Default for PatternOptions {
     fn default() -> Self {
-        Self { most_conditions: 3, level: 0.05, cells: 8, most_patterns: 8, work: 300_000_000 }
+        Self { most_conditions: 3, level: 0.05, cells: 8, most_patterns: 8, work: 40_000_000 }
     }
 }
 

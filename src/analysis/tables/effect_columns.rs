@@ -10,15 +10,15 @@ pub(super) const NOISE: &[Column] = &[
     noise("sense_target_x_m", "m", "error drawn for the target's perceived x, in the world", |p| of_target(p, 0)),
     noise("sense_target_y_m", "m", "error drawn for the target's perceived y, in the world", |p| of_target(p, 1)),
     noise("sense_target_z_m", "m", "error drawn for the target's perceived height", |p| of_target(p, 2)),
-    noise("sense_target_off_m", "m", "horizontal size of the error drawn for the target's perceived position", |p| {
-        Cell::Number(p.noise.target_off_m())
+    noise("sense_target_xy_m", "m", "horizontal size of the error drawn for the target's perceived position", |p| {
+        Cell::Number(p.noise.target_xy_m())
     }),
     noise("sense_target_yaw_rad", "rad", "error drawn for the target's perceived yaw", |p| of_target(p, 3)),
     noise("sense_target_width_m", "m", "error drawn for the target's perceived size along its x", |p| of_target(p, 4)),
     noise("sense_target_depth_m", "m", "error drawn for the target's perceived size along its y", |p| of_target(p, 5)),
     noise("sense_target_height_m", "m", "error drawn for the target's perceived vertical size", |p| of_target(p, 6)),
-    noise("sense_others_off_m", "m", "largest horizontal error drawn for any other perceived object", |p| {
-        Cell::Number(p.noise.others_off_m)
+    noise("sense_others_xy_m", "m", "largest horizontal error drawn for any other perceived object", |p| {
+        Cell::Number(p.noise.others_xy_m)
     }),
     noise("sense_localisation_x_m", "m", "error drawn for the initial localisation along the world's x", |p| {
         Cell::Number(p.noise.localisation[0])
@@ -26,8 +26,8 @@ pub(super) const NOISE: &[Column] = &[
     noise("sense_localisation_y_m", "m", "error drawn for the initial localisation along the world's y", |p| {
         Cell::Number(p.noise.localisation[1])
     }),
-    noise("sense_localisation_off_m", "m", "horizontal size of the error drawn for the initial localisation", |p| {
-        Cell::Number(p.noise.localisation_off_m())
+    noise("sense_localisation_xy_m", "m", "horizontal size of the error drawn for the initial localisation", |p| {
+        Cell::Number(p.noise.localisation_xy_m())
     }),
     noise("sense_localisation_heading_rad", "rad", "error drawn for the initial heading", |p| {
         Cell::Number(p.noise.localisation[2])

@@ -4,6 +4,8 @@
 //! version 3 derives it from the test case and its parameters. Therefore both contain the scene and the repetition
 //! number: each repetition is a separate result, and the same scene in another campaign continues the history.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use crate::formats::identity::{case_name, scene};

@@ -140,7 +140,7 @@ pub(crate) fn percent(share: f64) -> String {
 fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
     let unit = parameter.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
     let bare = match &parameter.unit {
-        Some(unit) => parameter.name.strip_suffix(&format!("_{unit}")).unwrap_or(&parameter.name),
+        Some(unit) => parameter.name.strip_suffix(&format!("_{}", unit.to_lowercase())).unwrap_or(&parameter.name),
         None => &parameter.name,
     };
     let name = match bare.strip_prefix(DRAWN) {

@@ -122,7 +122,7 @@ fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
 
 fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
     let found = &report.findings;
-    out.push_str("  when (conditions before the action):\n");
+    out.push_str("  when (conditions: the scene and the errors drawn):\n");
     for (number, pattern) in found.patterns.confirmed().enumerate() {
         let _ = writeln!(out, "  {}. {}", number + 1, report.sentence(pattern));
         evidence(out, &report.when(), pattern);
@@ -167,7 +167,7 @@ fn strongest(out: &mut String, causes: &Causes<'_>, noun: &str) {
         let _ = writeln!(out, "   no {noun} differs between its failures and passes");
         return;
     }
-    let _ = writeln!(out, "   none is beyond chance; the strongest (perhaps by chance):");
+    let _ = writeln!(out, "   none is confirmed beyond chance; the strongest (perhaps by chance):");
     for strongest in &patterns.strongest {
         let _ = writeln!(out, "   ? {}", causes.strongest_sentence(strongest));
         let needed = match strongest.runs_needed {

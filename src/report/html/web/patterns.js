@@ -5,7 +5,7 @@ function patterns(report) {
   return [
     make("h1", {}, "Patterns"),
     make("p", { class: "lead" }, `When and how properties fail more often than elsewhere: corrected for all ${count(tried)} conditions and effects tried, and confirmed on a held-out third of the runs.`),
-    make("h2", {}, "When: conditions before the action"), causesOf(report, "patterns"),
+    make("h2", {}, "When: conditions of the scene and of the errors drawn"), causesOf(report, "patterns"),
     make("h2", {}, "How: effects during the action"), causesOf(report, "effects"),
   ];
 }
