@@ -6,7 +6,7 @@ use crate::effects::ActionEffects;
 use crate::effects::action::target_of;
 use crate::effects::base::from_base;
 use actcheck_base::Outcome;
-use actcheck_data::{ActionTrace, BodyState, Pose, RobotState, Trace};
+use actcheck_data::{ActionTrace, BodyState, Look, Pose, RobotState, Trace};
 use actcheck_history::RunDetail;
 
 /// Tilt beyond which perception sees an object as its upright bounding box. Unit: radians.
@@ -38,18 +38,20 @@ impl PerceptionError {
     pub(super) fn of(trace: &Trace, step: usize, target: &str) -> Option<Self> {
         let (action, before) = (trace.actions.get(step)?, trace.snapshots.get(step)?);
         let body = before.bodies.iter().find(|body| body.id == target)?;
-        let bases = (before.robot.base_true, before.robot.base_believed);
-        let named = action.percepts.iter().find(|percept| percept.id == target);
-        match named {
-            Some(percept) => Some(Self::between(&percept.pose, bases, foot(body))),
-            None => Self::of_unnamed(action, body, &before.bodies, &before.robot),
+        let named = || action.percepts.iter().filter(|percept| percept.id == target);
+        let looked = named().rev().find_map(|percept| Some((percept, percept.look.as_ref()?)));
+        match (looked, named().next()) {
+            (Some((percept, look)), _) => Some(Self::between(&percept.pose, bases_at(look), foot(body))),
+            (None, Some(percept)) => Some(Self::between(&percept.pose, bases_of(&before.robot), foot(body))),
+            (None, None) => Self::of_unnamed(action, body, &before.bodies, &before.robot),
         }
     }
 
     /// Returns the error of the percept without an id that is nearest to the target, if no other object is nearer to it.
     fn of_unnamed(action: &ActionTrace, body: &BodyState, bodies: &[BodyState], robot: &RobotState) -> Option<Self> {
-        let things = &action.perceived.as_ref()?.things;
-        let bases = (robot.base_true, robot.base_believed);
+        let perceived = action.perceived.as_ref()?;
+        let things = &perceived.things;
+        let bases = perceived.look.as_ref().map_or_else(|| bases_of(robot), bases_at);
         let error = |pose: &Pose, body: &BodyState| Self::between(pose, bases, foot(body));
         let nearest = things
             .iter()
@@ -61,7 +63,7 @@ impl PerceptionError {
         (found.off_m() <= NEAR_M && !rivalled).then_some(found)
     }
 
-    fn between(perceived: &Pose, (base_true, base_believed): ([f64; 3], [f64; 3]), truth: [f64; 3]) -> Self {
+    fn between(perceived: &Pose, Bases { base_true, base_believed }: Bases, truth: [f64; 3]) -> Self {
         let [x, y, z] = perceived.position;
         let [perceived, truth_from_base] =
             [from_base(base_believed, [x, y]), from_base(base_true, [truth[0], truth[1]])];
@@ -101,6 +103,21 @@ impl PerceptionError {
         };
         Some(format!("{id} was perceived {place} where it was"))
     }
+}
+
+/// The true and the believed pose of the base at one moment.
+#[derive(Debug, Clone, Copy)]
+struct Bases {
+    base_true: [f64; 3],
+    base_believed: [f64; 3],
+}
+
+fn bases_of(robot: &RobotState) -> Bases {
+    Bases { base_true: robot.base_true, base_believed: robot.base_believed }
+}
+
+fn bases_at(look: &Look) -> Bases {
+    Bases { base_true: look.base_true, base_believed: look.base_believed }
 }
 
 /// The point that perception reports: the origin of a standing object, or the centre of the lower side of a lying
@@ -158,7 +175,7 @@ mod tests {
         // An object 1 m ahead is perceived 0.05 m to its left, in the believed frame.
         let [x, y] = super::super::base::turned([1.0, 0.05], believed[2]);
         let perceived = Pose::upright([believed[0] + x, believed[1] + y, 0.72], 0.0);
-        let error = PerceptionError::between(&perceived, (base_true, believed), [1.0, 3.0, 0.7]);
+        let error = PerceptionError::between(&perceived, Bases { base_true, base_believed: believed }, [1.0, 3.0, 0.7]);
         assert!((error.left_m - 0.05).abs() < 1e-12 && error.ahead_m.abs() < 1e-12, "{error:?}");
         assert!((error.above_m - 0.02).abs() < 1e-12 && (error.off_m() - 0.05).abs() < 1e-12);
     }

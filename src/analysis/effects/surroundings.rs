@@ -47,7 +47,7 @@ struct Blow<'a> {
     force_n: f64,
     by: &'a str,
     at_secs: f64,
-    /// Where the hardest contact was, in the world.
+    /// Where the hardest contact was, in the world. `None` in traces of earlier versions.
     point: Option<[f64; 2]>,
 }
 
@@ -55,7 +55,8 @@ struct Blow<'a> {
 pub(super) fn of(view: &ActionView<'_>) -> Vec<Surrounding> {
     let mut blows: BTreeMap<&str, Blow<'_>> = BTreeMap::new();
     for Hit { contact, thing, by } in hits(view) {
-        let found = Blow { force_n: contact.max_force_n, by, at_secs: contact.start_secs, point: None };
+        let point = contact.point_m.map(|[x, y, _]| [x, y]);
+        let found = Blow { force_n: contact.max_force_n, by, at_secs: contact.start_secs, point };
         let known = blows.entry(thing).or_insert(found);
         let at_secs = known.at_secs.min(found.at_secs);
         if found.force_n > known.force_n {
@@ -72,9 +73,10 @@ pub(super) fn of(view: &ActionView<'_>) -> Vec<Surrounding> {
 
 fn surrounding(view: &ActionView<'_>, body: &BodyState, blow: Option<&Blow<'_>>, frame: Option<&Frame>) -> Surrounding {
     let middle = [0, 1].map(|axis| (body.aabb_min[axis] + body.aabb_max[axis]) / 2.0);
-    // The middle of a large piece of furniture says little about the place of a contact.
+    // The middle of a large piece of furniture says little about the place of a contact; without the contact itself, the
+    // point nearest to the base is taken.
     let point = |frame: &Frame| match blow {
-        Some(Blow { point: Some(point), .. }) => *point,
+        Some(Blow { point: Some(point), .. }) if body.fixed => *point,
         _ if body.fixed => [0, 1].map(|axis| frame.base[axis].clamp(body.aabb_min[axis], body.aabb_max[axis])),
         _ => middle,
     };
