@@ -126,14 +126,7 @@ pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
     let mut families = Families::default();
     let rounds = search(input, open, &axes, options, &mut found, &mut families);
     found.tried = families.tried.iter().sum();
-    let probabilities: Vec<f64> = rounds.iter().map(|(_, table)| table.fisher().greater).collect();
-    let weighted: Vec<f64> = rounds
-        .iter()
-        .zip(&probabilities)
-        .map(|((conditions, _), p)| p * families.tests(conditions.len()) / found.tried.max(1) as f64)
-        .collect();
-    let adjusted: Vec<f64> =
-        benjamini_hochberg(&weighted, found.tried).into_iter().map(|adjusted| adjusted.min(1.0)).collect();
+    let (probabilities, adjusted) = adjusted(&rounds, &families);
     let conditions: Vec<Vec<Condition>> = rounds.iter().map(|(conditions, _)| conditions.clone()).collect();
     let confirmed = confirm(&conditions, input);
     for ((((conditions, searched), p), q), (held_out, p_held_out)) in
@@ -164,6 +157,17 @@ pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
         found.strongest = strongest(input, options, families.count());
     }
     found
+}
+
+/// Returns the p-values of patterns, and the adjusted ones.
+fn adjusted(rounds: &[(Vec<Condition>, TwoByTwo)], families: &Families) -> (Vec<f64>, Vec<f64>) {
+    let tried = families.tried.iter().sum::<u64>().max(1);
+    let probabilities: Vec<f64> = rounds.iter().map(|(_, table)| table.fisher().greater).collect();
+    let weighted =
+        |((conditions, _), p): (&(Vec<Condition>, TwoByTwo), &f64)| p * families.tests(conditions.len()) / tried as f64;
+    let weighted: Vec<f64> = rounds.iter().zip(&probabilities).map(weighted).collect();
+    let adjusted = benjamini_hochberg(&weighted, tried).into_iter().map(|adjusted| adjusted.min(1.0)).collect();
+    (probabilities, adjusted)
 }
 
 /// Returns the number of cells for a number of runs. With few runs, many narrow ranges would only add false positives.

@@ -19,7 +19,11 @@ const TITLE_PX: f64 = 14.0;
 /// Line height. Unit: pixels.
 const LINE_PX: f64 = 18.0;
 /// Radii of the circles around the goal. Unit: metres.
-const RINGS_M: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6];
+const RINGS_M: [f64; 7] = [0.1, 0.2, 0.4, 0.6, 0.8, 1.2, 1.6];
+/// Number of corners with which a circle is drawn.
+const RING_CORNERS: u32 = 120;
+/// Circles smaller than this share of the largest one have no label: labels would overlap.
+const LABELLED: f64 = 0.25;
 /// Share of the hit things that the panel must show.
 const SHOWN: f64 = 0.95;
 /// Half the size of a cross at 1 N and its growth with each tenfold force. Unit: pixels.
@@ -119,12 +123,20 @@ impl View {
     fn rings(&self, drawing: &mut Drawing) {
         let grid = Line::new(Paint::new(paint::GREY, 0.35), 0.8);
         let middle = self.panel.middle();
+        let turn = std::f64::consts::TAU / f64::from(RING_CORNERS);
         for ring in RINGS_M.into_iter().filter(|ring| *ring <= self.radius_m) {
-            drawing.circle(middle, ring * self.scale(), Style::line(grid));
-            let [x, y] = self.pixel([0.0, -ring]);
-            let text = format!("{:.0} cm", ring * 100.0);
-            let width = font::width(&text, SIZE_PX - 2.0, false);
-            write(drawing, &text, [x - width - 3.0, y - 3.0], SIZE_PX - 2.0, false, paint::GREY);
+            let on_ring = |idx: u32| {
+                let (sin, cos) = libm::sincos(turn * f64::from(idx));
+                self.pixel([ring * cos, ring * sin])
+            };
+            drawing.polygon((0..RING_CORNERS).map(on_ring).collect(), Style::line(grid));
+            if ring >= LABELLED * self.radius_m {
+                // At the lower right, where the approach does not cross it.
+                let [x, y] = on_ring(RING_CORNERS * 5 / 8);
+                let text = format!("{:.0} cm", ring * 100.0);
+                let width = font::width(&text, SIZE_PX - 2.0, false);
+                write(drawing, &text, [x - width - 4.0, y - 2.0], SIZE_PX - 2.0, false, paint::GREY);
+            }
         }
         let (low, tip) = ([middle[0], self.panel.bottom() - 8.0], [middle[0], self.panel.bottom() - 44.0]);
         let arrow = Style::line(Line::new(Paint::solid(paint::INK), 2.0));

@@ -3,7 +3,7 @@
 /** Colours of categories, most often hit first; the last one is for all others (Okabe-Ito). */
 const HIT_COLOURS = ["#d55e00", "#0072b2", "#cc79a7", "#e69f00", "#56b4e9", "#009e73", "#8a93a0"];
 /** Radii of the circles around the goal, in metres. */
-const RINGS = [0.1, 0.2, 0.4, 0.8, 1.6];
+const RINGS = [0.1, 0.2, 0.4, 0.6, 0.8, 1.2, 1.6];
 
 function collisions(report) {
   const actions = report.summary.findings.collisions;
@@ -75,7 +75,7 @@ function topView(runs, action, colour, open) {
   return make("svg", { class: "topview", viewBox: `0 0 ${2 * half} ${2 * half}`, role: "img", "aria-label": `Collisions of ${local(action.action)} from above` },
     RINGS.filter((ring) => ring <= radius).map((ring) => [
       make("circle", { class: "ring", cx: half, cy: half, r: ring * scale }),
-      make("text", { x: half + 4, y: half + ring * scale - 4 }, `${Math.round(ring * 100)} cm`)]),
+      ring >= radius / 4 && make("text", { x: half + ring * scale * 0.71 - 4, y: half + ring * scale * 0.71 - 2, "text-anchor": "end" }, `${Math.round(ring * 100)} cm`)]),
     missed.map((thing) => make("circle", { class: "missed", cx: at(thing)[0], cy: at(thing)[1], r: 1.8 })),
     hit.filter(within).map(cross),
     make("circle", { class: "goal", cx: half, cy: half, r: 4 }),
