@@ -40,8 +40,8 @@ async function watch(known, place, details, { runs, run, id }) {
   const seek = (secs) => shown?.seek(secs);
   const asked = new Set(runs.slots.map((slot) => slot.iri));
   const told = (judged) => judged.outcome === "failed" && asked.has(judged.property);
-  fill(details, replay.actions.map((action) => [action.judged.filter(told).map((judged) => explained(action, judged, seek)),
-    action.perceived && action.judged.some(told) && make("p", { class: "note perceived" }, `${action.perceived}.`)]), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
+  fill(details, replay.actions.map((action) => [action.perceived && action.judged.some(told) && make("p", { class: "perceived" }, `${action.perceived}.`),
+    action.judged.filter(told).map((judged) => explained(action, judged, seek))]), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
   if (!replay.courses || !replay.courses.frames) {
     fill(place, make("p", { class: "note" }, replay.reason ? `The run was ${runs.text(runs.status, run)}: ${replay.reason}` : "The trace of this run is missing, corrupt, or was written by an earlier version of the program."));
     return;
