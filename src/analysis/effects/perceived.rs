@@ -38,7 +38,7 @@ impl PerceptionError {
     pub(super) fn of(trace: &Trace, step: usize, target: &str) -> Option<Self> {
         let (action, before) = (trace.actions.get(step)?, trace.snapshots.get(step)?);
         let body = before.bodies.iter().find(|body| body.id == target)?;
-        let named = || action.percepts.iter().filter(|percept| percept.id == target);
+        let named = || action.percepts.iter().filter(move |percept| percept.id == target);
         let looked = named().rev().find_map(|percept| Some((percept, percept.look.as_ref()?)));
         match (looked, named().next()) {
             (Some((percept, look)), _) => Some(Self::between(&percept.pose, bases_at(look), foot(body))),
