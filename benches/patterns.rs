@@ -11,8 +11,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use actcheck::analysis::{
-    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternInput, PatternOptions, TableFilter, Values, cascades,
-    columns, judged, mine, property_findings, table_failure_modes, trend,
+    Hierarchy, Mirror, OutcomeTable, PatternInput, PatternOptions, TableFilter, Values, cascades, finding_columns,
+    judged, mine, property_findings, table_failure_modes, trend,
 };
 use actcheck::base::Outcome;
 use support::{made_up, planted};
@@ -84,9 +84,8 @@ fn many_outcomes() {
         .sum();
     reset_most_memory();
     let start = Instant::now();
-    let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
-    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).collect();
-    let table = OutcomeTable::read(&mirror, &TableFilter::default(), &names).expect("the tables can be read");
+    let table =
+        OutcomeTable::read(&mirror, &TableFilter::default(), &finding_columns()).expect("the tables can be read");
     let read = start.elapsed().as_secs_f64();
     let modes = table_failure_modes(&table).len();
     let cascades = cascades(&table, 0.05).len();
@@ -134,7 +133,7 @@ fn text(input: &PatternInput) -> String {
     let mut columns: Vec<(String, Vec<String>)> = Vec::new();
     for parameter in &input.parameters {
         match &parameter.values {
-            Values::Numbers(numbers) => {
+            Values::Numbers(numbers) | Values::Angles(numbers) => {
                 columns.push((parameter.name.clone(), numbers.iter().map(|number| format!("{number}")).collect()));
             }
             Values::Kinds { of_run, names, above } => {

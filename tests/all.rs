@@ -15,6 +15,7 @@ mod config;
 mod dataset;
 mod determinism;
 mod diagnostics;
+mod effects;
 mod english;
 mod extra;
 mod facts;

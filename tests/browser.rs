@@ -22,7 +22,7 @@ use actcheck::history::{CampaignEnd, History};
 use actcheck::report::{Explained, PropertyWords, Replays};
 use actcheck::verdict::wilson;
 
-const VIEWS: [&str; 7] = ["/", "/properties", "/modes", "/patterns", "/map", "/history", "/runs"];
+const VIEWS: [&str; 8] = ["/", "/properties", "/modes", "/patterns", "/collisions", "/map", "/history", "/runs"];
 const DESKTOP: (u32, u32) = (1280, 860);
 const PHONE: (u32, u32) = (390, 844);
 

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use actcheck::analysis::{
-    Condition, FINDING_COLUMNS, Hierarchy, Interval, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades,
-    columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Condition, Hierarchy, Interval, Mirror, OutcomeTable, PatternOptions, PerceptionError, PropertyFindings,
+    Surrounding, TableFilter, TableRun, cascades, collisions, finding_columns, flaky_scenes, judged, property_findings,
+    table_failure_modes, trend, two_way,
 };
 use actcheck::base::Outcome::{self, Failed, Inapplicable, Passed, Untested};
 use actcheck::history::{Repetition, RunDetail};
-use actcheck::report::{FindingsSummary, PropertyReport, patterns_picture};
+use actcheck::report::{FindingsSummary, PropertyReport, collisions_picture, findings_text, patterns_picture};
 
 use crate::support::made_up;
 use crate::support::planted::Dice;
@@ -36,18 +37,16 @@ fn runs(campaign: &str, count: u64, slippery: f64) -> Vec<RunDetail> {
         .collect()
 }
 
-fn table(runs: impl IntoIterator<Item = RunDetail>, filter: &TableFilter) -> OutcomeTable {
+fn table(runs: impl IntoIterator<Item = impl Into<TableRun>>, filter: &TableFilter) -> OutcomeTable {
     let folder = tempfile::tempdir().unwrap();
-    let mut by_campaign: BTreeMap<String, Vec<RunDetail>> = BTreeMap::new();
-    for run in runs {
-        by_campaign.entry(run.row.campaign.clone()).or_default().push(run);
+    let mut by_campaign: BTreeMap<String, Vec<TableRun>> = BTreeMap::new();
+    for run in runs.into_iter().map(Into::into) {
+        by_campaign.entry(run.detail.row.campaign.clone()).or_default().push(run);
     }
     // One folder of files, like the mirrors of campaigns beside a history.
-    let all: Vec<RunDetail> = by_campaign.into_values().flatten().collect();
+    let all: Vec<TableRun> = by_campaign.into_values().flatten().collect();
     let mirror = Mirror::of_runs(folder.path(), "all", all).unwrap();
-    let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
-    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).collect();
-    OutcomeTable::read(&mirror, filter, &names).unwrap()
+    OutcomeTable::read(&mirror, filter, &finding_columns()).unwrap()
 }
 
 fn hierarchy() -> Hierarchy {
@@ -89,27 +88,150 @@ fn a_pattern_is_reported_with_its_runs() {
     assert!(two_way(&found.input, &["nothing"]).is_none());
 }
 
+/// Picks that fail because of two causes: targets that are turned away, and targets that were perceived off by more than
+/// 4 cm.
+fn with_two_causes(count: u64) -> Vec<TableRun> {
+    let mut dice = Dice::new(11);
+    (0..count)
+        .map(|index| {
+            let off_m = 0.08 * dice.share();
+            let detail = made_up::run("k", index, &mut dice, &["Pick"], |target, _, dice| {
+                let rate = match (target.yaw.abs() > 2.5, off_m > 0.04) {
+                    (true, _) => 0.7,
+                    (_, true) => 0.5,
+                    _ => 0.04,
+                };
+                vec![("InHand", outcome(dice.share() < rate))]
+            });
+            let mut run = TableRun::from(detail);
+            let direction = 6.28 * dice.share();
+            let [ahead_m, left_m] = [off_m * direction.cos(), off_m * direction.sin()];
+            run.effects[0].perceived = Some(PerceptionError { ahead_m, left_m, above_m: 0.01 * dice.share() });
+            run.effects[0].last_phase = Some(if dice.share() < 0.3 { "lift" } else { "retract" }.to_owned());
+            run.noise[0].localisation = [Some(dice.share()), Some(dice.share()), None];
+            run
+        })
+        .collect()
+}
+
+#[test]
+fn a_condition_and_an_effect_are_listed_apart() {
+    let table = table(with_two_causes(600), &TableFilter::default());
+    let found = property_findings(&table, &judged(&table)[0], &hierarchy(), &PatternOptions::default());
+    let report = report(&table, found);
+    let [when, how] = [report.when(), report.how()].map(|causes| {
+        let all: Vec<String> =
+            causes.patterns.confirmed().map(|pattern| causes.conditions(&pattern.conditions)).collect();
+        all
+    });
+    // A direction wraps: both ends are one condition.
+    assert!(matches!(when.as_slice(), [only] if only.starts_with("target yaw beyond ±2.")), "{when:?}");
+    assert!(matches!(how.as_slice(), [only] if only.starts_with("target perceived off ≥ 0.0")), "{how:?}");
+    let text = findings_text(&summary_of(&table, report));
+    let [condition, effect] = ["when (", "how ("].map(|title| text.find(title).unwrap());
+    let place = |words: &str| text.find(words).unwrap_or_else(|| panic!("{words}: {text}"));
+    assert!(condition < place("target yaw beyond") && place("target yaw beyond") < effect, "{text}");
+    assert!(effect < place("target perceived off"), "{text}");
+}
+
+#[test]
+fn without_a_significant_condition_the_strongest_are_shown_as_unsure() {
+    let table = table(with_two_causes(40), &TableFilter::default());
+    let found = property_findings(&table, &judged(&table)[0], &hierarchy(), &PatternOptions::default());
+    let patterns = &found.patterns;
+    assert!(patterns.confirmed().next().is_none() && (1..=3).contains(&patterns.strongest.len()), "{patterns:#?}");
+    for strongest in &patterns.strongest {
+        let (inside, outside) = (strongest.rate, strongest.elsewhere);
+        assert!(inside.rate > outside.rate && inside.low < inside.rate && inside.rate < inside.high, "{strongest:?}");
+        assert!(strongest.p <= strongest.p_corrected && strongest.runs_needed.unwrap() > 40.0, "{strongest:?}");
+    }
+    assert!(patterns.strongest.windows(2).all(|pair| pair[0].condition.parameter() != pair[1].condition.parameter()));
+    let text = findings_text(&summary_of(&table, report(&table, found)));
+    assert!(text.contains("none is confirmed beyond chance; the strongest (perhaps by chance):"), "{text}");
+    assert!(text.contains("if it is real, about "), "{text}");
+}
+
+/// Every second run hits a mug to the left of the target, with 5 N; each has a can beyond it, which is never hit.
+#[test]
+fn collisions_are_counted_by_type_and_place() {
+    let thing = |object: &str, class: &str, [beyond, left]: [f64; 2], force_n: Option<f64>| Surrounding {
+        object: object.to_owned(),
+        category: format!("http://actions#{class}"),
+        role: if class == "Table" { "platform" } else { "other" }.to_owned(),
+        beyond_m: Some(beyond),
+        left_m: Some(left),
+        force_n,
+        by: force_n.map(|_| "robot/palm_link".to_owned()),
+        at_s: force_n.map(|_| 2.5),
+        phase: force_n.map(|_| "approach".to_owned()),
+    };
+    let mut dice = Dice::new(5);
+    let runs = (0..40).map(|index| {
+        let mut run = TableRun::from(made_up::run("k", index, &mut dice, &["Pick"], |_, _, _| {
+            vec![("InHand", Passed), ("Near", Passed)]
+        }));
+        let hit = (index % 2 == 0).then_some(5.0 + index as f64);
+        let table = (index == 0).then(|| thing("table_1", "Table", [-0.5, 0.0], Some(700.0)));
+        let others = [thing("mug_2", "Mug", [0.01, 0.15], hit), thing("can_3", "Can", [0.3, 0.0], None)];
+        run.effects[0].surroundings = Some(others.into_iter().chain(table).collect());
+        run
+    });
+    let table = table(runs.collect::<Vec<TableRun>>(), &TableFilter::default());
+    let found = collisions(&table);
+    assert_eq!(found.len(), 1);
+    let of = &found[0];
+    assert_eq!((of.executions, of.hit, of.kinds.len(), of.things.len()), (40, 20, 2, 81));
+    let [mug, furniture] = &of.kinds[..] else { panic!("{:?}", of.kinds) };
+    assert_eq!((mug.category.as_str(), mug.hit, mug.present, mug.furniture), ("http://actions#Mug", 20, 40, false));
+    assert_eq!((mug.force_n.least, mug.force_n.most, mug.rate.rate), (5.0, 43.0, 0.5));
+    assert_eq!(mug.by, [("robot/palm_link".to_owned(), 20)]);
+    assert_eq!((&mug.directions[..], mug.runs[0].as_str()), (&[("left of it".to_owned(), 20)][..], "k-39"));
+    assert_eq!((furniture.hit, furniture.present, furniture.furniture), (1, 40, true));
+    let sectors: Vec<_> = of.sectors.iter().flatten().filter(|sector| sector.present > 0).collect();
+    let counts: Vec<_> = sectors.iter().map(|it| (it.direction, it.distance_m, it.present, it.hit)).collect();
+    assert_eq!(
+        counts,
+        [("beyond it", (0.2, Some(0.4)), 40, 0), ("left of it", (0.1, Some(0.2)), 40, 20)],
+        "furniture is not movable"
+    );
+    let summary = summary(&table, 0);
+    let text = findings_text(&summary);
+    assert!(text.contains("Pick: in 50 % [35–65] of 40 runs") && text.contains("Table (furniture)"), "{text}");
+    let svg = collisions_picture(&summary).unwrap().to_svg();
+    assert!(svg.contains("Mug: hit in 20 of 40") && svg.contains("the robot's approach"), "{svg}");
+}
+
 /// The summary of one property, as `actcheck analyse` makes it.
 fn summary(table: &OutcomeTable, property: usize) -> FindingsSummary {
     let of = &judged(table)[property];
     let findings = property_findings(table, of, &hierarchy(), &PatternOptions::default());
-    let report = PropertyReport {
-        findings,
+    FindingsSummary { counts: of.counts, ..summary_of(table, report(table, findings)) }
+}
+
+fn report(table: &OutcomeTable, findings: PropertyFindings) -> PropertyReport {
+    let all = judged(table);
+    let of = all.iter().find(|of| of.property == findings.property && of.action == findings.action).unwrap();
+    PropertyReport {
         unit: None,
         trend: trend(table, of, 0.05),
         flaky: Vec::new(),
         repeated_scenes: 0,
         maps: Vec::new(),
-    };
+        findings,
+    }
+}
+
+fn summary_of(table: &OutcomeTable, report: PropertyReport) -> FindingsSummary {
     FindingsSummary {
         history: "h".to_owned(),
         program: "actcheck".to_owned(),
         options: String::new(),
         campaigns: vec!["k".to_owned()],
         runs: table.text("run").texts.len() as u64,
-        counts: of.counts,
+        counts: report.findings.counts,
         modes: Vec::new(),
         cascades: Vec::new(),
+        collisions: collisions(table),
         properties: vec![report],
         level: 0.05,
     }

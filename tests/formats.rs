@@ -67,7 +67,7 @@ fn allure_files(runs: &[RunDetail]) -> BTreeMap<String, Vec<u8>> {
             bytes: b"why".to_vec(),
         };
         let attachments = [why(about, "explanation"), why(None, "notes")];
-        for (name, bytes) in allure_results(run, repetitions.number(run), &attachments) {
+        for (name, bytes) in allure_results(run, repetitions.number(run), &attachments, &BTreeMap::new()) {
             assert!(files.insert(name.clone(), bytes).is_none(), "{name} is there twice");
         }
     }

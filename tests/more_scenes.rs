@@ -9,7 +9,7 @@ use actcheck::config::Overrides;
 use actcheck::data::Choices;
 use actcheck::report::scene_rule;
 
-use crate::support::planted::{kind, range};
+use crate::support::planted::{arc, kind, range};
 use crate::support::{actcheck, project, stderr};
 
 const CONTEXT: RunContext = RunContext { clock: Clock { now: String::new, secs: || 0.0 }, disturb: None };
@@ -65,6 +65,10 @@ fn conditions(column: &Column, row: &BTreeMap<String, String>) -> [Condition; 2]
     let value = &row[column.name];
     assert!(!value.is_empty(), "the scene has no {}: use another scene", column.name);
     match column.kind {
+        _ if column.wraps => {
+            let value: f64 = value.parse().unwrap();
+            [arc(0, value - SETTLED, value - 2.0 * SETTLED), arc(0, value + SETTLED, value - SETTLED)]
+        }
         ColumnKind::Text => [kind(0, value.rsplit(['#', '/']).next().unwrap()), kind(0, "nothing")],
         _ => {
             let value: f64 = value.parse().unwrap();
@@ -104,6 +108,7 @@ fn rules_have_every_parameter_of_the_tables() {
         held.push(match holds {
             Condition::Kind { kind: name, .. } => kind(idx, &name),
             Condition::Range { low, high, .. } => range(idx, low, high),
+            Condition::Arc { from, to, .. } => arc(idx, from, to),
         });
         parameters.push(parameter(column.name));
     }

@@ -17,6 +17,10 @@ fn same(found: &Condition, planted: &Condition) -> bool {
             Condition::Range { parameter: a, low: low_a, high: high_a },
             Condition::Range { parameter: b, low: low_b, high: high_b },
         ) => a == b && near(*low_a, *low_b) && near(*high_a, *high_b),
+        (
+            Condition::Arc { parameter: a, from: from_a, to: to_a },
+            Condition::Arc { parameter: b, from: from_b, to: to_b },
+        ) => a == b && near(Some(*from_a), Some(*from_b)) && near(Some(*to_a), Some(*to_b)),
         _ => found == planted,
     }
 }

@@ -67,6 +67,22 @@ fn tables_agree_with_the_history(here: &Path) {
     let (ahead, left) = (number("target_ahead_m"), number("target_left_m"));
     assert!((ahead.hypot(left) - number("robot_distance_m")).abs() < 1e-9);
     assert!(number("others") >= 1.0 && number("neighbour_distance_m") > 0.0);
+    // The base does not drift: without the error of localisation, the perceived error is the drawn one. (Objects settle
+    // by less than a millimetre.)
+    for row in rows.iter().filter(|row| !row["target_perceived_off_m"].is_empty()) {
+        let [drawn, perceived] =
+            ["sense_target_xy_m", "target_perceived_off_m"].map(|name| row[name].parse::<f64>().unwrap());
+        assert!((drawn - perceived).abs() < 1e-3, "{}: {drawn} {perceived}", row["run"]);
+    }
+    assert!(rows.iter().any(|row| !row["target_perceived_off_m"].is_empty() && !row["last_phase"].is_empty()));
+    let around: Value = serde_json::from_str(&rows[0]["surroundings"]).unwrap();
+    assert_eq!(
+        around.as_array().unwrap().iter().filter(|thing| thing["role"] == "other").count(),
+        number("others") as usize
+    );
+    let roles: Vec<&str> =
+        schema["columns"].as_array().unwrap().iter().map(|it| it["role"].as_str().unwrap()).collect();
+    assert!(["record", "scene", "noise", "effect"].iter().all(|role| roles.contains(role)), "{roles:?}");
     let outcomes = |property: &str| rows.iter().filter(|row| row["property"].ends_with(property)).count();
     assert_eq!(outcomes("#MovedObject"), 6);
 }
@@ -126,7 +142,7 @@ fn findings_are_reported(here: &Path) {
     assert!(patterns.starts_with("action,property,conditions,sentence,runs,failed,"), "{patterns}");
     for (arguments, printed) in [
         (vec!["analyse", "--property", "MovdObject"], "did you mean `MovedObject`?"),
-        (vec!["analyse", "--by", "friction"], "scenes have no parameter `friction`"),
+        (vec!["analyse", "--by", "friction"], "runs have no parameter `friction`"),
         (vec!["analyse", "--campaign", "nope"], "H014"),
         (vec!["analyse", "--since", "2999-01-01"], "X044"),
         (vec!["analyse", "--since", "yesterday"], "a day (2026-11-21)"),

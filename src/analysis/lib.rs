@@ -6,6 +6,7 @@ mod compare;
 mod consistency;
 mod coverage;
 mod dataset;
+mod effects;
 mod failure_modes;
 mod false_discovery;
 mod findings;
@@ -15,6 +16,7 @@ mod holm;
 mod oracles;
 mod paired;
 mod patterns;
+mod runs_needed;
 mod score_interval;
 mod tables;
 
@@ -22,23 +24,28 @@ pub use compare::{Compared, ComparedLine, ComparedRun, Comparison, compare, comp
 pub use consistency::{Consistency, PassPower, Repeated, SceneCounts, SceneRuns, Variance, consistency};
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
 pub use dataset::{Dataset, DatasetRuns, export_dataset, export_facts};
+pub use effects::{
+    ActionEffects, FirstContact, LargestForce, PerceptionError, RealisedNoise, Surrounding, TableRun,
+    perceived_sentences,
+};
 pub use failure_modes::{FailureMode, failure_modes};
 pub use false_discovery::benjamini_hochberg;
 pub use findings::{
-    Cascade, ChangePoint, Example, FINDING_COLUMNS, FlakyScene, Judged, JudgedProperty, PropertyFindings, Quantiles,
-    Trend, TrendPoint, TwoWay, TwoWayCell, cascades, flaky_scenes, judged, property_findings, quantiles,
-    table_failure_modes, trend, two_way,
+    Cascade, ChangePoint, Collisions, Example, FINDING_COLUMNS, FlakyScene, HitKind, Judged, JudgedProperty, Mined,
+    PlacedThing, PropertyFindings, Quantiles, Sector, Trend, TrendPoint, TwoWay, TwoWayCell, cascades, collisions,
+    finding_columns, flaky_scenes, judged, property_findings, quantiles, table_failure_modes, trend, two_way,
 };
 pub use fisher::{FisherTest, TwoByTwo};
 pub use health::{Health, HealthMeter, HealthProblem};
 pub use holm::holm;
 pub use oracles::{LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix};
 pub use paired::{Difference, PairedTable, PairedTest};
-pub use patterns::{Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Values, mine};
+pub use patterns::{Condition, Parameter, Pattern, PatternInput, PatternOptions, Patterns, Strongest, Values, mine};
+pub use runs_needed::{POWER, TwoRates};
 pub use score_interval::score_interval;
 pub use tables::{
-    Column, ColumnKind, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter, TextColumn, columns, export_csv,
-    export_parquet,
+    Column, ColumnKind, ColumnRole, Hierarchy, Mirror, MirrorChange, OutcomeTable, TableFilter, TextColumn, columns,
+    export_csv, export_parquet,
 };
 
 // Re-exported for readers of tables.

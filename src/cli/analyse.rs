@@ -10,15 +10,15 @@ use crate::output;
 use crate::picture::Picture;
 use crate::work::all_cores;
 use actcheck_analysis::{
-    FINDING_COLUMNS, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns,
-    flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
+    Column, Hierarchy, JudgedProperty, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, collisions,
+    columns, finding_columns, flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_history::History;
 use actcheck_ontology::Ontology;
 use actcheck_report::{
-    FindingsSummary, PropertyReport, findings_json, findings_table, findings_text, maps_table, patterns_picture,
-    scene_rule,
+    FindingsSummary, PropertyReport, collisions_picture, findings_json, findings_table, findings_text, maps_table,
+    patterns_picture, scene_rule,
 };
 use actcheck_verdict::Counts;
 
@@ -40,6 +40,9 @@ pub struct AnalyseArgs {
     /// Draw the patterns into this file, as a raster (.png) or vector image (.svg)
     #[arg(long, value_name = "FILE.png", conflicts_with = "by")]
     pub picture: Option<PathBuf>,
+    /// Draw collisions from above into this file: the things that were hit, around the target or goal
+    #[arg(long, value_name = "FILE.png", conflicts_with = "by")]
+    pub collisions: Option<PathBuf>,
     /// Print the N-th pattern of the requested property as a rule: if `[scene] require` in a configuration names the
     /// file, every scene matches the pattern
     #[arg(long, value_name = "N", requires = "property", conflicts_with = "by")]
@@ -72,6 +75,7 @@ pub(super) struct Analysed {
 pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     check_parameters(&args.by)?;
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
+    let top_view = args.collisions.as_deref().map(Picture::new).transpose()?;
     let history = args.chosen.open()?;
     let asked = Question {
         chosen: &args.chosen,
@@ -87,6 +91,12 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         picture.write(&patterns_picture(&summary).ok_or_else(|| {
             Diagnostic::error("X013", "there is no pattern to draw".to_owned())
                 .help("no pattern was confirmed on the held-out runs; more runs may show one")
+        })?)?;
+    }
+    if let Some(top_view) = top_view {
+        top_view.write(&collisions_picture(&summary).ok_or_else(|| {
+            Diagnostic::error("X013", "there is no collision to draw".to_owned())
+                .help("the robot touched nothing that it was not to touch, or the runs have no traces")
         })?)?;
     }
     if let Some(number) = args.scene_rule {
@@ -155,6 +165,7 @@ pub(super) fn analysed(
         }),
         modes: table_failure_modes(&table),
         cascades: cascades(&table, asked.level),
+        collisions: collisions(&table),
         properties,
         level: asked.level,
     };
@@ -177,8 +188,7 @@ fn reports(
 }
 
 fn read(mirror: &Mirror, filter: &TableFilter, further: &[&'static str]) -> Result<OutcomeTable, Diagnostics> {
-    let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
-    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).chain(further.iter().copied()).collect();
+    let names: Vec<&str> = finding_columns().into_iter().chain(further.iter().copied()).collect();
     OutcomeTable::read(mirror, filter, &names)
 }
 
@@ -194,13 +204,20 @@ fn report(
     let findings = property_findings(table, of, hierarchy, &options);
     let (flaky, repeated_scenes) = flaky_scenes(table, of);
     let by: Vec<&str> = asked.by.iter().map(String::as_str).collect();
-    let maps: Vec<&[&str]> = match (by.is_empty(), asked.usual_maps) {
+    let wanted: Vec<&[&str]> = match (by.is_empty(), asked.usual_maps) {
         (false, _) => vec![&by],
         (true, false) => Vec::new(),
         (true, true) => USUAL_MAPS.iter().map(<[&str; 2]>::as_slice).collect(),
     };
+    let maps = match wanted.is_empty() {
+        true => Vec::new(),
+        false => {
+            let all = findings.everything();
+            wanted.into_iter().filter_map(|by| two_way(&all, by)).collect()
+        }
+    };
     PropertyReport {
-        maps: maps.into_iter().filter_map(|by| two_way(&findings.input, by)).collect(),
+        maps,
         unit: ontology.properties.get(&of.property).and_then(|property| property.unit.clone()),
         trend: trend(table, of, asked.level),
         flaky,
@@ -236,11 +253,12 @@ fn rule(summary: &FindingsSummary, number: usize) -> Result<String, Diagnostics>
 }
 
 fn check_parameters(by: &[String]) -> Result<(), Diagnostics> {
-    let known: Vec<&str> = columns().iter().filter(|column| column.parameter).map(|column| column.name).collect();
+    let mined = |column: &&Column| column.is_condition() || column.is_effect();
+    let known: Vec<&str> = columns().iter().filter(mined).map(|column| column.name).collect();
     let mut faults = Diagnostics::new();
     for name in by.iter().filter(|name| !known.contains(&name.as_str())) {
         faults.push(
-            Diagnostic::error("X046", format!("scenes have no parameter `{name}`"))
+            Diagnostic::error("X046", format!("runs have no parameter `{name}`"))
                 .help(did_you_mean(name, known.iter().copied())),
         );
     }

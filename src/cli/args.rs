@@ -72,17 +72,23 @@ pub enum Command {
         after_help = "Examples:\n  actcheck report --html report.html    (after `actcheck run configs/pick.toml`)\n  actcheck report --html picks.html --campaign k7f3 --property ObjectInGripper\n  actcheck report --rrd runs.rrd    (built with `--features rerun`; `rerun runs.rrd` shows it)\n  actcheck report --allure allure-results --junit junit.xml --markdown"
     )]
     Report(crate::report::ReportArgs),
-    /// Find scene conditions, and combinations of them, that go with failures more often than by chance
+    /// Find when and how actions fail: conditions and effects that go with failures more often than by chance
     ///
-    /// For each property: patterns of up to three conditions (object categories at any level of the ontology's
-    /// hierarchy, ranges with bounds found in the runs), merged into the simplest ones, corrected for multiple testing,
-    /// and confirmed on a held-out third of the runs; the distribution of margins; changes from campaign to campaign;
-    /// flaky scenes. For all properties together: failure modes, and which failure leads to which later one. Only
-    /// passed and failed outcomes count; the others are reported separately.
+    /// For each property, two lists of patterns. When it fails: up to three conditions before the action, of the scene
+    /// and of the errors drawn (object categories at any level of the ontology's hierarchy, ranges with bounds found in
+    /// the runs; directions wrap). How it fails: up to two effects during the action, such as the perceived position
+    /// of the target against the true one, the first contact, a blocked base, the phase reached. Patterns are merged into
+    /// the simplest ones, corrected for multiple testing, and confirmed on a held-out third of the runs. If none is
+    /// confirmed, the strongest conditions are listed with the number of runs that would decide. Then the distribution of
+    /// margins; changes from campaign to campaign; flaky scenes.
+    ///
+    /// For all properties together: failure modes, which failure leads to which later one, and collisions: the
+    /// things that were hit, how often, how hard, and where they were around the target or goal. Only passed and failed outcomes count; the others
+    /// are reported separately.
     ///
     /// Reads the tables beside the history, and updates them first.
     #[command(
-        after_help = "Examples:\n  actcheck analyse    (after `actcheck run configs/pick.toml --runs 300`)\n  actcheck analyse --property ObjectInGripper --by target_category,target_turned_rad\n  actcheck analyse --picture patterns.png"
+        after_help = "Examples:\n  actcheck analyse    (after `actcheck run configs/pick.toml --runs 300`)\n  actcheck analyse --property ObjectInGripper --by target_category,target_turned_rad\n  actcheck analyse --picture patterns.png\n  actcheck analyse --collisions collisions.svg"
     )]
     Analyse(crate::analyse::AnalyseArgs),
     /// Compare two campaigns on the same scenes: which properties hold more or less often, and in which scenes outcomes

@@ -30,9 +30,13 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
     })?;
     let Some(summary) = summary else { return Ok(2) };
     let run = history.run(&summary.run)?;
+    let perceived = show::perceived(&history, &run);
     match args.format {
-        Format::Text => output::print(&format!("{}\n{}", run_text(&run), case_text(&summary))),
-        Format::Json => output::print(&format!("{:#}\n", json!({"case": case_json(&summary), "run": run_json(&run)}))),
+        Format::Text => output::print(&format!("{}\n{}", run_text(&run, &perceived), case_text(&summary))),
+        Format::Json => {
+            let both = json!({"case": case_json(&summary), "run": run_json(&run, &perceived)});
+            output::print(&format!("{both:#}\n"));
+        }
         Format::Csv => {
             output::print(&show::outcomes(&run).render(Format::Csv.into()));
             eprint!("{}", case_text(&summary));

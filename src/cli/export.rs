@@ -29,8 +29,8 @@ pub struct ExportArgs {
     /// Take everything but the choices from this configuration instead of the one in the history
     #[arg(long, value_name = "FILE", requires = "run")]
     pub config: Option<PathBuf>,
-    /// Write the table of outcomes, one row for each run, action and property with the scene's parameters, into this
-    /// folder: `outcomes.parquet`, and `schema.json`, which describes the columns
+    /// Write the table of outcomes, one row for each run, action and property with the scene's parameters, the errors
+    /// drawn and the effects, into this folder: `outcomes.parquet`, and `schema.json`, which describes the columns
     #[arg(long, value_name = "DIR")]
     pub parquet: Option<PathBuf>,
     /// Write the same table as CSV: `outcomes.csv` and `schema.json`

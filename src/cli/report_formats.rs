@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::report::ReportArgs;
-use crate::{chosen, output, output_file, replayed_runs};
+use crate::{chosen, output, output_file, replayed_runs, show};
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_history::{CampaignRow, History, RunDetail, RunFilter, RunRow};
 use actcheck_report::{
@@ -192,7 +192,7 @@ impl<'a> AllureFolder<'a> {
         let number = self.repetitions.number(run);
         self.results += run.actions.iter().map(|action| action.judgements.len()).sum::<usize>();
         let attachments = self.attachments(run);
-        self.write(&allure_results(run, number, &attachments))
+        self.write(&allure_results(run, number, &attachments, &show::perceived(self.history, run)))
     }
 
     /// Explanations of failures, and a picture unless everything passed.

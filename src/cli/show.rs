@@ -1,5 +1,6 @@
 //! `actcheck show`
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -7,8 +8,9 @@ use clap::Args;
 use crate::options::{Format, HistoryArgs};
 use crate::picture::Picture;
 use crate::{history_dir, output};
+use actcheck_analysis::perceived_sentences;
 use actcheck_base::Diagnostics;
-use actcheck_history::RunDetail;
+use actcheck_history::{History, RunDetail};
 use actcheck_report::{Table, run_json, run_text};
 
 /// `actcheck show`
@@ -33,14 +35,20 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     let history = history_dir::open_to_read(&args.history)?;
     let run = history.run(&args.run)?;
     output::print(&match args.format {
-        Format::Text => run_text(&run),
-        Format::Json => format!("{:#}\n", run_json(&run)),
+        Format::Text => run_text(&run, &perceived(&history, &run)),
+        Format::Json => format!("{:#}\n", run_json(&run, &perceived(&history, &run))),
         Format::Csv => outcomes(&run).render(Format::Csv.into()),
     });
     match picture {
         Some(picture) => picture.draw(&history, &run),
         None => Ok(()),
     }
+}
+
+/// Sentences about the perceived targets of a run's actions that failed, by their positions. Empty if its trace can't be
+/// read.
+pub(super) fn perceived(history: &History, run: &RunDetail) -> BTreeMap<u32, String> {
+    history.states(&run.row.run).map(|trace| perceived_sentences(run, &trace)).unwrap_or_default()
 }
 
 /// One row for each property of each action of a run.

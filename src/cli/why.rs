@@ -7,8 +7,8 @@ use std::sync::atomic::AtomicBool;
 use clap::Args;
 
 use crate::options::{HistoryArgs, ProofFormat};
-use crate::{explanations, history_dir, output};
-use actcheck_base::{Diagnostic, Diagnostics, Files, did_you_mean, names};
+use crate::{explanations, history_dir, output, show};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Judgement, Outcome, did_you_mean, names};
 use actcheck_history::{ActionDetail, RunDetail};
 use actcheck_ontology as ontology;
 use actcheck_report::{Table, TableFormat};
@@ -40,11 +40,12 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let facts = history.facts(&run.row.run)?;
     let (files, path) = ontology_file(args.ontology.as_deref());
     let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget)?;
+    let perceived = show::perceived(&history, &run);
     let mut told = 0;
     let mut table = Table::new(["run", "step", "action", "property", "holds", "margin", "explanation"]);
     for (step, action) in run.actions.iter().enumerate() {
         let Some(seen) = facts.action(step) else { continue };
-        for property in asked(action, args.property.as_deref()) {
+        for property in asked(action, args) {
             let title = format!("{} {}, {}", run.row.run, names::local(&action.action), names::local(&property));
             let explained = rules.explain(&seen, &property, &budget);
             let explained = explained.map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
@@ -56,6 +57,13 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
                 ProofFormat::Dot => output::print(&format!("{}\n", explained.to_dot())),
             }
             told += 1;
+        }
+        let failed = |judgement: &Judgement| judgement.outcome == Outcome::Failed && is_asked(judgement, args);
+        if let Some(sentence) = perceived.get(&action.step)
+            && args.format == ProofFormat::Text
+            && action.judgements.iter().any(failed)
+        {
+            output::print(&format!("{} {}: {sentence}\n", run.row.run, names::local(&action.action)));
         }
     }
     if args.format == ProofFormat::Csv && told > 0 {
@@ -75,9 +83,14 @@ pub(super) fn ontology_file(named: Option<&Path>) -> (Files, PathBuf) {
 }
 
 /// The requested properties of an action: the named one, or all that were judged.
-fn asked(action: &ActionDetail, named: Option<&str>) -> Vec<String> {
-    let all = action.judgements.iter().map(|judgement| judgement.property.clone());
-    all.filter(|iri| named.is_none_or(|named| names::local(iri) == named || iri == named)).collect()
+fn asked(action: &ActionDetail, args: &WhyArgs) -> Vec<String> {
+    let all = action.judgements.iter().filter(|judgement| is_asked(judgement, args));
+    all.map(|judgement| judgement.property.clone()).collect()
+}
+
+fn is_asked(judgement: &Judgement, args: &WhyArgs) -> bool {
+    let iri = &judgement.property;
+    args.property.as_ref().is_none_or(|named| names::local(iri) == named || iri == named)
 }
 
 fn nothing_to_tell(run: &RunDetail, named: Option<&str>) -> Diagnostic {

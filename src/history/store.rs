@@ -305,6 +305,15 @@ impl History {
         Ok(self.decoded(&id, trace_file::decode_states)?.0)
     }
 
+    /// Returns every choice of a run, named as in [`History::resolve`], and its trace as in [`History::states`].
+    ///
+    /// # Errors
+    /// As [`History::trace`].
+    pub fn recorded(&self, name: &str) -> Result<(Vec<Choice>, Trace), Diagnostics> {
+        let id = self.resolve(name)?;
+        self.decoded(&id, trace_file::decode_states)
+    }
+
     /// Calls `each` with the health data of every run of a campaign, in the order of their indices.
     ///
     /// # Errors

@@ -25,14 +25,14 @@ pub use json::{
     campaign_json, case_json, compare_json, findings_json, health_json, oracles_json, recheck_json, run_json,
     shrunk_json,
 };
-pub use picture::{Caption, Drawing, patterns_picture, run_picture};
+pub use picture::{Caption, Drawing, collisions_picture, patterns_picture, run_picture};
 #[cfg(feature = "rerun")]
 pub use recording::{RecordingFault, Recordings};
 pub use summary::{
-    ActionSummary, CampaignSummary, CaseSummary, ChangeReason, CompareSummary, ComparedSide, EndedBy, FindingsSummary,
-    GuidedSearch, HealthSummary, Oddity, OracleSummary, PropertyLine, PropertyReport, Proportion, RecheckChange,
-    RecheckLine, RecheckSummary, Remark, RepeatedProperty, RunSummary, ShrunkChoice, ShrunkSummary, SideChange,
-    WeightedLine,
+    ActionSummary, CampaignSummary, CaseSummary, Causes, ChangeReason, CompareSummary, ComparedSide, EndedBy,
+    FindingsSummary, GuidedSearch, HealthSummary, Oddity, OracleSummary, PropertyLine, PropertyReport, Proportion,
+    RecheckChange, RecheckLine, RecheckSummary, Remark, RepeatedProperty, RunSummary, ShrunkChoice, ShrunkSummary,
+    SideChange, WeightedLine,
 };
 pub use table::{
     Table, TableFormat, answer_table, campaign_table, compare_table, findings_table, health_table, maps_table,

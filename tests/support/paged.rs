@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use actcheck::analysis::{
-    FINDING_COLUMNS, Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, cascades, columns, flaky_scenes,
-    judged, property_findings, table_failure_modes, trend, two_way,
+    Hierarchy, Mirror, OutcomeTable, PatternOptions, TableFilter, TableRun, cascades, collisions, finding_columns,
+    flaky_scenes, judged, property_findings, table_failure_modes, trend, two_way,
 };
-use actcheck::history::RunDetail;
 use actcheck::report::{FindingsSummary, HTML_COLUMNS, HtmlReport, PropertyReport, PropertyWords, Replays, html};
 use actcheck::verdict::Counts;
 
@@ -44,20 +43,20 @@ pub fn findings(table: &OutcomeTable, history: &str) -> FindingsSummary {
         }),
         modes: table_failure_modes(table),
         cascades: cascades(table, LEVEL),
+        collisions: collisions(table),
         properties: all.iter().map(property).collect(),
         level: LEVEL,
     }
 }
 
 /// Writes runs as a mirror into a folder.
-pub fn mirror(folder: &Path, campaign: &str, runs: impl IntoIterator<Item = RunDetail>) -> Mirror {
+pub fn mirror(folder: &Path, campaign: &str, runs: impl IntoIterator<Item = impl Into<TableRun>>) -> Mirror {
     Mirror::of_runs(folder, campaign, runs).unwrap()
 }
 
 /// The page of a mirror.
 pub fn page(mirror: &Mirror, history: &str, words: &BTreeMap<String, PropertyWords>, replays: &Replays) -> String {
-    let parameters = columns().iter().filter(|column| column.parameter).map(|column| column.name);
-    let names: Vec<&str> = FINDING_COLUMNS.into_iter().chain(parameters).chain(HTML_COLUMNS).collect();
+    let names: Vec<&str> = finding_columns().into_iter().chain(HTML_COLUMNS).collect();
     let table = OutcomeTable::read(mirror, &TableFilter::default(), &names).unwrap();
     html(&HtmlReport {
         version: "0.1.0",

@@ -132,7 +132,9 @@ fn kinds(
 }
 
 fn numbers(name: &str, unit: Option<String>, numbers: Vec<f64>) -> Parameter {
-    Parameter { name: name.to_owned(), unit, values: Values::Numbers(numbers) }
+    let wraps = name.ends_with("_yaw_rad");
+    let values = if wraps { Values::Angles(numbers) } else { Values::Numbers(numbers) };
+    Parameter { name: name.to_owned(), unit, values }
 }
 
 pub fn kind(parameter: usize, kind: &str) -> Condition {
@@ -143,17 +145,23 @@ pub fn range(parameter: usize, low: Option<f64>, high: Option<f64>) -> Condition
     Condition::Range { parameter, low, high }
 }
 
+pub fn arc(parameter: usize, from: f64, to: f64) -> Condition {
+    Condition::Arc { parameter, from, to }
+}
+
 /// The planted patterns, by name: each alone, and all at once.
 pub fn plantings() -> Vec<(&'static str, Vec<Vec<Condition>>)> {
     let single = vec![kind(SURFACE, "shelf")];
     let conjunction = vec![kind(CATEGORY, "Bottle"), range(FRICTION, None, Some(0.35))];
     let band = vec![range(YAW, Some(0.5), Some(1.2))];
+    let turned_away = vec![arc(YAW, 2.5, -2.5)];
     let higher = vec![kind(CATEGORY, "Cup")];
     let three = vec![kind(CATEGORY, "Tableware"), range(OTHERS, Some(4.0), None), range(X, None, Some(-0.1))];
     vec![
         ("single", vec![single.clone()]),
         ("conjunction", vec![conjunction.clone()]),
         ("band", vec![band.clone()]),
+        ("arc", vec![turned_away]),
         ("higher kind", vec![higher.clone()]),
         ("three conditions", vec![three.clone()]),
         ("all at once", vec![single, conjunction, band, higher, three]),

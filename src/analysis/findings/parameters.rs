@@ -1,21 +1,34 @@
-//! Scene parameters of selected rows of a table.
+//! Conditions and effects of selected rows of a table.
 
 use std::collections::BTreeMap;
 
-use crate::{ColumnKind, Hierarchy, OutcomeTable, Parameter, TextColumn, Values, columns};
+use crate::{Column, ColumnKind, Hierarchy, OutcomeTable, Parameter, TextColumn, Values, columns};
 use actcheck_base::names;
 
-/// Returns every scene parameter of the selected rows, and every designator that has exactly one value in each row.
-pub(super) fn parameters(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarchy) -> Vec<Parameter> {
-    let mut found: Vec<Parameter> = Vec::new();
-    for column in columns().iter().filter(|column| column.parameter) {
-        let values = match column.kind {
-            ColumnKind::Text => kinds(table.text(column.name), rows, hierarchy),
-            _ => numbers(table.number(column.name), rows),
-        };
-        let unit = (!column.unit.is_empty() && column.unit != "1").then(|| column.unit.to_owned());
-        found.push(Parameter { name: column.name.to_owned(), unit, values });
-    }
+/// Returns the effects of the selected rows.
+pub(super) fn effects(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarchy) -> Vec<Parameter> {
+    columns()
+        .iter()
+        .filter(|column| column.is_effect())
+        .map(|column| parameter(column, table, rows, hierarchy))
+        .collect()
+}
+
+fn parameter(column: &Column, table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarchy) -> Parameter {
+    let values = match column.kind {
+        ColumnKind::Text => kinds(table.text(column.name), rows, hierarchy),
+        _ if column.wraps => Values::Angles(numbers(table.number(column.name), rows)),
+        _ => Values::Numbers(numbers(table.number(column.name), rows)),
+    };
+    let unit = (!column.unit.is_empty() && column.unit != "1").then(|| column.unit.to_owned());
+    Parameter { name: column.name.to_owned(), unit, values }
+}
+
+/// Returns every condition of the selected rows: the parameters of the scene, realised noise, and every designator that
+/// has exactly one value in each row.
+pub(super) fn conditions(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarchy) -> Vec<Parameter> {
+    let columns = columns().iter().filter(|column| column.is_condition());
+    let mut found: Vec<Parameter> = columns.map(|column| parameter(column, table, rows, hierarchy)).collect();
     for (name, column) in designators(table.text("designators"), rows) {
         let values = kinds(&column, &(0..rows.len() as u32).collect::<Vec<u32>>(), hierarchy);
         found.push(Parameter { name, unit: None, values });
@@ -23,8 +36,8 @@ pub(super) fn parameters(table: &OutcomeTable, rows: &[u32], hierarchy: &Hierarc
     found
 }
 
-fn numbers(column: &[f64], rows: &[u32]) -> Values {
-    Values::Numbers(rows.iter().map(|row| column.get(*row as usize).copied().unwrap_or(f64::NAN)).collect())
+fn numbers(column: &[f64], rows: &[u32]) -> Vec<f64> {
+    rows.iter().map(|row| column.get(*row as usize).copied().unwrap_or(f64::NAN)).collect()
 }
 
 /// Returns kinds in the order of first occurrence. IRIs become local names, with their superclasses.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::findings::judged::{JudgedProperty, failed, outcomes};
 use crate::findings::margins::{Quantiles, quantiles};
-use crate::findings::parameters::parameters;
+use crate::findings::parameters::{conditions, effects};
 use crate::findings::scenes::Scenes;
 use crate::{Hierarchy, Interval, OutcomeTable, PatternInput, PatternOptions, Patterns, mine, wilson};
 use actcheck_base::{Outcome, digest_of};
@@ -12,6 +12,9 @@ use actcheck_verdict::Counts;
 
 /// One of this many runs is held out to confirm the patterns of the others.
 const HELD_OUT_EVERY: u64 = 3;
+
+/// Maximum number of effects that a pattern combines.
+const MOST_EFFECTS: usize = 2;
 
 /// Findings from a property's outcomes.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,7 +29,7 @@ pub struct PropertyFindings {
     pub failing: Option<Interval>,
     /// Margins of its decided outcomes.
     pub margins: Option<Quantiles>,
-    /// Decided runs from which patterns were mined.
+    /// Decided runs from which patterns were mined, with the conditions of their scenes and their realised noise.
     pub input: PatternInput,
     /// IDs and rows of these runs.
     pub examples: Vec<Example>,
@@ -36,7 +39,27 @@ pub struct PropertyFindings {
     pub repeated: u64,
     /// Number of used runs whose scene a search chose.
     pub weighted_runs: u64,
-    /// Patterns of its failures.
+    /// Patterns of its failures: when it fails.
+    pub patterns: Patterns,
+    /// Effects, with the patterns of its failures: how it fails.
+    pub effects: Mined,
+}
+
+impl PropertyFindings {
+    /// Returns the runs with both conditions and effects.
+    pub fn everything(&self) -> PatternInput {
+        let mut all = self.input.clone();
+        all.parameters.extend(self.effects.input.parameters.iter().cloned());
+        all
+    }
+}
+
+/// Runs and the patterns that were mined from them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mined {
+    /// The decided runs.
+    pub input: PatternInput,
+    /// Patterns of their failures.
     pub patterns: Patterns,
 }
 
@@ -68,8 +91,11 @@ pub fn property_findings(
     let input = PatternInput {
         failed: rows.iter().map(|row| failed(outcomes[*row as usize]) == Some(true)).collect(),
         held_out: rows.iter().map(|row| is_held_out(table, *row as usize)).collect(),
-        parameters: parameters(table, &rows, hierarchy),
+        parameters: conditions(table, &rows, hierarchy),
     };
+    let happened = PatternInput { parameters: effects(table, &rows, hierarchy), ..input.clone() };
+    // Effects often imply each other: combinations of three would say little more.
+    let simple = PatternOptions { most_conditions: options.most_conditions.min(MOST_EFFECTS), ..*options };
     let run = table.text("run");
     let margin = table.number("margin");
     PropertyFindings {
@@ -94,12 +120,13 @@ pub fn property_findings(
             .filter(|row| weight.get(**row as usize).is_some_and(|weight| !weight.is_nan()))
             .count() as u64,
         patterns: mine(&input, options),
+        effects: Mined { patterns: mine(&happened, &simple), input: happened },
         input,
     }
 }
 
 /// Drops rows for which a later row has the same step and a bit-identical run.
-fn newest_of_alike(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
+pub(super) fn newest_of_alike(table: &OutcomeTable, rows: &[u32]) -> Vec<u32> {
     let (hash, step) = (table.text("trace_hash"), table.number("step"));
     let mut seen = BTreeSet::new();
     let mut kept: Vec<u32> = rows

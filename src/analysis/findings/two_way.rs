@@ -64,7 +64,7 @@ fn labelled(parameter: &Parameter) -> (Vec<String>, Vec<Option<usize>>) {
             let labels = order.iter().map(|place| names[*place].clone()).collect();
             (labels, of_run.iter().map(|of| of.map(|of| rank[of as usize])).collect())
         }
-        Values::Numbers(numbers) => {
+        Values::Numbers(numbers) | Values::Angles(numbers) => {
             let bounds = bounds(numbers);
             let labels = bounds.windows(2).map(|pair| format!("{} – {}", pair[0], pair[1])).collect();
             let last = bounds.len().saturating_sub(2);

@@ -7,14 +7,14 @@ use crate::patterns::likelihood::{Count, Likelihood, one};
 /// Summing the boxes of three parameters costs as much as counting this many runs. (Measured with eight cells each.)
 const BOXES_IN_RUNS: u64 = 50_000;
 
-/// The best box, and the extent of the search.
+/// The best box with up to some number of conditions, and the extent of the search.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Best {
     /// Conditions on different parameters. Empty if no box scores above 0.
     pub conditions: Vec<Condition>,
     /// Score of the box.
     pub score: f64,
-    /// Number of boxes tried.
+    /// Number of boxes tried with exactly that number of conditions.
     pub tried: u64,
     /// Number of parameters whose triples were combined.
     pub combined: usize,
@@ -42,19 +42,21 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// Returns the box with the highest score and at most `most_conditions` conditions (at most three). Ties go to
-    /// fewer conditions, then to earlier parameters.
+    /// Returns the boxes with the highest scores and at most one, two, … `most_conditions` conditions (at most three).
+    /// Ties go to fewer conditions, then to earlier parameters.
     ///
     /// Every box is tried, except those whose upper bound does not exceed the best score. If all triples of parameters
     /// would take more than `work` steps, only the parameters of the best pairs are combined, as many as `work` allows.
-    pub fn best(&self, most_conditions: usize, work: u64) -> Best {
+    pub fn best(&self, most_conditions: usize, work: u64) -> Vec<Best> {
         let mut best = Best::default();
         for axis in 0..self.axes.len() {
             self.lines(axis, &mut best);
         }
+        let mut found = vec![best.clone()];
         if most_conditions < 2 {
-            return best;
+            return found;
         }
+        best.tried = 0;
         let mut promise = vec![0.0f64; self.axes.len()];
         for first in 0..self.axes.len() {
             for second in first + 1..self.axes.len() {
@@ -63,9 +65,11 @@ impl<'a> Runs<'a> {
                 promise[second] = promise[second].max(score);
             }
         }
+        found.push(best.clone());
         if most_conditions < 3 {
-            return best;
+            return found;
         }
+        best.tried = 0;
         let combined = self.promising(&promise, work);
         best.combined = combined.len();
         for (at, first) in combined.iter().enumerate() {
@@ -76,7 +80,8 @@ impl<'a> Runs<'a> {
                 }
             }
         }
-        best
+        found.push(best);
+        found
     }
 
     /// Selects the most promising parameters for triples, in their original order.
@@ -174,7 +179,7 @@ impl Best {
 
 impl Axis {
     /// Returns the highest score and the index of its condition, or (0, 0) if no score exceeds 0.
-    fn highest(&self, row: &[Count], likelihood: &Likelihood) -> (f64, usize) {
+    pub(super) fn highest(&self, row: &[Count], likelihood: &Likelihood) -> (f64, usize) {
         let mut highest = (0.0, 0);
         let mut place = 0;
         let mut look = |count: Count| {
@@ -185,12 +190,18 @@ impl Axis {
             place += 1;
         };
         match &self.conditions {
-            Conditions::Ranges(_) => {
+            Conditions::Ranges(_) | Conditions::Arcs(_) => {
                 for first in 1..self.cells {
                     let mut sum: Count = 0;
                     for count in &row[first..self.cells] {
                         sum = sum.wrapping_add(*count);
                         look(sum);
+                    }
+                }
+                if let Conditions::Arcs(_) = self.conditions {
+                    let all = row[1..self.cells].iter().fold(0, |sum: Count, count| sum.wrapping_add(*count));
+                    for (first, last) in self.gaps() {
+                        look(row[first..=last].iter().fold(all, |sum, count| sum.wrapping_sub(*count)));
                     }
                 }
             }

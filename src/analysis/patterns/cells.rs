@@ -24,6 +24,9 @@ pub(super) struct Axis {
 pub(super) enum Conditions {
     /// All ranges of adjacent cells, given by the cuts between cells 1, 2, ….
     Ranges(Vec<Cut>),
+    /// All ranges of adjacent cells of directions, where the last cell is adjacent to cell 1: first those of
+    /// [`Conditions::Ranges`], then those that contain the last cell and cell 1. Given by the cuts.
+    Arcs(Vec<Cut>),
     /// Kinds with their cells.
     Kinds(Vec<(String, Vec<usize>)>),
 }
@@ -41,9 +44,22 @@ impl Axis {
     /// Number of conditions.
     pub fn len(&self) -> usize {
         match &self.conditions {
-            Conditions::Ranges(_) => (self.cells - 1) * self.cells / 2,
+            Conditions::Ranges(_) => self.ranges(),
+            Conditions::Arcs(_) => self.ranges() + self.gaps().count(),
             Conditions::Kinds(kinds) => kinds.len(),
         }
+    }
+
+    /// Number of ranges of adjacent cells.
+    fn ranges(&self) -> usize {
+        (self.cells - 1) * self.cells / 2
+    }
+
+    /// Iterates over the ranges of cells that an arc with the last cell and cell 1 leaves out: the first and the last cell
+    /// of each.
+    pub(super) fn gaps(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let last = self.cells - 1;
+        (2..last).flat_map(move |first| (first..last).map(move |end| (first, end)))
     }
 
     /// Sums counts over the cells of every condition. The input has one row of counts for each cell, the output one for
@@ -57,11 +73,18 @@ impl Axis {
             sum.iter_mut().zip(row).for_each(|(sum, count)| *sum = sum.wrapping_add(*count));
         };
         match &self.conditions {
-            Conditions::Ranges(_) => {
+            Conditions::Ranges(_) | Conditions::Arcs(_) => {
                 for first in 1..self.cells {
                     sum.fill(0);
                     for last in first..self.cells {
                         add(&mut sum, row(last));
+                        out.extend_from_slice(&sum);
+                    }
+                }
+                if let Conditions::Arcs(_) = self.conditions {
+                    for (first, last) in self.gaps() {
+                        sum.fill(0);
+                        (1..first).chain(last + 1..self.cells).for_each(|cell| add(&mut sum, row(cell)));
                         out.extend_from_slice(&sum);
                     }
                 }
@@ -80,7 +103,12 @@ impl Axis {
     pub fn condition(&self, place: usize) -> Condition {
         match &self.conditions {
             Conditions::Kinds(kinds) => Condition::Kind { parameter: self.parameter, kind: kinds[place].0.clone() },
-            Conditions::Ranges(cuts) => {
+            Conditions::Arcs(cuts) if place >= self.ranges() => {
+                // The gap exists: places are below the number of conditions.
+                let (first, last) = self.gaps().nth(place - self.ranges()).unwrap_or((2, 2));
+                Condition::Arc { parameter: self.parameter, from: cuts[last - 1].bound, to: cuts[first - 2].bound }
+            }
+            Conditions::Ranges(cuts) | Conditions::Arcs(cuts) => {
                 let (first, last) = self.range(place);
                 let bound = |cut: usize| cuts.get(cut).map(|cut| cut.bound);
                 Condition::Range {
@@ -124,14 +152,16 @@ pub(super) fn axes(input: &PatternInput, takes_part: &[bool], cells: usize) -> V
 fn is_same(known: &Values, values: &Values) -> bool {
     match (known, values) {
         (Values::Kinds { of_run: a, .. }, Values::Kinds { of_run: b, .. }) => a == b,
-        (Values::Numbers(a), Values::Numbers(b)) => a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits()),
+        (Values::Numbers(a), Values::Numbers(b)) | (Values::Angles(a), Values::Angles(b)) => {
+            a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+        }
         _ => false,
     }
 }
 
 fn axis(place: usize, parameter: &Parameter, takes_part: &[bool], cells: usize) -> Option<Axis> {
     let axis = match &parameter.values {
-        Values::Numbers(numbers) => {
+        Values::Numbers(numbers) | Values::Angles(numbers) => {
             let cuts = cuts(numbers, takes_part, cells);
             let cell = |value: &f64| {
                 if value.is_nan() { 0 } else { 1 + cuts.partition_point(|cut| cut.at <= *value) as u8 }
@@ -140,7 +170,10 @@ fn axis(place: usize, parameter: &Parameter, takes_part: &[bool], cells: usize) 
                 parameter: place,
                 cells: cuts.len() + 2,
                 of_run: numbers.iter().map(cell).collect(),
-                conditions: Conditions::Ranges(cuts),
+                conditions: match parameter.values {
+                    Values::Angles(_) => Conditions::Arcs(cuts),
+                    _ => Conditions::Ranges(cuts),
+                },
             }
         }
         Values::Kinds { of_run, names, above } => {
@@ -240,5 +273,18 @@ mod tests {
         assert_eq!(axis.condition(3), range(None, None));
         assert_eq!(axis.condition(5), range(Some(0.25), Some(0.75)));
         assert_eq!(axis.condition(9), range(Some(0.75), None));
+    }
+
+    #[test]
+    fn an_arc_contains_both_ends_of_the_range() {
+        let angles: Vec<f64> = (0..80).map(|i| f64::from(i) / 10.0 - 4.0).collect();
+        let parameter = Parameter { name: "yaw".into(), unit: None, values: Values::Angles(angles) };
+        let axis = axis(0, &parameter, &[true; 80], 4).expect("it varies");
+        assert_eq!((axis.cells, axis.len()), (5, 13), "ten ranges and three arcs");
+        let mut out = Vec::new();
+        axis.expand(&[100, 1, 2, 4, 8], 1, &mut out);
+        assert_eq!(out[10..], [13, 9, 11]);
+        let arc = |from, to| Condition::Arc { parameter: 0, from, to };
+        assert_eq!([10, 11, 12].map(|place| axis.condition(place)), [arc(0.0, -2.0), arc(2.0, -2.0), arc(2.0, 0.0)]);
     }
 }

@@ -21,13 +21,22 @@ pub enum Condition {
         /// Exclusive upper end.
         high: Option<f64>,
     },
+    /// A direction is in an arc that contains ±π: it is at least `from`, or less than `to`.
+    Arc {
+        /// Index of the parameter.
+        parameter: usize,
+        /// Inclusive start of the arc. Unit: radians.
+        from: f64,
+        /// Exclusive end of the arc, less than `from`. Unit: radians.
+        to: f64,
+    },
 }
 
 impl Condition {
     /// Index of the parameter.
     pub fn parameter(&self) -> usize {
         match self {
-            Self::Kind { parameter, .. } | Self::Range { parameter, .. } => *parameter,
+            Self::Kind { parameter, .. } | Self::Range { parameter, .. } | Self::Arc { parameter, .. } => *parameter,
         }
     }
 
@@ -35,7 +44,7 @@ impl Condition {
     /// on it.
     pub fn holds(&self, input: &PatternInput) -> Vec<bool> {
         match (self, &input.parameters[self.parameter()].values) {
-            (Self::Range { low, high, .. }, Values::Numbers(numbers)) => numbers
+            (Self::Range { low, high, .. }, Values::Numbers(numbers) | Values::Angles(numbers)) => numbers
                 .iter()
                 .map(|value| {
                     !value.is_nan() && low.is_none_or(|low| *value >= low) && high.is_none_or(|high| *value < high)
@@ -45,6 +54,9 @@ impl Condition {
                 let belongs: Vec<bool> =
                     names.iter().zip(above).map(|(name, above)| name == kind || above.contains(kind)).collect();
                 of_run.iter().map(|of| of.is_some_and(|of| belongs[of as usize])).collect()
+            }
+            (Self::Arc { from, to, .. }, Values::Angles(angles)) => {
+                angles.iter().map(|angle| angle >= from || angle < to).collect()
             }
             // A condition of the wrong type holds for no run.
             _ => vec![false; input.len()],

@@ -27,6 +27,8 @@ pub struct Parameter {
 pub enum Values {
     /// Numbers, NaN if missing.
     Numbers(Vec<f64>),
+    /// Directions in [-π, π], NaN if missing. -π and π are equal. Unit: radians.
+    Angles(Vec<f64>),
     /// Categories, each of which may have superkinds.
     Kinds {
         /// Index in `names` of each run's kind, `None` if missing. Names are in the order of first occurrence.
@@ -36,6 +38,16 @@ pub enum Values {
         /// Superkinds of each kind, nearest first.
         above: Vec<Vec<String>>,
     },
+}
+
+impl Values {
+    /// Returns numbers or angles, or `None` for categories.
+    pub fn numbers(&self) -> Option<&[f64]> {
+        match self {
+            Self::Numbers(numbers) | Self::Angles(numbers) => Some(numbers),
+            Self::Kinds { .. } => None,
+        }
+    }
 }
 
 impl PatternInput {

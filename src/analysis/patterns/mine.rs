@@ -1,13 +1,18 @@
 //! Sequential covering: finds the strongest pattern, then the strongest among the runs that it does not explain, and so
 //! on.
+//!
+//! Patterns with one, two and three conditions are three families of tests, and each gets an equal share of the level.
+//! There are thousands of times as many combinations of three conditions as single ones; corrected for all of them, a
+//! simple cause would stay hidden.
 
-use crate::patterns::boxes::Runs;
+use crate::patterns::boxes::{Best, Runs};
 use crate::patterns::cells::{Axis, axes};
 use crate::patterns::condition::all_hold;
 use crate::patterns::confirm::{confirm, count};
 use crate::patterns::likelihood::{Likelihood, one};
 use crate::patterns::refine::{OpenRuns, refine};
 use crate::patterns::simplify::simplify;
+use crate::patterns::strongest::{Strongest, strongest};
 use crate::patterns::{Condition, PatternInput};
 use crate::{Interval, TwoByTwo, benjamini_hochberg, wilson};
 
@@ -31,7 +36,7 @@ pub struct PatternOptions {
 
 impl Default for PatternOptions {
     fn default() -> Self {
-        Self { most_conditions: 3, level: 0.05, cells: 8, most_patterns: 8, work: 300_000_000 }
+        Self { most_conditions: 3, level: 0.05, cells: 8, most_patterns: 8, work: 40_000_000 }
     }
 }
 
@@ -60,7 +65,11 @@ pub struct Pattern {
     pub wracc: f64,
     /// One-sided p-value of Fisher's exact test among the training runs.
     pub p: f64,
-    /// `p` adjusted for all boxes tried (Benjamini and Hochberg), an upper bound.
+    /// `p` adjusted for all boxes tried (Benjamini and Hochberg, weighted so that patterns with one, two and three
+    /// conditions have equal shares), an upper bound.
+    ///
+    /// Source of the weights: C. R. Genovese, K. Roeder and L. Wasserman, "False discovery control with p-value
+    /// weighting", Biometrika 93 (2006) 509–524.
     pub q: f64,
     /// One-sided p-value of Fisher's exact test among the held-out runs, adjusted for the number of patterns (Holm).
     pub p_held_out: f64,
@@ -88,6 +97,8 @@ pub struct Patterns {
     pub depth: usize,
     /// Number of parameters whose triples were combined.
     pub combined: usize,
+    /// The strongest single conditions, if no pattern is confirmed. They may be due to chance.
+    pub strongest: Vec<Strongest>,
 }
 
 impl Patterns {
@@ -112,9 +123,10 @@ pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
     let runs = open.iter().filter(|open| **open).count();
     let axes = axes(input, &open, cells(runs, options.cells));
     found.parameters = axes.len();
-    let rounds = search(input, open, &axes, options, &mut found);
-    let probabilities: Vec<f64> = rounds.iter().map(|(_, table)| table.fisher().greater).collect();
-    let adjusted = benjamini_hochberg(&probabilities, found.tried);
+    let mut families = Families::default();
+    let rounds = search(input, open, &axes, options, &mut found, &mut families);
+    found.tried = families.tried.iter().sum();
+    let (probabilities, adjusted) = adjusted(&rounds, &families);
     let conditions: Vec<Vec<Condition>> = rounds.iter().map(|(conditions, _)| conditions.clone()).collect();
     let confirmed = confirm(&conditions, input);
     for ((((conditions, searched), p), q), (held_out, p_held_out)) in
@@ -141,12 +153,51 @@ pub fn mine(input: &PatternInput, options: &PatternOptions) -> Patterns {
             confirmed: p_held_out <= options.level,
         });
     }
+    if found.confirmed().next().is_none() {
+        found.strongest = strongest(input, options, families.count());
+    }
     found
 }
 
+/// Returns the p-values of patterns, and the adjusted ones.
+fn adjusted(rounds: &[(Vec<Condition>, TwoByTwo)], families: &Families) -> (Vec<f64>, Vec<f64>) {
+    let tried = families.tried.iter().sum::<u64>().max(1);
+    let probabilities: Vec<f64> = rounds.iter().map(|(_, table)| table.fisher().greater).collect();
+    let weighted =
+        |((conditions, _), p): (&(Vec<Condition>, TwoByTwo), &f64)| p * families.tests(conditions.len()) / tried as f64;
+    let weighted: Vec<f64> = rounds.iter().zip(&probabilities).map(weighted).collect();
+    let adjusted = benjamini_hochberg(&weighted, tried).into_iter().map(|adjusted| adjusted.min(1.0)).collect();
+    (probabilities, adjusted)
+}
+
 /// Returns the number of cells for a number of runs. With few runs, many narrow ranges would only add false positives.
-fn cells(runs: usize, most: usize) -> usize {
+pub(super) fn cells(runs: usize, most: usize) -> usize {
     (libm::cbrt(runs as f64) as usize).clamp(4, 64).min(most.max(2))
+}
+
+/// The families of tests: patterns with one, two and three conditions.
+#[derive(Debug, Clone, Copy, Default)]
+struct Families {
+    /// Number of boxes tried in each.
+    tried: [u64; 3],
+}
+
+impl Families {
+    fn add(&mut self, found: &[Best]) {
+        self.tried.iter_mut().zip(found).for_each(|(tried, best)| *tried += best.tried);
+    }
+
+    /// Number of families with tests.
+    fn count(&self) -> usize {
+        self.tried.iter().filter(|tried| **tried > 0).count()
+    }
+
+    /// Number of tests that a pattern with this many conditions is corrected for: those of its family, times the number
+    /// of families.
+    fn tests(&self, conditions: usize) -> f64 {
+        let tried = conditions.checked_sub(1).and_then(|family| self.tried.get(family)).copied().unwrap_or_default();
+        tried as f64 * self.count() as f64
+    }
 }
 
 /// Finds patterns, each with its counts among the runs that were still open when it was found.
@@ -156,6 +207,7 @@ fn search(
     axes: &[Axis],
     options: &PatternOptions,
     found: &mut Patterns,
+    families: &mut Families,
 ) -> Vec<(Vec<Condition>, TwoByTwo)> {
     let mut rounds: Vec<(Vec<Condition>, TwoByTwo)> = Vec::new();
     while rounds.len() < options.most_patterns {
@@ -168,28 +220,43 @@ fn search(
         let likelihood =
             Likelihood::new((0..open.len()).filter(|run| open[*run]).map(|run| one(input.failed[run])).sum());
         let runs = Runs::new(axes, &input.failed, &open, &likelihood);
-        let mut best = runs.best(depth, options.work);
-        found.tried += best.tried;
-        found.combined = found.combined.max(best.combined);
-        if best.conditions.is_empty() {
-            break;
-        }
+        let best = runs.best(depth, options.work);
+        families.add(&best);
+        found.combined = best.iter().map(|best| best.combined).fold(found.combined, usize::max);
         let open_runs = OpenRuns { input, open: &open, axes, likelihood: &likelihood };
-        simplify(&mut best.conditions, &open_runs, options.level);
-        let table = count(input, &all_hold(&best.conditions, input), |run| open[run]);
-        // Later patterns are weaker: if this one is not significant, they are not either.
+        // Later patterns are weaker: if none is significant now, they are not either.
         let rank = rounds.len() as f64 + 1.0;
-        if table.fisher().greater * found.tried as f64 / rank > options.level {
+        let Some((mut conditions, table)) =
+            significant(best, &open_runs, families, [options.level * rank, options.level])
+        else {
             break;
-        }
+        };
         // Bounds between the cuts describe the pattern better. They are not part of the test, because not all of them
         // were tried.
-        refine(&mut best.conditions, &open_runs);
-        let within = all_hold(&best.conditions, input);
+        refine(&mut conditions, &open_runs);
+        let within = all_hold(&conditions, input);
         open.iter_mut().zip(&within).for_each(|(open, within)| *open &= !within);
-        rounds.push((best.conditions, table));
+        rounds.push((conditions, table));
     }
     rounds
+}
+
+/// Returns the significant pattern with the highest score, simplified, with its counts among the open runs. Boxes with
+/// more conditions have higher scores.
+fn significant(
+    best: Vec<Best>,
+    open_runs: &OpenRuns<'_>,
+    families: &Families,
+    [level, simpler_level]: [f64; 2],
+) -> Option<(Vec<Condition>, TwoByTwo)> {
+    let found = best.into_iter().rev().map(|best| best.conditions).filter(|conditions| !conditions.is_empty());
+    found
+        .map(|mut conditions| {
+            simplify(&mut conditions, open_runs, simpler_level);
+            let within = all_hold(&conditions, open_runs.input);
+            (conditions, count(open_runs.input, &within, |run| open_runs.open[run]))
+        })
+        .find(|(conditions, table)| table.fisher().greater * families.tests(conditions.len()) <= level)
 }
 
 /// Returns the maximum number of conditions, at least one, with which a pattern of half of all failures and no passes

@@ -15,7 +15,9 @@ mod likelihood;
 mod mine;
 mod refine;
 mod simplify;
+mod strongest;
 
 pub use condition::{Condition, simplest_between};
 pub use input::{Parameter, PatternInput, Values};
 pub use mine::{Pattern, PatternOptions, Patterns, mine};
+pub use strongest::Strongest;

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use crate::patterns::cells::{Axis, Conditions, Cut};
 use crate::patterns::condition::all_hold;
 use crate::patterns::likelihood::{Count, Likelihood, one};
-use crate::patterns::{Condition, PatternInput, Values, simplest_between};
+use crate::patterns::{Condition, PatternInput, simplest_between};
 
 /// Bounds depend on each other, but converge quickly.
 const MOST_PASSES: usize = 4;
@@ -75,31 +75,69 @@ impl Scale {
 }
 
 fn refined(condition: &Condition, others: &[Condition], open_runs: &OpenRuns<'_>) -> Option<Condition> {
-    let Condition::Range { parameter, low, high } = condition else { return None };
-    let Values::Numbers(numbers) = &open_runs.input.parameters[*parameter].values else { return None };
-    let Conditions::Ranges(cuts) = &open_runs.axes.iter().find(|axis| axis.parameter == *parameter)?.conditions else {
+    let parameter = condition.parameter();
+    // An arc is refined by the range that it leaves out.
+    let (low, high, is_arc) = match condition {
+        Condition::Range { low, high, .. } => (*low, *high, false),
+        Condition::Arc { from, to, .. } => (Some(*to), Some(*from), true),
+        Condition::Kind { .. } => return None,
+    };
+    let numbers = open_runs.input.parameters[parameter].values.numbers()?;
+    let (Conditions::Ranges(cuts) | Conditions::Arcs(cuts)) =
+        &open_runs.axes.iter().find(|axis| axis.parameter == parameter)?.conditions
+    else {
         return None;
     };
     let scale = Scale::new(numbers, &all_hold(others, open_runs.input), open_runs);
-    let score = |first: usize, last: usize| open_runs.likelihood.gain(scale.below[last] - scale.below[first]);
+    let end = scale.values.len();
+    let score = |first: usize, last: usize| {
+        let between = scale.below[last] - scale.below[first];
+        open_runs.likelihood.gain(if is_arc { scale.below[end] - between } else { between })
+    };
+    let (low, high) = refined_bounds([low, high], cuts, &scale, score);
+    match (is_arc, low, high) {
+        (true, Some(to), Some(from)) => Some(even(parameter, from, to, open_runs.input)),
+        (true, ..) => None,
+        (false, ..) => Some(Condition::Range { parameter, low, high }),
+    }
+}
+
+/// Returns an arc with the same runs whose bounds have the same size, if there is one: it is easier to read.
+fn even(parameter: usize, from: f64, to: f64, input: &PatternInput) -> Condition {
+    let arc = Condition::Arc { parameter, from, to };
+    let holds = arc.holds(input);
+    [from, -to]
+        .into_iter()
+        .filter(|bound| *bound > 0.0)
+        .map(|bound| Condition::Arc { parameter, from: bound, to: -bound })
+        .find(|even| even.holds(input) == holds)
+        .unwrap_or(arc)
+}
+
+/// Moves the bounds of a range of values, one after the other, to the positions with the highest score.
+fn refined_bounds(
+    [mut low, mut high]: [Option<f64>; 2],
+    cuts: &[Cut],
+    scale: &Scale,
+    score: impl Fn(usize, usize) -> f64,
+) -> (Option<f64>, Option<f64>) {
     let end = scale.values.len();
     let (mut first, last) = (low.map_or(0, |low| scale.place(low)), high.map_or(end, |high| scale.place(high)));
-    let (mut low, mut high) = (*low, *high);
     if let Some(bound) = low {
-        let window = window(bound, cuts, &scale).filter(|place| *place <= last);
+        let window = window(bound, cuts, scale).filter(|place| *place <= last);
         let best = best(first, window, |place| score(place, last));
         if best != first {
             (first, low) = (best, scale.bound(best));
         }
     }
     if let Some(bound) = high {
-        let window = window(bound, cuts, &scale).filter(|place| *place >= first);
+        let window = window(bound, cuts, scale).filter(|place| *place >= first);
         let best = best(last, window, |place| score(first, place));
         if best != last {
             high = scale.bound(best);
         }
     }
-    Some(Condition::Range { parameter: *parameter, low, high })
+    (low, high)
 }
 
 /// Returns the position with the highest score. Ties go to the current position.

@@ -1,9 +1,12 @@
 //! The columns of the table: name, type, unit, description and source.
 
+use std::sync::LazyLock;
+
 use serde::Serialize;
 use serde_json::json;
 
 use crate::tables::cell::Cell;
+use crate::tables::effect_columns::{EFFECTS, NOISE};
 use crate::tables::row_source::{RowSource, angle};
 use actcheck_base::names;
 use actcheck_data::Role;
@@ -24,6 +27,20 @@ pub enum ColumnKind {
     Bool,
 }
 
+/// The meaning of a column's values for a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColumnRole {
+    /// The run, its outcomes, or a consequence that is nearly the outcome itself.
+    Record,
+    /// A parameter of the scene: a quantity fixed before the robot acts that may affect the outcome.
+    Scene,
+    /// Realised noise: an error drawn by chance, whatever the robot does. With the scene, it is a condition of the run.
+    Noise,
+    /// An event or an error during the action, as a consequence of the robot's behaviour.
+    Effect,
+}
+
 /// A column of the table.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Column {
@@ -34,8 +51,13 @@ pub struct Column {
     pub kind: ColumnKind,
     /// Unit of its numbers, empty if they have none.
     pub unit: &'static str,
-    /// Whether it is a parameter of the scene: a quantity fixed before the robot acts that may affect the outcome.
+    /// Whether it is a parameter of the scene.
     pub parameter: bool,
+    /// The meaning of its values for a run.
+    pub role: ColumnRole,
+    /// Whether its numbers are directions, of which -π and π are equal.
+    #[serde(skip)]
+    pub wraps: bool,
     /// Description of its values.
     pub description: &'static str,
     #[serde(skip)]
@@ -44,7 +66,8 @@ pub struct Column {
 
 /// Returns all columns in order.
 pub fn columns() -> &'static [Column] {
-    COLUMNS
+    static ALL: LazyLock<Vec<Column>> = LazyLock::new(|| [COLUMNS, NOISE, EFFECTS].concat());
+    &ALL
 }
 
 const COLUMNS: &[Column] = &[
@@ -93,7 +116,9 @@ const COLUMNS: &[Column] = &[
     text("world", "name of the world", |p| Cell::text(&p.run.world)).of_scene(),
     number("base_x_m", "m", "initial x of the base, in the world", |p| Cell::number(p.run.robot_base[0])).of_scene(),
     number("base_y_m", "m", "initial y of the base, in the world", |p| Cell::number(p.run.robot_base[1])).of_scene(),
-    number("base_yaw_rad", "rad", "initial heading of the base", |p| Cell::number(p.run.robot_base[2])).of_scene(),
+    number("base_yaw_rad", "rad", "initial heading of the base", |p| Cell::number(p.run.robot_base[2]))
+        .wrapping()
+        .of_scene(),
     count("others", "number of clutter objects around the target", |p| Cell::count(with_role(p, Role::Other)))
         .of_scene(),
     count("place_others", "number of objects on the surface where the target is to be placed", |p| {
@@ -110,6 +135,7 @@ const COLUMNS: &[Column] = &[
     number("target_y_m", "m", "initial y of the target, in the world", |p| of_target(p, |t| t.y)).of_scene(),
     number("target_z_m", "m", "initial z of the target, in the world", |p| of_target(p, |t| t.z)).of_scene(),
     number("target_yaw_rad", "rad", "initial yaw of the target, in the world", |p| of_target(p, |t| angle(t.yaw)))
+        .wrapping()
         .of_scene(),
     number("target_mass_kg", "kg", "mass of the target", |p| of_target(p, |t| t.mass_kg)).of_scene(),
     number("target_friction", "1", "friction coefficient of the target", |p| of_target(p, |t| t.friction)).of_scene(),
@@ -130,6 +156,7 @@ const COLUMNS: &[Column] = &[
     number("target_turned_rad", "rad", "initial yaw of the target, relative to the base", |p| {
         of_target(p, |t| angle(t.yaw - p.run.robot_base[2]))
     })
+    .wrapping()
     .of_scene(),
     number("surface_x_m", "m", "position of the target on its surface, from the centre along the surface's x", |p| {
         Cell::Number(p.scene.target_on_surface().map(|[x, _]| x))
@@ -155,6 +182,7 @@ const COLUMNS: &[Column] = &[
         "direction from the target to the nearest object; 0 is towards the base",
         |p| Cell::Number(p.scene.neighbour_direction(p.run.robot_base)),
     )
+    .wrapping()
     .of_scene(),
     number("obstacle_distance_m", "m", "distance of the nearest obstacle from the straight line to the target", |p| {
         Cell::Number(p.scene.obstacle_distance_m)
@@ -220,30 +248,94 @@ const COLUMNS: &[Column] = &[
         let others = p.run.objects.iter().filter(|object| object.role.is_bystander());
         Cell::Number(others.filter_map(|object| object.displacement_m).max_by(f64::total_cmp))
     }),
+    text(
+        "surroundings",
+        "things that the action is not to touch: where they were, and how hard they were hit (JSON)",
+        |p| {
+            let json = p.effects.surroundings.as_ref().and_then(|around| serde_json::to_string(around).ok());
+            Cell::Text(json)
+        },
+    ),
 ];
 
-type Of = fn(&RowSource<'_>) -> Cell;
+pub(super) type Of = fn(&RowSource<'_>) -> Cell;
 
-const fn text(name: &'static str, description: &'static str, cell: Of) -> Column {
-    Column { name, kind: ColumnKind::Text, unit: "", parameter: false, description, cell }
+pub(super) const fn text(name: &'static str, description: &'static str, cell: Of) -> Column {
+    Column {
+        name,
+        kind: ColumnKind::Text,
+        unit: "",
+        parameter: false,
+        role: ColumnRole::Record,
+        wraps: false,
+        description,
+        cell,
+    }
 }
 
-const fn number(name: &'static str, unit: &'static str, description: &'static str, cell: Of) -> Column {
-    Column { name, kind: ColumnKind::Number, unit, parameter: false, description, cell }
+pub(super) const fn number(name: &'static str, unit: &'static str, description: &'static str, cell: Of) -> Column {
+    Column {
+        name,
+        kind: ColumnKind::Number,
+        unit,
+        parameter: false,
+        role: ColumnRole::Record,
+        wraps: false,
+        description,
+        cell,
+    }
 }
 
 const fn count(name: &'static str, description: &'static str, cell: Of) -> Column {
-    Column { name, kind: ColumnKind::Count, unit: "", parameter: false, description, cell }
+    Column {
+        name,
+        kind: ColumnKind::Count,
+        unit: "",
+        parameter: false,
+        role: ColumnRole::Record,
+        wraps: false,
+        description,
+        cell,
+    }
 }
 
 const fn truth(name: &'static str, description: &'static str, cell: Of) -> Column {
-    Column { name, kind: ColumnKind::Bool, unit: "", parameter: false, description, cell }
+    Column {
+        name,
+        kind: ColumnKind::Bool,
+        unit: "",
+        parameter: false,
+        role: ColumnRole::Record,
+        wraps: false,
+        description,
+        cell,
+    }
 }
 
 impl Column {
     const fn of_scene(mut self) -> Self {
-        self.parameter = true;
+        (self.parameter, self.role) = (true, ColumnRole::Scene);
         self
+    }
+
+    pub(super) const fn in_role(mut self, role: ColumnRole) -> Self {
+        self.role = role;
+        self
+    }
+
+    pub(super) const fn wrapping(mut self) -> Self {
+        self.wraps = true;
+        self
+    }
+
+    /// Whether it is known before the robot acts, or drawn by chance: a parameter of the scene, or noise.
+    pub fn is_condition(&self) -> bool {
+        matches!(self.role, ColumnRole::Scene | ColumnRole::Noise)
+    }
+
+    /// Whether it is an effect.
+    pub fn is_effect(&self) -> bool {
+        self.role == ColumnRole::Effect
     }
 }
 

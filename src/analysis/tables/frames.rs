@@ -4,17 +4,19 @@ use std::collections::BTreeMap;
 
 use polars::prelude::{Column as Series, DataFrame, NamedFrom as _, PolarsError, Series as Values};
 
+use crate::TableRun;
 use crate::tables::cell::Cell;
-use crate::tables::columns::{ColumnKind, columns};
+use crate::tables::columns::{Column, ColumnKind, columns};
 use crate::tables::row_source::{ActionScene, Hierarchy, RowSource};
 use actcheck_base::names;
-use actcheck_history::RunDetail;
 
 /// Columns of categories, with the columns of their superclasses.
-const KINDS: [(&str, &str); 3] = [
+const KINDS: [(&str, &str); 5] = [
     ("surface_category", "surface_kinds"),
     ("target_category", "target_kinds"),
     ("neighbour_category", "neighbour_kinds"),
+    ("first_contact_category", "first_contact_kinds"),
+    ("largest_force_category", "largest_force_kinds"),
 ];
 
 /// Rows of runs, stored by column.
@@ -26,12 +28,13 @@ pub(super) struct Rows {
 
 impl Rows {
     /// Adds a row for each outcome of a run.
-    pub fn add(&mut self, run: &RunDetail) {
+    pub fn add(&mut self, table_run: &TableRun) {
         self.cells.resize_with(columns().len(), Vec::new);
-        for action in &run.actions {
+        let run = &table_run.detail;
+        for (action, (noise, effects)) in run.actions.iter().zip(table_run.noise.iter().zip(&table_run.effects)) {
             let scene = ActionScene::of(run, action);
             for judgement in &action.judgements {
-                let source = RowSource { run, action, judgement, scene: &scene };
+                let source = RowSource { run, action, judgement, scene: &scene, noise, effects };
                 for (cells, column) in self.cells.iter_mut().zip(columns()) {
                     cells.push((column.cell)(&source));
                 }
@@ -93,9 +96,12 @@ pub(super) fn with_kinds(frame: &mut DataFrame, hierarchy: &Hierarchy) -> Result
     Ok(())
 }
 
-/// Returns the names and descriptions of the columns that [`with_kinds`] adds.
-pub(super) fn kinds_columns() -> impl Iterator<Item = (&'static str, String)> {
-    KINDS.into_iter().map(|(from, to)| (to, format!("local names of {from} and its superclasses, nearest first")))
+/// Returns the names of the columns that [`with_kinds`] adds, the columns that they extend, and their descriptions.
+pub(super) fn kinds_columns() -> impl Iterator<Item = (&'static str, &'static Column, String)> {
+    KINDS.into_iter().filter_map(|(from, to)| {
+        let column = columns().iter().find(|column| column.name == from)?;
+        Some((to, column, format!("local names of {from} and its superclasses, nearest first")))
+    })
 }
 
 /// Returns the local names of a category and its superclasses, nearest first, joined by spaces.

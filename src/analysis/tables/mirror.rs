@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _};
 
+use crate::TableRun;
 use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::frames::Rows;
 use actcheck_base::{Diagnostic, Diagnostics, digest_of};
-use actcheck_history::{History, RunDetail};
+use actcheck_history::History;
 
 /// Maximum number of runs in a file, and so in memory at once.
 const RUNS_IN_A_FILE: usize = 2_000;
@@ -81,14 +82,14 @@ impl Mirror {
     pub fn of_runs(
         folder: &Path,
         campaign: &str,
-        runs: impl IntoIterator<Item = RunDetail>,
+        runs: impl IntoIterator<Item = impl Into<TableRun>>,
     ) -> Result<Self, Diagnostics> {
         fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
         let mut mirror = Self { folder: folder.to_path_buf(), files: Vec::new() };
         let mut runs = runs.into_iter().peekable();
         while runs.peek().is_some() {
             let mut rows = Rows::default();
-            runs.by_ref().take(RUNS_IN_A_FILE).for_each(|run| rows.add(&run));
+            runs.by_ref().take(RUNS_IN_A_FILE).for_each(|run| rows.add(&run.into()));
             let file = mirror.write(campaign, rows)?;
             mirror.files.push((campaign.to_owned(), file));
         }
@@ -147,7 +148,7 @@ impl Mirror {
         for runs in missing.chunks(RUNS_IN_A_FILE) {
             let mut rows = Rows::default();
             for run in runs {
-                rows.add(&history.run(run)?);
+                rows.add(&table_run(history, run)?);
             }
             let file = self.write(campaign, rows)?;
             self.files.push((campaign.to_owned(), file));
@@ -174,6 +175,15 @@ impl Mirror {
     fn file(&self, campaign: &str, number: usize) -> PathBuf {
         self.folder.join(format!("{campaign}.{number:06}.parquet"))
     }
+}
+
+/// Reads a run. Noise and effects are unknown if its trace is missing, damaged, or of an unknown version.
+fn table_run(history: &History, run: &str) -> Result<TableRun, Diagnostics> {
+    let detail = history.run(run)?;
+    Ok(match history.recorded(run) {
+        Ok((choices, trace)) => TableRun::new(detail, &choices, &trace),
+        Err(_) => detail.into(),
+    })
 }
 
 /// Reads the wanted columns of a file, or all of them.

@@ -1,12 +1,14 @@
 //! Runs as a table: one row for each outcome of a property, with the data of the run, the action and the scene.
 //!
 //! The table is in the history's folder `tables`: a mirror in Parquet that analyses and notebooks read much faster than
-//! the store. The store is authoritative; the mirror can be rebuilt from it at any time.
+//! the store. Store and traces are authoritative; the mirror can be rebuilt from them at any time.
 //!
-//! Never: changes the store, holds data that the store lacks, or reads a mirror that lacks runs of the store.
+//! Never: changes the store, holds data that the store and the traces lack, or reads a mirror that lacks runs of the
+//! store.
 
 mod cell;
 mod columns;
+mod effect_columns;
 mod frames;
 mod mirror;
 mod outcomes;
@@ -14,7 +16,7 @@ mod row_source;
 mod write;
 
 pub(super) use cell::Cell;
-pub use columns::{Column, ColumnKind, columns};
+pub use columns::{Column, ColumnKind, ColumnRole, columns};
 pub(super) use frames::{kinds_of, series};
 pub(super) use mirror::unwritten;
 pub use mirror::{Mirror, MirrorChange};

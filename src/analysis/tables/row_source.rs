@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
+use crate::effects::target_of;
+use crate::{ActionEffects, RealisedNoise};
 use actcheck_base::Judgement;
 use actcheck_data::Role;
 use actcheck_history::{ActionDetail, ObjectDetail, RunDetail};
@@ -17,6 +19,8 @@ pub(super) struct RowSource<'a> {
     pub action: &'a ActionDetail,
     pub judgement: &'a Judgement,
     pub scene: &'a ActionScene<'a>,
+    pub noise: &'a RealisedNoise,
+    pub effects: &'a ActionEffects,
 }
 
 /// The objects related to an action.
@@ -36,11 +40,7 @@ pub(super) struct ActionScene<'a> {
 impl<'a> ActionScene<'a> {
     pub fn of(run: &'a RunDetail, action: &ActionDetail) -> Self {
         let named = |object: &&ObjectDetail| action.parameters.values().flatten().any(|value| *value == object.id);
-        let first = |role: Role| {
-            let of_role = || run.objects.iter().filter(move |object| object.role == role);
-            of_role().find(named).or_else(|| of_role().next())
-        };
-        let target = first(Role::Target);
+        let target = target_of(run, action);
         // Designators of transport tests name several platforms: the nearest one is under the target.
         let platforms = || run.objects.iter().filter(|object| object.role == Role::Platform);
         let among = |wanted: &dyn Fn(&&'a ObjectDetail) -> bool| match target {

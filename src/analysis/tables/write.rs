@@ -74,8 +74,11 @@ fn export(
 /// Returns the description of every column.
 pub(crate) fn schema() -> Value {
     let mut described: Vec<Value> = columns().iter().map(|column| json!(column)).collect();
-    described.extend(kinds_columns().map(|(name, description)| {
-        json!({ "name": name, "type": ColumnKind::Text, "unit": "", "parameter": true, "description": description })
+    described.extend(kinds_columns().map(|(name, of, description)| {
+        json!({
+            "name": name, "type": ColumnKind::Text, "unit": "", "parameter": of.parameter, "role": of.role,
+            "description": description,
+        })
     }));
     json!({ "rows": "one for each run, action and property", "columns": described })
 }

@@ -68,7 +68,12 @@ const CODES_X: &[Code] = &[
         "choose a name as the help says",
     ),
     code("X012", "an unknown picture format", "the extension is neither .png nor .svg", "use one of the two"),
-    code("X013", "there is no pattern to draw", "no pattern was confirmed on the held-out runs", "run more scenes"),
+    code(
+        "X013",
+        "there is nothing to draw",
+        "no pattern was confirmed on the held-out runs, or nothing was hit",
+        "run more scenes",
+    ),
     code(
         "X014",
         "a command needs a configuration",
@@ -149,7 +154,7 @@ const CODES_X: &[Code] = &[
         "its name is misspelt, or the ontology did not have it yet",
         "take the suggested name",
     ),
-    code("X046", "scenes have no such parameter", "the name in `--by` is misspelt", "take the suggested name"),
+    code("X046", "runs have no such parameter", "the name in `--by` is misspelt", "take the suggested name"),
     code(
         "X047",
         "a named query can't be read",

@@ -4,6 +4,8 @@
 //! version 3 derives it from the test case and its parameters. Therefore both contain the scene and the repetition
 //! number: each repetition is a separate result, and the same scene in another campaign continues the history.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use crate::formats::identity::{case_name, scene};
@@ -43,15 +45,21 @@ impl Attachment {
 
 /// Returns the files of a run with their names: a result for each property of each action, and the attachments.
 ///
-/// `number` is the run's number among those of its scene ([`super::Repetitions`]). Times are simulated times, counted
+/// `number` is the run's number among those of its scene ([`super::Repetitions`]), `perceived` are the sentences of
+/// [`run_text`]. Times are simulated times, counted
 /// from the start of the run.
-pub fn allure_results(run: &RunDetail, number: u64, attachments: &[Attachment]) -> Vec<(String, Vec<u8>)> {
+pub fn allure_results(
+    run: &RunDetail,
+    number: u64,
+    attachments: &[Attachment],
+    perceived: &BTreeMap<u32, String>,
+) -> Vec<(String, Vec<u8>)> {
     let whole = Attachment {
         about: None,
         name: "the whole run".to_owned(),
         media_type: "text/plain",
         ending: "txt",
-        bytes: run_text(run).into_bytes(),
+        bytes: run_text(run, perceived).into_bytes(),
     };
     let attachments: Vec<&Attachment> = attachments.iter().chain([&whole]).collect();
     let mut files = Vec::new();

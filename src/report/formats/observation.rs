@@ -19,7 +19,7 @@ pub fn observation(run: &RunDetail, campaign_started: &str) -> Value {
     let judgements = || run.actions.iter().flat_map(|action| &action.judgements);
     let counts = Counts::of(judgements().map(|judgement| judgement.outcome));
     let (status, reason) = result(run, counts);
-    let whole = run_json(run);
+    let whole = run_json(run, &BTreeMap::new());
     let mut features: BTreeMap<String, Value> =
         Outcome::ALL.iter().map(|outcome| (outcome.word().to_owned(), counts.get(*outcome).into())).collect();
     features.insert("score".to_owned(), run.row.score.into());

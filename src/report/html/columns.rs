@@ -1,4 +1,4 @@
-//! Packs all runs as columns: their outcomes and the parameters of their scenes.
+//! Packs all runs as columns: their outcomes, their conditions and effects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::html::pack::Pack;
 use actcheck_analysis::{ColumnKind, OutcomeTable, columns};
 use actcheck_base::{Outcome, names};
 
-/// Columns that a page needs in addition to those of the findings and the scene parameters.
+/// Columns that a page needs in addition to those of the findings.
 pub const HTML_COLUMNS: [&str; 9] = [
     "index",
     "repetition",
@@ -82,23 +82,25 @@ pub(super) fn runs(table: &OutcomeTable, slots: &Slots) -> String {
     steps(table, &mut pack);
     let parameters: Vec<Value> = columns()
         .iter()
-        .filter(|column| column.parameter || column.name.ends_with("_displacement_m"))
+        .filter(|column| column.is_condition() || column.is_effect() || column.name.ends_with("_displacement_m"))
         .filter_map(|column| {
             let values = match column.kind {
                 ColumnKind::Text => Some(kinds(table, column.name, &first_rows, &mut pack)),
                 _ => pack.numbers(&of_rows(table, column.name, &first_rows)),
             };
             Some(json!({
-                "name": column.name, "unit": column.unit, "told": column.description, "scene": column.parameter,
+                "name": column.name, "unit": column.unit, "told": column.description, "role": column.role,
                 "values": values?,
             }))
         })
         .collect();
     pack.set("parameters", parameters);
+    let acted = kinds(table, "action", &first_rows, &mut pack);
+    pack.set("action", acted);
     pack.finish()
 }
 
-/// For each run, the row that describes its scene: the one whose surface is nearest to the target. Actions at another
+/// For each run, the row that describes its scene and effects: the one whose surface is nearest to the target. Actions at another
 /// place refer to another surface.
 fn first_rows(table: &OutcomeTable) -> Vec<usize> {
     let runs = table.text("run");

@@ -6,6 +6,7 @@ use crate::contacts::strongest;
 use crate::html::Explained;
 use crate::moment::deciding_moment;
 use crate::pressed::pressed_in;
+use actcheck_analysis::perceived_sentences;
 use actcheck_base::{Outcome, names};
 use actcheck_data::{Pose, Trace};
 use actcheck_history::RunDetail;
@@ -24,8 +25,9 @@ pub(super) fn action(run: &RunDetail, trace: Option<&Trace>, idx: usize, explain
             "decided": trace.filter(|_| failed).map(|trace| deciding_moment(trace, idx, &judgement.witness)),
         })
     });
+    let perceived = trace.and_then(|trace| perceived_sentences(run, trace).remove(&action.step));
     let mut packed = json!({
-        "action": action.action, "step": action.step, "reported": action.reported, "message": action.message,
+        "action": action.action, "perceived": perceived, "step": action.step, "reported": action.reported, "message": action.message,
         "seconds": action.duration_secs, "end": action.end, "parameters": action.parameters,
         "judged": judged.collect::<Vec<Value>>(),
     });

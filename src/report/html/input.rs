@@ -16,7 +16,7 @@ pub struct HtmlReport<'a> {
     pub made: &'a str,
     /// Findings of the analysis; their properties are the ones displayed.
     pub findings: &'a FindingsSummary,
-    /// The outcomes, with [`HTML_COLUMNS`](crate::HTML_COLUMNS) and the parameters of scenes.
+    /// The outcomes, with [`HTML_COLUMNS`](crate::HTML_COLUMNS) and the columns of the findings.
     pub table: &'a OutcomeTable,
     /// All campaigns of the history, in order of start.
     pub campaigns: &'a [CampaignRow],

@@ -9,7 +9,7 @@ pub(super) const STYLE: [&str; 4] = [
 ];
 
 /// Scripts. All share one scope; the last one starts the program.
-pub(super) const SCRIPT: [&str; 25] = [
+pub(super) const SCRIPT: [&str; 26] = [
     include_str!("web/dom.js"),
     include_str!("web/unpack.js"),
     include_str!("web/words.js"),
@@ -23,6 +23,7 @@ pub(super) const SCRIPT: [&str; 25] = [
     include_str!("web/properties.js"),
     include_str!("web/modes.js"),
     include_str!("web/patterns.js"),
+    include_str!("web/collisions.js"),
     include_str!("web/map.js"),
     include_str!("web/trends.js"),
     include_str!("web/theme.js"),

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::findings_json;
 use crate::html::HtmlReport;
 use crate::html::columns::{Slot, Slots};
 use crate::html::pack::Pack;
+use crate::{findings_json, scene_rule};
 use actcheck_analysis::score_interval;
 use actcheck_base::{Outcome, names};
 use actcheck_history::{CampaignRow, SkillRecord};
@@ -46,23 +46,34 @@ fn number_runs(findings: &mut Value, places: &BTreeMap<&str, usize>) {
     let modes = findings["failure_modes"].as_array_mut().into_iter().flatten();
     modes.for_each(|mode| number(&mut mode["runs"]));
     for property in findings["properties"].as_array_mut().into_iter().flatten() {
-        let patterns = property["patterns"]["found"].as_array_mut().into_iter().flatten();
-        patterns.for_each(|pattern| number(&mut pattern["runs"]));
+        for causes in ["patterns", "effects"] {
+            let patterns = property[causes]["found"].as_array_mut().into_iter().flatten();
+            patterns.for_each(|pattern| number(&mut pattern["runs"]));
+        }
+    }
+    for action in findings["collisions"].as_array_mut().into_iter().flatten() {
+        action["kinds"].as_array_mut().into_iter().flatten().for_each(|kind| number(&mut kind["runs"]));
+        for thing in action["things"].as_array_mut().into_iter().flatten() {
+            thing["run"] = json!(thing["run"].as_str().and_then(|run| places.get(run)));
+        }
     }
 }
 
-/// Adds to each pattern the command that generates more of its scenes.
+/// Adds to each pattern the command that generates more of its scenes, if its conditions are on scenes.
 fn sentences(findings: &mut Value, report: &HtmlReport<'_>) {
     let summary = report.findings;
-    for property in findings["properties"].as_array_mut().into_iter().flatten() {
-        let name = property["property"].as_str().map(names::local).unwrap_or_default().to_owned();
-        let mut number = 0;
-        for pattern in property["patterns"]["found"].as_array_mut().into_iter().flatten() {
-            if pattern["confirmed"] == json!(true) {
-                number += 1;
-                pattern["more"] = json!(format!(
-                    "{} analyse{} --property {name} --scene-rule {number}",
-                    summary.program, summary.options
+    let properties = findings["properties"].as_array_mut().into_iter().flatten();
+    for (property, told) in properties.zip(&summary.properties) {
+        let found = &told.findings;
+        let patterns = property["patterns"]["found"].as_array_mut().into_iter().flatten();
+        let confirmed = patterns.zip(&found.patterns.patterns).filter(|(_, pattern)| pattern.confirmed);
+        for (number, (shown, pattern)) in (1..).zip(confirmed) {
+            if scene_rule(&pattern.conditions, &found.input.parameters, "").is_ok() {
+                shown["more"] = json!(format!(
+                    "{} analyse{} --property {} --scene-rule {number}",
+                    summary.program,
+                    summary.options,
+                    told.name()
                 ));
             }
         }

@@ -2,8 +2,11 @@
 
 use serde_json::{Value, json};
 
-use crate::{FindingsSummary, PropertyReport};
-use actcheck_analysis::{Cascade, Condition, Judged, Parameter, Pattern, TwoByTwo, TwoWay};
+use crate::{Causes, FindingsSummary, PropertyReport};
+use actcheck_analysis::{
+    Cascade, Collisions, Condition, HitKind, Judged, Parameter, Pattern, PropertyFindings, Sector, Strongest, TwoByTwo,
+    TwoWay,
+};
 
 /// Returns all findings as JSON.
 pub fn findings_json(summary: &FindingsSummary) -> Value {
@@ -19,6 +22,7 @@ pub fn findings_json(summary: &FindingsSummary) -> Value {
         "level": summary.level,
         "failure_modes": modes,
         "cascades": summary.cascades.iter().map(cascade).collect::<Vec<Value>>(),
+        "collisions": summary.collisions.iter().map(collisions).collect::<Vec<Value>>(),
         "properties": summary.properties.iter().map(property).collect::<Vec<Value>>(),
     })
 }
@@ -40,7 +44,6 @@ fn table(table: TwoByTwo) -> Value {
 
 fn property(report: &PropertyReport) -> Value {
     let found = &report.findings;
-    let patterns = &found.patterns;
     let points = report.trend.points.iter().map(|point| {
         json!({
             "campaign": point.campaign, "started": point.started, "runs": point.runs, "failed": point.failed,
@@ -62,29 +65,48 @@ fn property(report: &PropertyReport) -> Value {
         "outcomes": found.counts,
         "failing": found.failing,
         "margin": { "unit": report.unit, "quantiles": found.margins },
-        "patterns": {
-            "runs": patterns.runs, "failed": patterns.failed, "held_out": patterns.held_out, "tried": patterns.tried,
-            "parameters": patterns.parameters, "depth": patterns.depth, "combined": patterns.combined,
-            "twins": found.twins, "repeated": found.repeated, "steered": found.weighted_runs,
-            "found": patterns.patterns.iter().map(|one| pattern(report, one)).collect::<Vec<Value>>(),
-        },
+        "patterns": causes(report.when(), found),
+        "effects": causes(report.how(), found),
         "trend": { "campaigns": points.collect::<Vec<Value>>(), "changes": changes.collect::<Vec<Value>>() },
         "flaky": { "scenes": report.repeated_scenes, "both_ways": flaky.collect::<Vec<Value>>() },
         "maps": report.maps.iter().map(map).collect::<Vec<Value>>(),
     })
 }
 
-fn pattern(report: &PropertyReport, pattern: &Pattern) -> Value {
-    let parameters = &report.findings.input.parameters;
+/// Patterns of conditions or of effects.
+fn causes(causes: Causes<'_>, found: &PropertyFindings) -> Value {
+    let patterns = causes.patterns;
+    json!({
+        "runs": patterns.runs, "failed": patterns.failed, "held_out": patterns.held_out, "tried": patterns.tried,
+        "parameters": patterns.parameters, "depth": patterns.depth, "combined": patterns.combined,
+        "twins": found.twins, "repeated": found.repeated, "steered": found.weighted_runs,
+        "found": patterns.patterns.iter().map(|one| pattern(&causes, one)).collect::<Vec<Value>>(),
+        "strongest": patterns.strongest.iter().map(|one| strongest(&causes, one)).collect::<Vec<Value>>(),
+    })
+}
+
+/// A condition that may go with failures by chance.
+fn strongest(causes: &Causes<'_>, strongest: &Strongest) -> Value {
+    let one = &strongest.condition;
+    json!({
+        "sentence": causes.strongest_sentence(strongest),
+        "conditions": [condition(one, &causes.input.parameters[one.parameter()])],
+        "all": table(strongest.all), "rate": strongest.rate, "elsewhere": strongest.elsewhere,
+        "p": strongest.p, "p_corrected": strongest.p_corrected, "runs_needed": strongest.runs_needed,
+    })
+}
+
+fn pattern(causes: &Causes<'_>, pattern: &Pattern) -> Value {
+    let parameters = &causes.input.parameters;
     let conditions: Vec<Value> =
         pattern.conditions.iter().map(|one| condition(one, &parameters[one.parameter()])).collect();
     json!({
-        "sentence": report.sentence(pattern),
+        "sentence": causes.sentence(pattern),
         "conditions": conditions,
         "all": table(pattern.all), "searched": table(pattern.searched), "held_out": table(pattern.held_out),
         "rate": pattern.rate, "elsewhere": pattern.elsewhere, "lift": pattern.lift, "wracc": pattern.wracc,
         "p": pattern.p, "q": pattern.q, "p_held_out": pattern.p_held_out, "confirmed": pattern.confirmed,
-        "runs": report.runs(pattern),
+        "runs": causes.runs(pattern),
     })
 }
 
@@ -94,7 +116,43 @@ fn condition(condition: &Condition, parameter: &Parameter) -> Value {
         Condition::Range { low, high, .. } => {
             json!({ "parameter": parameter.name, "low": low, "high": high, "unit": parameter.unit })
         }
+        // An arc through ±π: its lower end is above its upper end.
+        Condition::Arc { from, to, .. } => {
+            json!({ "parameter": parameter.name, "low": from, "high": to, "unit": parameter.unit, "wraps": true })
+        }
     }
+}
+
+fn collisions(of: &Collisions) -> Value {
+    let counted = |counts: &[(String, u64)]| -> Vec<Value> {
+        counts.iter().map(|(name, count)| json!({ "name": name, "count": count })).collect()
+    };
+    let kind = |kind: &HitKind| {
+        json!({
+            "category": kind.category, "furniture": kind.furniture, "present": kind.present, "hit": kind.hit,
+            "rate": kind.rate, "force_n": kind.force_n, "by": counted(&kind.by), "phases": counted(&kind.phases),
+            "directions": counted(&kind.directions), "runs": kind.runs,
+        })
+    };
+    let sector = |sector: &Sector| {
+        let (from, to) = sector.distance_m;
+        json!({
+            "direction": sector.direction, "from_m": from, "to_m": to, "present": sector.present, "hit": sector.hit,
+            "rate": sector.rate,
+        })
+    };
+    let things = of.things.iter().map(|thing| {
+        json!({
+            "run": thing.run, "object": thing.object, "category": thing.category, "beyond_m": thing.beyond_m,
+            "left_m": thing.left_m, "force_n": thing.force_n,
+        })
+    });
+    json!({
+        "action": of.action, "executions": of.executions, "hit": of.hit, "rate": of.rate,
+        "kinds": of.kinds.iter().map(kind).collect::<Vec<Value>>(),
+        "sectors": of.sectors.iter().map(|row| row.iter().map(sector).collect()).collect::<Vec<Vec<Value>>>(),
+        "things": things.collect::<Vec<Value>>(),
+    })
 }
 
 fn map(map: &TwoWay) -> Value {

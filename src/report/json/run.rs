@@ -1,11 +1,15 @@
 //! One stored run as JSON.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use actcheck_history::RunDetail;
 
 /// Returns the run as JSON.
-pub fn run_json(run: &RunDetail) -> Value {
+///
+/// `perceived` are sentences about the perceived target, by the action's position in the test (from 1).
+pub fn run_json(run: &RunDetail, perceived: &BTreeMap<u32, String>) -> Value {
     let row = &run.row;
     let objects: Vec<Value> = run
         .objects
@@ -26,7 +30,7 @@ pub fn run_json(run: &RunDetail) -> Value {
         .map(|a| {
             json!({
                 "step": a.step, "action": a.action, "score": a.score, "end": a.end, "reported": a.reported,
-                "message": a.message, "duration_secs": a.duration_secs, "parameters": a.parameters,
+                "message": a.message, "perceived": perceived.get(&a.step), "duration_secs": a.duration_secs, "parameters": a.parameters,
                 "outcomes": a.judgements.iter().map(|j| json!({
                     "property": j.property, "outcome": j.outcome, "margin": j.margin, "witness": j.witness,
                     "rule_digest": j.rule_digest, "held_before": j.held_before,

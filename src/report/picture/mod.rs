@@ -3,10 +3,11 @@
 //! From a run to pixels: [`run`] lays out the panels, [`window`] selects the region that each shows, [`outline`] and
 //! [`paths`] compute the outlines of bodies and the paths of motions, and [`labels`] places names. The result is a
 //! [`drawing`] of plain shapes, which [`svg`] writes and [`png`] rasterises, with glyphs from [`font`]. [`patterns`]
-//! draws the runs of patterns in the same way.
+//! draws the runs of patterns in the same way, and [`collisions`] the things that were hit.
 //!
 //! Never: reads or writes a file, or uses a shape that is not in the trace.
 
+mod collisions;
 mod drawing;
 mod font;
 mod header;
@@ -22,6 +23,7 @@ mod run;
 mod svg;
 mod window;
 
+pub use collisions::collisions_picture;
 pub use drawing::Drawing;
 pub use header::Caption;
 pub use patterns::patterns_picture;

@@ -4,7 +4,7 @@
 use crate::FindingsSummary;
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
 use crate::picture::{font, paint};
-use actcheck_analysis::{Condition, Parameter, Pattern, PatternInput, Values};
+use actcheck_analysis::{Condition, Parameter, Pattern, PatternInput};
 
 /// Width of a picture. Unit: pixels.
 const WIDTH_PX: f64 = 1200.0;
@@ -81,7 +81,7 @@ struct Axis<'a> {
 impl<'a> Axis<'a> {
     /// Returns `None` if the parameter has fewer than two distinct numbers.
     fn of(parameter: &'a Parameter, asked: [Option<f64>; 2]) -> Option<Self> {
-        let Values::Numbers(numbers) = &parameter.values else { return None };
+        let numbers = parameter.values.numbers()?;
         let known = || numbers.iter().copied().filter(|number| number.is_finite());
         let (low, high) = (known().min_by(f64::total_cmp)?, known().max_by(f64::total_cmp)?);
         let room = (high - low) * ROOM;
@@ -91,6 +91,15 @@ impl<'a> Axis<'a> {
     /// Position in the panel, from 0 to 1.
     fn share(&self, value: f64) -> f64 {
         (value - self.range[0]) / (self.range[1] - self.range[0])
+    }
+
+    /// The bands in which the condition holds: two for an arc through ±π, whose lower bound is above its upper bound.
+    fn bands(&self) -> Vec<[f64; 2]> {
+        let [first, last] = self.range;
+        match self.asked {
+            [Some(from), Some(to)] if from > to => vec![[first, to], [from, last]],
+            [low, high] => vec![[low.unwrap_or(first), high.unwrap_or(last)]],
+        }
     }
 
     fn name(&self) -> String {
@@ -119,6 +128,9 @@ impl<'a> Plane<'a> {
     fn of(input: &'a PatternInput, pattern: &Pattern) -> Option<Self> {
         let ranges = pattern.conditions.iter().filter_map(|condition| match condition {
             Condition::Range { parameter, low, high } => Axis::of(input.parameters.get(*parameter)?, [*low, *high]),
+            Condition::Arc { parameter, from, to } => {
+                Axis::of(input.parameters.get(*parameter)?, [Some(*from), Some(*to)])
+            }
             Condition::Kind { .. } => None,
         });
         let mut axes: Vec<Axis<'a>> = ranges.take(2).collect();
@@ -169,12 +181,15 @@ impl<'a> Plane<'a> {
         if self.axes.iter().all(|axis| axis.asked == [None, None]) {
             return;
         }
-        let end = |axis: &Axis<'_>, end: usize| axis.asked[end].unwrap_or(axis.range[end]);
         let [across, up] = &self.axes;
-        let corner = |x: usize, y: usize| self.pixel(panel, [end(across, x), end(up, y)]);
         let line = Line::dashed(Paint::solid(paint::FAILED), 1.2, [5.0, 4.0]);
         let style = Style::both(Paint::new(paint::FAILED, 0.09), line);
-        drawing.polygon(vec![corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)], style);
+        for [left, right] in across.bands() {
+            for [low, high] in up.bands() {
+                let corners = [[left, low], [right, low], [right, high], [left, high]];
+                drawing.polygon(corners.map(|corner| self.pixel(panel, corner)).to_vec(), style);
+            }
+        }
     }
 
     /// Draws the grid lines, their numbers and the axis names.

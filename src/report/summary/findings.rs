@@ -1,7 +1,8 @@
 //! Findings of the analysis, with the names needed to print them.
 
 use actcheck_analysis::{
-    Cascade, Condition, FailureMode, FlakyScene, Parameter, Pattern, PropertyFindings, Trend, TwoWay,
+    Cascade, Collisions, Condition, FailureMode, FlakyScene, Interval, Parameter, Pattern, PatternInput, Patterns,
+    PropertyFindings, Strongest, Trend, TwoWay,
 };
 use actcheck_base::names;
 use actcheck_verdict::Counts;
@@ -25,6 +26,8 @@ pub struct FindingsSummary {
     pub modes: Vec<FailureMode>,
     /// Pairs of properties in which a failure is associated with a later failure.
     pub cascades: Vec<Cascade>,
+    /// Collisions of each action.
+    pub collisions: Vec<Collisions>,
     /// One report for each property of each action.
     pub properties: Vec<PropertyReport>,
     /// Significance level of the findings.
@@ -54,32 +57,62 @@ impl PropertyReport {
         names::local(&self.findings.property)
     }
 
+    /// The conditions of failures: when the property fails.
+    pub fn when(&self) -> Causes<'_> {
+        Causes { report: self, input: &self.findings.input, patterns: &self.findings.patterns }
+    }
+
+    /// The effects that go with failures: how the property fails.
+    pub fn how(&self) -> Causes<'_> {
+        let effects = &self.findings.effects;
+        Causes { report: self, input: &effects.input, patterns: &effects.patterns }
+    }
+
+    /// Describes a pattern of conditions in one sentence.
+    pub fn sentence(&self, pattern: &Pattern) -> String {
+        self.when().sentence(pattern)
+    }
+}
+
+/// Patterns of one kind: conditions or effects.
+#[derive(Debug, Clone, Copy)]
+pub struct Causes<'a> {
+    report: &'a PropertyReport,
+    /// The runs and their parameters.
+    pub input: &'a PatternInput,
+    /// The patterns.
+    pub patterns: &'a Patterns,
+}
+
+impl<'a> Causes<'a> {
     /// Describes a pattern in one sentence.
     pub fn sentence(&self, pattern: &Pattern) -> String {
-        let all = pattern.all;
-        let elsewhere = match pattern.elsewhere {
+        let conditions = self.conditions(&pattern.conditions);
+        self.compared(&conditions, pattern.rate, pattern.runs.len() as u64, pattern.elsewhere)
+    }
+
+    /// Describes one of the strongest conditions in one sentence.
+    pub fn strongest_sentence(&self, strongest: &Strongest) -> String {
+        let all = strongest.all;
+        let condition = self.conditions(std::slice::from_ref(&strongest.condition));
+        self.compared(&condition, strongest.rate, all.failed_in + all.passed_in, Some(strongest.elsewhere))
+    }
+
+    fn compared(&self, conditions: &str, rate: Interval, runs: u64, elsewhere: Option<Interval>) -> String {
+        let elsewhere = match elsewhere {
             Some(elsewhere) => format!("; elsewhere in {}", percent(elsewhere.rate)),
             None => String::new(),
         };
-        format!(
-            "{} fails in {} [{:.0}–{:.0}] of {} runs with {}{elsewhere}",
-            self.name(),
-            percent(pattern.rate.rate),
-            pattern.rate.low * 100.0,
-            pattern.rate.high * 100.0,
-            all.failed_in + all.passed_in,
-            self.conditions(pattern)
-        )
+        let (name, share) = (self.report.name(), percent(rate.rate));
+        let [low, high] = [rate.low * 100.0, rate.high * 100.0];
+        format!("{name} fails in {share} [{low:.0}–{high:.0}] of {runs} runs with {conditions}{elsewhere}")
     }
 
-    /// Describes the conditions of a pattern in words.
-    pub fn conditions(&self, pattern: &Pattern) -> String {
-        let parameters = &self.findings.input.parameters;
-        let conditions: Vec<String> = pattern
-            .conditions
-            .iter()
-            .map(|condition| condition_text(condition, &parameters[condition.parameter()]))
-            .collect();
+    /// Describes conditions in words.
+    pub fn conditions(&self, conditions: &[Condition]) -> String {
+        let parameters = &self.input.parameters;
+        let conditions: Vec<String> =
+            conditions.iter().map(|condition| condition_text(condition, &parameters[condition.parameter()])).collect();
         match conditions.as_slice() {
             [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
             all => all.join(""),
@@ -87,12 +120,15 @@ impl PropertyReport {
     }
 
     /// Ids of the runs of a pattern, failed runs first.
-    pub fn runs(&self, pattern: &Pattern) -> Vec<&str> {
-        let failed = &self.findings.input.failed;
+    pub fn runs(&self, pattern: &Pattern) -> Vec<&'a str> {
+        let (failed, examples) = (&self.input.failed, &self.report.findings.examples);
         let of = |wanted: bool| pattern.runs.iter().filter(move |run| failed[**run] == wanted);
-        of(true).chain(of(false)).map(|run| self.findings.examples[*run].run.as_str()).collect()
+        of(true).chain(of(false)).map(|run| examples[*run].run.as_str()).collect()
     }
 }
+
+/// Prefix of the names of realised noise.
+const DRAWN: &str = "sense_";
 
 /// Formats a proportion, such as `71 %`; values below 10 % have one decimal.
 pub(crate) fn percent(share: f64) -> String {
@@ -104,10 +140,13 @@ pub(crate) fn percent(share: f64) -> String {
 fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
     let unit = parameter.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
     let bare = match &parameter.unit {
-        Some(unit) => parameter.name.strip_suffix(&format!("_{unit}")).unwrap_or(&parameter.name),
+        Some(unit) => parameter.name.strip_suffix(&format!("_{}", unit.to_lowercase())).unwrap_or(&parameter.name),
         None => &parameter.name,
     };
-    let name = bare.replace('_', " ");
+    let name = match bare.strip_prefix(DRAWN) {
+        Some(of) => format!("drawn error of {}", of.replace('_', " ")),
+        None => bare.replace('_', " "),
+    };
     match condition {
         Condition::Kind { kind, .. } => {
             let thing = bare.strip_suffix("_category").or_else(|| bare.strip_suffix("_model")).unwrap_or(bare);
@@ -117,5 +156,7 @@ fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
         Condition::Range { low: Some(low), .. } => format!("{name} ≥ {low}{unit}"),
         Condition::Range { high: Some(high), .. } => format!("{name} < {high}{unit}"),
         Condition::Range { .. } => format!("any {name}"),
+        Condition::Arc { from, to, .. } if *from == -to => format!("{name} beyond ±{from}{unit}"),
+        Condition::Arc { from, to, .. } => format!("{name} ≥ {from} or < {to}{unit}"),
     }
 }

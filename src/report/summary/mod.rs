@@ -21,7 +21,7 @@ pub use case::CaseSummary;
 pub use compare::{CompareSummary, ComparedSide, SideChange};
 pub(crate) use compare::{compared_name, compared_parts};
 pub(crate) use findings::percent;
-pub use findings::{FindingsSummary, PropertyReport};
+pub use findings::{Causes, FindingsSummary, PropertyReport};
 pub use health::HealthSummary;
 pub use oracles::OracleSummary;
 pub(crate) use oracles::notice_word;

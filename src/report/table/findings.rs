@@ -2,7 +2,7 @@
 
 use crate::{FindingsSummary, Table};
 
-/// Returns one row for each pattern.
+/// Returns one row for each pattern, of conditions or of effects.
 pub fn findings_table(summary: &FindingsSummary) -> Table {
     let mut table = Table::new([
         "action",
@@ -24,15 +24,18 @@ pub fn findings_table(summary: &FindingsSummary) -> Table {
         "p_held_out",
         "confirmed",
         "run_ids",
+        "of",
     ]);
     for report in &summary.properties {
-        for pattern in &report.findings.patterns.patterns {
+        let conditions = report.when().patterns.patterns.iter().map(|pattern| (report.when(), "conditions", pattern));
+        let effects = report.how().patterns.patterns.iter().map(|pattern| (report.how(), "effects", pattern));
+        for (causes, of, pattern) in conditions.chain(effects) {
             let held_out = pattern.held_out;
             table.rows.push(vec![
                 report.findings.action.clone().into(),
                 report.findings.property.clone().into(),
-                report.conditions(pattern).into(),
-                report.sentence(pattern).into(),
+                causes.conditions(&pattern.conditions).into(),
+                causes.sentence(pattern).into(),
                 (pattern.all.failed_in + pattern.all.passed_in).into(),
                 pattern.all.failed_in.into(),
                 pattern.rate.rate.into(),
@@ -47,7 +50,8 @@ pub fn findings_table(summary: &FindingsSummary) -> Table {
                 held_out.failed_in.into(),
                 pattern.p_held_out.into(),
                 pattern.confirmed.into(),
-                report.runs(pattern).join(" ").into(),
+                causes.runs(pattern).join(" ").into(),
+                of.into(),
             ]);
         }
     }

@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 
 use crate::summary::percent;
+use crate::text::collisions::{collisions, shade};
 use crate::text::{ruled, scene_rule};
-use crate::{FindingsSummary, PropertyReport, Proportion};
+use crate::{Causes, FindingsSummary, PropertyReport, Proportion};
 use actcheck_analysis::{Judged, Pattern, TwoWay, TwoWayCell};
 use actcheck_base::{Outcome, names};
 use actcheck_verdict::Counts;
@@ -13,10 +14,7 @@ use actcheck_verdict::Counts;
 const MAX_LISTED: usize = 8;
 /// Maximum number of failure modes and of cascades listed.
 const MAX_LINES: usize = 10;
-/// Shades of heat map cells, by failure rate in steps of 20 %.
-const SHADES: [char; 5] = ['·', '░', '▒', '▓', '█'];
-
-/// Formats counts, failure modes and cascades, then each property with its patterns, margins, trend, flaky scenes and
+/// Formats counts, failure modes, cascades and collisions, then each property with its patterns, margins, trend, flaky scenes and
 /// heat maps.
 pub fn findings_text(summary: &FindingsSummary) -> String {
     let mut out = String::new();
@@ -26,6 +24,7 @@ pub fn findings_text(summary: &FindingsSummary) -> String {
     let _ = writeln!(out, "{} outcomes: {}", summary.counts.total(), counts(summary.counts));
     modes(&mut out, summary);
     cascades(&mut out, summary);
+    collisions(&mut out, &summary.collisions);
     for report in &summary.properties {
         property(&mut out, report, summary);
     }
@@ -122,16 +121,68 @@ fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
 }
 
 fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
-    let (found, patterns) = (&report.findings, &report.findings.patterns);
-    for (number, pattern) in patterns.confirmed().enumerate() {
+    let found = &report.findings;
+    out.push_str("  when (conditions: the scene and the errors drawn):\n");
+    for (number, pattern) in found.patterns.confirmed().enumerate() {
         let _ = writeln!(out, "  {}. {}", number + 1, report.sentence(pattern));
-        evidence(out, report, pattern);
+        evidence(out, &report.when(), pattern);
         more_scenes(out, report, pattern, summary, number + 1);
     }
-    let confirmed = patterns.confirmed().count();
-    if confirmed == 0 {
-        out.push_str("  no condition on the scenes is significantly associated with its failures\n");
+    strongest(out, &report.when(), "condition");
+    searched(out, report.when(), summary);
+    out.push_str("  how (effects during the action):\n");
+    for pattern in found.effects.patterns.confirmed() {
+        let _ = writeln!(out, "   - {}", report.how().sentence(pattern));
+        evidence(out, &report.how(), pattern);
     }
+    strongest(out, &report.how(), "effect");
+    searched(out, report.how(), summary);
+    if found.twins + found.repeated > 0 {
+        let _ = writeln!(
+            out,
+            "  ({} runs are bit-for-bit duplicates of a later one, {} repeat the scene of an earlier one: each counts once)",
+            found.twins, found.repeated
+        );
+    }
+    if found.weighted_runs > 0 {
+        let _ = writeln!(
+            out,
+            "  (a search chose the scenes of {} runs: rates describe these runs, not the configured ranges)",
+            found.weighted_runs
+        );
+    }
+}
+
+/// Writes the strongest single conditions or effects if none is confirmed.
+fn strongest(out: &mut String, causes: &Causes<'_>, noun: &str) {
+    let patterns = causes.patterns;
+    if patterns.confirmed().next().is_some() {
+        return;
+    }
+    if patterns.parameters == 0 && patterns.tried == 0 && patterns.strongest.is_empty() {
+        let _ = writeln!(out, "   no {noun} was searched: too few runs, or nothing that varies");
+        return;
+    }
+    if patterns.strongest.is_empty() {
+        let _ = writeln!(out, "   no {noun} differs between its failures and passes");
+        return;
+    }
+    let _ = writeln!(out, "   none is confirmed beyond chance; the strongest (perhaps by chance):");
+    for strongest in &patterns.strongest {
+        let _ = writeln!(out, "   ? {}", causes.strongest_sentence(strongest));
+        let needed = match strongest.runs_needed {
+            Some(runs) => format!("; if it is real, about {runs} runs would show it"),
+            None => String::new(),
+        };
+        let (p, corrected) = (probability(strongest.p), probability(strongest.p_corrected));
+        let _ = writeln!(out, "     p {p}, corrected {corrected}{needed}");
+    }
+}
+
+/// Writes the extent of a search.
+fn searched(out: &mut String, causes: Causes<'_>, summary: &FindingsSummary) {
+    let patterns = causes.patterns;
+    let confirmed = patterns.confirmed().count();
     let unconfirmed = patterns.patterns.len() - confirmed;
     if unconfirmed > 0 {
         let _ =
@@ -155,23 +206,9 @@ fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
     if patterns.depth == 3 && patterns.combined < patterns.parameters {
         let _ = writeln!(out, "  (combinations of three only use the {} most promising parameters)", patterns.combined);
     }
-    if found.twins + found.repeated > 0 {
-        let _ = writeln!(
-            out,
-            "  ({} runs are bit-for-bit duplicates of a later one, {} repeat the scene of an earlier one: each counts once)",
-            found.twins, found.repeated
-        );
-    }
-    if found.weighted_runs > 0 {
-        let _ = writeln!(
-            out,
-            "  (a search chose the scenes of {} runs: rates describe these runs, not the configured ranges)",
-            found.weighted_runs
-        );
-    }
 }
 
-fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
+fn evidence(out: &mut String, causes: &Causes<'_>, pattern: &Pattern) {
     let held_out = pattern.held_out;
     let _ = writeln!(
         out,
@@ -184,7 +221,7 @@ fn evidence(out: &mut String, report: &PropertyReport, pattern: &Pattern) {
         held_out.failed_in + held_out.passed_in,
         probability(pattern.p_held_out)
     );
-    let _ = writeln!(out, "     runs: {}", list(report.runs(pattern).into_iter()));
+    let _ = writeln!(out, "     runs: {}", list(causes.runs(pattern).into_iter()));
 }
 
 /// Writes the command that generates more scenes of a pattern.
@@ -261,9 +298,6 @@ fn map(out: &mut String, map: &TwoWay) {
 fn shaded(cell: &TwoWayCell) -> String {
     match cell.failing {
         None => String::new(),
-        Some(failing) => {
-            let shade = SHADES[((failing.rate * SHADES.len() as f64) as usize).min(SHADES.len() - 1)];
-            format!("{shade} {} of {}", percent(failing.rate), cell.runs)
-        }
+        Some(failing) => format!("{} {} of {}", shade(failing.rate), percent(failing.rate), cell.runs),
     }
 }

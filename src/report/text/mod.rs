@@ -5,6 +5,7 @@
 mod by_action;
 mod campaign;
 mod case;
+mod collisions;
 mod compare;
 mod findings;
 mod health;

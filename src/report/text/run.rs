@@ -1,5 +1,6 @@
 //! One stored run for the terminal.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::text::ruled;
@@ -7,7 +8,9 @@ use actcheck_base::names;
 use actcheck_history::{ActionDetail, ObjectDetail, Repetition, RunDetail};
 
 /// Formats a run: its scene, the reports of its actions, and every outcome with margin and witness.
-pub fn run_text(run: &RunDetail) -> String {
+///
+/// `perceived` are sentences about the perceived target, by the action's position in the test (from 1).
+pub fn run_text(run: &RunDetail, perceived: &BTreeMap<u32, String>) -> String {
     let mut out = String::new();
     let row = &run.row;
     let _ = writeln!(out, "run {} ({}), {}, S = {:.2}", row.run, row.test, row.status.word(), row.score);
@@ -42,6 +45,9 @@ pub fn run_text(run: &RunDetail) -> String {
     scene(&mut out, run);
     for action in &run.actions {
         action_text(&mut out, action);
+        if let Some(sentence) = perceived.get(&action.step) {
+            let _ = writeln!(out, "{sentence}");
+        }
     }
     out
 }

@@ -166,5 +166,14 @@ fn asked_of(condition: &Condition, name: &str, number: usize) -> Option<(String,
             }
             Some((rule, literal))
         }
+        Condition::Arc { from, to, .. } => {
+            let body = known(&NUMBERS)?;
+            let rule = format!(
+                "value_{number}(?v) :- {body} .\n\
+                 within_{number}(?v) :- value_{number}(?v), ?v >= {from:?} .\n\
+                 within_{number}(?v) :- value_{number}(?v), ?v < {to:?} .\n"
+            );
+            Some((rule, format!("within_{number}(_)")))
+        }
     }
 }

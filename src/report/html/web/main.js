@@ -1,6 +1,6 @@
 // Loads the data and maps addresses to views.
 
-const VIEWS = [["", "Overview"], ["properties", "Properties"], ["modes", "Failure modes"], ["patterns", "Patterns"], ["map", "From above"],
+const VIEWS = [["", "Overview"], ["properties", "Properties"], ["modes", "Failure modes"], ["patterns", "Patterns"], ["collisions", "Collisions"], ["map", "From above"],
   ["history", "History"], ["runs", "Runs"]];
 
 /** Number of runs indexed for search in one idle period: a few milliseconds, so that clicks are not delayed. */
@@ -12,6 +12,7 @@ function view(report, [name, chosen]) {
     case "properties": return { parts: properties(report, chosen) };
     case "modes": return { parts: modes(report) };
     case "patterns": return { parts: patterns(report) };
+    case "collisions": return { parts: collisions(report) };
     case "map": return tableMap(report);
     case "history": return { parts: trends(report) };
     case "run": return runView(report, decodeURIComponent(chosen ?? ""));

@@ -49,9 +49,13 @@ function propertyTable(summary) {
 }
 
 function patternList(summary, most) {
-  const found = summary.findings.properties.flatMap((property) => property.patterns.found.filter((pattern) => pattern.confirmed));
-  if (!found.length) {
-    return make("p", {}, "No condition on scenes is significantly associated with failures in these runs. More runs may show one: `actcheck run --runs N`.");
-  }
-  return make("ul", { class: "sentences" }, found.sort((a, b) => b.wracc - a.wracc).slice(0, most).map((pattern) => make("li", {}, pattern.sentence)));
+  const list = (kind) => {
+    const found = summary.findings.properties.flatMap((property) => property[kind].found.filter((pattern) => pattern.confirmed));
+    if (found.length) return make("ul", { class: "sentences" }, found.sort((a, b) => b.wracc - a.wracc).slice(0, most).map((pattern) => make("li", {}, pattern.sentence)));
+    const strongest = summary.findings.properties.flatMap((property) => property[kind].strongest.slice(0, 1)).sort((a, b) => a.p_corrected - b.p_corrected || a.p - b.p);
+    if (!strongest.length) return make("p", {}, "Nothing differs between failures and passes.");
+    return [make("p", { class: "faint" }, "None is beyond chance; the strongest:"), make("ul", { class: "sentences" }, strongest.slice(0, 3).map((one) => make("li", {}, one.sentence,
+      one.runs_needed !== null && make("span", { class: "faint" }, ` (about ${count(one.runs_needed)} runs would decide)`))))];
+  };
+  return [make("h3", {}, "When"), list("patterns"), make("h3", {}, "How"), list("effects")];
 }

@@ -1,14 +1,36 @@
-// Patterns: conditions on scenes, with their evidence and a plot.
+// Patterns: conditions and effects that go with failures, with their evidence and a plot.
 
-function patterns({ runs, summary, filter, open }) {
-  const cards = summary.findings.properties.flatMap((property, of) =>
-    property.patterns.found.filter((pattern) => pattern.confirmed).map((pattern) => patternCard(runs, property, of, pattern, filter, open)));
-  const tried = summary.findings.properties.reduce((sum, property) => sum + property.patterns.tried, 0);
+function patterns(report) {
+  const tried = report.summary.findings.properties.reduce((sum, property) => sum + property.patterns.tried + property.effects.tried, 0);
   return [
     make("h1", {}, "Patterns"),
-    make("p", { class: "lead" }, `Conditions on scenes under which a property fails more often than elsewhere: corrected for all ${count(tried)} conditions tried, and confirmed on a held-out third of the runs.`),
-    cards.length ? cards : make("p", {}, "No condition was confirmed in these runs."),
+    make("p", { class: "lead" }, `When and how properties fail more often than elsewhere: corrected for all ${count(tried)} conditions and effects tried, and confirmed on a held-out third of the runs.`),
+    make("h2", {}, "When: conditions of the scene and of the errors drawn"), causesOf(report, "patterns"),
+    make("h2", {}, "How: effects during the action"), causesOf(report, "effects"),
   ];
+}
+
+/** The confirmed patterns of conditions or effects; for properties that fail without one, the strongest. */
+function causesOf({ runs, summary, filter, open }, kind) {
+  const cards = summary.findings.properties.flatMap((property, of) =>
+    property[kind].found.filter((pattern) => pattern.confirmed).map((pattern) => patternCard(runs, property, of, pattern, filter, open)));
+  const unsure = summary.findings.properties.filter((property) => property.outcomes.failed > 0 && !property[kind].found.some((pattern) => pattern.confirmed));
+  return [cards, unsure.length > 0 && make("section", { class: "card unsure" },
+    make("h3", {}, "Not beyond chance"),
+    make("p", { class: "faint" }, "The strongest of each of these properties. They may be due to chance."),
+    unsure.map((property) => unsureList(property, kind)))];
+}
+
+function unsureList(property, kind) {
+  const strongest = property[kind].strongest;
+  if (!strongest.length) return make("p", {}, `${local(property.property)}: nothing differs between its failures and passes.`);
+  return make("ul", { class: "sentences" }, strongest.map((one) => make("li", {}, one.sentence,
+    make("span", { class: "faint" }, ` (p ${probability(one.p)}, corrected ${probability(one.p_corrected)}`,
+      one.runs_needed !== null && `; if it is real, about ${count(one.runs_needed)} runs would show it`, ")"))));
+}
+
+function probability(p) {
+  return p < 1e-3 ? p.toExponential(0) : p.toFixed(3);
 }
 
 function patternCard(runs, property, of, pattern, filter, open) {

@@ -40,7 +40,8 @@ async function watch(known, place, details, { runs, run, id }) {
   const seek = (secs) => shown?.seek(secs);
   const asked = new Set(runs.slots.map((slot) => slot.iri));
   const told = (judged) => judged.outcome === "failed" && asked.has(judged.property);
-  fill(details, replay.actions.map((action) => action.judged.filter(told).map((judged) => explained(action, judged, seek))), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
+  fill(details, replay.actions.map((action) => [action.perceived && action.judged.some(told) && make("p", { class: "perceived" }, `${action.perceived}.`),
+    action.judged.filter(told).map((judged) => explained(action, judged, seek))]), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
   if (!replay.courses || !replay.courses.frames) {
     fill(place, make("p", { class: "note" }, replay.reason ? `The run was ${runs.text(runs.status, run)}: ${replay.reason}` : "The trace of this run is missing, corrupt, or was written by an earlier version of the program."));
     return;
@@ -112,8 +113,12 @@ function discards(replay) {
 
 function parameterTable(runs, run) {
   const known = runs.parameters.map((parameter) => [parameter, runs.value(parameter.name, run)]).filter(([, value]) => value !== "" && !Number.isNaN(value));
-  return make("section", {}, make("h2", {}, "Parameters of the scene"), make("dl", { class: "parameters" }, known.map(([parameter, value]) => make("div", { title: parameter.told },
-    make("dt", {}, parameter.name.replace(/_(m|rad|kg)$/, "").replaceAll("_", " ")), make("dd", {}, typeof value === "number" ? number(value, parameter.unit) : value)))));
+  const lists = [["Parameters of the scene", ["scene"]], ["Errors drawn", ["noise"]], [`Effects during ${local(runs.text(runs.action, run))}`, ["effect", "record"]]];
+  return lists.map(([title, roles]) => {
+    const listed = known.filter(([parameter]) => roles.includes(parameter.role));
+    return listed.length > 0 && make("section", {}, make("h2", {}, title), make("dl", { class: "parameters" }, listed.map(([parameter, value]) => make("div", { title: parameter.told },
+      make("dt", {}, parameter.name.replace(/_(m|rad|kg|n|s)$/, "").replace(/^sense_/, "").replaceAll("_", " ")), make("dd", {}, typeof value === "number" ? number(value, parameter.unit) : value)))));
+  });
 }
 
 /** The commands that show a run that is not in this file. */

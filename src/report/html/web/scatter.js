@@ -119,13 +119,16 @@ function axes(pen, runs, x, y, equal, width, height, box) {
   pen.rect(inner.left, inner.top, inner.width, inner.height);
   pen.clip();
   if (box[x] || box[y]) {
-    const [x0, x1] = [px(box[x]?.low ?? xr[0]), px(box[x]?.high ?? xr[1])];
-    const [y0, y1] = [py(box[y]?.high ?? yr[1]), py(box[y]?.low ?? yr[0])];
     pen.fillStyle = colourOf("mark");
-    pen.fillRect(x0, y0, x1 - x0, y1 - y0);
     pen.strokeStyle = colourOf("failed");
     pen.setLineDash([5, 4]);
-    pen.strokeRect(x0, y0, x1 - x0, y1 - y0);
+    for (const [x0, x1] of bands(box[x], xr)) {
+      for (const [y0, y1] of bands(box[y], yr)) {
+        const marked = [px(x0), py(y1), px(x1) - px(x0), py(y0) - py(y1)];
+        pen.fillRect(...marked);
+        pen.strokeRect(...marked);
+      }
+    }
     pen.setLineDash([]);
   }
   pen.restore();
@@ -157,6 +160,12 @@ function axes(pen, runs, x, y, equal, width, height, box) {
     has: (run) => !Number.isNaN(xs.values[run]) && !Number.isNaN(ys.values[run]),
     at: (run) => [px(xs.values[run]), py(ys.values[run])],
   };
+}
+
+/** The bands in which a condition holds: two for an arc of directions through ±π, whose lower end is above its upper end. */
+function bands(condition, [first, last]) {
+  if (condition?.wraps) return [[first, condition.high], [condition.low, last]];
+  return [[condition?.low ?? first, condition?.high ?? last]];
 }
 
 function rangeOf(values) {
