@@ -27,10 +27,10 @@ fn a_new_property_is_judged_as_soon_as_it_is_written() {
 #[test]
 fn why_prints_the_proof_or_the_missing_facts() {
     let project = project();
-    actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "4", "--history", "h"]);
+    actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "6", "--history", "h"]);
     let list = stdout(&actcheck(project.path(), &["list", "--history", "h", "--format", "csv"]));
     let run = |score: &str| {
-        let line = list.lines().find(|line| line.contains(score)).expect("the first four runs pass and fail");
+        let line = list.lines().find(|line| line.contains(score)).expect("the first six runs pass and fail");
         line.split(',').next().unwrap().to_owned()
     };
     let why = |run: &str, property: &str| {

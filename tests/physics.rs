@@ -272,13 +272,10 @@ fn a_joint_limit_holds_under_load() {
 #[test]
 fn joint_limits_of_position_and_velocity_override_commands() {
     let mut world = world(Vec::new());
+    // Links in contact can push each other beyond these limits.
+    world.let_links_pass(true);
     let mut command = world.hold();
     let arm = world.layout().arm.clone();
-    // The head looks down to its right, out of the way of the lift.
-    for joint in world.layout().head.clone() {
-        command.positions[joint] = -1.57;
-    }
-    (0..120).for_each(|_| world.step(&command));
     // The lift goes up first and down last, when the arm is upright again: it would hit the floor.
     let courses: [[f64; 5]; 4] = [
         [100.0, 100.0, 100.0, 100.0, 100.0],

@@ -16,7 +16,7 @@ fn every_command_of_the_readme_works() {
     let project = project_with(COARSEST);
     let folder = project.path();
     // Among four scenes there is a failure to inspect.
-    edit(&folder.join("configs/pick.toml"), "test_count = 15", "test_count = 4");
+    edit(&folder.join("configs/pick.toml"), "test_count = 15", "test_count = 6");
     std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
     copy(&root().join("clients"), &folder.join("clients"));
     // The program as the README calls it, with its exit codes recorded.

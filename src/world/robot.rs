@@ -57,12 +57,13 @@ impl Motor {
     }
 
     /// Keeps the setpoint near the joint's position: a setpoint that ran ahead of a blocked joint would make it shoot
-    /// off, once it is free. The joint catches up at a speed at which damping balances stiffness; together with the
-    /// setpoint's velocity this must not exceed its largest speed.
-    fn keep_near(&mut self, position: f64, fastest: f64) {
-        let most = (self.damping * fastest).max(self.max_effort) / self.stiffness;
+    /// off, once it is free. The joint catches up at a speed at which damping balances stiffness, in the engine's
+    /// implicit steps of `substep_secs`; together with the setpoint's velocity this must not exceed its largest speed.
+    fn keep_near(&mut self, position: f64, fastest: f64, substep_secs: f64) {
+        let damping = self.damping + self.stiffness * substep_secs;
+        let most = (damping * fastest).max(self.max_effort) / self.stiffness;
         self.setpoint = self.setpoint.clamp(position - most, position + most);
-        let catching_up = self.stiffness * (self.setpoint - position) / self.damping;
+        let catching_up = self.stiffness * (self.setpoint - position) / damping;
         self.setpoint_velocity = self.setpoint_velocity.clamp(-fastest - catching_up, fastest - catching_up);
     }
 
@@ -253,6 +254,7 @@ impl Robot {
     /// Steps the joint controllers: setpoints approach the targets evenly over the `steps_left` of the tick, within the
     /// velocity limits. Motors follow the setpoints, with gravity compensation for the robot but not for held objects.
     pub fn control(&mut self, engine: &mut PhysicsWorld, holding: &[f64], dt: f64, steps_left: u32) {
+        let substep_secs = dt / engine.integration_parameters.num_solver_iterations as f64;
         for (idx, motor) in self.motors.iter_mut().enumerate() {
             let held = holding.get(idx).copied().unwrap_or(0.0);
             let largest = self.model.joints[idx].velocity * dt;
@@ -266,7 +268,7 @@ impl Robot {
             let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else { continue };
             let Some(link) = multibody.link_mut(link) else { continue };
             motor.began = f64::from(link.joint.coords()[motor.axis as usize]);
-            motor.keep_near(motor.began, self.model.joints[idx].velocity);
+            motor.keep_near(motor.began, self.model.joints[idx].velocity, substep_secs);
             let position = motor.setpoint + held / motor.stiffness;
             let data = &mut link.joint.data;
             data.set_motor(
