@@ -104,7 +104,7 @@ fn with_two_causes(count: u64) -> Vec<TableRun> {
                 vec![("InHand", outcome(dice.share() < rate))]
             });
             let mut run = TableRun::from(detail);
-            let direction = 6.28 * dice.share();
+            let direction = std::f64::consts::TAU * dice.share();
             let [ahead_m, left_m] = [off_m * direction.cos(), off_m * direction.sin()];
             run.effects[0].perceived = Some(PerceptionError { ahead_m, left_m, above_m: 0.01 * dice.share() });
             run.effects[0].last_phase = Some(if dice.share() < 0.3 { "lift" } else { "retract" }.to_owned());
