@@ -90,7 +90,8 @@ mod tests {
                     }
                 }
             }
-            assert!((power - POWER).abs() < 0.05, "{power} with {n} and {m} runs at {level}");
+            // The continuity correction errs on the side of more runs, most of all at a strict level.
+            assert!((POWER - 0.03..POWER + 0.1).contains(&power), "{power} with {n} and {m} runs at {level}");
         }
     }
 

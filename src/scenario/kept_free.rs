@@ -231,7 +231,7 @@ mod tests {
             paths.stay_open(&[Rectangle::new(&outline)])
         };
         assert!(!stays_open([0.0, 0.0], 0.2));
-        assert!(stays_open([-1.0, 0.0], 0.6), "a path around it exists");
+        assert!(stays_open([-1.1, 0.0], 0.3), "a path around it exists");
         assert!(!stays_open([-1.0, 0.0], 3.5));
         assert!(stays_open([0.0, 0.6], 0.1), "an obstacle at the door post leaves room beside it");
     }
