@@ -95,7 +95,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
     }
     if let Some(top_view) = top_view {
         top_view.write(&collisions_picture(&summary).ok_or_else(|| {
-            Diagnostic::error("X013", "there is no collision to draw".to_owned())
+            Diagnostic::error("X013", "no collisions were found, so nothing was drawn".to_owned())
                 .help("the robot touched nothing that it was not to touch, or the runs have no traces")
         })?)?;
     }

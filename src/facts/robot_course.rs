@@ -7,8 +7,8 @@ use actcheck_data::RobotCourse;
 /// A joint that used less than this share of its maximum speed counts as unmoved: its speed is not written.
 const MIN_SPEED_SHARE: f64 = 0.01;
 
-/// Writes how close joints came to their limits, self-contacts, clearances and held objects. Marks the robot as measured, so that
-/// rules don't take missing facts for a pass.
+/// Writes how close joints came to their limits, self-contacts, clearances and held objects. Marks the robot as
+/// measured, so that rules don't take missing facts for a pass.
 pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
     let action = writer.w("action");
     writer.boolean(action, "robotMeasured", true);

@@ -70,6 +70,17 @@ impl Kinematics {
         self.links(positions)[self.camera.0] * self.camera.1
     }
 
+    /// Returns the nearest ancestor link with shapes. (Stages of a mobile base have none.)
+    pub(crate) fn solid_parent(&self, mut link: usize) -> Option<usize> {
+        while link > 0 {
+            link = self.model.joints[link - 1].parent;
+            if !self.model.links[link].solids.is_empty() {
+                return Some(link);
+            }
+        }
+        None
+    }
+
     /// Returns the collision shapes of each link, in its frame.
     pub(crate) fn solids_of_links(&self) -> impl Iterator<Item = &[Part]> {
         self.model.links.iter().map(|link| link.solids.as_slice())

@@ -40,23 +40,14 @@ impl World {
     pub(super) fn find_link_pairs(&self) -> LinkPairs {
         let links = &self.robot.model.links;
         let solid: Vec<usize> = (0..links.len()).filter(|idx| !links[*idx].solids.is_empty()).collect();
-        let neighbours: BTreeSet<(usize, usize)> =
-            solid.iter().filter_map(|idx| self.solid_parent(*idx).map(|parent| (parent, *idx))).collect();
+        let neighbours: BTreeSet<(usize, usize)> = solid
+            .iter()
+            .filter_map(|idx| self.robot.kinematics.solid_parent(*idx).map(|parent| (parent, *idx)))
+            .collect();
         let pairs = solid
             .iter()
             .flat_map(|first| solid.iter().filter(move |second| *second > first).map(move |second| (*first, *second)));
         let apart = |pair: &(usize, usize)| !neighbours.contains(pair) && self.depth_of(pair.0, pair.1) <= TOUCH_M;
         LinkPairs { pairs: pairs.filter(apart).collect(), pass: false }
-    }
-
-    /// Returns the nearest ancestor link with shapes. (Stages of the base have none.)
-    fn solid_parent(&self, mut link: usize) -> Option<usize> {
-        while link > 0 {
-            link = self.robot.model.joints[link - 1].parent;
-            if !self.robot.model.links[link].solids.is_empty() {
-                return Some(link);
-            }
-        }
-        None
     }
 }

@@ -47,7 +47,7 @@ impl SelfContact {
         let is_solid = |link: &usize| !links[*link].solids.is_empty();
         let mut pairs = Vec::new();
         for second in (0..links.len()).filter(is_solid) {
-            let neighbour = bearer(kinematics, &links, second);
+            let neighbour = kinematics.solid_parent(second);
             for first in (0..second).filter(is_solid).filter(|first| neighbour != Some(*first)) {
                 let pair = Pair { links: (first, second), clear_m: CLEAR_M };
                 let nearest = right.iter().map(|poses| gap(&links, pair, poses)).fold(CLEAR_M, f64::min);
@@ -104,15 +104,4 @@ impl Form {
             radius: (high - low).norm() / 2.0,
         }
     }
-}
-
-/// Returns the nearest ancestor link with shapes.
-fn bearer(kinematics: &Kinematics, links: &[Form], mut link: usize) -> Option<usize> {
-    while link > 0 {
-        link = kinematics.joints()[link - 1].parent;
-        if !links[link].solids.is_empty() {
-            return Some(link);
-        }
-    }
-    None
 }
