@@ -71,7 +71,8 @@ pub struct RunInput<'a> {
 ///
 /// # Errors
 /// [`Failure::Discard`] if the scene could not be generated or did not settle, [`Failure::Interrupted`] if
-/// [`Env::rule_budget`] was stopped during a long rule or an action of an external program. Simulation faults are not errors: the record is `broken`.
+/// [`Env::rule_budget`] was stopped during a long rule or an action of an external program. Simulation faults are not
+/// errors: the record is `broken`.
 pub fn run_line(
     env: &Env,
     campaign: &str,
