@@ -74,8 +74,8 @@ fn one_interrupt_ends_a_skill_that_polls_or_is_silent() {
         let begun = || match program {
             "polls.py" => here.join("starts").exists(),
             _ => std::fs::read_dir("/proc").unwrap().flatten().any(|entry| {
-                let is_python =
-                    std::fs::read(entry.path().join("cmdline")).is_ok_and(|line| line.starts_with(b"python"));
+                let is_python = std::fs::read(entry.path().join("cmdline"))
+                    .is_ok_and(|line| line.windows(6).any(|part| part == b"python"));
                 is_python && std::fs::read_link(entry.path().join("cwd")).is_ok_and(|cwd| cwd == here)
             }),
         };
