@@ -9,6 +9,7 @@ mod fault;
 mod folder;
 mod frames;
 mod graphs;
+mod light;
 mod lists;
 pub mod merge;
 mod newest;
@@ -42,5 +43,5 @@ pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, R
 pub use scene_digest::SceneDigest;
 pub use store::History;
 pub use vitals::RunVitals;
-pub use wire::{WireFault, WireSyntax};
+pub use wire::{WireFault, WireLimits, WireSyntax};
 pub use write_scene::{NOISE_TERMS, noise};

@@ -8,6 +8,7 @@ pub mod look;
 pub mod made_up;
 pub mod paged;
 pub mod planted;
+pub mod server;
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt as _;
