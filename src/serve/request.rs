@@ -17,6 +17,7 @@ use crate::question::Refusal;
 const MOST_BODY: u64 = 1 << 20;
 /// Time limit for a client to send the head of a request, and again for its body.
 pub(super) const PATIENCE: Duration = Duration::from_secs(10);
+
 /// A header's text, if it is ASCII.
 pub(super) fn text<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     headers.get(name).and_then(|value| value.to_str().ok())
