@@ -29,13 +29,14 @@ CONNECTIONS = (1, 16, 64)
 
 
 def rate(url, connections, seconds):
-    """Requests per second, 99th percentile in ms, and responses other than 2xx and 3xx."""
+    """Answered requests per second, 99th percentile in ms, and responses other than 2xx and 3xx."""
     command = ["wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "--latency", url]
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    per_second = float(re.search(r"Requests/sec:\s+([\d.]+)", text)[1])
     value, unit = re.search(r"99%\s+([\d.]+)(us|ms|s)", text).groups()
     refused = re.search(r"Non-2xx or 3xx responses: (\d+)", text)
-    return per_second, float(value) * {"us": 1e-3, "ms": 1, "s": 1e3}[unit], int(refused[1]) if refused else 0
+    refused = int(refused[1]) if refused else 0
+    answered = int(re.search(r"(\d+) requests in", text)[1]) - refused
+    return answered / seconds, float(value) * {"us": 1e-3, "ms": 1, "s": 1e3}[unit], refused
 
 
 def wait_for(url):
