@@ -125,7 +125,7 @@ fn faults_that_a_robot_can_not_have_are_left_out() {
 
 /// The actions of the whole task, each with its preceding actions, in a room with nothing unusual. (An object
 /// displaced by half a metre from a cabinet is never still on it.)
-const TASK: &str = "test_count = 7\nseed = 3\n\
+const TASK: &str = "test_count = 8\nseed = 3\n\
     nav_obstacle_list = [\"bottle\"]\nnav_obstacle_count = 1\n[world]\nworlds = [\"empty_room\"]\n\
     [objectLocation]\nlocation_list = [\"left_corner\"]\n[objectSurface]\nobject_surfaces = [\"table\"]\n\
     [placeSurface]\nplace_object_surfaces = [\"cabinet\"]\n[pickObject]\nmodel_list = [\"glass\", \"can\"]\n\
