@@ -65,6 +65,7 @@ mod shrink;
 mod shrunk;
 mod statistics;
 mod stops;
+mod strangers;
 mod support;
 mod tables;
 mod trust;
