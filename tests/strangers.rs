@@ -122,7 +122,10 @@ fn a_case_starts_another_program_only_with_consent() {
     let run = ["run", "c.toml", "--history", "h"];
     let said = refused(here, &run);
     let place = "regressions/theirs.toml:3:1";
-    assert!(said.contains("X059") && said.contains(place) && said.contains("mark.sh") && said.contains("--trust"), "{said}");
+    assert!(
+        said.contains("X059") && said.contains(place) && said.contains("mark.sh") && said.contains("--trust"),
+        "{said}"
+    );
     let said = refused(here, &["run", "regressions/theirs.toml", "--history", "h"]);
     assert!(said.contains("X059") && said.contains("--trust"), "{said}");
     let checked = actcheck(here, &["check", "c.toml"]);
@@ -147,7 +150,11 @@ fn a_case_with_the_campaigns_own_program_needs_no_consent() {
         campaign(here, "./mark.sh", "");
     };
     let run = ["run", "c.toml", "--history", "h"];
-    for more in ["", "[skill]\ndir = \"..\"\nenv = { LD_PRELOAD = \"theirs.so\" }\n", "[skill]\ndir = \"..\"\nargs = [\"-c\"]\n"] {
+    for more in [
+        "",
+        "[skill]\ndir = \"..\"\nenv = { LD_PRELOAD = \"theirs.so\" }\n",
+        "[skill]\ndir = \"..\"\nargs = [\"-c\"]\n",
+    ] {
         case(more);
         assert!(refused(here, &run).contains("X059"), "{more}");
         assert!(!mark.exists(), "{more}");
@@ -155,6 +162,31 @@ fn a_case_with_the_campaigns_own_program_needs_no_consent() {
     case("[skill]\ndir = \"..\"\n");
     let output = actcheck(here, &run);
     assert!(mark.exists() && !stderr(&output).contains("X059"), "{}", stderr(&output));
+}
+
+/// The configuration in a history names a program too, which `replay` and `shrink` start.
+#[test]
+fn a_program_of_a_history_without_its_configuration_needs_consent() {
+    let folder = with_marker();
+    let (here, mark) = (folder.path(), folder.path().join("mark"));
+    campaign(here, "./mark.sh", "");
+    let output = actcheck(here, &["run", "c.toml", "--history", "h", "--format", "csv"]);
+    let run = stdout(&output).lines().nth(1).unwrap().split(',').next().unwrap().to_owned();
+    std::fs::remove_file(&mark).unwrap();
+    // The same program in the configuration.
+    actcheck(here, &["replay", &run, "--history", "h"]);
+    assert!(mark.exists());
+    std::fs::remove_file(&mark).unwrap();
+    campaign(here, "", "");
+    for command in ["replay", "shrink"] {
+        let said = refused(here, &[command, &run, "--history", "h"]);
+        assert!(said.contains("X059") && said.contains("mark.sh"), "{command}: {said}");
+    }
+    assert!(!mark.exists());
+    actcheck(here, &["replay", &run, "--history", "h", "--config", "c.toml"]);
+    assert!(!mark.exists());
+    actcheck(here, &["replay", &run, "--history", "h", "--trust"]);
+    assert!(mark.exists());
 }
 
 /// Writes a model whose shape is the mesh at a URI, and returns what reading it reports.
@@ -195,11 +227,19 @@ fn devices_and_pipes_are_not_read() {
             let ending = if key.contains("require") { ".rls" } else { ".toml" };
             let path = folder.path().join(format!("odd{ending}"));
             let _ = std::fs::remove_file(&path);
-            if file == "pipe" { fifo(&path) } else { std::os::unix::fs::symlink(file, &path).unwrap() }
+            if file == "pipe" {
+                fifo(&path)
+            } else {
+                std::os::unix::fs::symlink(file, &path).unwrap()
+            }
             let said = said_of_config(folder.path(), &format!("{key} = \"odd{ending}\"\n"));
             assert!(said.contains(code) && said.contains("it is a device or a pipe"), "{key} {file}: {said}");
         }
     }
+    let history = folder.path().join("h");
+    std::fs::create_dir(&history).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", history.join("VERSION")).unwrap();
+    assert!(refused(folder.path(), &["list", "--history", "h"]).contains("H003"));
     let found = ontology::load(&Files::Disk, Path::new("/dev/zero")).map(drop).unwrap_err();
     assert!(found.to_string().contains("O001") && found.to_string().contains("it is a device or a pipe"), "{found}");
 }
@@ -231,7 +271,8 @@ fn xml_that_grows_in_a_parser_is_refused() {
         ("<a>".repeat(100_000), "nested more than 10000 levels deep"),
     ] {
         for name in ["o.owl", "o.rdf"] {
-            let found = ontology::triples_of(&Source::new(name, format!("<?xml version=\"1.0\"?>{text}")), 0).unwrap_err();
+            let found =
+                ontology::triples_of(&Source::new(name, format!("<?xml version=\"1.0\"?>{text}")), 0).unwrap_err();
             assert!(found.to_string().contains("O013") && found.to_string().contains(reason), "{found}");
         }
     }
@@ -313,7 +354,10 @@ fn xacro_ends_when_actcheck_is_killed() {
     let folder = tempfile::tempdir().unwrap();
     let (note, tools) = (folder.path().join("pid"), folder.path().join("tools"));
     std::fs::create_dir(&tools).unwrap();
-    script(&tools.join("xacro"), &format!("#!/bin/sh\necho $$ > '{0}.new'\nmv '{0}.new' '{0}'\nwhile :; do sleep 5; done\n", note.display()));
+    script(
+        &tools.join("xacro"),
+        &format!("#!/bin/sh\necho $$ > '{0}.new'\nmv '{0}.new' '{0}'\nwhile :; do sleep 5; done\n", note.display()),
+    );
     let profile = std::fs::read_to_string("models/robots/fixed_arm.toml").unwrap();
     std::fs::write(folder.path().join("r.toml"), profile.replace("fixed_arm.urdf", "r.urdf.xacro")).unwrap();
     std::fs::write(folder.path().join("r.urdf.xacro"), "<robot/>").unwrap();
@@ -335,8 +379,10 @@ fn xacro_ends_when_actcheck_is_killed() {
 fn a_file_with_thousands_of_faults_reports_the_first() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir_all(folder.path().join("models/objects")).unwrap();
-    let links: String = (0..900).map(|number| format!("<link name=\"l{number}\"><odd{number}/><collision/></link>")).collect();
-    std::fs::write(folder.path().join("models/objects/cup.urdf"), format!("<robot name=\"r\">{links}</robot>")).unwrap();
+    let links: String =
+        (0..900).map(|number| format!("<link name=\"l{number}\"><odd{number}/><collision/></link>")).collect();
+    std::fs::write(folder.path().join("models/objects/cup.urdf"), format!("<robot name=\"r\">{links}</robot>"))
+        .unwrap();
     let more = "tests = [[\"Pick\"]]\ntest_count = 1\nmodel_dir = \"models\"\n[pickObject]\nmodel_list = [\"cup\"]\n";
     let source = Source::new(folder.path().join("c.toml").display().to_string(), more);
     let found: Diagnostics = config::load_text(source, folder.path(), &Overrides::default()).map(drop).unwrap_err();

@@ -90,7 +90,21 @@ mod tests {
         for id in ["k7f3", "k7f3-12", "1f00_shrunk", &"a".repeat(128)] {
             assert!(is_id(id), "{id}");
         }
-        for wrong in ["", ".", "..", "../../x", "a/b", "a\\b", "-rf", "a b", "a\0", "é", "a.trace", "a\u{1b}[2J", &"a".repeat(129)] {
+        for wrong in [
+            "",
+            ".",
+            "..",
+            "../../x",
+            "a/b",
+            "a\\b",
+            "-rf",
+            "a b",
+            "a\0",
+            "é",
+            "a.trace",
+            "a\u{1b}[2J",
+            &"a".repeat(129),
+        ] {
             assert!(!is_id(wrong), "{wrong}");
         }
     }

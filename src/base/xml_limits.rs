@@ -217,7 +217,8 @@ mod tests {
 
     /// The message without its beginning; empty if the text is accepted.
     fn said(text: &str) -> String {
-        let said = check_xml(&Source::new("a.xml", text), "W055").map_or_else(|fault| fault.message, |()| String::new());
+        let said =
+            check_xml(&Source::new("a.xml", text), "W055").map_or_else(|fault| fault.message, |()| String::new());
         said.trim_start_matches("this XML is refused: ").to_owned()
     }
 
@@ -226,7 +227,9 @@ mod tests {
         let owl = "<?xml version=\"1.0\"?>\n<!DOCTYPE rdf:RDF [\n <!ENTITY owl \"http://www.w3.org/2002/07/owl#\" >\n \
             <!ENTITY xsd 'http://www.w3.org/2001/XMLSchema#' >\n]>\n<!-- a > b, don't <i> --><r xmlns=\"&owl;\" a='>'>\
             <![CDATA[<x>]]><b/></r>";
-        for text in [owl, "", "<", "<!", "<!--", "<![", "<?", "</", "</a>", "a &b; c", "<a b=", "<!DOCTYPE a [<!ENTITY", "<é"] {
+        for text in
+            [owl, "", "<", "<!", "<!--", "<![", "<?", "</", "</a>", "a &b; c", "<a b=", "<!DOCTYPE a [<!ENTITY", "<é"]
+        {
             assert_eq!(said(text), "", "{text}");
         }
     }

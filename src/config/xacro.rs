@@ -63,7 +63,7 @@ fn expand_with(program: &PathBuf, path: &Path, limit: Duration) -> Result<Source
     let output = run(program, path, limit).map_err(|error| not_started(path, &error.to_string()))?;
     let refused = |message: String| Unexpanded {
         message,
-        help: format!("run `xacro {shown}` to see what it does, and use its output: `xacro {shown} > robot.urdf`"),
+        help: format!("expand it elsewhere, and name the result: `xacro {shown} > robot.urdf`"),
     };
     let Some(output) = output else {
         return Err(refused(format!("xacro did not expand {shown} within {} s", limit.as_secs_f64())));
@@ -178,6 +178,9 @@ mod tests {
     use std::os::unix::fs::PermissionsExt as _;
 
     use super::*;
+    use crate::foreign::{self, Lookup};
+    use crate::mutations::cases;
+    use actcheck_base::{Diagnostics, Files};
 
     /// Expands a file with a shell script in the place of xacro.
     fn expanded(script: &str, limit: Duration) -> Result<Source, Unexpanded> {
@@ -194,6 +197,42 @@ mod tests {
         assert_eq!((&*source.text, &*source.name), ("<robot/>\n", "r.urdf.xacro (expanded)"));
         let fault = expanded("echo 'no such arm' >&2; exit 3", LIMIT).expect_err("it fails");
         assert_eq!(fault.message, "xacro cannot expand r.urdf.xacro: no such arm");
+    }
+
+    /// The program prints mutated texts, and the expansion is read as a robot's URDF.
+    #[test]
+    fn mutated_expansions_are_read_or_refused() {
+        const WORDS: [&str; 8] = [
+            "<xacro:if value=\"${x}\">",
+            "${",
+            "$(find a)",
+            "\u{1b}[31m",
+            "<link name=\"l\"/>",
+            "<!DOCTYPE a [",
+            "&x;",
+            "\u{80}",
+        ];
+        let folder = tempfile::tempdir().expect("a folder");
+        let (program, printed) = (folder.path().join("xacro"), folder.path().join("printed"));
+        fs::write(&program, format!("#!/bin/sh\ncat '{}'\n[ ! -e \"$1\" ] || exit 1\n", printed.display()))
+            .expect("a script");
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is executable");
+        let urdf =
+            b"<robot name=\"r\"><link name=\"a\"><inertial><mass value=\"1\"/></inertial></link><link name=\"b\"/>\
+            <joint name=\"j\" type=\"prismatic\"><parent link=\"a\"/><child link=\"b\"/><limit lower=\"0\" upper=\"1\" \
+            effort=\"1\" velocity=\"1\"/></joint></robot>";
+        cases("xacro", 20, |mut random| {
+            fs::write(&printed, random.text(urdf, &WORDS, &[])).expect("a text");
+            match expand_with(&program, Path::new("r.urdf.xacro"), LIMIT) {
+                Ok(source) => {
+                    let lookup = Lookup { files: &Files::Disk, folders: Vec::new() };
+                    let mut found = Diagnostics::new();
+                    foreign::robot::read(&source, Path::new("r.urdf.xacro"), &lookup, &mut found);
+                    assert!(found.iter().all(|fault| fault.message.len() < 10_000));
+                }
+                Err(fault) => assert!(!fault.message.is_empty()),
+            }
+        });
     }
 
     /// An endless loop in a xacro file went on for 33 minutes after actcheck was gone.
@@ -216,7 +255,8 @@ mod tests {
     fn an_expansion_without_end_in_length_is_refused() {
         let fault = expanded("while :; do echo '<robot name=\"a very long robot, again and again\"/>'; done", LIMIT);
         assert_eq!(fault.expect_err("it is too long").message, "the expansion of r.urdf.xacro is longer than 16 MiB");
-        let fault = expanded("while echo error >&2; do :; done", Duration::from_millis(300)).expect_err("it never ends");
+        let fault =
+            expanded("while echo error >&2; do :; done", Duration::from_millis(300)).expect_err("it never ends");
         assert!(fault.message.contains("within 0.3 s"), "{}", fault.message);
     }
 }

@@ -219,8 +219,8 @@ const CODES_X: &[Code] = &[
     ),
     code(
         "X059",
-        "a case starts a program of its own",
-        "it comes from someone else, or the campaign's program has changed since it was exported",
+        "a case or a history would start a program without consent",
+        "it comes from someone else, or the campaign's own program has changed since",
         "read the program, then run again with `--trust`; or remove the case",
     ),
     code(

@@ -97,15 +97,7 @@ impl<'a> Gathering<'a> {
                 by_id.entry((node.tag_name().name(), id)).or_insert(node);
             }
         }
-        Self {
-            root,
-            by_id,
-            known: BTreeMap::new(),
-            vertices: Vec::new(),
-            triangles: Vec::new(),
-            depth: 0,
-            n_nodes: 0,
-        }
+        Self { root, by_id, known: BTreeMap::new(), vertices: Vec::new(), triangles: Vec::new(), depth: 0, n_nodes: 0 }
     }
 
     /// Gathers the scene that the file instances, or else its first scene, or else every geometry without transforms.

@@ -68,7 +68,9 @@ pub(crate) fn parse(source: &Source) -> Result<roxmltree::Document<'_>, Diagnost
 /// As [`parse`]; W055 also if it has more parts than can be simulated.
 pub(crate) fn parse_model(source: &Source) -> Result<roxmltree::Document<'_>, Diagnostics> {
     let refused = |message: String, at: Span| {
-        Diagnostic::error("W055", message).at(source, at).help("use fewer and simpler parts; meshes have files of their own")
+        Diagnostic::error("W055", message)
+            .at(source, at)
+            .help("use fewer and simpler parts; meshes have files of their own")
     };
     if source.text.len() > LONGEST_MODEL {
         return Err(refused(format!("this model is longer than {} MiB", LONGEST_MODEL >> 20), 0..0).into());
