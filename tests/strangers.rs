@@ -81,7 +81,7 @@ fn an_id_of_a_foreign_history_does_not_lead_out_of_a_folder() {
         &["merge", "theirs", "--into", "ours"][..],
         &["list", "--history", "theirs"],
         &["analyse", "--history", "theirs"],
-        &["report", "--history", "theirs", "-o", "r.html"],
+        &["report", "--history", "theirs", "--html", "r.html"],
         &["export", "../../../x-1", "-o", "case.toml", "--history", "theirs"],
         &["run", "--resume", "--history", "theirs"],
         &["recheck", "--history", "theirs"],
@@ -139,7 +139,7 @@ fn a_case_starts_another_program_only_with_consent() {
     assert!(mark.exists() && !stderr(&output).contains("X059"), "{}", stderr(&output));
 }
 
-/// The same program in another environment or folder is another program: both can change what it loads.
+/// The same program in another environment or folder is another program: both can change the code that it loads.
 #[test]
 fn a_case_with_the_campaigns_own_program_needs_no_consent() {
     let folder = with_marker();
@@ -189,7 +189,7 @@ fn a_program_of_a_history_without_its_configuration_needs_consent() {
     assert!(mark.exists());
 }
 
-/// Writes a model whose shape is the mesh at a URI, and returns what reading it reports.
+/// Writes a model whose shape is the mesh at a URI, and returns the diagnostics of reading it.
 fn said_of_mesh(folder: &Path, uri: &str) -> String {
     let model = folder.join("models/objects/lamp");
     std::fs::create_dir_all(&model).unwrap();
@@ -222,7 +222,7 @@ fn devices_and_pipes_are_not_read() {
         let said = said_of_mesh(folder.path(), uri);
         assert!(said.contains("W037") && said.contains("it is a device or a pipe"), "{uri}: {said}");
     }
-    for (key, code) in [("ontology", "C012"), ("[scene]\nrequire", "C022"), ("[robot]\nprofile", "W010")] {
+    for (key, code) in [("ontology", "C012"), ("[scene]\nrequire", "C022"), ("[robot]\nprofile", "C011")] {
         for file in ["/dev/zero", "pipe"] {
             let ending = if key.contains("require") { ".rls" } else { ".toml" };
             let path = folder.path().join(format!("odd{ending}"));
@@ -244,7 +244,7 @@ fn devices_and_pipes_are_not_read() {
     assert!(found.to_string().contains("O001") && found.to_string().contains("it is a device or a pipe"), "{found}");
 }
 
-/// Declarations of entities that stand for 10⁹ words.
+/// Declarations of an entity that expands to 10⁹ words.
 fn laughs() -> String {
     let mut text = "<!DOCTYPE a [<!ENTITY l0 \"lol\">".to_owned();
     for level in 1..10 {

@@ -108,12 +108,17 @@ impl<'a> Scan<'a> {
     }
 
     /// Length of the replacement texts of all entities that a text refers to.
-    fn expansion_of(&self, text: &[u8]) -> usize {
+    fn expansion_of(&self, text: &'a [u8]) -> usize {
         if self.entities.is_empty() {
             return 0;
         }
+        self.references(text).fold(0, |sum: usize, (_, length)| sum.saturating_add(length))
+    }
+
+    /// The known entities that a text refers to, with the lengths of their replacement texts.
+    fn references<'t>(&'t self, text: &'t [u8]) -> impl Iterator<Item = (&'t [u8], usize)> {
         let names = text.split(|byte| *byte == b'&').skip(1).filter_map(|rest| rest.split(|byte| *byte == b';').next());
-        names.filter_map(|name| self.entities.get(name)).fold(0, |sum, length| sum.saturating_add(*length))
+        names.filter_map(|name| Some((name, *self.entities.get(name)?)))
     }
 
     /// Reads a start tag or an empty element.
@@ -198,7 +203,8 @@ impl<'a> Scan<'a> {
         let value = value.trim_ascii_start();
         let Some(quote @ (b'"' | b'\'')) = value.first() else { return Ok(()) };
         let text = value[1..].split(|byte| byte == quote).next().unwrap_or_default();
-        let length = text.len().saturating_add(self.expansion_of(text));
+        let written: usize = self.references(text).map(|(name, _)| name.len() + "&;".len()).sum();
+        let length = text.len().saturating_sub(written).saturating_add(self.expansion_of(text));
         if length > LONGEST_ENTITY {
             let name = String::from_utf8_lossy(name.get(..40).unwrap_or(name)).into_owned();
             return Err(format!("the entity `{name}` expands to more than {} KiB", LONGEST_ENTITY >> 10));

@@ -40,7 +40,7 @@ const WORDS: [&str; 16] = [
     "\"positions\": {\"a\": 1, \"a\": 2}, ",
     "\u{0}\u{0}\u{0}\u{0}J",
     "\u{7f}\u{0}\u{0}\u{0}J{}",
-    "\"what\": \"cloud\"",
+    "\"of\": \"can_1\", ",
 ];
 
 fn joints() -> Joints {
