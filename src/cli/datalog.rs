@@ -39,7 +39,7 @@ pub struct DatalogArgs {
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let budget = Budget { tuples: args.max_tuples, secs: args.max_time, stop: Arc::clone(stop) };
     if let Some(statement) = &args.trace {
-        let source = Files::Disk.read(&args.file).map_err(|why| {
+        let source = Files::Disk.read_program(&args.file).map_err(|why| {
             Diagnostic::error("X005", format!("{}: {why}", args.file.display())).help("name a file with rules (.rls)")
         })?;
         let folder = args.file.parent().unwrap_or(Path::new("."));

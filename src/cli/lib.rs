@@ -54,6 +54,7 @@ mod session;
 mod show;
 mod shrink;
 mod stop;
+mod trust;
 mod when;
 mod why;
 mod work;

@@ -67,6 +67,15 @@ pub(super) fn damaged(dir: &Path, what: &str) -> Diagnostics {
         .into()
 }
 
+/// H026: an id can't be part of a file name.
+pub(super) fn foreign_id(dir: &Path, kind: &str, id: &str) -> Diagnostics {
+    let id: String = id.chars().take(80).collect();
+    let message = format!("the history `{}` has a {kind} with the id `{id}`, which is not an id", dir.display());
+    Diagnostic::error("H026", message)
+        .help("an id has only letters, digits, `-` and `_`: actcheck did not write this history, so don't trust it")
+        .into()
+}
+
 fn failed(dir: &Path, doing: &str, kind: ErrorKind, text: &str) -> Diagnostics {
     let has = |words: &[&str]| words.iter().any(|word| text.contains(word));
     if matches!(kind, ErrorKind::StorageFull | ErrorKind::QuotaExceeded) || has(&["No space left", "quota exceeded"]) {

@@ -14,6 +14,8 @@ use actcheck_base::{Diagnostics, write_atomic};
 /// Format of the folder that this program writes, and the newest that it reads.
 pub(super) const FORMAT: u64 = 1;
 const TITLE: &str = "actcheck history";
+/// Longest version file. Unit: bytes.
+const LONGEST_VERSION: u64 = 1_000;
 
 /// A folder that this process owns, or shares with other readers, until the value is dropped.
 #[derive(Debug)]
@@ -79,7 +81,12 @@ impl Folder {
 
 /// Whether the folder has a history that this program can read.
 fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
-    let text = match fs::read_to_string(dir.join("VERSION")) {
+    let file = dir.join("VERSION");
+    // A pipe or a device of a foreign folder may have no end.
+    if fs::metadata(&file).is_ok_and(|data| !data.is_file() || data.len() > LONGEST_VERSION) {
+        return Err(fault::foreign(dir));
+    }
+    let text = match fs::read_to_string(&file) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
         Err(error) if error.kind() == ErrorKind::InvalidData => return Err(fault::foreign(dir)),

@@ -19,7 +19,7 @@ use crate::{
     RunVitals, detail, fault, query, trace_file, vitals,
 };
 use crate::{lists, read_campaign};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, RunFacts, Source, nearest, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, RunFacts, Source, names, nearest, write_atomic};
 use actcheck_data::{Choice, Trace};
 use actcheck_facts::extract;
 
@@ -103,8 +103,9 @@ impl History {
     /// Writes a campaign before its first run, and removes the leftovers of killed processes.
     ///
     /// # Errors
-    /// Writing failed: `H005`, `H006`.
+    /// Writing failed: `H005`, `H006`; `H026` its id is not an id.
     pub fn begin_campaign(&self, record: &CampaignRecord) -> Result<(), Diagnostics> {
+        self.check_ids("campaign", [&record.id])?;
         self.remove_orphans()?;
         self.store()?
             .extend(write_campaign::beginning(record))
@@ -140,6 +141,7 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`. Runs stored before are complete.
     pub fn commit(&self, record: &RunRecord) -> Result<(), Diagnostics> {
+        self.check_ids("run", [&record.id])?;
         let doing = format!("writing run {}", record.id);
         let bytes = trace_file::encode(&record.choices, &record.trace)
             .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
@@ -175,9 +177,11 @@ impl History {
     /// Returns all campaigns, sorted by start, then by id.
     ///
     /// # Errors
-    /// The store can't be read.
+    /// The store can't be read; `H026` an id is not an id.
     pub fn campaigns(&self) -> Result<Vec<CampaignRow>, Diagnostics> {
-        lists::campaigns(&self.store()?).map_err(|error| self.query_fault(&error))
+        let campaigns = lists::campaigns(&self.store()?).map_err(|error| self.query_fault(&error))?;
+        self.check_ids("campaign", campaigns.iter().map(|campaign| &campaign.id))?;
+        Ok(campaigns)
     }
 
     /// Returns the record of a campaign.
@@ -205,9 +209,11 @@ impl History {
     /// has no runs.
     ///
     /// # Errors
-    /// The store can't be read.
+    /// The store can't be read; `H026` an id is not an id.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
-        lists::runs(&self.store()?, filter).map_err(|error| self.query_fault(&error))
+        let runs = lists::runs(&self.store()?, filter).map_err(|error| self.query_fault(&error))?;
+        self.check_ids("run", runs.iter().flat_map(|run| [&run.run, &run.campaign]))?;
+        Ok(runs)
     }
 
     /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by start, each with its
@@ -226,6 +232,8 @@ impl History {
             let mut runs: Vec<String> =
                 runs.into_iter().map(|run| short_id(&text_of(&run.into())).to_owned()).collect();
             runs.sort();
+            self.check_ids("campaign", [&id])?;
+            self.check_ids("run", &runs)?;
             found.push((id, runs));
         }
         Ok(found)
@@ -247,7 +255,7 @@ impl History {
     pub fn resolve(&self, name: &str) -> Result<String, Diagnostics> {
         let name = short_id(name.trim().trim_start_matches('<').trim_end_matches('>'));
         let name = name.strip_prefix("run:").unwrap_or(name);
-        if self.has_run(name)? {
+        if names::is_id(name) && self.has_run(name)? {
             return Ok(name.to_owned());
         }
         let known = self.ids("act:Run")?;
@@ -365,7 +373,7 @@ impl History {
 
     fn decoded<T>(&self, id: &str, decode: impl FnOnce(&[u8]) -> Result<T, String>) -> Result<T, Diagnostics> {
         let file = self.folder.trace(id);
-        let bytes = std::fs::read(&file).map_err(|error| {
+        let bytes = Files::Disk.read_bytes(&file).map_err(|error| {
             Diagnostic::error("H009", format!("the trace of run {id} can't be read from `{}`: {error}", file.display()))
                 .help("restore the file from a backup; the store's data on the run is intact")
         })?;
@@ -386,7 +394,16 @@ impl History {
             subjects(&self.store()?, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
         let mut ids: Vec<String> = found.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
         ids.sort();
+        self.check_ids(if class.as_str().ends_with("Run") { "run" } else { "campaign" }, &ids)?;
         Ok(ids)
+    }
+
+    /// Ids are parts of file names, so those of a foreign history must not lead out of its folder.
+    fn check_ids<'a>(&self, kind: &str, ids: impl IntoIterator<Item = &'a String>) -> Result<(), Diagnostics> {
+        match ids.into_iter().find(|id| !names::is_id(id)) {
+            Some(id) => Err(fault::foreign_id(self.dir(), kind, id)),
+            None => Ok(()),
+        }
     }
 
     fn campaign_ids(&self) -> Result<Vec<String>, Diagnostics> {

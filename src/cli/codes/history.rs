@@ -135,4 +135,10 @@ const CODES_H: &[Code] = &[
         "leave one out, and recheck the result",
     ),
     code("H025", "there is no such campaign to leave out", "the id is misspelt", "take the suggested id"),
+    code(
+        "H026",
+        "a campaign or run of a history has an id that is not an id",
+        "another program wrote or changed the history; such an id could name a file outside of the history",
+        "don't use the history; ids have only letters, digits, `-` and `_`",
+    ),
 ];

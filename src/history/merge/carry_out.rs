@@ -14,7 +14,7 @@ use crate::statements::{Statements, iri, time};
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::run_node;
 use crate::{History, fault};
-use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics, Files, write_atomic};
 
 /// The result of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -115,7 +115,7 @@ impl Writer<'_> {
 
     fn run(&mut self, source: usize, run: &str, new: &str) -> Result<(), Diagnostics> {
         let doing = format!("writing run {new}");
-        match std::fs::read(self.sources[source].trace_path(run)) {
+        match Files::Disk.read_bytes(&self.sources[source].trace_path(run)) {
             Ok(bytes) => write_atomic(&self.into.trace_path(new), &bytes)
                 .map_err(|error| fault::io(self.into.dir(), &doing, &error))?,
             Err(_) => self.merged.without_trace.push(new.to_owned()),

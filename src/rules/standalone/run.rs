@@ -26,7 +26,7 @@ pub struct Summary {
 /// budget's `stop` was set (`R091`).
 pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diagnostics> {
     let source = Files::Disk
-        .read(path)
+        .read_program(path)
         .map_err(|reason| Diagnostic::error("R072", format!("`{}` can't be read: {reason}", path.display())))?;
     let program = Program::load_until(&source, path.parent().unwrap_or(Path::new("")), &budget.stop)?;
     let mut diagnostics = Diagnostics::new();
