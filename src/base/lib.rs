@@ -16,6 +16,7 @@ mod source;
 mod suggest;
 mod term;
 mod write_atomic;
+mod xml_guard;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
 pub use digest::{Digest, digest_of, program_digest, set_program_digest};
@@ -29,3 +30,4 @@ pub use source::{Source, Span};
 pub use suggest::{did_you_mean, nearest};
 pub use term::{Term, TermId, Terms};
 pub use write_atomic::write_atomic;
+pub use xml_guard::{XmlGuard, XmlProgress};
