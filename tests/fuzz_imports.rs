@@ -1,8 +1,8 @@
 //! Damaged files of every import format: each is refused with a place or read as a whole, without a panic, and within
 //! its limits.
 //!
-//! `FUZZ_IMPORTS=100000 cargo test --release --test all fuzz_imports` tries that many files of each format instead of
-//! a few, and `FUZZ_IMPORTS_FROM` is the number of the first one. A file is a function of its number.
+//! A few files of each format, or as many as fit into `ACTCHECK_FUZZ_MINUTES` if that is set. A file is a function of
+//! its number.
 
 use actcheck::data::Choices;
 
@@ -108,43 +108,52 @@ fn damaged(valid: &[u8], number: u64) -> Vec<u8> {
     bytes
 }
 
-fn setting(name: &str, usual: u64) -> u64 {
-    std::env::var(name).map_or(usual, |text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number")))
-}
-
 #[test]
 fn valid_files_of_all_formats_have_no_fault() {
-    for format in 0..FORMATS.len() {
+    for (format, names) in FORMATS.iter().enumerate() {
         let file = [&[u8::try_from(format).unwrap()], valid(format).as_slice()].concat();
-        assert!(import(&file), "{:?}", FORMATS[format]);
+        assert!(import(&file), "{names:?}");
     }
 }
 
 #[test]
 fn damaged_files_of_all_formats_are_refused_or_read() {
-    let (count, from) = (setting("FUZZ_IMPORTS", 40), setting("FUZZ_IMPORTS_FROM", 0));
-    let mut whole = 0;
-    for format in 0..FORMATS.len() {
-        let (_, ending, _) = FORMATS[format];
+    let (mut all, mut whole) = (0, 0);
+    for (format, names) in FORMATS.iter().enumerate() {
         let valid = valid(format);
-        for number in from..from + count {
-            // Half of the compressed files are damaged before their compression.
-            let inside = ending.ends_with("gz") && number % 2 == 0;
-            let bytes = match inside {
-                true => packed(&damaged(if ending.starts_with("csv") { TABLE } else { XML }.as_bytes(), number)),
-                false => damaged(&valid, number),
-            };
-            let file = [&[u8::try_from(format).unwrap()], bytes.as_slice()].concat();
+        let mut count = 0;
+        for number in numbers() {
+            let file = [&[u8::try_from(format).unwrap()], changed(format, &valid, number).as_slice()].concat();
             match std::panic::catch_unwind(|| import(&file)) {
                 Ok(fine) => whole += u64::from(fine),
-                Err(_) => panic!(
-                    "file {number} of {:?} ends in a panic: {:?}",
-                    FORMATS[format],
-                    String::from_utf8_lossy(&bytes)
-                ),
+                Err(_) => {
+                    let text = String::from_utf8_lossy(&file[1..]);
+                    panic!("file {number} of {names:?} causes a panic: {text:?}");
+                }
             }
+            count += 1;
         }
+        println!("{names:?}: {count} files");
+        all += count;
     }
-    println!("{} files, {whole} without a fault", count * FORMATS.len() as u64);
-    assert!(whole > 0 && whole < count * FORMATS.len() as u64);
+    println!("{all} files, {whole} of them without a fault");
+    assert!(0 < whole && whole < all);
+}
+
+/// The numbers of the files of one format: a few, or as many as fit into its part of `ACTCHECK_FUZZ_MINUTES`.
+fn numbers() -> Box<dyn Iterator<Item = u64>> {
+    let Ok(text) = std::env::var("ACTCHECK_FUZZ_MINUTES") else { return Box::new(0..40) };
+    let minutes: f64 = text.parse().unwrap_or_else(|_| panic!("ACTCHECK_FUZZ_MINUTES is not a number: {text}"));
+    let (start, share) = (std::time::Instant::now(), minutes * 60.0 / FORMATS.len() as f64);
+    Box::new((0..).take_while(move |_| start.elapsed().as_secs_f64() < share))
+}
+
+/// The damaged file of a number. Half of the compressed ones are damaged before their compression.
+fn changed(format: usize, valid: &[u8], number: u64) -> Vec<u8> {
+    let (name, ending, _) = FORMATS[format];
+    if !ending.ends_with("gz") || number % 2 == 1 {
+        return damaged(valid, number);
+    }
+    let text = if name == "csv" { TABLE } else { XML };
+    packed(&damaged(text.as_bytes(), number))
 }

@@ -74,21 +74,17 @@ fn faults_of_tables_are_errors_with_their_place() {
 
 #[test]
 fn faults_of_statements_are_errors_with_their_place() {
-    let line = "<http://x#a> <http://x#b> <http://x#c>";
-    fails("t.nt", "", format!("{line} .\n{line}\n{line} .\nx\n").as_bytes(), &["2 faults", "t.nt:2:", "t.nt:4:1"], 2);
-    fails("t.nq", "", format!("{line} <http://g> .\n{line} <http://g").as_bytes(), &["t.nq:2:"], 1);
-    fails(
-        "t.ttl",
-        "",
-        format!("{line} .\n{line}, .\n{line}, 1.5 .\n{line}").as_bytes(),
-        &["2 faults", "t.ttl:2:", "t.ttl:4:"],
-        3,
-    );
-    fails("t.ttl", "", format!("{line} .\n<a> <http://x#b> 1 .").as_bytes(), &["t.ttl:2:1", "IRI"], 1);
+    let [one, two, three, four] = [1, 2, 3, 4].map(|n| format!("<http://x#a> <http://x#b> <http://x#c{n}>"));
+    let lines = format!("{one} .\n{two}\n{three} .\nx\n");
+    fails("t.nt", "", lines.as_bytes(), &["2 faults", "t.nt:3:1", "t.nt:4:1"], 2);
+    fails("t.nq", "", format!("{one} <http://g> .\n{two} <http://g").as_bytes(), &["1 fault", "t.nq:2:"], 1);
+    let statements = format!("{one} .\n{two}, .\n{three}, 1.5 .\n{four}");
+    fails("t.ttl", "", statements.as_bytes(), &["2 faults", "t.ttl:2:", "t.ttl:4:"], 3);
+    fails("t.ttl", "", format!("{one} .\n<a> <http://x#b> 1 .").as_bytes(), &["t.ttl:2:1", "IRI"], 1);
     // The rest of the graph would be read as part of the default graph.
-    let graph = format!("<http://x#g> {{ {line} .\n{line}, . \n {line}, 2 . }}");
-    fails("t.trig", "", graph.as_bytes(), &["t.trig:2:", "nothing is read from line 2 on"], 1);
-    fails("t.trig", "", format!("<http://x#g> {{ {line} .\n").as_bytes(), &["t.trig:2:1"], 1);
+    let graph = format!("<http://x#g> {{ {one} .\n{two}, . \n {three}, 2 . }}");
+    fails("t.trig", "", graph.as_bytes(), &["t.trig:2:", "nothing is read from line 2 on"], 2);
+    fails("t.trig", "", format!("<http://x#g> {{ {one} .\n").as_bytes(), &["1 fault", "t.trig:"], 1);
 }
 
 #[test]
@@ -110,7 +106,7 @@ fn faults_of_xml_are_errors_with_their_place() {
 #[test]
 fn utf_16_is_refused_and_a_byte_order_mark_of_utf_8_is_not_data() {
     let utf_16 = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
-    for (name, text) in [("t.csv", "a,b\n"), ("t.nt", "<http://x> <http://y> 1 .\n"), ("t.rdf", RDF)] {
+    for (name, text) in [("t.csv", "a,b\n"), ("t.nt", "<http://x> <http://y> <http://z> .\n"), ("t.rdf", RDF)] {
         for bytes in [utf_16(text), utf_16(&format!("\u{feff}{text}"))] {
             let folder = folder(&[(name, &bytes)]);
             let text = match name {
@@ -121,8 +117,10 @@ fn utf_16_is_refused_and_a_byte_order_mark_of_utf_8_is_not_data() {
             assert!(found.contains("R072") && found.contains("UTF-16"), "{found}");
         }
     }
-    let folder =
-        folder(&[("t.csv", "\u{feff}a,b\r\n".as_bytes()), ("t.nt", "\u{feff}<http://x> <http://y> 1 .".as_bytes())]);
+    let folder = folder(&[
+        ("t.csv", "\u{feff}a,b\r\n".as_bytes()),
+        ("t.nt", "\u{feff}<http://x> <http://y> <http://z> .".as_bytes()),
+    ]);
     let text = "@import p :- csv{resource = \"t.csv\"} .\n@import q :- ntriples{resource = \"t.nt\"} .";
     let (closure, _) = load(text, folder.path(), &Loading::default()).unwrap_or_else(|found| panic!("{found}"));
     assert_eq!(closure.tuples("p"), [[Term::iri("a"), Term::iri("b")]]);
@@ -150,7 +148,8 @@ fn options_that_do_not_exist_or_cannot_be_are_refused() {
         ("csv{resource = \"t.csv\", format = (any, itn)}", "unknown column format `itn`"),
         ("csv{resource = \"t.csv\", format = (skip, skip)}", "all columns are skipped"),
         ("csv{resource = 7}", "`resource` must be a text, but is 7"),
-        ("ntriples{resource = \"t.nt\", base = \"no iri\"}", "`no iri` is not a base IRI"),
+        ("turtle{resource = \"t.nt\", base = \"no iri\"}", "`no iri` is not a base IRI"),
+        ("ntriples{resource = \"t.nt\", base = \"http://x\"}", "an import of `ntriples` has no option `base`"),
     ] {
         let found = shown(&load(&format!("@import p :- {import} ."), folder.path(), &lenient()).unwrap_err());
         assert!(found.contains("R071") && found.contains(words), "{import}: {found}");

@@ -137,9 +137,13 @@ pub struct Terms {
     by_id: Vec<Term>,
     ids: HashTable<TermId>,
     hasher: RandomState,
+    /// IDs of small integers, or [`ABSENT`]: a column of numbers would otherwise jump about in a table of gigabytes.
+    small: Vec<TermId>,
     /// Memory of the texts. Unit: bytes.
     text_bytes: usize,
 }
+
+const ABSENT: TermId = TermId::MAX;
 
 /// The identity of a term: its kind, its texts and its number.
 type Key<'a> = (u8, &'a str, &'a str, u64);
@@ -190,11 +194,15 @@ impl Terms {
 
     /// Returns the approximate memory of all terms. Unit: bytes.
     pub fn bytes(&self) -> usize {
-        self.text_bytes + self.by_id.len() * (size_of::<Term>() + 2 * size_of::<TermId>())
+        let ids = self.small.len() + 2 * self.ids.len();
+        self.text_bytes + self.by_id.len() * size_of::<Term>() + ids * size_of::<TermId>()
     }
 
     /// Returns a term's hash, and its ID if it is interned.
     fn find(&self, key: Key<'_>) -> (u64, Option<TermId>) {
+        if let Some(id) = small(key).and_then(|value| self.small.get(value)).filter(|id| **id != ABSENT) {
+            return (0, Some(*id));
+        }
         let hash = hash(&self.hasher, key);
         (hash, self.ids.find(hash, |id| self.by_id[*id as usize].key() == key).copied())
     }
@@ -202,14 +210,28 @@ impl Terms {
     fn add(&mut self, new_hash: u64, term: Term) -> TermId {
         let id = TermId::try_from(self.by_id.len()).expect("a run has far fewer than 2^32 terms");
         let (_, text, more, _) = term.key();
+        // The table has at most two places for each term.
+        let place = small(term.key()).filter(|value| *value < 2 * self.by_id.len() + 1024);
         // A shared text has two counters before it.
         self.text_bytes +=
             [text, more].iter().filter(|text| !text.is_empty()).map(|text| text.len() + 16).sum::<usize>();
         self.by_id.push(term);
+        if let Some(place) = place {
+            if self.small.len() <= place {
+                self.small.resize(place + 1, ABSENT);
+            }
+            self.small[place] = id;
+            return id;
+        }
         let Self { by_id, ids, hasher, .. } = self;
         ids.insert_unique(new_hash, id, |id| hash(hasher, by_id[*id as usize].key()));
         id
     }
+}
+
+/// Returns the value of an integer that is not negative.
+fn small((kind, _, _, number): Key<'_>) -> Option<usize> {
+    if kind == 4 { usize::try_from(number ^ (1 << 63)).ok().filter(|value| *value >> 63 == 0) } else { None }
 }
 
 fn hash(hasher: &RandomState, (kind, text, more, number): Key<'_>) -> u64 {
@@ -245,6 +267,22 @@ mod tests {
         assert_eq!((terms.intern(Term::string("a")), terms.intern_string("")), (iri + 1, iri + 2));
         assert_eq!(terms.id(&Term::string("")), Some(iri + 2));
         assert!(terms.bytes() > 3 * size_of::<Term>() && terms.len() == 3);
+    }
+
+    #[test]
+    fn integers_of_all_sizes_are_found() {
+        let mut terms = Terms::new();
+        // Some are too large for the table of small ones, until it has grown.
+        let values: Vec<i64> =
+            [i64::MAX, i64::MIN, -1, 3_000, 5_000].into_iter().chain(0..4_000).chain([1 << 40]).collect();
+        for _ in 0..2 {
+            for value in &values {
+                let id = terms.intern(Term::Integer(*value));
+                assert_eq!((terms.term(id), terms.id(&Term::Integer(*value))), (&Term::Integer(*value), Some(id)));
+            }
+            assert_eq!(terms.len(), 4_005);
+        }
+        assert_eq!(terms.id(&Term::Integer(4_500)), None);
     }
 
     #[test]

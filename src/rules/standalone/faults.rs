@@ -51,6 +51,6 @@ impl Faults {
         };
         let cut = self.cut.map_or(String::new(), |line| format!("; nothing is read from line {line} on"));
         let faults = if self.count == 1 { "1 fault".to_owned() } else { format!("{} faults", self.count) };
-        format!("`{path}` has {faults}: {shown}{more}{cut}")
+        format!("an imported file has {faults}: {shown}{more}{cut}")
     }
 }

@@ -181,7 +181,10 @@ fn rdf(
     };
     let arity = if format.supports_datasets() { 4 } else { 3 };
     let base = settings.text("base");
-    if let Some(base) = &base
+    if base.is_some() && matches!(format, RdfFormat::NTriples | RdfFormat::NQuads) {
+        let message = format!("an import of `{}` has no option `base`", transfer.format);
+        settings.error(&settings.span("base"), message, "N-Triples and N-Quads have no relative IRIs; remove it");
+    } else if let Some(base) = &base
         && let Err(error) = RdfParser::from_format(format).with_base_iri(base)
     {
         let message = format!("`{base}` is not a base IRI: {}", error.to_string().to_lowercase());

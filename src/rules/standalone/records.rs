@@ -1,7 +1,7 @@
 //! Splits delimited text into rows and fields, without copying them.
 //!
-//! As RFC 4180, and as the crate `csv` where that is silent: a row ends with `\n`, `\r\n` or `\r`, empty lines are no
-//! rows, and a quote inside an unquoted field is a character. Unlike `csv`, it knows the place of each field, and finds
+//! As RFC 4180, and as the crate `csv` where that is silent: a row ends with `\n`, `\r\n` or `\r`, empty lines are
+//! skipped, and a quote inside an unquoted field is a character. Unlike `csv`, it knows the place of each field, and finds
 //! quotes that do not end and text after a closing quote.
 
 use std::borrow::Cow;

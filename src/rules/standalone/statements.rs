@@ -14,8 +14,8 @@ use actcheck_base::{Term, TermId, Terms, XmlGuard, XmlProgress};
 /// Nemo's name for the default graph.
 const DEFAULT_GRAPH: &str = "tag:nemo:defaultgraph";
 
-/// Length of the labels that the parser draws: 128 bits in hexadecimal digits.
-const RANDOM_LABEL: usize = 32;
+/// Minimum length of the labels that the parser draws: 128 bits in hexadecimal digits, without zeros at the beginning.
+const RANDOM_LABEL: usize = 24;
 
 /// Reads the statements of a file, at most `limit`. A statement that can't be parsed is a fault and left out.
 ///
@@ -140,7 +140,7 @@ impl Blanks {
         if let Some(id) = self.known.get(node) {
             return *id;
         }
-        let random = node.as_ref().unique_id().is_some() && node.as_str().len() == RANDOM_LABEL;
+        let random = node.as_ref().unique_id().is_some() && node.as_str().len() >= RANDOM_LABEL;
         let label = if random {
             self.unnamed += 1;
             format!("b{}", self.unnamed)
