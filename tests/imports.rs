@@ -159,8 +159,8 @@ fn options_that_do_not_exist_or_cannot_be_are_refused() {
         ("@export p :- csv{resource = \"p.csv.gz\"}", "exports are not compressed"),
         ("@export p :- csv{delimiter = \"ab\"}", "`delimiter` must be one character"),
         ("@export p :- dsv{}", "needs a `delimiter`"),
-        ("@export p :- csv{} . @export q :- csv{resource = \"./p.csv\"}", "`p.csv` is also the file of `p`"),
-        ("@export q :- csv{resource = \"p.csv\"} . @output p, q", "`p.csv` is also the file of `q`"),
+        ("@export p :- csv{} . @export q :- csv{resource = \"./p.csv\"}", "`p.csv` is the file of `q` and of `p`"),
+        ("@export q :- csv{resource = \"p.csv\"} . @output p, q", "`p.csv` is the file of `p` and of `q`"),
     ] {
         let program = folder.path().join("p.rls");
         std::fs::write(&program, format!("p(1) . q(2) . {export} .")).unwrap();

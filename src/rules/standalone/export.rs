@@ -26,36 +26,36 @@ pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<E
     let syntax = &program.syntax;
     let mut found: Vec<Export> = Vec::new();
     for statement in &syntax.statements {
-        match statement {
+        let (exports, span) = match statement {
             Statement::Transfer(transfer) if !transfer.import => {
-                let Some(export) = export(syntax, transfer, diagnostics) else { continue };
-                if let Some(other) = found.iter().find(|other| other.path == export.path) {
-                    let message = format!("`{}` is also the file of `{}`", export.path.display(), other.predicate);
-                    let help = "export to another file with `resource = \"…\"`";
-                    let error = Diagnostic::error("R073", message).at(&syntax.source, transfer.span.clone());
-                    diagnostics.push(error.help(help));
-                }
-                found.push(export);
+                (export(syntax, transfer, diagnostics).into_iter().collect(), Some(&transfer.span))
             }
-            Statement::Output { predicates } => {
-                for predicate in predicates {
-                    let path = PathBuf::from(format!("{}.csv", file_name(syntax, predicate)));
-                    match found.iter().find(|other| other.path == path) {
-                        // The same table twice is harmless.
-                        Some(other) if other.predicate == *predicate && other.delimiter == b',' => {}
-                        Some(other) => {
-                            let message = format!("`{}` is also the file of `{}`", path.display(), other.predicate);
-                            let help = format!("replace `@output {predicate}` by an `@export` to another file");
-                            diagnostics.push(Diagnostic::error("R073", message).in_source(&syntax.source).help(help));
-                        }
-                        None => found.push(Export { predicate: predicate.clone(), path, delimiter: b',' }),
-                    }
+            Statement::Output { predicates } => (predicates.iter().map(|one| output(syntax, one)).collect(), None),
+            _ => (Vec::new(), None),
+        };
+        for export in exports {
+            match found.iter().find(|other| other.path == export.path) {
+                None => found.push(export),
+                // The same table twice is one file.
+                Some(other) if other.predicate == export.predicate && other.delimiter == export.delimiter => {}
+                Some(other) => {
+                    let (path, predicate) = (export.path.display(), &export.predicate);
+                    let message = format!("`{path}` is the file of `{predicate}` and of `{}`", other.predicate);
+                    let error = Diagnostic::error("R073", message).help("name another file with `resource = \"…\"`");
+                    diagnostics.push(match span {
+                        Some(span) => error.at(&syntax.source, span.clone()),
+                        None => error.in_source(&syntax.source),
+                    });
                 }
             }
-            _ => {}
         }
     }
     found
+}
+
+fn output(syntax: &Syntax, predicate: &str) -> Export {
+    let path = PathBuf::from(format!("{}.csv", file_name(syntax, predicate)));
+    Export { predicate: predicate.to_owned(), path, delimiter: b',' }
 }
 
 fn export(syntax: &Syntax, transfer: &Transfer, diagnostics: &mut Diagnostics) -> Option<Export> {
