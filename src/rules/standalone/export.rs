@@ -8,7 +8,7 @@ use crate::standalone::program::{Closure, Program};
 use crate::standalone::settings::Settings;
 use crate::standalone::unfinished::Unfinished;
 use crate::syntax::{Statement, Syntax, Transfer};
-use actcheck_base::{Diagnostic, Diagnostics, RuleFault, TermId, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, RuleFault, Span, TermId, did_you_mean};
 
 const FORMATS: [&str; 3] = ["csv", "dsv", "tsv"];
 const OPTIONS: [&str; 2] = ["resource", "delimiter"];
@@ -26,7 +26,7 @@ pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<E
     let syntax = &program.syntax;
     let mut found: Vec<Export> = Vec::new();
     for statement in &syntax.statements {
-        let (exports, span) = match statement {
+        let (exports, span): (Vec<Export>, Option<&Span>) = match statement {
             Statement::Transfer(transfer) if !transfer.import => {
                 (export(syntax, transfer, diagnostics).into_iter().collect(), Some(&transfer.span))
             }
