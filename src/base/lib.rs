@@ -16,6 +16,7 @@ mod source;
 mod suggest;
 mod term;
 mod write_atomic;
+mod xml_guard;
 mod xml_limits;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
@@ -30,4 +31,5 @@ pub use source::{Source, Span};
 pub use suggest::{did_you_mean, nearest};
 pub use term::{Term, TermId, Terms};
 pub use write_atomic::write_atomic;
+pub use xml_guard::{XmlGuard, XmlProgress};
 pub use xml_limits::check_xml;

@@ -11,7 +11,7 @@ use crate::{explanations, output};
 use actcheck_base::{Diagnostic, Diagnostics, Files};
 use actcheck_report::{Table, TableFormat};
 use actcheck_rules::Budget;
-use actcheck_rules::standalone::{self, Program};
+use actcheck_rules::standalone::{self, Loading, Program};
 
 /// `actcheck datalog`
 #[derive(Debug, Args)]
@@ -33,17 +33,23 @@ pub struct DatalogArgs {
     /// Stop after this time, such as 90s, 10m or 2h
     #[arg(long, alias = "max-secs", value_name = "DURATION", default_value = "10m", value_parser = duration)]
     pub max_time: f64,
+    /// Leave out rows and statements of imported files that can't be read, with a warning
+    #[arg(long)]
+    pub lenient: bool,
 }
 
 /// Runs a standalone program, or explains why one of its facts holds or does not.
 pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
-    let budget = Budget { tuples: args.max_tuples, secs: args.max_time, stop: Arc::clone(stop) };
+    let (tuples, bytes, secs) = (args.max_tuples, 4 << 30, args.max_time);
+    let budget = Budget { tuples, bytes, secs, stop: Arc::clone(stop) };
+    let loading = Loading { budget: budget.clone(), lenient: args.lenient };
     if let Some(statement) = &args.trace {
         let source = Files::Disk.read_program(&args.file).map_err(|why| {
             Diagnostic::error("X005", format!("{}: {why}", args.file.display())).help("name a file with rules (.rls)")
         })?;
         let folder = args.file.parent().unwrap_or(Path::new("."));
-        let program = Program::load_until(&source, folder, stop)?;
+        let program = Program::load_as(&source, folder, &loading)?;
+        output::print_diagnostics(&program.warnings);
         let explained = program.explain(statement, &budget);
         let explained = explained.map_err(|fault| Diagnostic::error("X008", fault.to_string()).in_source(&source))?;
         output::print(&match args.format {
@@ -68,7 +74,7 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnos
                 .into());
         }
     };
-    let summary = standalone::run(&args.file, &args.output, &budget)?;
+    let summary = standalone::run_as(&args.file, &args.output, &loading)?;
     output::print_diagnostics(&summary.warnings);
     let mut table = Table::new(["predicate", "tuples"]);
     for (predicate, tuples) in summary.tuples {

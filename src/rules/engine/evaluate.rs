@@ -31,7 +31,7 @@ impl Tables {
 
     /// Removes and returns the rows of a predicate.
     pub(crate) fn take_rows(&mut self, predicate: PredicateId) -> Vec<TermId> {
-        self.list.get_mut(predicate).and_then(Option::take).map_or(Vec::new(), |table| table.index(0).to_vec())
+        self.list.get_mut(predicate).and_then(Option::take).map_or(Vec::new(), |table| table.into_rows())
     }
 
     pub(crate) fn set(&mut self, predicate: PredicateId, table: Box<dyn Finished>) {
@@ -161,12 +161,16 @@ impl Run<'_, '_, '_> {
     fn facts(&mut self, layers: &mut Layers<'_>) {
         for (predicate, facts) in &self.planned.facts {
             let mut rows = layers.rows(*predicate).to_vec();
+            if rows.is_empty() {
+                self.finish(*predicate, facts, layers);
+                continue;
+            }
             rows.extend(facts);
-            self.finish(*predicate, rows, layers);
+            self.finish(*predicate, &rows, layers);
         }
     }
 
-    fn finish(&self, predicate: PredicateId, rows: Vec<TermId>, layers: &mut Layers<'_>) {
+    fn finish(&self, predicate: PredicateId, rows: &[TermId], layers: &mut Layers<'_>) {
         let width = self.predicates.get(predicate).width;
         layers.own.set(predicate, finished(width, rows, self.indexes.of(predicate).clone()));
     }
@@ -184,7 +188,7 @@ impl Run<'_, '_, '_> {
                 rows.extend(derived);
             }
         }
-        self.finish(predicate, rows, layers);
+        self.finish(predicate, &rows, layers);
         Ok(())
     }
 

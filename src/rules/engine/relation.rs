@@ -13,6 +13,8 @@ use actcheck_base::TermId;
 pub(crate) trait Finished: Send + Sync {
     /// Returns the rows in the order of an index. The index is built on first use.
     fn index(&self, index: usize) -> &[TermId];
+    /// Returns the rows in the order of the first index.
+    fn into_rows(self: Box<Self>) -> Vec<TermId>;
 }
 
 /// Tuples of a predicate whose rules are still being evaluated.
@@ -71,6 +73,11 @@ impl<const W: usize> Finished for FinishedOf<W> {
         let relation = self.indexes[index].get_or_init(|| permuted(self.primary(), &self.orders[index]));
         relation.elements.as_flattened()
     }
+
+    fn into_rows(self: Box<Self>) -> Vec<TermId> {
+        let first = self.indexes.into_iter().next().and_then(OnceLock::into_inner);
+        first.map_or(Vec::new(), |relation| relation.elements.into_flattened())
+    }
 }
 
 /// One column order of growing tuples: a datafrog variable with its own iteration, so that all orders of a
@@ -105,7 +112,7 @@ impl<const W: usize> GrowingOf<W> {
 
 impl<const W: usize> Growing for GrowingOf<W> {
     fn insert(&self, rows: Vec<TermId>) -> usize {
-        let relation = relation_of::<W>(rows);
+        let relation = relation_of::<W>(&rows);
         let count = relation.len();
         self.primary.variable.insert(relation);
         count
@@ -157,7 +164,7 @@ fn permuted<const W: usize>(rows: &[[TermId; W]], order: &[usize]) -> Relation<[
     Relation { elements: out }
 }
 
-fn relation_of<const W: usize>(rows: Vec<TermId>) -> Relation<[TermId; W]> {
+fn relation_of<const W: usize>(rows: &[TermId]) -> Relation<[TermId; W]> {
     let mut rows = rows.as_chunks::<W>().0.to_vec();
     sort(&mut rows);
     rows.dedup();
@@ -198,7 +205,7 @@ macro_rules! with_width {
     };
 }
 
-fn boxed_finished<const W: usize>(rows: Vec<TermId>, orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
+fn boxed_finished<const W: usize>(rows: &[TermId], orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
     Box::new(FinishedOf::<W>::new(relation_of(rows), orders))
 }
 
@@ -207,7 +214,7 @@ fn boxed_growing<const W: usize>(orders: Arc<Vec<Order>>, wanted: &[bool]) -> Bo
 }
 
 /// Creates finished tuples from rows in any order.
-pub(crate) fn finished(width: usize, rows: Vec<TermId>, orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
+pub(crate) fn finished(width: usize, rows: &[TermId], orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
     with_width!(width, boxed_finished(rows, orders))
 }
 

@@ -30,7 +30,7 @@ pub(super) fn stated_facts(programs: &[&Planned], predicates: &Predicates, index
     let mut facts = Tables::default();
     for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
         let width = predicates.get(*predicate).width;
-        facts.set(*predicate, finished(width, rows.clone(), indexes.of(*predicate).clone()));
+        facts.set(*predicate, finished(width, rows, indexes.of(*predicate).clone()));
     }
     facts
 }
