@@ -104,3 +104,17 @@ fn mutated_frames_are_understood_or_refused() {
         });
     });
 }
+
+/// The reason of a fault repeated a field's name of a megabyte, and was kept with the run.
+#[test]
+fn a_fault_does_not_repeat_a_long_name() {
+    let long = "x".repeat(500_000);
+    for message in [
+        format!("{{\"type\": \"{long}\"}}"),
+        format!("{{\"type\": \"end\", \"succeeded\": true, \"{long}\": 1}}"),
+        format!("{{\"type\": \"command\", \"positions\": {{\"{long}\": 1}}}}"),
+    ] {
+        let fault = understand(message.as_bytes(), &joints()).expect_err("it is wrong");
+        assert!(fault.reason.len() < 1_000, "{} bytes", fault.reason.len());
+    }
+}
