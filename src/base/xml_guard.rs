@@ -10,13 +10,17 @@ const MAX_TEXT: usize = 64 << 20;
 /// Maximum size of a tag, and of the document type. Unit: bytes.
 const MAX_TAG: usize = 1 << 20;
 /// Maximum number of attributes of one tag; parsers compare all pairs.
-const MAX_ATTRIBUTES: usize = 1_000;
+const MAX_ATTRIBUTES: usize = 256;
 /// Maximum number of namespaces declared around one place; parsers search all of them for each name.
-const MAX_NAMESPACES: usize = 1_000;
+const MAX_NAMESPACES: usize = 256;
+/// Maximum number of namespaces around all elements that declare one, added up: some parsers copy them each time.
+const MAX_COPIED_NAMESPACES: usize = 10_000_000;
 /// Maximum number of elements inside each other.
 const MAX_DEPTH: usize = 10_000;
 /// Maximum size of one entity after its expansion. Those of ontologies are IRIs. Unit: bytes.
 const MAX_ENTITY: usize = 1 << 16;
+/// Maximum number of entity declarations.
+const MAX_ENTITIES: usize = 10_000;
 /// Entities may together expand to this size, and beyond it to [`MAX_AMPLIFICATION`] times the document. Unit: bytes.
 const FREE_EXPANSION: usize = 8 << 20;
 const MAX_AMPLIFICATION: usize = 100;
@@ -50,6 +54,7 @@ pub struct XmlGuard<R> {
     /// Whether an element was found.
     any: bool,
     namespaces: usize,
+    copied_namespaces: usize,
     /// Size of each declared entity after its expansion.
     entities: HashMap<Vec<u8>, usize>,
     expanded: usize,
@@ -74,7 +79,11 @@ struct Progress {
     /// Newlines before the part that was handed on last, and characters after the last of them.
     lines: u64,
     characters: u64,
+    /// The same place as a number of bytes.
+    offset: usize,
     fault: Option<String>,
+    /// Whether the document is incomplete, not excessive.
+    is_cut: bool,
 }
 
 impl XmlProgress {
@@ -84,9 +93,20 @@ impl XmlProgress {
         (progress.lines + 1, progress.characters + 1)
     }
 
+    /// Returns the same place as the number of bytes before it.
+    pub fn offset(&self) -> usize {
+        self.0.borrow().offset
+    }
+
     /// Returns the reason for which the guard refused the document, if it did.
     pub fn fault(&self) -> Option<String> {
         self.0.borrow().fault.clone()
+    }
+
+    /// Returns the reason for which the guard refused the document, unless the document is only incomplete.
+    pub fn excess(&self) -> Option<String> {
+        let progress = self.0.borrow();
+        progress.fault.clone().filter(|_| !progress.is_cut)
     }
 }
 
@@ -103,6 +123,7 @@ impl<R: Read> XmlGuard<R> {
             open: Vec::new(),
             any: false,
             namespaces: 0,
+            copied_namespaces: 0,
             entities: HashMap::new(),
             expanded: 0,
             total: 0,
@@ -116,9 +137,15 @@ impl<R: Read> XmlGuard<R> {
         Error::other(why)
     }
 
+    fn refuse_cut(&self, why: impl Into<String>) -> Error {
+        self.progress.0.borrow_mut().is_cut = true;
+        self.refuse(why)
+    }
+
     /// Moves the place behind the current part.
     fn advance(&mut self) {
         let mut progress = self.progress.0.borrow_mut();
+        progress.offset += self.part.len();
         let last_line = match self.part.iter().rposition(|byte| *byte == b'\n') {
             Some(end) => {
                 progress.lines += self.part.iter().filter(|byte| **byte == b'\n').count() as u64;
@@ -156,10 +183,10 @@ impl<R: Read> XmlGuard<R> {
         self.references()?;
         if !self.in_markup && self.part.is_empty() {
             if let Some(open) = self.open.last() {
-                return Err(self.refuse(format!("the file ends inside `<{}>` of line {}", open.name, open.line)));
+                return Err(self.refuse_cut(format!("the file ends inside `<{}>` of line {}", open.name, open.line)));
             }
             if !self.any {
-                return Err(self.refuse("the file has no XML element"));
+                return Err(self.refuse_cut("the file has no XML element"));
             }
         }
         Ok(())
@@ -171,7 +198,7 @@ impl<R: Read> XmlGuard<R> {
         loop {
             let limit = if self.part.starts_with(b"!--") || self.part.starts_with(b"![") { MAX_TEXT } else { MAX_TAG };
             if !self.until(b'>', limit)? {
-                return Err(self.refuse("the file ends inside a tag or comment"));
+                return Err(self.refuse_cut("the file ends inside a tag or comment"));
             }
             let part = self.part.as_slice();
             let new = &part[seen..];
@@ -221,6 +248,12 @@ impl<R: Read> XmlGuard<R> {
         if self.namespaces + namespaces > MAX_NAMESPACES {
             return Err(self.refuse(format!("more than {MAX_NAMESPACES} namespaces are declared around one element")));
         }
+        if namespaces > 0 {
+            self.copied_namespaces += self.namespaces + namespaces;
+        }
+        if self.copied_namespaces > MAX_COPIED_NAMESPACES {
+            return Err(self.refuse("too many elements declare namespaces"));
+        }
         if self.part.ends_with(b"/>") {
             return Ok(());
         }
@@ -260,6 +293,9 @@ impl<R: Read> XmlGuard<R> {
                 return Err(self.refuse(format!("the entity `{name}` expands to more than {MAX_ENTITY} bytes")));
             }
             self.entities.insert(name.to_vec(), size);
+            if self.entities.len() > MAX_ENTITIES {
+                return Err(self.refuse(format!("it declares more than {MAX_ENTITIES} entities")));
+            }
         }
         Ok(())
     }
@@ -350,12 +386,16 @@ mod tests {
 
     #[test]
     fn documents_that_demand_too_much_are_refused() {
-        let attributes: String = (0..1001).map(|n| format!(" a{n}=''")).collect();
+        let attributes: String = (0..257).map(|n| format!(" a{n}=''")).collect();
         refused(&format!("<a{attributes}/>"), "attributes");
-        let namespaces: String = (0..600).map(|n| format!(" xmlns:a{n}=''")).collect();
+        let namespaces: String = (0..150).map(|n| format!(" xmlns:a{n}=''")).collect();
         refused(&format!("<a{namespaces}><b{namespaces}/></a>"), "namespaces");
         assert!(guarded(&format!("<a><b{namespaces}/><b{namespaces}></b></a>")).is_ok(), "of siblings");
+        let beside = format!("<a{namespaces}>{}</a>", "<c xmlns='d'/>".repeat(70_000));
+        refused(&beside, "too many elements declare namespaces");
         refused(&"<a>".repeat(10_001), "nested");
+        let many: String = (0..10_001).map(|number| format!("<!ENTITY e{number} \"\">")).collect();
+        refused(&format!("<!DOCTYPE a [{many}]><a/>"), "more than 10000 entities");
         refused(&format!("<a b='{}'/>", "x".repeat(MAX_TAG)), "larger than");
         let bomb: String =
             (1..9).map(|n| format!("<!ENTITY e{n} \"{}\">", format!("&e{};", n - 1).repeat(10))).collect();
