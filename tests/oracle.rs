@@ -105,7 +105,7 @@ proptest! {
         }
     }
 
-    /// A goal is said to be derived exactly if it is, and what is said to be missing is missing.
+    /// A goal is reported as derived exactly if it is, and a condition reported as missing is missing.
     #[test]
     fn every_miss_is_true(statements in statements(), first in 0..9_i64, second in 0..9_i64) {
         let text = statements.join("\n");

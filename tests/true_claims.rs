@@ -1,4 +1,4 @@
-//! Explanations never claim what is false, and invalid goals are reported with their place.
+//! Explanations never make false claims, and invalid goals are reported with their place.
 
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn explained(program: &Program, goal: &str) -> (bool, String) {
     (found.holds(), found.to_text())
 }
 
-/// Every statement over the constants of a program is explained as what it is.
+/// Every statement over the constants of a program gets the right answer.
 #[test]
 fn a_goal_is_derived_exactly_if_its_tuple_is() {
     for text in [
@@ -51,7 +51,7 @@ fn a_goal_is_derived_exactly_if_its_tuple_is() {
 }
 
 #[test]
-fn an_underivable_goal_names_what_is_missing() {
+fn an_underivable_goal_names_the_missing_condition() {
     for (text, goal, words) in [
         ("q(1) .", "q(2)", "q(2) is not a fact, and no rule has a matching head"),
         ("p(1, 2) .", "p(1, 3)", "nearest p(1, 2)"),

@@ -74,7 +74,7 @@ struct Counting {
     expected: Expected,
 }
 
-/// What follows in a call of `GROUP_CONCAT`.
+/// The next token in a call of `GROUP_CONCAT`.
 #[derive(Default, PartialEq, Eq)]
 enum Expected {
     #[default]
@@ -84,7 +84,7 @@ enum Expected {
 }
 
 impl Counting {
-    /// Writes what comes before a token: the begin or the end of a call that counts.
+    /// Writes the begin or the end of a call that counts, if it comes before a token.
     fn before(&mut self, token: &str, out: &mut String) {
         if token.starts_with('#') || token.trim().is_empty() {
             return;

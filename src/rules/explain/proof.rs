@@ -137,7 +137,7 @@ impl<'g, 'a> Prover<'g, 'a> {
     }
 
     /// Returns the matches of the group from which an aggregating rule derived a head row. Returns `None` if the group
-    /// yields another row, or if it has too many matches to tell.
+    /// yields another row, or if it has too many matches to compute it again.
     fn aggregate(&mut self, rule: &Rule, row: &[TermId], depth: usize) -> Option<Support> {
         let aggregation = rule.aggregation.as_ref()?;
         let mut binding = self.context.head_binding(rule, row)?;

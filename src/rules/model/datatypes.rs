@@ -44,7 +44,7 @@ const OTHERS: [&str; 16] = [
 /// Longer literals are compared as they are. Unit: bytes.
 const LONGEST: usize = 1 << 20;
 
-/// Returns the term that stands for a literal's value: equal values have equal terms. Returns `None` if the literal is
+/// Returns the term that represents a literal's value: equal values have equal terms. Returns `None` if the literal is
 /// ill-typed or its datatype is unknown.
 pub(crate) fn canonical(term: &Term) -> Option<Term> {
     match term {
