@@ -136,7 +136,7 @@ fn queries_that_make_long_texts_stop_at_the_memory() {
         let decision = rules.judge(&Facts::new());
         assert_eq!(decision.outcome, Outcome::Timeout, "{query}");
         let fault = decision.result.unwrap_err().to_string();
-        assert!(fault.contains("long.rq made texts of more than 1024 MiB"), "{fault}");
+        assert!(fault.contains("long.rq made a text that is too long for a budget of 1024 MiB"), "{fault}");
     }
 }
 

@@ -21,6 +21,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Maximum length of the texts that a query makes. Unit: bytes.
 const MOST_TEXT: usize = 512 << 20;
+/// Maximum length of one of these texts. Unit: bytes.
+const LONGEST_TEXT: usize = 32 << 20;
 
 /// Answers a query.
 ///
@@ -77,7 +79,7 @@ fn with_text_functions(evaluator: SparqlEvaluator, cancel: &Cancel, made: &Arc<A
         let (cancel, made) = (cancel.clone(), Arc::clone(made));
         evaluator.with_custom_function(NamedNode::new_unchecked(iri), move |args: &[StoreTerm]| {
             let args: Vec<Term> = args.iter().map(from_store).collect();
-            let left = MOST_TEXT.saturating_sub(made.load(Ordering::Relaxed));
+            let left = LONGEST_TEXT.min(MOST_TEXT.saturating_sub(made.load(Ordering::Relaxed)));
             let Ok(found) = function(&args, left) else {
                 made.store(usize::MAX, Ordering::Relaxed);
                 cancel.cancel();
@@ -92,7 +94,9 @@ fn with_text_functions(evaluator: SparqlEvaluator, cancel: &Cancel, made: &Arc<A
 }
 
 fn too_much_text(text: &Source) -> Diagnostic {
-    Diagnostic::error("H012", format!("the query makes texts of more than {} MiB", MOST_TEXT >> 20))
+    let (one, all) = (LONGEST_TEXT >> 20, MOST_TEXT >> 20);
+    let message = format!("the query makes texts that are too long: over {one} MiB, or over {all} MiB together");
+    Diagnostic::error("H012", message)
         .in_source(text)
         .help("repeated concatenation doubles a text: write texts once, or filter the rows before")
 }

@@ -124,7 +124,8 @@ impl Query {
             Stop::Bytes => {
                 let advice = "repeated concatenation doubles a text: write texts once";
                 let most = mebibytes(budget.bytes);
-                RuleFault::BudgetSpent(format!("the query in {} made texts of more than {most}; {advice}", self.file))
+                let how = format!("made a text that is too long for a budget of {most}");
+                RuleFault::BudgetSpent(format!("the query in {} {how}; {advice}", self.file))
             }
             Stop::Requested => RuleFault::Interrupted,
         }
