@@ -245,7 +245,19 @@ const CODES_R: &[Code] = &[
         "R090",
         "a budget of rule evaluation is spent",
         "a recursive rule computes new values without end, there are very many facts, or an import has no end",
-        "add a limit such as `?x < 100`; `actcheck datalog` has `--max-tuples` and `--max-time`",
+        "add a limit such as `?x < 100`; `actcheck datalog` has `--max-tuples`, `--max-memory` and `--max-time`",
     ),
     code("R091", "an evaluation of rules was interrupted", "Ctrl-C", "start the command again"),
+    code(
+        "R092",
+        "a fact to explain is invalid",
+        "a syntax error, a predicate that the program does not have, or another number of arguments",
+        "write one statement with constants and `_`, such as `p(1, _)`",
+    ),
+    code(
+        "R093",
+        "a constant of a fact to explain is unknown",
+        "a misspelt name, or a value of another type: `1`, `1.0` and `\"1\"` differ",
+        "compare it with the facts of the program",
+    ),
 ];

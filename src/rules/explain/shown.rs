@@ -74,6 +74,17 @@ impl ProofContext<'_> {
         }
     }
 
+    /// Formats a condition that is not satisfied. For an assignment, this is the computed value and the required one.
+    pub(super) fn unsatisfied(&self, rule: &Rule, literal: &Literal, binding: &Binding) -> String {
+        if let Literal::Assign { variable, value, span } = literal
+            && let (Some(wanted), Some(found)) = (binding[*variable], self.value(value, binding))
+        {
+            let text = self.source_text(rule, span.clone());
+            return format!("{text}, which gives {}, not {}", shown(&found), self.term(wanted));
+        }
+        self.literal(rule, literal, binding)
+    }
+
     /// Formats a negated atom. For a helper predicate, which is not in the rule text, returns the source text instead.
     pub(super) fn negated(&self, rule: &Rule, atom: &Atom, binding: &Binding) -> String {
         if self.predicates.get(atom.predicate).name.contains('~') {
@@ -90,7 +101,7 @@ impl ProofContext<'_> {
             return None;
         }
         let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
-        expr.value(&values, self.universe).map(std::borrow::Cow::into_owned)
+        expr.value(&values, self.universe, self.watch).map(std::borrow::Cow::into_owned)
     }
 
     fn source_text(&self, rule: &Rule, span: actcheck_base::Span) -> String {
