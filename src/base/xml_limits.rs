@@ -148,12 +148,12 @@ impl<'a> Scan<'a> {
         }
         self.n_expanded = self.n_expanded.saturating_add(self.expansion_of(&rest[..length]));
         self.check_expansion()?;
-        if n_attributes > MOST_ATTRIBUTES {
-            return Err(format!("a tag has more than {MOST_ATTRIBUTES} attributes"));
-        }
         self.n_namespaces += n_declared;
         if self.n_namespaces > MOST_NAMESPACES {
             return Err(format!("more than {MOST_NAMESPACES} namespaces are in scope"));
+        }
+        if n_attributes > MOST_ATTRIBUTES {
+            return Err(format!("a tag has more than {MOST_ATTRIBUTES} attributes"));
         }
         if n_declared > 0 {
             self.n_copied += self.n_namespaces;
