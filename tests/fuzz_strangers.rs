@@ -21,10 +21,10 @@ use crate::history::{sample_campaign, sample_run};
 use crate::support::copy;
 use crate::support::mutations::{Mutations, cases};
 
-/// Renders diagnostics as the program prints them.
+/// Renders diagnostics as the program prints them: the first 200.
 fn show(found: &Diagnostics) {
     let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none());
-    for fault in found.iter() {
+    for fault in found.iter().take(200) {
         assert!(fault.message.chars().count() <= 20_001, "a message of {} bytes", fault.message.len());
         let mut out = String::new();
         handler.render_report(&mut out, fault).unwrap();

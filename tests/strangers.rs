@@ -374,6 +374,20 @@ fn xacro_ends_when_actcheck_is_killed() {
     wait_for("xacro ends with actcheck", || !is_running(&pid));
 }
 
+/// Thousands of faults in one ontology took seconds to print.
+#[test]
+fn only_the_first_faults_of_thousands_are_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let parameters = "act:Pick act:hasParameter act:unknown .\n".repeat(1_000);
+    let text = format!("@prefix act: <http://actions#> .\nact:Pick a act:Action .\n{parameters}");
+    std::fs::write(folder.path().join("o.ttl"), text).unwrap();
+    campaign(folder.path(), "", "");
+    let config = std::fs::read_to_string(folder.path().join("c.toml")).unwrap();
+    std::fs::write(folder.path().join("c.toml"), format!("ontology = \"o.ttl\"\n{config}")).unwrap();
+    let said = refused(folder.path(), &["check", "c.toml"]);
+    assert!(said.matches("O008").count() <= 200 && said.contains("more are not printed"), "{}", said.len());
+}
+
 /// The rest of a longer list of faults is not reported, and faults still refuse the file.
 #[test]
 fn a_file_with_thousands_of_faults_reports_the_first() {

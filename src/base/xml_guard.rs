@@ -242,11 +242,11 @@ impl<R: Read> XmlGuard<R> {
         self.any = true;
         self.references()?;
         let (attributes, namespaces) = attributes(&self.part);
-        if attributes > MAX_ATTRIBUTES {
-            return Err(self.refuse(format!("an element has more than {MAX_ATTRIBUTES} attributes")));
-        }
         if self.namespaces + namespaces > MAX_NAMESPACES {
             return Err(self.refuse(format!("more than {MAX_NAMESPACES} namespaces are declared around one element")));
+        }
+        if attributes > MAX_ATTRIBUTES {
+            return Err(self.refuse(format!("an element has more than {MAX_ATTRIBUTES} attributes")));
         }
         if namespaces > 0 {
             self.copied_namespaces += self.namespaces + namespaces;

@@ -1,7 +1,7 @@
 //! Deterministic mutations of texts, for tests of everything that reads files or messages from others.
 //!
 //! Each test makes a few cases by default. `ACTCHECK_FUZZ_MINUTES=10` makes as many as fit into ten minutes, and checks
-//! the memory that they took.
+//! the memory that they took. `ACTCHECK_FUZZ_CASE=7` makes only that case.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -39,7 +39,11 @@ const ODD: [&str; 12] = ["\"", "'", "<", ">", "&", "[", "]", "{", "\n", "\u{0}",
 /// # Panics
 /// If a case takes too long, or all together took too much memory.
 pub fn cases(name: &str, default: u64, mut case: impl FnMut(Mutations)) {
-    let minutes: Option<f64> = std::env::var("ACTCHECK_FUZZ_MINUTES").ok().and_then(|text| text.parse().ok());
+    let number_of = |variable: &str| std::env::var(variable).ok().and_then(|text| text.parse::<f64>().ok());
+    if let Some(number) = number_of("ACTCHECK_FUZZ_CASE") {
+        return case(Mutations::new(number as u64));
+    }
+    let minutes = number_of("ACTCHECK_FUZZ_MINUTES");
     let begun = Instant::now();
     let goes_on = |number: u64| match minutes {
         Some(minutes) => begun.elapsed().as_secs_f64() < 60.0 * minutes,
