@@ -165,7 +165,7 @@ fn functions_of_texts_keep_their_meaning_in_queries() {
         ("LANG(CONCAT(\"a\"@en, \"b\"@en)) = \"en\"", true),
         ("ucase(\"straße\") = \"STRASSE\"", true),
         ("REPLACE(\"abcd\", \"b(.)\", \"[$1]\") = \"a[c]d\"", true),
-        ("\"CONCAT(\" = CONCAT ( \"CONCAT\" , \"(\" )", true),
+        ("\"CONCAT(\" = CONCAT(\"CONCAT\", \"(\")", true),
         (
             "EXISTS { { SELECT (GROUP_CONCAT(DISTINCT ?x; SEPARATOR=\";\") AS ?y) { VALUES ?x { \"a\" \"b\" \"a\" } } } FILTER(?y = \"a;b\") }",
             true,

@@ -81,7 +81,7 @@ fn with_text_functions(evaluator: SparqlEvaluator, cancel: &Cancel, made: &Arc<A
             let args: Vec<Term> = args.iter().map(from_store).collect();
             let left = LONGEST_TEXT.min(MOST_TEXT.saturating_sub(made.load(Ordering::Relaxed)));
             let Ok(found) = function(&args, left) else {
-                made.store(usize::MAX, Ordering::Relaxed);
+                made.fetch_add(MOST_TEXT + 1, Ordering::Relaxed);
                 cancel.cancel();
                 return None;
             };

@@ -133,6 +133,8 @@ fn arguments(head: &AtomSyntax) -> Result<Vec<(Option<Term>, Span)>, (String, Sp
 /// Returns a known term with a similar name.
 fn similar(term: &Term, universe: &Universe<'_>) -> Option<String> {
     let name = |term: &Term| match term {
+        // A bare name.
+        Term::Iri(iri) if !iri.contains(':') => Some(iri.to_string()),
         Term::Iri(_) | Term::String(_) => Some(term.to_string()),
         _ => None,
     };

@@ -318,7 +318,7 @@ mod tests {
             (":a", "NCName"),
             ("1a", "Name"),
             ("", "NMTOKEN"),
-            ("english-language", "language"),
+            ("english-languages", "language"),
             ("f", "hexBinary"),
             ("Zh==", "base64Binary"),
             ("Zg=", "base64Binary"),
