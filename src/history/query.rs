@@ -1,11 +1,12 @@
 //! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
-use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::time::Duration;
+use std::path::Path;
 
 use oxigraph::sparql::{QueryEvaluationError, QueryResults, SparqlEvaluator};
-use oxigraph::store::Store;
 
+use crate::evaluation::{Unfinished, evaluate};
+use crate::fault;
+use crate::open::OpenStore;
 use crate::syntax_fault::syntax_fault;
 use crate::terms::from_store;
 use crate::{Cancel, QueryAnswer};
@@ -13,35 +14,19 @@ use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, names};
 
 /// Words with which an update begins.
 const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREATE", "ADD", "MOVE", "COPY", "WITH"];
-/// Interval at which a waiting query checks whether it was stopped: too short to notice.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Answers a query.
-///
-/// The evaluation checks its token only when it reads the store, which a join of large results may not do for minutes.
-/// It therefore runs in its own thread; when the query is stopped, the thread is abandoned and ends at its next check.
-pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
+pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     let prepared =
         evaluator(cancel).parse_query(&*text.text).map_err(|error| syntax_fault(text, &error.to_string()))?;
-    let (sender, receiver) = sync_channel(1);
-    let store = store.clone();
-    std::thread::spawn(move || {
-        let answer = prepared.on_store(&store).execute().and_then(collect);
-        drop(store);
-        // If the query was stopped, the receiver is gone.
-        let _ = sender.send(answer);
-    });
-    loop {
-        match receiver.recv_timeout(LOOK_EVERY) {
-            Ok(answer) => return answer.map_err(|error| evaluation_fault(text, &error).into()),
-            Err(RecvTimeoutError::Timeout) if cancel.is_cancelled() => return Err(stopped(text).into()),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into());
-            }
-        }
-    }
+    let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));
+    evaluated.map_err(|fault| match fault {
+        Unfinished::Stopped => stopped(text).into(),
+        Unfinished::Failed(error) => evaluation_fault(text, &error).into(),
+        Unfinished::Crashed => Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into(),
+        Unfinished::Damaged(error) => fault::damaged(dir, &error.to_string()),
+    })
 }
 
 fn stopped(text: &Source) -> Diagnostic {

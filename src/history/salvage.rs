@@ -1,0 +1,143 @@
+//! Reads a damaged store: finds out whether all of it can be read, and collects what can be.
+//!
+//! The store keeps each statement in several indexes, in different files, so that most damage to one of them loses
+//! nothing. Its iterators repeat an error for ever; everything here ends after errors.
+
+use std::collections::HashSet;
+
+use oxigraph::model::vocab::rdf;
+use oxigraph::model::{GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term};
+use oxigraph::store::{StorageError, Store};
+
+use crate::merge::about;
+use crate::read::{short_id, text_of};
+use crate::statements::iri;
+use crate::write_campaign::end_properties;
+
+/// Number of errors in a row after which an iterator is abandoned: more than statements with one unreadable term follow
+/// each other, and few enough to take about a second.
+const MOST_ERRORS: usize = 100_000;
+
+/// What is left of a damaged store.
+pub(super) struct Salvaged {
+    /// A store in memory.
+    pub(super) store: Store,
+    /// Runs that are lost, because a part of them can't be read: their ids, sorted.
+    pub(super) lost: Vec<String>,
+}
+
+/// Reads every statement by subject, by property and by object, to find damage.
+///
+/// # Errors
+/// A part can't be read.
+pub(super) fn scan(store: &Store) -> Result<(), StorageError> {
+    let (mut properties, mut objects) = (HashSet::new(), HashSet::new());
+    for quad in store.iter() {
+        let quad = quad?;
+        properties.insert(quad.predicate);
+        objects.insert(quad.object);
+    }
+    for property in properties {
+        store.quads_for_pattern(None, Some(property.as_ref()), None, None).find_map(Result::err).map_or(Ok(()), Err)?;
+    }
+    for object in objects {
+        store.quads_for_pattern(None, None, Some(object.as_ref()), None).find_map(Result::err).map_or(Ok(()), Err)?;
+    }
+    Ok(())
+}
+
+/// Collects the readable statements of a store. Runs that may lack some are left out completely.
+///
+/// # Errors
+/// There is not enough memory.
+pub(super) fn salvage(store: &Store) -> Result<Salvaged, StorageError> {
+    let mut found = Collected::default();
+    let is_whole = found.add(store.iter());
+    let is_complete = is_whole || found.add_other_indexes(store);
+    let memory = Store::new()?;
+    memory.extend(found.quads.iter().cloned())?;
+    let mut lost = Vec::new();
+    if !is_complete {
+        for run in runs(&memory) {
+            if about(store, &run).is_err() {
+                lost.push(short_id(run.as_str()).to_owned());
+                about(&memory, &run)?.iter().try_for_each(|quad| memory.remove(quad))?;
+                reopen_campaign_of(&memory, &found, &run)?;
+            }
+        }
+    }
+    lost.sort();
+    Ok(Salvaged { store: memory, lost })
+}
+
+/// Removes the end of a run's campaign, so that the campaign can be resumed.
+fn reopen_campaign_of(memory: &Store, found: &Collected, run: &NamedNode) -> Result<(), StorageError> {
+    let (campaign, ends) = (iri("act:campaign"), end_properties());
+    let of_run = |quad: &&Quad| quad.subject == run.clone().into() && quad.predicate == campaign;
+    let Some(Term::NamedNode(node)) = found.quads.iter().find(of_run).map(|quad| &quad.object) else { return Ok(()) };
+    let is_end = |quad: &&Quad| quad.subject == node.clone().into() && ends.contains(&quad.predicate);
+    found.quads.iter().filter(is_end).try_for_each(|quad| memory.remove(quad))
+}
+
+/// Statements found so far.
+#[derive(Default)]
+struct Collected {
+    quads: HashSet<Quad>,
+    properties: HashSet<NamedNode>,
+    subjects: HashSet<NamedOrBlankNode>,
+}
+
+impl Collected {
+    /// Adds what can be read. Returns whether everything could be.
+    fn add(&mut self, quads: impl Iterator<Item = Result<Quad, StorageError>>) -> bool {
+        let (mut in_a_row, mut is_whole) = (0, true);
+        for quad in quads {
+            match quad {
+                Ok(quad) => {
+                    in_a_row = 0;
+                    self.properties.insert(quad.predicate.clone());
+                    self.subjects.insert(quad.subject.clone());
+                    self.quads.insert(quad);
+                }
+                Err(_) => (in_a_row, is_whole) = (in_a_row + 1, false),
+            }
+            if in_a_row > MOST_ERRORS {
+                return false;
+            }
+        }
+        is_whole
+    }
+
+    /// Reads the indexes by property and by subject, until they name nothing new. Returns whether every property could be
+    /// read completely: then nothing is lost.
+    fn add_other_indexes(&mut self, store: &Store) -> bool {
+        let (mut read, mut asked, mut is_whole) = (HashSet::new(), HashSet::new(), true);
+        self.properties.insert(rdf::TYPE.into_owned());
+        loop {
+            let properties: Vec<NamedNode> = self.properties.difference(&read).cloned().collect();
+            for property in properties {
+                is_whole &= self.add(store.quads_for_pattern(None, Some(property.as_ref()), None, None));
+                read.insert(property);
+            }
+            let subjects: Vec<NamedOrBlankNode> = self.subjects.difference(&asked).cloned().collect();
+            if subjects.is_empty() {
+                return is_whole;
+            }
+            for subject in subjects {
+                self.add(store.quads_for_pattern(Some(subject.as_ref()), None, None, None));
+                asked.insert(subject);
+            }
+        }
+    }
+}
+
+fn runs(store: &Store) -> Vec<NamedNode> {
+    let class = Term::from(iri("act:Run"));
+    let found =
+        store.quads_for_pattern(None, Some(rdf::TYPE), Some(class.as_ref()), Some(GraphNameRef::DefaultGraph));
+    let runs = found.filter_map(|quad| match quad.ok()?.subject {
+        NamedOrBlankNode::NamedNode(node) => Some(node),
+        NamedOrBlankNode::BlankNode(_) => None,
+    });
+    runs.collect()
+}
