@@ -20,7 +20,14 @@ const MOST_SECS: u64 = 60;
 const QUESTIONS: [&[&str]; 5] = [
     &["list", "--format", "csv", "--history", "h"],
     &["query", "failure-rates", "--format", "csv", "--history", "h"],
-    &["query", "--format", "csv", "SELECT ?p (COUNT(*) AS ?n) WHERE { ?s ?p ?o } GROUP BY ?p ORDER BY ?p", "--history", "h"],
+    &[
+        "query",
+        "--format",
+        "csv",
+        "SELECT ?p (COUNT(*) AS ?n) WHERE { ?s ?p ?o } GROUP BY ?p ORDER BY ?p",
+        "--history",
+        "h",
+    ],
     &["analyse", "--format", "json", "--history", "h"],
     &["export", "--turtle", "all.ttl", "--history", "h"],
 ];

@@ -72,7 +72,11 @@ fn killed_processes_lose_nothing() {
             "merge" => killed(&words(&format!("merge {whole} --into DIR")), after / 4),
             other => {
                 copy_made_history(&dir);
-                let command = if other == "recheck" { "recheck --history DIR" } else { "export --nquads DIR.nq --dataset DIR.set --history DIR" };
+                let command = if other == "recheck" {
+                    "recheck --history DIR"
+                } else {
+                    "export --nquads DIR.nq --dataset DIR.set --history DIR"
+                };
                 killed(&words(command), after / 4)
             }
         };

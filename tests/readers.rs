@@ -127,7 +127,8 @@ fn a_read_only_history_can_be_read_by_every_reading_command() {
     std::fs::remove_dir_all(kept.join("tables")).unwrap();
     let before = files(&kept);
     std::fs::create_dir(&dir).unwrap();
-    let mount = |arguments: &[&str]| Command::new("mount").args(arguments).status().is_ok_and(|status| status.success());
+    let mount =
+        |arguments: &[&str]| Command::new("mount").args(arguments).status().is_ok_and(|status| status.success());
     let (from, to) = (kept.display().to_string(), dir.display().to_string());
     if !mount(&["--bind", &from, &to]) || !mount(&["-o", "remount,bind,ro", &to]) {
         let _ = Command::new("umount").arg(&to).status();

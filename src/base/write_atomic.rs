@@ -106,10 +106,11 @@ fn remove_leftovers(target: &Path) {
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     for entry in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok) {
         let found = entry.file_name();
-        let of_process = found.to_str().and_then(|found| found.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(SUFFIX));
-        let is_ours = of_process.and_then(|of| of.split_once('-')).is_some_and(|(process, number)| {
-            process.parse::<u32>().is_ok() && number.parse::<u64>().is_ok()
-        });
+        let of_process =
+            found.to_str().and_then(|found| found.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(SUFFIX));
+        let is_ours = of_process
+            .and_then(|of| of.split_once('-'))
+            .is_some_and(|(process, number)| process.parse::<u32>().is_ok() && number.parse::<u64>().is_ok());
         if is_ours && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
             // Harmless if it remains.
             let _ = fs::remove_file(entry.path());

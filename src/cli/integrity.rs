@@ -42,7 +42,8 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
 }
 
 fn mended(files: usize) -> Diagnostic {
-    let what = if files == 1 { "a file of the mirror was".to_owned() } else { format!("{files} files of the mirror were") };
+    let what =
+        if files == 1 { "a file of the mirror was".to_owned() } else { format!("{files} files of the mirror were") };
     Diagnostic::warning("A002", format!("{what} damaged, and the mirror was written anew from the store"))
         .help("tables and reports made before may be wrong: make them again")
 }
@@ -50,11 +51,13 @@ fn mended(files: usize) -> Diagnostic {
 fn fault(found: &Integrity, mirror: usize, dir: &Path) -> Diagnostic {
     let parts = found.damage.len() - mirror;
     let what = if parts == 1 { "a part is".to_owned() } else { format!("{parts} parts are") };
-    Diagnostic::error("H007", format!("the history `{}` is damaged: {what} not as written", dir.display())).help(format!(
-        "restore the files from a backup; or `actcheck merge --salvage {} --into NEW` copies what can be read, and \
+    Diagnostic::error("H007", format!("the history `{}` is damaged: {what} not as written", dir.display())).help(
+        format!(
+            "restore the files from a backup; or `actcheck merge --salvage {} --into NEW` copies what can be read, and \
          `actcheck run --resume ID --history NEW` makes the lost runs again",
-        dir.display()
-    ))
+            dir.display()
+        ),
+    )
 }
 
 fn text(found: &Integrity, dir: &Path) -> String {

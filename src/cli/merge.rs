@@ -107,8 +107,9 @@ fn lost_runs(dir: &Path, lost: &[String]) -> Option<Diagnostic> {
     }
     let message = format!("{} runs of `{}` can't be read any more: {}", lost.len(), dir.display(), named.join(", "));
     (!lost.is_empty()).then(|| {
-        Diagnostic::warning("H007", message)
-            .help("`actcheck run --resume ID --history DIR` in the merged history makes them again, with the same results")
+        Diagnostic::warning("H007", message).help(
+            "`actcheck run --resume ID --history DIR` in the merged history makes them again, with the same results",
+        )
     })
 }
 

@@ -50,7 +50,11 @@ impl History {
                 writer.serialize_quad(&quad).map_err(|error| failed(&error))?;
             }
         }
-        writer.finish().and_then(|mut writer| writer.flush()).and_then(|()| new.finish()).map_err(|error| failed(&error))
+        writer
+            .finish()
+            .and_then(|mut writer| writer.flush())
+            .and_then(|()| new.finish())
+            .map_err(|error| failed(&error))
     }
 
     /// Writes the default graph as Turtle: campaigns, runs, executions, scenes and outcomes. Turtle can't represent the

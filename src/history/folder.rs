@@ -88,6 +88,15 @@ impl Folder {
         self.dir.join("traces")
     }
 
+    /// The ids of the runs that have a trace, sorted.
+    pub(super) fn traced(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.traces()).into_iter().flatten().filter_map(Result::ok);
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut ids: Vec<String> = names.filter_map(|name| Some(name.strip_suffix(".trace")?.to_owned())).collect();
+        ids.sort();
+        ids
+    }
+
     /// File of a run's trace.
     pub(super) fn trace(&self, run: &str) -> PathBuf {
         self.traces().join(format!("{run}.trace"))
@@ -111,9 +120,8 @@ fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
 /// Whether a folder without a version holds any files other than those left by `actcheck check` or by an interrupted
 /// start.
 fn holds_other_things(dir: &Path) -> bool {
-    let is_ours = |name: &str| {
-        ["lock", "hulls"].contains(&name) || (name.starts_with("VERSION.") && name.ends_with(".tmp"))
-    };
+    let is_ours =
+        |name: &str| ["lock", "hulls"].contains(&name) || (name.starts_with("VERSION.") && name.ends_with(".tmp"));
     fs::read_dir(dir)
         .into_iter()
         .flatten()

@@ -49,13 +49,19 @@ impl History {
             Found::Whole(seal) => {
                 let what = "it has changed since it was written";
                 found.damage.extend(seal.damage(&folder, u64::MAX).into_iter().map(|name| of_store(&name, what)));
+                found.damage.extend(seal.damaged_copies(&folder).into_iter().map(|name| Damage {
+                    file: Path::new("seal").join(name),
+                    run: None,
+                    what: what.to_owned(),
+                }));
                 found.unlisted = seal.unlisted(&folder);
             }
             Found::Missing => found.unlisted = Seal::default().unlisted(&folder),
             Found::Damaged => found.damage.push(Damage {
                 file: PathBuf::from("seal/SUMS"),
                 run: None,
-                what: "the list of checksums is damaged; the next process that writes the history replaces it".to_owned(),
+                what: "the list of checksums is damaged; the next process that writes the history replaces it"
+                    .to_owned(),
             }),
         }
         let history = match Self::open_to_read(dir) {
@@ -96,7 +102,6 @@ impl History {
         Ok(())
     }
 }
-
 
 /// Opens what is left of a history, and adds its faults.
 fn salvaged(dir: &Path, why: &str, found: &mut Integrity) -> Result<History, Diagnostics> {

@@ -73,7 +73,8 @@ impl History {
     pub fn open_to_salvage(dir: &Path) -> Result<(Self, Vec<String>), Diagnostics> {
         let folder = Folder::to_read(dir)?;
         let opened = read(&folder, Snapshot::salvage(&folder)?)?;
-        let salvaged = salvage(&opened.store).map_err(|error| fault::store(dir, "reading it", &error))?;
+        let salvaged =
+            salvage(&opened.store, &folder.traced()).map_err(|error| fault::store(dir, "reading it", &error))?;
         let store = OpenStore { store: salvaged.store, _snapshot: opened.snapshot.clone() };
         let opened = Opened { store, snapshot: opened.snapshot };
         Ok((Self { opened: RwLock::new(Some(opened)), folder }, salvaged.lost))

@@ -3,7 +3,7 @@
 //! The store keeps each statement in several indexes, in different files, so that most damage to one of them loses
 //! nothing. Its iterators repeat an error for ever; everything here ends after errors.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term};
@@ -12,11 +12,14 @@ use oxigraph::store::{StorageError, Store};
 use crate::merge::about;
 use crate::read::{short_id, text_of};
 use crate::statements::iri;
-use crate::write_campaign::end_properties;
+use crate::write_campaign::{campaign_node, end_properties};
+use crate::write_run::run_node;
 
 /// Number of errors in a row after which an iterator is abandoned: more than statements with one unreadable term follow
 /// each other, and few enough to take about a second.
 const MOST_ERRORS: usize = 100_000;
+/// The same for the statements about one subject, of which there are many.
+const MOST_ERRORS_OF_ONE: usize = 100;
 
 /// What is left of a damaged store.
 pub(super) struct Salvaged {
@@ -46,37 +49,40 @@ pub(super) fn scan(store: &Store) -> Result<(), StorageError> {
     Ok(())
 }
 
-/// Collects the readable statements of a store. Runs that may lack some are left out completely.
+/// Collects the readable statements of a store. Runs that may lack some are left out completely, and their campaigns lose
+/// their end, so that they can be resumed. `traces` are the ids of the runs that have a trace.
 ///
 /// # Errors
 /// There is not enough memory.
-pub(super) fn salvage(store: &Store) -> Result<Salvaged, StorageError> {
+pub(super) fn salvage(store: &Store, traces: &[String]) -> Result<Salvaged, StorageError> {
     let mut found = Collected::default();
-    let is_whole = found.add(store.iter());
+    let is_whole = found.add(store.iter(), MOST_ERRORS);
     let is_complete = is_whole || found.add_other_indexes(store);
     let memory = Store::new()?;
-    memory.extend(found.quads.iter().cloned())?;
+    memory.extend(found.quads)?;
     let mut lost = Vec::new();
     if !is_complete {
-        for run in runs(&memory) {
-            if about(store, &run).is_err() {
-                lost.push(short_id(run.as_str()).to_owned());
-                about(&memory, &run)?.iter().try_for_each(|quad| memory.remove(quad))?;
-                reopen_campaign_of(&memory, &found, &run)?;
-            }
+        let known = runs(&memory);
+        for run in known.iter().filter(|run| about(store, run).is_err()) {
+            about(&memory, run)?.iter().try_for_each(|quad| memory.remove(quad))?;
+            lost.push(short_id(run.as_str()).to_owned());
         }
+        lost.extend(traces.iter().filter(|id| !known.contains(&run_node(id))).cloned());
+        let campaign_of =
+            |run: &String| run.rsplit_once('-').map_or_else(String::new, |(campaign, _)| campaign.to_owned());
+        let campaigns: BTreeSet<String> = lost.iter().map(campaign_of).collect();
+        campaigns.iter().try_for_each(|campaign| remove_end(&memory, campaign))?;
     }
     lost.sort();
     Ok(Salvaged { store: memory, lost })
 }
 
-/// Removes the end of a run's campaign, so that the campaign can be resumed.
-fn reopen_campaign_of(memory: &Store, found: &Collected, run: &NamedNode) -> Result<(), StorageError> {
-    let (campaign, ends) = (iri("act:campaign"), end_properties());
-    let of_run = |quad: &&Quad| quad.subject == run.clone().into() && quad.predicate == campaign;
-    let Some(Term::NamedNode(node)) = found.quads.iter().find(of_run).map(|quad| &quad.object) else { return Ok(()) };
-    let is_end = |quad: &&Quad| quad.subject == node.clone().into() && ends.contains(&quad.predicate);
-    found.quads.iter().filter(is_end).try_for_each(|quad| memory.remove(quad))
+/// Removes the end of a campaign.
+fn remove_end(memory: &Store, campaign: &str) -> Result<(), StorageError> {
+    let (node, ends) = (campaign_node(campaign), end_properties());
+    let about: Result<Vec<Quad>, StorageError> =
+        memory.quads_for_pattern(Some(node.as_ref().into()), None, None, Some(GraphNameRef::DefaultGraph)).collect();
+    about?.iter().filter(|quad| ends.contains(&quad.predicate)).try_for_each(|quad| memory.remove(quad))
 }
 
 /// Statements found so far.
@@ -88,8 +94,8 @@ struct Collected {
 }
 
 impl Collected {
-    /// Adds what can be read. Returns whether everything could be.
-    fn add(&mut self, quads: impl Iterator<Item = Result<Quad, StorageError>>) -> bool {
+    /// Adds what can be read, until there were more than `most` errors in a row. Returns whether everything could be.
+    fn add(&mut self, quads: impl Iterator<Item = Result<Quad, StorageError>>, most: usize) -> bool {
         let (mut in_a_row, mut is_whole) = (0, true);
         for quad in quads {
             match quad {
@@ -101,7 +107,7 @@ impl Collected {
                 }
                 Err(_) => (in_a_row, is_whole) = (in_a_row + 1, false),
             }
-            if in_a_row > MOST_ERRORS {
+            if in_a_row > most {
                 return false;
             }
         }
@@ -116,7 +122,7 @@ impl Collected {
         loop {
             let properties: Vec<NamedNode> = self.properties.difference(&read).cloned().collect();
             for property in properties {
-                is_whole &= self.add(store.quads_for_pattern(None, Some(property.as_ref()), None, None));
+                is_whole &= self.add(store.quads_for_pattern(None, Some(property.as_ref()), None, None), MOST_ERRORS);
                 read.insert(property);
             }
             let subjects: Vec<NamedOrBlankNode> = self.subjects.difference(&asked).cloned().collect();
@@ -124,7 +130,7 @@ impl Collected {
                 return is_whole;
             }
             for subject in subjects {
-                self.add(store.quads_for_pattern(Some(subject.as_ref()), None, None, None));
+                self.add(store.quads_for_pattern(Some(subject.as_ref()), None, None, None), MOST_ERRORS_OF_ONE);
                 asked.insert(subject);
             }
         }
@@ -133,8 +139,7 @@ impl Collected {
 
 fn runs(store: &Store) -> Vec<NamedNode> {
     let class = Term::from(iri("act:Run"));
-    let found =
-        store.quads_for_pattern(None, Some(rdf::TYPE), Some(class.as_ref()), Some(GraphNameRef::DefaultGraph));
+    let found = store.quads_for_pattern(None, Some(rdf::TYPE), Some(class.as_ref()), Some(GraphNameRef::DefaultGraph));
     let runs = found.filter_map(|quad| match quad.ok()?.subject {
         NamedOrBlankNode::NamedNode(node) => Some(node),
         NamedOrBlankNode::BlankNode(_) => None,

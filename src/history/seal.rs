@@ -117,6 +117,18 @@ impl Seal {
         self.sums.keys().filter(|name| is_wrong(name)).cloned().collect()
     }
 
+    /// Returns the names of the copies beside the list that differ from what was copied.
+    pub(super) fn damaged_copies(&self, folder: &Folder) -> Vec<String> {
+        let is_copied = |name: &str| name == CURRENT || name.starts_with(MANIFEST);
+        let is_wrong = |name: &str, sum: &Sum| {
+            let found = File::open(folder.seal().join(name)).and_then(|mut file| sum_of(&mut file, u64::MAX));
+            // An older manifest has no copy any more.
+            found.map_or_else(|error| error.kind() != ErrorKind::NotFound, |found| found != *sum)
+        };
+        let copies = self.sums.iter().filter(|(name, _)| is_copied(name));
+        copies.filter(|(name, sum)| is_wrong(name, sum)).map(|(name, _)| name.clone()).collect()
+    }
+
     /// The number of tables of a folder's store that the seal does not list: those of a killed process.
     pub(super) fn unlisted(&self, folder: &Folder) -> usize {
         let entries = fs::read_dir(folder.store()).into_iter().flatten().filter_map(Result::ok);

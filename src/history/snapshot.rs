@@ -71,7 +71,8 @@ impl Snapshot {
         let manifest = manifest_of(&current).map(|name| folder.store().join(name));
         let is_damaged = |path: PathBuf| {
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            File::open(path).map_or(true, |mut file| matches!(seal.is_damaged(&name, &mut file), Some(Ok(true) | Err(_))))
+            File::open(path)
+                .map_or(true, |mut file| matches!(seal.is_damaged(&name, &mut file), Some(Ok(true) | Err(_))))
         };
         let damaged = seal.is_wrong_current(&current) || manifest.is_none_or(is_damaged);
         let small = if damaged { folder.seal() } else { folder.store() };

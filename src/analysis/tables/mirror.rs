@@ -112,7 +112,9 @@ impl Mirror {
     fn updated(history: &History, tables: &Path, anew: bool) -> Result<(Self, MirrorChange), Diagnostics> {
         let place = Place::find(tables)?;
         let (folder, is_beside) = match &place {
-            Place::Scratch(_) if anew => return Err(unwritten(tables, &"it is read-only, or another process writes it")),
+            Place::Scratch(_) if anew => {
+                return Err(unwritten(tables, &"it is read-only, or another process writes it"));
+            }
             Place::Scratch(scratch) => (scratch.path().to_path_buf(), false),
             Place::Beside { .. } | Place::Given => (tables.to_path_buf(), true),
         };
