@@ -1,4 +1,4 @@
-//! Damage to any file of a history is found or harmless, and what can be read is saved.
+//! Damage to any file of a history is found or harmless, and readable data is saved.
 //!
 //! `ACTCHECK_FLIPS` sets the number of flipped bits.
 

@@ -1,4 +1,4 @@
-//! Processes killed at any moment lose nothing: what they had stored is complete, and the same command completes the
+//! Processes killed at any moment lose nothing: stored data is complete, and the same command completes the
 //! rest.
 //!
 //! `ACTCHECK_KILLS` sets the number of kills.

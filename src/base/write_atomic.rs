@@ -162,7 +162,7 @@ mod tests {
         let file = NewFile::create(&target).expect("it can be created");
         file.writer().and_then(|mut file| file.write_all(b"ne")).expect("it can be written");
         drop(file);
-        // A killed process leaves its file, which nobody holds a lock on.
+        // A killed process leaves its file without a lock.
         fs::write(folder.join("out.1-7.tmp"), "half").expect("it can be written");
         fs::write(folder.join("out.mine.tmp"), "another program's").expect("it can be written");
         write_atomic(&folder.join("other"), b"x").expect("it can be written");

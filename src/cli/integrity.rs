@@ -16,11 +16,11 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
     let dir = history_dir::folder(args)?;
     let (mut found, history) = History::examine(&dir)?;
     let damaged = Mirror::damage(&history)?;
-    let what = "it differs from the store";
+    let reason = "it differs from the store";
     found.damage.extend(damaged.iter().map(|file| Damage {
         file: file.strip_prefix(&dir).unwrap_or(file).to_path_buf(),
         run: None,
-        what: what.to_owned(),
+        reason: reason.to_owned(),
     }));
     output::print(&match format {
         Format::Text => text(&found, &dir),
@@ -42,18 +42,18 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
 }
 
 fn mended(files: usize) -> Diagnostic {
-    let what =
+    let files =
         if files == 1 { "a file of the mirror was".to_owned() } else { format!("{files} files of the mirror were") };
-    Diagnostic::warning("A002", format!("{what} damaged, and the mirror was written anew from the store"))
+    Diagnostic::warning("A002", format!("{files} damaged, and the mirror was written anew from the store"))
         .help("tables and reports made before may be wrong: make them again")
 }
 
 fn fault(found: &Integrity, mirror: usize, dir: &Path) -> Diagnostic {
     let parts = found.damage.len() - mirror;
-    let what = if parts == 1 { "a part is".to_owned() } else { format!("{parts} parts are") };
-    Diagnostic::error("H007", format!("the history `{}` is damaged: {what} not as written", dir.display())).help(
+    let parts = if parts == 1 { "a part is".to_owned() } else { format!("{parts} parts are") };
+    Diagnostic::error("H007", format!("the history `{}` is damaged: {parts} not as written", dir.display())).help(
         format!(
-            "restore the files from a backup; or `actcheck merge --salvage {} --into NEW` copies what can be read, and \
+            "restore the files from a backup; or `actcheck merge --salvage {} --into NEW` copies all readable data, and \
          `actcheck run --resume ID --history NEW` makes the lost runs again",
             dir.display()
         ),
@@ -64,7 +64,7 @@ fn text(found: &Integrity, dir: &Path) -> String {
     let mut text = String::new();
     for damage in &found.damage {
         let run = damage.run.as_ref().map_or_else(String::new, |run| format!(" (run {run})"));
-        text.push_str(&format!("{}{run}: {}\n", dir.join(&damage.file).display(), damage.what));
+        text.push_str(&format!("{}{run}: {}\n", dir.join(&damage.file).display(), damage.reason));
     }
     if found.damage.is_empty() {
         text = format!("{}: store, {} traces and mirror are intact\n", dir.display(), found.runs);
@@ -87,14 +87,14 @@ fn text(found: &Integrity, dir: &Path) -> String {
 fn table(found: &Integrity) -> Table {
     let mut table = Table::new(["file", "run", "damage"]);
     let row = |damage: &Damage| {
-        vec![damage.file.display().to_string().into(), damage.run.clone().into(), damage.what.clone().into()]
+        vec![damage.file.display().to_string().into(), damage.run.clone().into(), damage.reason.clone().into()]
     };
     table.rows = found.damage.iter().map(row).collect();
     table
 }
 
 fn summary(found: &Integrity, dir: &Path) -> Value {
-    let damage = |damage: &Damage| json!({ "file": damage.file, "run": damage.run, "damage": damage.what });
+    let damage = |damage: &Damage| json!({ "file": damage.file, "run": damage.run, "damage": damage.reason });
     json!({
         "history": dir.display().to_string(),
         "runs": found.runs,

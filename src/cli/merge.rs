@@ -31,7 +31,7 @@ pub struct MergeArgs {
     /// Leave this campaign out: ID, or DIR#ID as messages name it; may be given several times
     #[arg(long, value_name = "CAMPAIGN")]
     pub leave_out: Vec<String>,
-    /// Copy what can be read of damaged histories; the runs that are lost are named, and resuming their campaigns makes
+    /// Copy all readable data of damaged histories; lost runs are listed, and resuming their campaigns makes
     /// them again
     #[arg(long)]
     pub salvage: bool,

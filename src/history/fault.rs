@@ -81,8 +81,8 @@ pub(super) fn damaged_file(dir: &Path, name: &str) -> Diagnostics {
 pub(super) fn damaged(dir: &Path, what: &str) -> Diagnostics {
     Diagnostic::error("H007", format!("the history `{}` is damaged: {}", dir.display(), lower(what)))
         .help(
-            "`actcheck health --integrity` lists the damage; `actcheck merge --salvage DIR --into NEW` copies what can \
-             be read; or restore the folder from a backup",
+            "`actcheck health --integrity` lists the damage; `actcheck merge --salvage DIR --into NEW` copies all \
+             readable data; or restore the folder from a backup",
         )
         .into()
 }

@@ -16,8 +16,8 @@ pub struct Damage {
     pub file: PathBuf,
     /// The run that it concerns; `None` if it concerns all.
     pub run: Option<String>,
-    /// What is wrong with it.
-    pub what: String,
+    /// The kind of damage.
+    pub reason: String,
 }
 
 /// The result of an examination.
@@ -47,12 +47,12 @@ impl History {
         let mut found = Integrity::default();
         match Seal::read(&folder) {
             Found::Whole(seal) => {
-                let what = "it has changed since it was written";
-                found.damage.extend(seal.damage(&folder, u64::MAX).into_iter().map(|name| of_store(&name, what)));
+                let reason = "it has changed since it was written";
+                found.damage.extend(seal.damage(&folder, u64::MAX).into_iter().map(|name| of_store(&name, reason)));
                 found.damage.extend(seal.damaged_copies(&folder).into_iter().map(|name| Damage {
                     file: Path::new("seal").join(name),
                     run: None,
-                    what: what.to_owned(),
+                    reason: reason.to_owned(),
                 }));
                 found.unlisted = seal.unlisted(&folder);
             }
@@ -60,7 +60,7 @@ impl History {
             Found::Damaged => found.damage.push(Damage {
                 file: PathBuf::from("seal/SUMS"),
                 run: None,
-                what: "the list of checksums is damaged; the next process that writes the history replaces it"
+                reason: "the list of checksums is damaged; the next process that writes the history replaces it"
                     .to_owned(),
             }),
         }
@@ -83,7 +83,7 @@ impl History {
         let mut known = BTreeSet::new();
         for run in &runs {
             let file = self.trace_path(&run.run);
-            let what = match std::fs::read(&file) {
+            let reason = match std::fs::read(&file) {
                 Ok(bytes) => match trace_file::decode(&bytes) {
                     Ok((_, trace)) if trace.hash == run.trace_hash => None,
                     Ok((_, trace)) => Some(format!("it is the trace {}, not {}", trace.hash, run.trace_hash)),
@@ -91,8 +91,8 @@ impl History {
                 },
                 Err(error) => Some(error.to_string()),
             };
-            let damage = |what| Damage { file: relative(self.dir(), &file), run: Some(run.run.clone()), what };
-            found.damage.extend(what.map(damage));
+            let damage = |reason| Damage { file: relative(self.dir(), &file), run: Some(run.run.clone()), reason };
+            found.damage.extend(reason.map(damage));
             known.insert(file);
         }
         let folder = std::fs::read_dir(self.folder.traces()).into_iter().flatten();
@@ -103,23 +103,23 @@ impl History {
     }
 }
 
-/// Opens what is left of a history, and adds its faults.
+/// Opens the readable part of a history, and adds its faults.
 fn salvaged(dir: &Path, why: &str, found: &mut Integrity) -> Result<History, Diagnostics> {
     if found.damage.iter().all(|damage| !damage.file.starts_with("store")) {
-        found.damage.push(Damage { file: PathBuf::from("store"), run: None, what: why.trim().to_owned() });
+        found.damage.push(Damage { file: PathBuf::from("store"), run: None, reason: why.trim().to_owned() });
     }
     let (history, lost) = History::open_to_salvage(dir).map_err(|_| fault::damaged(dir, why.trim()))?;
-    let what = "its statements can't be read";
+    let reason = "its statements can't be read";
     found.damage.extend(lost.into_iter().map(|run| Damage {
         file: PathBuf::from("store"),
         run: Some(run),
-        what: what.to_owned(),
+        reason: reason.to_owned(),
     }));
     Ok(history)
 }
 
-fn of_store(name: &str, what: &str) -> Damage {
-    Damage { file: Path::new("store").join(name), run: None, what: what.to_owned() }
+fn of_store(name: &str, reason: &str) -> Damage {
+    Damage { file: Path::new("store").join(name), run: None, reason: reason.to_owned() }
 }
 
 fn relative(dir: &Path, file: &Path) -> PathBuf {

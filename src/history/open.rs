@@ -99,7 +99,7 @@ impl History {
     }
 
     fn open_folder(folder: Folder) -> Result<Self, Diagnostics> {
-        // The library would drop what it can't read.
+        // The library would drop unreadable parts.
         if let Found::Whole(seal) = Seal::read(&folder)
             && let Some(name) = seal.damage(&folder, MOST_COMPARED).first()
         {

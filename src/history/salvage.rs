@@ -1,4 +1,4 @@
-//! Reads a damaged store: finds out whether all of it can be read, and collects what can be.
+//! Reads a damaged store: finds out whether all of it can be read, and collects the readable part.
 //!
 //! The store keeps each statement in several indexes, in different files, so that most damage to one of them loses
 //! nothing. Its iterators repeat an error for ever; everything here ends after errors.
@@ -21,7 +21,7 @@ const MOST_ERRORS: usize = 100_000;
 /// The same for the statements about one subject, of which there are many.
 const MOST_ERRORS_OF_ONE: usize = 100;
 
-/// What is left of a damaged store.
+/// The readable part of a damaged store.
 pub(super) struct Salvaged {
     /// A store in memory.
     pub(super) store: Store,
@@ -94,7 +94,7 @@ struct Collected {
 }
 
 impl Collected {
-    /// Adds what can be read, until there were more than `most` errors in a row. Returns whether everything could be.
+    /// Adds readable statements, until there were more than `most` errors in a row. Returns whether everything could be.
     fn add(&mut self, quads: impl Iterator<Item = Result<Quad, StorageError>>, most: usize) -> bool {
         let (mut in_a_row, mut is_whole) = (0, true);
         for quad in quads {

@@ -117,7 +117,7 @@ impl Seal {
         self.sums.keys().filter(|name| is_wrong(name)).cloned().collect()
     }
 
-    /// Returns the names of the copies beside the list that differ from what was copied.
+    /// Returns the names of the copies beside the list that differ from the originals.
     pub(super) fn damaged_copies(&self, folder: &Folder) -> Vec<String> {
         let is_copied = |name: &str| name == CURRENT || name.starts_with(MANIFEST);
         let is_wrong = |name: &str, sum: &Sum| {

@@ -46,7 +46,7 @@ const CODES_H: &[Code] = &[
         "H007",
         "the history is damaged",
         "a file was changed or truncated from outside",
-        "`actcheck health --integrity` names the damaged files; `actcheck merge --salvage DIR --into NEW` copies what can be read, or restore the folder from a backup",
+        "`actcheck health --integrity` names the damaged files; `actcheck merge --salvage DIR --into NEW` copies all readable data, or restore the folder from a backup",
     ),
     code(
         "H008",
