@@ -24,6 +24,7 @@ mod export;
 mod groups;
 mod health;
 mod history_dir;
+mod integrity;
 mod list;
 mod man;
 mod merge;

@@ -55,7 +55,7 @@ pub struct ReplayArgs {
 
 /// Runs stored runs again and prints whether they are the same. Returns the exit code.
 pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
-    let history = history_dir::open(&args.history)?;
+    let history = history_dir::open_to_read(&args.history)?;
     let runs = runs(&history, args)?;
     let campaigns = recall(&history, &runs, args)?;
     let bar = ProgressBar::with_draw_target(Some(runs.len() as u64), ProgressDrawTarget::stderr());

@@ -1,14 +1,15 @@
 //! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::time::Duration;
 
 use oxigraph::model::{NamedNode, Term as StoreTerm};
 use oxigraph::sparql::{QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError};
-use oxigraph::store::Store;
 
+use crate::evaluation::{Unfinished, evaluate};
+use crate::fault;
+use crate::open::OpenStore;
 use crate::syntax_fault::syntax_fault;
 use crate::terms::{from_store, to_store};
 use crate::{Cancel, QueryAnswer};
@@ -16,8 +17,6 @@ use actcheck_base::{COUNTED_TEXT, Diagnostic, Diagnostics, Source, Span, TEXT_FU
 
 /// Words with which an update begins.
 const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREATE", "ADD", "MOVE", "COPY", "WITH"];
-/// Interval at which a waiting query checks whether it was stopped: too short to notice.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Maximum length of the texts that a query makes. Unit: bytes.
 const MOST_TEXT: usize = 512 << 20;
@@ -25,10 +24,7 @@ const MOST_TEXT: usize = 512 << 20;
 const LONGEST_TEXT: usize = 32 << 20;
 
 /// Answers a query.
-///
-/// The evaluation checks its token only when it reads the store, which a join of large results may not do for minutes.
-/// It therefore runs in its own thread; when the query is stopped, the thread is abandoned and ends at its next check.
-pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
+pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     let syntax = |error: SparqlSyntaxError| syntax_fault(text, &error.to_string());
     drop(evaluator(cancel).parse_query(&*text.text).map_err(syntax)?);
@@ -36,28 +32,16 @@ pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<Qu
     let made = Arc::new(AtomicUsize::new(0));
     let bounded = with_text_functions(evaluator(cancel), cancel, &made);
     let prepared = bounded.parse_query(&bounded_texts(&text.text)).map_err(syntax)?;
-    let (sender, receiver) = sync_channel(1);
-    let store = store.clone();
-    std::thread::spawn(move || {
-        let answer = prepared.on_store(&store).execute().and_then(collect);
-        drop(store);
-        // If the query was stopped, the receiver is gone.
-        let _ = sender.send(answer);
-    });
-    loop {
-        match receiver.recv_timeout(LOOK_EVERY) {
-            Ok(_) if made.load(Ordering::Relaxed) > MOST_TEXT => return Err(too_much_text(text).into()),
-            Ok(answer) => return answer.map_err(|error| evaluation_fault(text, &error).into()),
-            Err(RecvTimeoutError::Timeout) if made.load(Ordering::Relaxed) > MOST_TEXT => {
-                return Err(too_much_text(text).into());
-            }
-            Err(RecvTimeoutError::Timeout) if cancel.is_cancelled() => return Err(stopped(text).into()),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into());
-            }
-        }
+    let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));
+    if made.load(Ordering::Relaxed) > MOST_TEXT {
+        return Err(too_much_text(text).into());
     }
+    evaluated.map_err(|fault| match fault {
+        Unfinished::Stopped => stopped(text).into(),
+        Unfinished::Failed(error) => evaluation_fault(text, &error).into(),
+        Unfinished::Crashed => Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into(),
+        Unfinished::Damaged(error) => fault::damaged(dir, &error.to_string()),
+    })
 }
 
 /// Adds functions that make texts of limited length: the evaluator keeps them until the query ends. Beyond the limit, they

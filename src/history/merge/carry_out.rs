@@ -150,7 +150,7 @@ impl Writer<'_> {
     /// All statements of a source about a campaign or run, with the ids of the destination.
     fn about(&self, source: usize, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
         let history = &self.sources[source];
-        let quads = about(&history.store()?, node).map_err(|error| history.fault("reading it", &error))?;
+        let quads = about(&*history.store()?, node).map_err(|error| history.fault("reading it", &error))?;
         Ok(self.renames[source].apply(quads))
     }
 
@@ -166,7 +166,7 @@ impl Writer<'_> {
         if new.is_empty() && old.is_empty() {
             return Ok(());
         }
-        replace(&self.into.store()?, new, old).map_err(|error| self.into.fault("writing merged data", &error))
+        replace(&*self.into.store()?, new, old).map_err(|error| self.into.fault("writing merged data", &error))
     }
 }
 
