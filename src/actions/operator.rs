@@ -22,6 +22,10 @@ pub enum Interrupt {
     HeldUp(String),
     /// The run is cut off.
     Cut,
+    /// The external skill made more requests than the action's budget allows, as the sentence says.
+    Requests(String),
+    /// The campaign is interrupted: the run is not needed.
+    Stopped,
     /// A fault of the external skill.
     ExternalSkill(ExternalFault),
 }
@@ -61,6 +65,8 @@ pub struct Operator<'a> {
     pub perceived: Option<Perceived>,
     /// The moment of the last picture; `None` before the first.
     last_look: Option<Look>,
+    /// Number of perceptions that an external skill requested.
+    requests: u64,
 }
 
 impl<'a> Operator<'a> {
@@ -94,6 +100,7 @@ impl<'a> Operator<'a> {
             percepts,
             perceived: None,
             last_look: None,
+            requests: 0,
         }
     }
 
@@ -385,6 +392,34 @@ impl<'a> Operator<'a> {
     pub fn set_opening(&mut self, opening_m: f64) {
         self.command.gripper_opening_m = opening_m;
         self.command.grip_force_n = self.profile().grip_force_n;
+    }
+
+    /// Whether the run is cut off now. Ticks check it; a skill that waits or perceives must check it itself.
+    ///
+    /// # Errors
+    /// [`Interrupt::Cut`].
+    pub fn check_cut(&self) -> Result<(), Interrupt> {
+        if self.cut.is_due(self.world.time_secs()) { Err(Interrupt::Cut) } else { Ok(()) }
+    }
+
+    /// Counts a request of an external skill for perception, for which no simulated time passes. An action may make one
+    /// for each control tick of its budget, so that a skill that polls without end is ended like one that moves
+    /// without end, and the trace of an action is bounded.
+    ///
+    /// # Errors
+    /// [`Interrupt::Requests`] if there are more, [`Interrupt::Cut`] if the run is cut off.
+    pub fn count_request(&mut self) -> Result<(), Interrupt> {
+        self.check_cut()?;
+        self.requests += 1;
+        let ticks = (self.budget_secs / self.world.tick_secs()).ceil().max(1.0);
+        #[expect(clippy::cast_precision_loss, reason = "an hour has 216,000 ticks")]
+        if self.requests as f64 > ticks {
+            return Err(Interrupt::Requests(format!(
+                "the action made more than {ticks} requests for perception, one for each control tick of its budget of {} s",
+                self.budget_secs
+            )));
+        }
+        Ok(())
     }
 
     /// Waits for a simulated time.

@@ -137,6 +137,8 @@ fn ended(
         (_, Some(fault)) => (ActionEnd::Broken(fault.to_string()), None),
         (Ok(report), None) => (ActionEnd::Completed, Some(report)),
         (Err(Interrupt::Cut), None) => (ActionEnd::Cut(cut::REASON.to_owned()), None),
+        (Err(Interrupt::Requests(reason)), None) => (ActionEnd::Timeout(reason), None),
+        (Err(Interrupt::Stopped), None) => (ActionEnd::Cut("the campaign was interrupted".to_owned()), None),
         (Err(Interrupt::ExternalSkill(fault)), None) => (ended_by(fault), None),
         (Err(_), None) => {
             let reason = format!("the action took longer than its budget of {} s", budget.action_secs);

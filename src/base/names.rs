@@ -1,5 +1,7 @@
 //! Namespaces, and functions that build and shorten IRIs.
 
+use std::fmt::Write as _;
+
 /// The paper's namespace: actions, properties, designators.
 pub const ACT: &str = "http://actions#";
 /// The world vocabulary, defined in `ontology/world.ttl`.
@@ -81,6 +83,54 @@ pub fn shorten(iri: &str) -> String {
     format!("<{iri}>")
 }
 
+/// Whether a text is an absolute IRI that every RDF parser accepts. (A few exotic IRIs are not recognised, such as those
+/// with IPv6 addresses.)
+pub fn is_iri(text: &str) -> bool {
+    let Some((scheme, rest)) = text.split_once(':') else { return false };
+    let begins = scheme.starts_with(|c: char| c.is_ascii_alphabetic());
+    if !begins || !scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c)) {
+        return false;
+    }
+    let named = rest.strip_prefix("//").is_none_or(|rest| {
+        let authority = rest.split(['/', '?', '#']).next().unwrap_or_default();
+        let (host, port) = authority.split_once(':').unwrap_or((authority, ""));
+        host.chars().all(|c| c.is_alphanumeric() || "-._~".contains(c)) && port.chars().all(|c| c.is_ascii_digit())
+    });
+    named && rest.matches('#').count() <= 1 && has_only_iri_characters(rest)
+}
+
+fn has_only_iri_characters(text: &str) -> bool {
+    let mut bytes = text.bytes();
+    while let Some(byte) = bytes.next() {
+        let escapes = byte != b'%'
+            || [bytes.next(), bytes.next()].iter().all(|digit| digit.is_some_and(|digit| digit.is_ascii_hexdigit()));
+        if !escapes {
+            return false;
+        }
+    }
+    text.chars().all(|c| c.is_alphanumeric() || "-._~:/?#@!$&'()*+,;=%".contains(c))
+}
+
+/// Returns the IRI of an object category that a skill named: an IRI as it is, and any other text as a label, which
+/// becomes `w:category/LABEL` with percent-encoding, so that no text can be anything but one IRI.
+pub fn category(named: &str) -> String {
+    if is_iri(named) { named.to_owned() } else { w(&format!("category/{}", escaped(named))) }
+}
+
+/// Escapes a name for an IRI: percent-encodes every byte except ASCII letters, digits and `_-.~`.
+pub fn escaped(name: &str) -> String {
+    let mut out = String::with_capacity(name.len());
+    for byte in name.bytes() {
+        if byte.is_ascii_alphanumeric() || b"_-.~".contains(&byte) {
+            out.push(char::from(byte));
+        } else {
+            // Writing to a string can't fail.
+            let _ = write!(out, "%{byte:02X}");
+        }
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -106,6 +156,28 @@ mod tests {
             &"a".repeat(129),
         ] {
             assert!(!is_id(wrong), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_category_is_an_iri_or_becomes_one() {
+        for named in
+            ["http://actions#Glass", "https://w3id.org/x/a%20b?c=d#e", "urn:isbn:1", "act:Größe", "http://a:80/"]
+        {
+            assert_eq!(category(named), named);
+        }
+        for (named, label) in [
+            ("coffee mug", "coffee%20mug"),
+            ("mug", "mug"),
+            ("", ""),
+            ("http://a> <b> <c> .\n", "http%3A%2F%2Fa%3E%20%3Cb%3E%20%3Cc%3E%20.%0A"),
+            ("http://a#b#c", "http%3A%2F%2Fa%23b%23c"),
+            ("http://a/%zz", "http%3A%2F%2Fa%2F%25zz"),
+            ("http://a:b/", "http%3A%2F%2Fa%3Ab%2F"),
+            ("a:\u{1b}", "a%3A%1B"),
+            ("1:a", "1%3Aa"),
+        ] {
+            assert_eq!(category(named), format!("{W}category/{label}"));
         }
     }
 }

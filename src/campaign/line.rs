@@ -1,5 +1,7 @@
 //! One run from start to end: choices → scene → world → trace → facts → findings → verdict.
 
+use std::sync::Arc;
+
 use crate::finished_run::{FinishedRun, RunPlace};
 use crate::judging::judge_action;
 use crate::{Env, Failure};
@@ -69,7 +71,8 @@ pub struct RunInput<'a> {
 ///
 /// # Errors
 /// [`Failure::Discard`] if the scene could not be generated or did not settle, [`Failure::Interrupted`] if
-/// [`Env::rule_budget`] was stopped during a long rule. Simulation faults are not errors: the record is `broken`.
+/// [`Env::rule_budget`] was stopped during a long rule or an action of an external program. Simulation faults are not
+/// errors: the record is `broken`.
 pub fn run_line(
     env: &Env,
     campaign: &str,
@@ -123,11 +126,14 @@ pub(super) fn simulate(
     let mut program = env.programs.as_ref().map(|programs| {
         let seed = choices.index(ChoiceName::SkillSeed, SEEDS) as u64;
         let run = RunName { run: format!("{campaign}-{}", index + 1), index, seed };
-        Performance::new(programs, run, context.clock.secs)
+        Performance::new(programs, run, context.clock.secs, Arc::clone(&env.rule_budget.stop))
     });
     let external = program.as_mut().map(|program| program as &mut dyn ExternalSkill);
     let interference = Interference { cut: interference.cut, saboteur: interference.saboteur, external };
     let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
+    if program.as_ref().is_some_and(Performance::was_stopped) {
+        return Err(Failure::Interrupted);
+    }
     let program_output = program.as_ref().and_then(Performance::output).map(|lines| lines.join("\n"));
     finish(env, Simulated { index, scene, trace, quality, choices, program_output }, context, start)
 }

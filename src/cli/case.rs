@@ -8,7 +8,7 @@ use crate::options::Format;
 use crate::run_args::RunArgs;
 use crate::work::quietly;
 use crate::{clock, output, show};
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, printable_in_colour};
 use actcheck_campaign::{CaseRun, Env, RunContext, run_cases};
 use actcheck_history::History;
 use actcheck_report::{CaseSummary, case_json, case_text, run_json, run_text};
@@ -39,7 +39,7 @@ pub fn run(args: &RunArgs, env: Env) -> Result<u8, Diagnostics> {
         }
         Format::Csv => {
             output::print(&show::outcomes(&run).render(Format::Csv.into()));
-            eprint!("{}", case_text(&summary));
+            eprint!("{}", printable_in_colour(&case_text(&summary)));
         }
     }
     Ok(summary.exit_code())

@@ -4,11 +4,17 @@ use std::io::{IsTerminal, Write};
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
 
-use actcheck_base::{Diagnostic, Diagnostics, Severity};
+use actcheck_base::{Diagnostic, Diagnostics, Severity, printable_in_colour};
 
 /// Writes results. A reader that has gone away (`| head`) ends the process quietly.
+///
+/// On a terminal, control characters of names and messages from files and skills are shown as escapes.
 pub fn print(text: &str) {
-    print_bytes(text.as_bytes());
+    if std::io::stdout().is_terminal() {
+        print_bytes(printable_in_colour(text).as_bytes());
+    } else {
+        print_bytes(text.as_bytes());
+    }
 }
 
 /// Writes binary results, as [`print`] does.
@@ -28,7 +34,7 @@ pub fn tell(lines: &[String], printed: bool) {
     let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
     if printed {
         // If the error stream itself fails, there is nowhere left to report it.
-        let _ = std::io::stderr().lock().write_all(text.as_bytes());
+        let _ = std::io::stderr().lock().write_all(printable_in_colour(&text).as_bytes());
     } else {
         print(&text);
     }
@@ -65,7 +71,7 @@ pub fn print_diagnostics(faults: &Diagnostics) {
         text.push_str(&format!("`actcheck explain {}` prints usual causes and the way out\n", first.code));
     }
     // If the error stream itself fails, there is nowhere left to report it.
-    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+    let _ = std::io::stderr().lock().write_all(printable_in_colour(&text).as_bytes());
 }
 
 /// A fault of a whole file has no excerpt with the file's name, so the message names the file.

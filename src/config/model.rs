@@ -57,17 +57,21 @@ pub fn read(source: &Source) -> Result<ObjectModel, Diagnostics> {
     found.or(model)
 }
 
+/// Bounds of a mass and of a length of an object: the physics engine can't calculate with much larger numbers. Units:
+/// kilograms, metres.
 const POSITIVE: (std::ops::Bound<f64>, std::ops::Bound<f64>) =
-    (std::ops::Bound::Excluded(0.0), std::ops::Bound::Unbounded);
+    (std::ops::Bound::Excluded(0.0), std::ops::Bound::Included(1e6));
 
 /// Expands a known prefix, as in `act:Glass`; returns a full IRI unchanged, and `None` if the prefix is unknown.
 pub(crate) fn full_iri(text: &str) -> Option<String> {
-    if text.contains("://") {
-        return Some(text.to_owned());
-    }
-    let (prefix, local) = text.split_once(':')?;
-    let (_, namespace) = names::PREFIXES.iter().find(|(known, _)| *known == prefix)?;
-    Some(format!("{namespace}{local}"))
+    let full = if text.contains("://") {
+        text.to_owned()
+    } else {
+        let (prefix, local) = text.split_once(':')?;
+        let (_, namespace) = names::PREFIXES.iter().find(|(known, _)| *known == prefix)?;
+        format!("{namespace}{local}")
+    };
+    names::is_iri(&full).then_some(full)
 }
 
 fn stem(path: &str) -> String {

@@ -136,7 +136,7 @@ fn write_perceived(perceived: &Perceived, began_secs: f64, writer: &mut Writer) 
         writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], thing.size_m);
         write_look(subject, perceived.look.as_ref(), began_secs, writer);
         if let Some(category) = &thing.category {
-            writer.iri(subject, "seenAs", category);
+            writer.iri(subject, "seenAs", &names::category(category));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use actcheck_base::names::escaped;
 use actcheck_base::{Term, TermId, Terms, Triple, names};
 
 /// Returns the IRI of an object with this ID in the simulation: `w:robot`, `w:floor`, `w:link/NAME` for `robot/NAME`,
@@ -16,20 +17,6 @@ pub fn thing_iri(id: &str) -> String {
             None => names::obj(&escaped(id)),
         },
     }
-}
-
-/// Escapes a name for an IRI: percent-encodes every byte except ASCII letters, digits and `_-.~`.
-pub(super) fn escaped(name: &str) -> String {
-    let mut out = String::with_capacity(name.len());
-    for byte in name.bytes() {
-        if byte.is_ascii_alphanumeric() || b"_-.~".contains(&byte) {
-            out.push(char::from(byte));
-        } else {
-            // Writing to a string can't fail.
-            let _ = write!(out, "%{byte:02X}");
-        }
-    }
-    out
 }
 
 /// Returns the number with the fewest digits that rounds to the same f32. Physics has f32 precision, and 0.3 stays 0.3.

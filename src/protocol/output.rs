@@ -6,6 +6,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use actcheck_base::printable;
+
 /// Number of lines kept.
 const LINES: usize = 20;
 /// Longest line kept without truncation. Unit: bytes.
@@ -79,10 +81,9 @@ impl Tail {
     }
 }
 
-/// A line with control characters replaced, so that it can't move a terminal's cursor.
+/// A line without control characters, so that it can't move a terminal's cursor.
 fn readable(line: &[u8]) -> String {
-    let text = String::from_utf8_lossy(line);
-    text.trim_end_matches('\r').chars().map(|c| if c.is_control() && c != '\t' { '\u{fffd}' } else { c }).collect()
+    printable(String::from_utf8_lossy(line).trim_end_matches('\r')).into_owned()
 }
 
 #[cfg(test)]
@@ -100,6 +101,6 @@ mod tests {
         assert_eq!(tail.lines.len(), LINES);
         assert_eq!(tail.lines[0], "and line 11");
         assert_eq!(tail.lines[LINES - 1].len(), LONGEST);
-        assert_eq!(readable(&tail.begun), "\u{fffd}[2Jlast");
+        assert_eq!(readable(&tail.begun), "\\u{1b}[2Jlast");
     }
 }

@@ -1,6 +1,8 @@
 //! A program's part in one run: it performs actions, command by command.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::answer::answer;
 use crate::command::WireCommand;
@@ -10,6 +12,7 @@ use crate::pool::{Lent, Programs};
 use crate::remember::{Grasped, remember};
 use crate::session::Session;
 use actcheck_actions::{ActionCall, ExternalFault, ExternalSkill, Interrupt, Operator};
+use actcheck_base::printable;
 use actcheck_data::ActionReport;
 use actcheck_world::World;
 
@@ -36,6 +39,10 @@ pub struct Performance<'a> {
     lent: Lent<'a>,
     run: RunName,
     clock_secs: fn() -> f64,
+    /// Set to interrupt the campaign: the run then ends between two messages.
+    stop: Arc<AtomicBool>,
+    /// Whether the run ended for that reason.
+    stopped: bool,
     /// Its last output lines, if it caused a fault.
     output: Option<Vec<String>>,
 }
@@ -43,8 +50,14 @@ pub struct Performance<'a> {
 impl<'a> Performance<'a> {
     /// One run with one of the campaign's programs. The program is started at the beginning of the run unless it is
     /// already running.
-    pub fn new(programs: &'a Programs, run: RunName, clock_secs: fn() -> f64) -> Self {
-        Self { lent: programs.lend(), run, clock_secs, output: None }
+    /// When `stop` is set, the run ends between two messages.
+    pub fn new(programs: &'a Programs, run: RunName, clock_secs: fn() -> f64, stop: Arc<AtomicBool>) -> Self {
+        Self { lent: programs.lend(), run, clock_secs, stop, stopped: false, output: None }
+    }
+
+    /// Whether `stop` ended an action of the program, so that the run must not be stored.
+    pub fn was_stopped(&self) -> bool {
+        self.stopped
     }
 
     /// The last lines that the program printed. Returns `None` unless its own fault ended the run.
@@ -85,7 +98,9 @@ impl<'a> Performance<'a> {
             let line: String = line.trim().chars().take(LONGEST_LINE).collect();
             format!("; its last output: {line}")
         });
-        ExternalFault { reason: format!("the program `{text}`: {}{printed}", fault.reason), ..fault }
+        // The reason quotes the program, for example names of its actions.
+        let reason = format!("the program `{text}`: {}{printed}", fault.reason);
+        ExternalFault { reason: printable(&reason).into_owned(), ..fault }
     }
 }
 
@@ -108,7 +123,8 @@ impl ExternalSkill for Performance<'_> {
         };
         session.idle = false;
         robot.begin(&call.action);
-        let mut performed = Performed { session, robot, privileged, grasped: Grasped::default() };
+        let (stop, grasped) = (&*self.stop, Grasped::default());
+        let mut performed = Performed { session, robot, privileged, grasped, stop };
         let ended = performed.begin(call).and_then(|()| performed.follow());
         let outcome = match ended {
             Ok(end) => remember(call, &end, performed.grasped, performed.robot)
@@ -116,6 +132,7 @@ impl ExternalSkill for Performance<'_> {
                 .map_err(Interrupt::ExternalSkill),
             Err(interrupt) => Err(performed.stop(interrupt)),
         };
+        self.stopped |= outcome == Err(Interrupt::Stopped);
         match outcome {
             Err(Interrupt::ExternalSkill(fault)) => Err(Interrupt::ExternalSkill(self.give_up(fault))),
             other => {
@@ -129,7 +146,7 @@ impl ExternalSkill for Performance<'_> {
 }
 
 fn report(end: End) -> ActionReport {
-    let message = end.message.chars().take(LONGEST_MESSAGE).collect();
+    let message = printable(&end.message).chars().take(LONGEST_MESSAGE).collect();
     ActionReport { succeeded: end.succeeded, message }
 }
 
@@ -139,6 +156,7 @@ struct Performed<'a, 'b> {
     robot: &'a mut Operator<'b>,
     privileged: bool,
     grasped: Grasped,
+    stop: &'a AtomicBool,
 }
 
 impl Performed<'_, '_> {
@@ -166,7 +184,7 @@ impl Performed<'_, '_> {
     /// Executes the program's commands and requests until it ends the action.
     fn follow(&mut self) -> Result<End, Interrupt> {
         loop {
-            let message = self.session.receive().map_err(Interrupt::ExternalSkill)?;
+            let message = self.receive()?;
             match kind_of(message).map_err(Interrupt::ExternalSkill)?.as_str() {
                 "command" => {
                     let command: WireCommand = parse("command", message).map_err(Interrupt::ExternalSkill)?;
@@ -174,6 +192,7 @@ impl Performed<'_, '_> {
                 }
                 "ask" => {
                     let ask: Ask = parse("ask", message).map_err(Interrupt::ExternalSkill)?;
+                    self.robot.count_request()?;
                     let (answer, bytes) = answer(&ask, self.robot);
                     let binaries: Vec<&[u8]> = bytes.iter().map(Vec::as_slice).collect();
                     self.session.send(&answer, &binaries).map_err(Interrupt::ExternalSkill)?;
@@ -184,6 +203,21 @@ impl Performed<'_, '_> {
                     return Err(Interrupt::ExternalSkill(ExternalFault { late: false, reason }));
                 }
             }
+        }
+    }
+
+    /// The next message. Waiting for it ends at the limits of the run, too.
+    fn receive(&mut self) -> Result<&[u8], Interrupt> {
+        let (robot, stop) = (&*self.robot, self.stop);
+        let limits = || match stop.load(Ordering::Relaxed) {
+            true => Err(Interrupt::Stopped),
+            false => robot.check_cut(),
+        };
+        limits()?;
+        let received = self.session.wait(&|| limits().is_err());
+        match received {
+            Ok(range) => Ok(self.session.wire.payload(range)),
+            Err(fault) => Err(limits().err().unwrap_or(Interrupt::ExternalSkill(fault))),
         }
     }
 
@@ -204,10 +238,11 @@ impl Performed<'_, '_> {
             Interrupt::ExternalSkill(_) => return interrupt,
             // The steps of an external skill are not watched for joints that are held back.
             Interrupt::Fault | Interrupt::HeldUp(_) => "fault",
-            Interrupt::Budget => "budget",
-            Interrupt::Cut => "stopped",
+            Interrupt::Budget | Interrupt::Requests(_) => "budget",
+            Interrupt::Cut | Interrupt::Stopped => "stopped",
         };
-        if self.session.abort(reason).is_err() {
+        let hurried = matches!(interrupt, Interrupt::Cut | Interrupt::Stopped);
+        if self.session.abort(reason, hurried).is_err() {
             self.session.lost = true;
         }
         interrupt

@@ -5,6 +5,7 @@ use nalgebra::Isometry3;
 
 use crate::message::{End, WirePose};
 use actcheck_actions::{ActionCall, ExternalFault, Held, Operator, feels_in};
+use actcheck_base::names;
 use actcheck_data::{Perceived, PerceivedPlane, PerceivedThing, Pose};
 use actcheck_world::Observation;
 
@@ -91,7 +92,8 @@ fn perceived(end: &End) -> Result<Perceived, ExternalFault> {
     let plane = end.plane.map(|plane| Ok(PerceivedPlane { pose: plane.pose.pose()?, size_m: plane.size_m }));
     let things = end.perceived.iter().flatten().map(|thing| {
         let pose = upright(&thing.pose)?;
-        Ok(PerceivedThing { category: thing.category.clone(), pose: Pose::from_isometry(&pose), size_m: thing.size_m })
+        let category = thing.category.as_deref().map(names::category);
+        Ok(PerceivedThing { category, pose: Pose::from_isometry(&pose), size_m: thing.size_m })
     });
     Ok(Perceived { plane: plane.transpose()?, things: things.collect::<Result<_, ExternalFault>>()?, look: None })
 }

@@ -1,12 +1,14 @@
 //! One program from start to exit: introductions, runs, and its faults.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use crate::frame::Wire;
 use crate::hello::{Joints, introduction};
 use crate::message::{Hello, PROTOCOL, Plain, ToProgram, kind_of, parse};
 use crate::process::Process;
 use actcheck_actions::ExternalFault;
+use actcheck_base::printable;
 use actcheck_config::Skill;
 use actcheck_world::World;
 
@@ -100,7 +102,7 @@ impl Session {
                 list(tested)
             )));
         }
-        self.name = hello.name.unwrap_or_default().chars().take(LONGEST_NAME).collect();
+        self.name = printable(&hello.name.unwrap_or_default()).chars().take(LONGEST_NAME).collect();
         Ok(())
     }
 
@@ -116,11 +118,20 @@ impl Session {
         parse("ready", message).map(|Plain { .. }| ())
     }
 
-    /// Notifies the program that its action is over, and waits for the acknowledgement.
+    /// Notifies the program that its action is over, and waits for the acknowledgement: only briefly if `hurried`,
+    /// because the time of the run is over.
     ///
     /// # Errors
     /// A fault of the program.
-    pub fn abort(&mut self, reason: &str) -> Result<(), ExternalFault> {
+    pub fn abort(&mut self, reason: &str, hurried: bool) -> Result<(), ExternalFault> {
+        let patience_secs = self.timeout_secs;
+        self.timeout_secs = if hurried { patience_secs.min(HURRIED_SECS) } else { patience_secs };
+        let acknowledged = self.exchange_abort(reason);
+        self.timeout_secs = patience_secs;
+        acknowledged
+    }
+
+    fn exchange_abort(&mut self, reason: &str) -> Result<(), ExternalFault> {
         self.send(&ToProgram::Abort { reason }, &[])?;
         let message = self.receive()?;
         expect(&kind_of(message)?, "aborted")?;
@@ -141,16 +152,24 @@ impl Session {
     /// # Errors
     /// The program is late, has exited, exceeds the output limit, or sends an invalid message.
     pub fn receive(&mut self) -> Result<&[u8], ExternalFault> {
+        let range = self.wait(&|| false)?;
+        Ok(self.wire.payload(range))
+    }
+
+    /// As [`Self::receive`], but also gives up once `is_over`. Returns the range of the message for [`Wire::payload`].
+    ///
+    /// # Errors
+    /// As [`Self::receive`].
+    pub fn wait(&mut self, is_over: &dyn Fn() -> bool) -> Result<Range<usize>, ExternalFault> {
         let limit_secs = self.timeout_secs;
         let (process, before) = (&mut self.process, self.printed_before);
         let mut watch = || match process.output.n_bytes() - before {
             too_much @ PRINTED_LIMIT.. => Err(broke(format!("it printed {too_much} bytes in one run"))),
+            _ if is_over() => Err(ExternalFault { late: true, reason: "its run was over".to_owned() }),
             _ => process.ended().map_or(Ok(()), |how| Err(broke(how))),
         };
-        match self.wire.receive(limit_secs, &mut watch) {
-            Ok(range) => Ok(self.wire.payload(range)),
-            Err(fault) => Err(cause_of(&mut self.process, fault)),
-        }
+        let received = self.wire.receive(limit_secs, &mut watch);
+        received.map_err(|fault| self.cause(fault))
     }
 
     /// Replaces a closed connection by the exit of the process if it exits, which is more informative.
@@ -184,6 +203,8 @@ impl Session {
     }
 }
 
+/// Time limit for the acknowledgement that an action is over, if the time of its run is. Unit: seconds.
+const HURRIED_SECS: f64 = 1.0;
 /// Time limit for delivering a fault notification. Unit: seconds.
 const REFUSAL_SECS: f64 = 0.2;
 

@@ -77,13 +77,13 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> Tree {
     tree
 }
 
-/// Reports a negative mass.
+/// Reports a negative or absurd mass.
 fn read_mass(link: Node, reader: &mut Reader) {
     let Some(inertial) = xml::child(link, "inertial") else { return };
     if let Some(mass) = reader.required(inertial, "mass")
         && let Some(written) = reader.attribute(mass, "value")
     {
-        reader.numbers::<1>(mass, written, Bound::NotNegative);
+        reader.numbers::<1>(mass, written, Bound::Mass);
     }
 }
 

@@ -21,8 +21,15 @@ pub(crate) type Node<'a> = roxmltree::Node<'a, 'a>;
 pub(crate) enum Bound {
     Finite,
     NotNegative,
+    /// A mass, or a length of a body: see [`LARGEST`].
     Positive,
+    /// A mass that may be missing: 0 or as [`Bound::Positive`].
+    Mass,
 }
+
+/// Largest mass and largest length of a body: a thousand tonnes and a thousand kilometres are no part of a robot's scene,
+/// and the physics engine can't calculate with much larger numbers. Units: kilograms, metres.
+const LARGEST: f64 = 1e6;
 
 impl Bound {
     fn holds(self, number: f64) -> bool {
@@ -30,7 +37,8 @@ impl Bound {
             && match self {
                 Self::Finite => true,
                 Self::NotNegative => number >= 0.0,
-                Self::Positive => number > 0.0,
+                Self::Positive => number > 0.0 && number <= LARGEST,
+                Self::Mass => (0.0..=LARGEST).contains(&number),
             }
     }
 
@@ -38,7 +46,8 @@ impl Bound {
         match self {
             Self::Finite => "finite",
             Self::NotNegative => "at least 0",
-            Self::Positive => "above 0",
+            Self::Positive => "above 0 and at most 1000000",
+            Self::Mass => "at least 0 and at most 1000000",
         }
     }
 }
