@@ -281,11 +281,11 @@ fn xml_that_grows_in_a_parser_is_refused() {
     let mesh = folder.path().join("m.dae");
     let uri = format!("file://{}", mesh.display());
     for (text, reason) in [
-        (format!("{}<COLLADA>&l9;</COLLADA>", laughs()), "W055: this XML is refused: the entity `l4` expands"),
+        (format!("{}<COLLADA>&l9;</COLLADA>", laughs()), "this XML is refused: the entity `l4` expands"),
         ("<!DOCTYPE a [<!ENTITY l \"lol\">]><COLLADA>&l;</COLLADA>".to_owned(), "W031"),
-        (crowded("COLLADA", "a"), "W055: this XML is refused: an element has more than 256 attributes"),
-        (crowded("COLLADA", "xmlns:n"), "W055: this XML is refused: more than 256 namespaces"),
-        ("<COLLADA>".repeat(100_000), "W055: this XML is refused: more than 10000 elements are nested"),
+        (crowded("COLLADA", "a"), "this XML is refused: an element has more than 256 attributes"),
+        (crowded("COLLADA", "xmlns:n"), "this XML is refused: more than 256 namespaces"),
+        ("<COLLADA>".repeat(100_000), "this XML is refused: more than 10000 elements are nested"),
     ] {
         std::fs::write(&mesh, &text).unwrap();
         let said = said_of_mesh(folder.path(), &uri);
@@ -298,7 +298,7 @@ fn xml_that_grows_in_a_parser_is_refused() {
     let links: String = (0..1_001).map(|number| format!("<link name=\"l{number}\"/>")).collect();
     std::fs::write(objects.join("cup.urdf"), format!("<robot name=\"r\">{links}</robot>")).unwrap();
     let said = said_of_config(folder.path(), "model_dir = \"models\"\n[pickObject]\nmodel_list = [\"cup\"]\n");
-    assert!(said.contains("W055: this model has more than 1000 `<link>`"), "{said}");
+    assert!(said.contains("W055") && said.contains("this model has more than 1000 `<link>`"), "{said}");
 }
 
 /// A COLLADA file with one geometry, whose corners have an input at `offset`, and `instances` of it.
