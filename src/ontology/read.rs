@@ -139,9 +139,9 @@ fn imports_of(reading: &Reading, text: usize) -> Vec<Waiting> {
 fn parse(source: &Source, text: usize, base: &str, statements: &mut Vec<Statement>, found: &mut Diagnostics) {
     let format = format_of(source);
     if format == RdfFormat::RdfXml
-        && let Err(fault) = check_xml(source, "O013")
+        && let Err(faults) = check_xml(source, "O013")
     {
-        found.push(fault);
+        found.extend(faults);
         return;
     }
     let position = Rc::new(Cell::new(mark_length(source)));
