@@ -192,11 +192,19 @@ impl<R: Read> XmlGuard<R> {
         Ok(())
     }
 
+    /// Whether the markup after a `<` can be a comment or CDATA section, as far as it is known.
+    fn is_long_markup(&mut self) -> std::io::Result<bool> {
+        if self.part.is_empty() {
+            return Ok(self.inner.fill_buf()?.first() == Some(&b'!'));
+        }
+        Ok(self.part.starts_with(b"!--") || self.part.starts_with(b"!["))
+    }
+
     /// Reads the markup after a `<`.
     fn markup(&mut self) -> std::io::Result<()> {
         let (mut seen, mut quote, mut inner) = (0, None, 0);
         loop {
-            let limit = if self.part.starts_with(b"!--") || self.part.starts_with(b"![") { MAX_TEXT } else { MAX_TAG };
+            let limit = if self.is_long_markup()? { MAX_TEXT } else { MAX_TAG };
             if !self.until(b'>', limit)? {
                 return Err(self.refuse_cut("the file ends inside a tag or comment"));
             }

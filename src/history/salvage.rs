@@ -10,7 +10,7 @@ use oxigraph::model::{GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term};
 use oxigraph::store::{StorageError, Store};
 
 use crate::merge::about;
-use crate::read::{short_id, text_of};
+use crate::read::short_id;
 use crate::statements::iri;
 use crate::write_campaign::{campaign_node, end_properties};
 use crate::write_run::run_node;
