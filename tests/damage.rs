@@ -19,7 +19,7 @@ const MOST_SECS: u64 = 60;
 /// Questions whose answers must not change.
 const QUESTIONS: [&[&str]; 5] = [
     &["list", "--format", "csv", "--history", "h"],
-    &["query", "failure-rates", "--format", "csv", "--history", "h"],
+    &["query", "--named", "failure-rates", "--format", "csv", "--history", "h"],
     &[
         "query",
         "--format",

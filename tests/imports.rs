@@ -76,7 +76,8 @@ fn faults_of_tables_are_errors_with_their_place() {
 fn faults_of_statements_are_errors_with_their_place() {
     let [one, two, three, four] = [1, 2, 3, 4].map(|n| format!("<http://x#a> <http://x#b> <http://x#c{n}>"));
     let lines = format!("{one} .\n{two}\n{three} .\nx\n");
-    fails("t.nt", "", lines.as_bytes(), &["2 faults", "t.nt:3:1", "t.nt:4:1"], 2);
+    // Only the dot is missing in line 2, so its statement is read.
+    fails("t.nt", "", lines.as_bytes(), &["2 faults", "t.nt:3:1", "t.nt:4:1"], 3);
     fails("t.nq", "", format!("{one} <http://g> .\n{two} <http://g").as_bytes(), &["1 fault", "t.nq:2:"], 1);
     let statements = format!("{one} .\n{two}, .\n{three}, 1.5 .\n{four}");
     fails("t.ttl", "", statements.as_bytes(), &["2 faults", "t.ttl:2:", "t.ttl:4:"], 3);
@@ -97,7 +98,7 @@ fn faults_of_xml_are_errors_with_their_place() {
     fails("t.rdf", "", format!("{RDF}{node}<b c='&no;'/></rdf:RDF>").as_bytes(), &["t.rdf:5:2"], 1);
     fails("t.rdf", "", b"", &["no XML element"], 0);
     let namespaces: String = (0..2000).map(|n| format!(" xmlns:n{n}='http://x#'")).collect();
-    fails("t.rdf", "", format!("<rdf:RDF{namespaces}/>").as_bytes(), &["t.rdf:1:2", "1000"], 0);
+    fails("t.rdf", "", format!("<rdf:RDF{namespaces}/>").as_bytes(), &["t.rdf:1:2", "256"], 0);
     let bomb: String = (1..10).map(|n| format!("<!ENTITY e{n} \"{}\">", format!("&e{};", n - 1).repeat(10))).collect();
     let bomb = format!("<!DOCTYPE a [<!ENTITY e0 \"ha\">{bomb}]>\n{RDF}<b>&e9;</b></rdf:RDF>");
     fails("t.rdf", "", bomb.as_bytes(), &["t.rdf:1:2", "the entity `e4` expands to more than 65536 bytes"], 0);

@@ -141,7 +141,14 @@ fn matching(statement: &str, closure: &Closure) -> Option<bool> {
     let (name, args) = statement.strip_suffix(')')?.split_once('(')?;
     closure.arity(name)?;
     let args: Vec<&str> = args.split(", ").collect();
-    let fits = |tuple: &Vec<Term>| tuple.iter().zip(&args).all(|(term, arg)| *arg == "_" || term.to_string() == *arg);
+    let fits = |tuple: &Vec<Term>| {
+        // A variable that occurs twice has one value.
+        let value_of = |name: &str| args.iter().position(|arg| *arg == name).map(|place| tuple[place].to_string());
+        tuple.iter().zip(&args).all(|(term, arg)| match arg.strip_prefix('?') {
+            Some(_) => value_of(arg).as_deref() == Some(&*term.to_string()),
+            None => *arg == "_" || term.to_string() == *arg,
+        })
+    };
     Some(closure.tuples(name).iter().any(fits))
 }
 

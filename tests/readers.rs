@@ -29,7 +29,7 @@ fn reading(run: &str) -> Vec<Vec<String>> {
     let commands = [
         "list --history h".to_owned(),
         format!("show {run} --history h"),
-        "query failure-rates --history h".to_owned(),
+        "query --named failure-rates --history h".to_owned(),
         format!("why {run} --history h"),
         "health --history h".to_owned(),
         "health --integrity --history h".to_owned(),

@@ -326,7 +326,11 @@ fn owl_compares_literals_by_value() {
         let file = folder.path().join("a.ttl");
         let prefixes: String =
             names::PREFIXES.iter().map(|(prefix, iri)| format!("@prefix {prefix}: <{iri}> .\n")).collect();
-        std::fs::write(&file, format!("{prefixes}@prefix : <https://example.org/> .\n{text} .")).unwrap();
+        std::fs::write(
+            &file,
+            format!("{prefixes}@prefix : <https://example.org/> .\nact:Wait a act:Action .\n{text} ."),
+        )
+        .unwrap();
         let read = ontology::load(&Files::Disk, &file).map(|ontology| ontology.triples).unwrap_or_default();
         assert!(!read.is_empty() && owl_closure(&read).is_ok() == consistent, "read from a file: {text}");
     }

@@ -27,8 +27,8 @@ pub(crate) enum Bound {
     Mass,
 }
 
-/// Largest mass and largest length of a body: a thousand tonnes and a thousand kilometres are no part of a robot's scene,
-/// and the physics engine can't calculate with much larger numbers. Units: kilograms, metres.
+/// Largest mass and largest length of a body: no scene of a robot has a thousand tonnes or a thousand kilometres, and the
+/// physics engine can't calculate with much larger numbers. Units: kilograms, metres.
 const LARGEST: f64 = 1e6;
 
 impl Bound {

@@ -140,7 +140,7 @@ impl<'a> ProofContext<'a> {
         let rule = attempt.rule;
         let shown = |idx: &usize| self.literal(rule, &rule.body[*idx], &attempt.binding);
         let open = open_binding(&rule.head, known, rule.variables.len()).unwrap_or_default();
-        let goal = self.pattern(&rule.head, &open);
+        let goal = self.pattern(&rule.head, &open, &rule.variables);
         let (failed, failure) = match attempt.order.get(attempt.depth).map(|idx| &rule.body[*idx]) {
             Some(literal) => {
                 (self.unsatisfied(rule, literal, &attempt.binding), self.failure(literal, &attempt.binding, depth))
@@ -165,7 +165,7 @@ impl<'a> ProofContext<'a> {
     /// Describes a pattern that no rule has a matching head for.
     pub(super) fn underivable(&self, predicate: PredicateId, known: &[Option<TermId>]) -> Miss {
         let args = known.iter().map(|id| id.map_or(Operand::Any, Operand::Constant)).collect();
-        let goal = self.pattern(&Atom { predicate, args, span: 0..0 }, &Vec::new());
+        let goal = self.pattern(&Atom { predicate, args, span: 0..0 }, &Vec::new(), &[]);
         let failure = Failure::NoMatch { nearest: self.nearest(predicate, known), because: None };
         Miss { failed: goal.clone(), goal, rule: None, satisfied: Vec::new(), failure }
     }

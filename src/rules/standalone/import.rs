@@ -282,7 +282,10 @@ pub(super) fn import(
         Ok(()) if faults.is_empty() => Diagnostics::new(),
         Ok(()) if lenient => {
             let warning = Diagnostic::warning("R074", faults.message(&import.path));
-            warning.at(&import.source, import.span.clone()).help("these rows or statements were left out").into()
+            warning
+                .at(&import.source, import.span.clone())
+                .help("rows and statements that can't be read were left out")
+                .into()
         }
         Ok(()) => {
             let help = "correct the file or the options of the import; `--lenient` leaves out these rows or statements";
