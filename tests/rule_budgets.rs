@@ -129,7 +129,7 @@ fn queries_that_make_long_texts_stop_at_the_memory() {
         // Within one expression.
         format!(
             "ASK {{ FILTER(STRLEN({}) > 0) }}",
-            (0..36).fold("\"aa\"".to_owned(), |text, _| format!("REPLACE({text}, \"a\", \"aaaa\")"))
+            (0..12).fold("\"aa\"".to_owned(), |text, _| format!("REPLACE({text}, \"a\", \"aaaaaa\")"))
         ),
     ] {
         let rules = Rules::builder().build("long.rq", &query).unwrap();

@@ -29,6 +29,9 @@ pub const TEXT_FUNCTIONS: [(&str, &str, TextFunction); 5] = [
 /// IRI of the function around each text that `GROUP_CONCAT` appends: it returns its argument, and counts its length.
 pub const COUNTED_TEXT: &str = "urn:actcheck:text:counted";
 
+/// Maximum nesting of calls that [`check_calls`] accepts.
+pub const MOST_NESTED_CALLS: usize = 12;
+
 /// Upper and lower case have at most this many times the bytes of a text, and so do escaped bytes.
 const GROWTH: usize = 3;
 /// Maximum size of a compiled pattern, as in oxigraph. Unit: bytes.
@@ -41,27 +44,65 @@ pub fn bounded_texts(query: &str) -> String {
     let mut out = String::with_capacity(query.len());
     let mut rest = query;
     let mut counting = Counting::default();
-    while let Some(first) = rest.chars().next() {
-        let length = match first {
-            '#' => rest.find('\n').unwrap_or(rest.len()),
-            '"' | '\'' => string_length(rest, first),
-            '<' => match rest.find(|c: char| c == '>' || c.is_whitespace()) {
-                Some(end) if rest[end..].starts_with('>') => end + 1,
-                _ => 1,
-            },
-            _ if is_of_word(first) => rest.find(|c: char| !is_of_word(c)).unwrap_or(rest.len()),
-            other => other.len_utf8(),
-        };
-        let (token, after) = rest.split_at(length);
+    while let Some((token, after)) = split_token(rest) {
         counting.before(token, &mut out);
-        let function = TEXT_FUNCTIONS.iter().find(|(name, ..)| name.eq_ignore_ascii_case(token));
-        match function.filter(|_| opens(after)) {
-            Some((_, iri, _)) => out.extend(["<", iri, ">"]),
+        match text_function(token).filter(|_| opens(after)) {
+            Some(iri) => out.extend(["<", iri, ">"]),
             None => out.push_str(token),
         }
         rest = after;
     }
     out
+}
+
+/// Checks that calls of [`TEXT_FUNCTIONS`] and of functions with IRIs are nested at most [`MOST_NESTED_CALLS`] deep: the
+/// time of oxigraph's parser doubles with each level.
+///
+/// # Errors
+/// Place of the first call that is deeper, in bytes.
+pub fn check_calls(query: &str) -> Result<(), usize> {
+    // For each open parenthesis, whether it begins the arguments of such a call.
+    let mut open: Vec<bool> = Vec::new();
+    let (mut rest, mut calls) = (query, false);
+    while let Some((token, after)) = split_token(rest) {
+        match token {
+            "(" => {
+                open.push(calls);
+                if open.iter().filter(|call| **call).count() > MOST_NESTED_CALLS {
+                    return Err(query.len() - rest.len());
+                }
+            }
+            ")" => drop(open.pop()),
+            _ => {}
+        }
+        if !token.starts_with('#') && !token.trim().is_empty() {
+            calls =
+                token.len() > 1 && (token.starts_with('<') || token.contains(':')) || text_function(token).is_some();
+        }
+        rest = after;
+    }
+    Ok(())
+}
+
+/// Splits a query after its first token: a comment, string, IRI, word or character.
+fn split_token(query: &str) -> Option<(&str, &str)> {
+    let first = query.chars().next()?;
+    let length = match first {
+        '#' => query.find('\n').unwrap_or(query.len()),
+        '"' | '\'' => string_length(query, first),
+        '<' => match query.find(|c: char| c == '>' || c.is_whitespace()) {
+            Some(end) if query[end..].starts_with('>') => end + 1,
+            _ => 1,
+        },
+        _ if is_of_word(first) => query.find(|c: char| !is_of_word(c)).unwrap_or(query.len()),
+        other => other.len_utf8(),
+    };
+    Some(query.split_at(length))
+}
+
+/// Returns the IRI of the function with this name.
+fn text_function(name: &str) -> Option<&'static str> {
+    TEXT_FUNCTIONS.iter().find(|(known, ..)| known.eq_ignore_ascii_case(name)).map(|(_, iri, _)| *iri)
 }
 
 /// Finds the arguments of `GROUP_CONCAT`.
@@ -241,6 +282,20 @@ fn compiled(pattern: &str, flags: &str) -> Option<Regex> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn deeply_nested_calls_are_found() {
+        let nested =
+            |call: &str, depth: usize| format!("ASK {{ FILTER({}1{}) }}", call.repeat(depth), ")".repeat(depth));
+        for call in ["CONCAT(", "replace (", "<http://x#f>(", "f:g # (\n("] {
+            assert_eq!(check_calls(&nested(call, MOST_NESTED_CALLS)), Ok(()), "{call}");
+            assert!(check_calls(&nested(call, MOST_NESTED_CALLS + 1)).is_err(), "{call}");
+        }
+        for fine in ["STRLEN(", "(", "\"<f>\" + (", "?x < ("] {
+            assert_eq!(check_calls(&nested(fine, 40)), Ok(()), "{fine}");
+        }
+        assert_eq!(check_calls(&"CONCAT(1) ".repeat(40)), Ok(()));
+    }
 
     #[test]
     fn only_calls_are_renamed() {

@@ -13,7 +13,10 @@ use crate::open::OpenStore;
 use crate::syntax_fault::syntax_fault;
 use crate::terms::{from_store, to_store};
 use crate::{Cancel, QueryAnswer};
-use actcheck_base::{COUNTED_TEXT, Diagnostic, Diagnostics, Source, Span, TEXT_FUNCTIONS, Term, bounded_texts, names};
+use actcheck_base::{
+    COUNTED_TEXT, Diagnostic, Diagnostics, MOST_NESTED_CALLS, Source, Span, TEXT_FUNCTIONS, Term, bounded_texts,
+    check_calls, names,
+};
 
 /// Words with which an update begins.
 const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREATE", "ADD", "MOVE", "COPY", "WITH"];
@@ -26,6 +29,11 @@ const LONGEST_TEXT: usize = 32 << 20;
 /// Answers a query.
 pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
+    if let Err(at) = check_calls(&text.text) {
+        let message = format!("calls are nested more than {MOST_NESTED_CALLS} deep");
+        let help = "name the inner values, as in `BIND(CONCAT(?a, ?b) AS ?c)`";
+        return Err(Diagnostic::error("H010", message).at(text, at..at + 1).help(help).into());
+    }
     let syntax = |error: SparqlSyntaxError| syntax_fault(text, &error.to_string());
     drop(evaluator(cancel).parse_query(&*text.text).map_err(syntax)?);
     // Places in the text that is evaluated differ from the original's, so errors were reported before.

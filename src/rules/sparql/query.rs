@@ -17,8 +17,8 @@ use crate::sparql::ledger::Ledger;
 use crate::sparql::query_text::{first_group, groups, scan, variables};
 use crate::watch::Watch;
 use actcheck_base::{
-    COUNTED_TEXT, Diagnostic, Diagnostics, Findings, RuleFault, Source, Span, TEXT_FUNCTIONS, Term, WitnessRow,
-    bounded_texts, names,
+    COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Source, Span, TEXT_FUNCTIONS, Term,
+    WitnessRow, bounded_texts, check_calls, names,
 };
 use actcheck_ontology::{Ontology, Vocabulary};
 
@@ -41,6 +41,12 @@ impl Query {
         let mut diagnostics = Diagnostics::new();
         if !ontology.vocabulary.terms.is_empty() {
             check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
+        }
+        if let Err(at) = check_calls(&source.text) {
+            let message = format!("calls are nested more than {MOST_NESTED_CALLS} deep");
+            let help = "name the inner values, as in `BIND(CONCAT(?a, ?b) AS ?c)`";
+            diagnostics.push(Diagnostic::error("R060", message).at(source, at..at + 1).help(help));
+            return Err(diagnostics);
         }
         if let Err(error) = evaluator().parse_query(source.text.as_ref()) {
             diagnostics.push(syntax_fault(source, &error.to_string()));
