@@ -78,7 +78,7 @@ fn faults_of_statements_are_errors_with_their_place() {
     let lines = format!("{one} .\n{two}\n{three} .\nx\n");
     // Only the dot is missing in line 2, so its statement is read.
     fails("t.nt", "", lines.as_bytes(), &["2 faults", "t.nt:3:1", "t.nt:4:1"], 3);
-    fails("t.nq", "", format!("{one} <http://g> .\n{two} <http://g").as_bytes(), &["1 fault", "t.nq:2:"], 1);
+    fails("t.nq", "", format!("{one} <http://g> .\n{two} <http://g").as_bytes(), &["2 faults", "t.nq:2:"], 1);
     let statements = format!("{one} .\n{two}, .\n{three}, 1.5 .\n{four}");
     fails("t.ttl", "", statements.as_bytes(), &["2 faults", "t.ttl:2:", "t.ttl:4:"], 3);
     fails("t.ttl", "", format!("{one} .\n<a> <http://x#b> 1 .").as_bytes(), &["t.ttl:2:1", "IRI"], 1);

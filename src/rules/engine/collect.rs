@@ -27,7 +27,8 @@ impl Sink {
     /// Sets the next limit: in proportion to the collected rows, so that merging takes amortised constant time for a
     /// row, and small if memory is short. `collected`: terms.
     pub(crate) fn adapt(&mut self, collected: usize, watch: &Watch) {
-        let most = (watch.left() / (8 * size_of::<TermId>())).max(LEAST_SINK);
+        let eighth = watch.left() / 8;
+        let most = (eighth / size_of::<TermId>()).max(LEAST_SINK);
         self.limit = (collected / 2).clamp(LEAST_SINK, most);
     }
 }

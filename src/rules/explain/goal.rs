@@ -26,7 +26,7 @@ pub(super) struct Goal {
     predicate: String,
     name_span: Span,
     span: Span,
-    args: Vec<(Option<Term>, Span)>,
+    args: Vec<GoalArgument>,
 }
 
 impl Goal {
@@ -110,8 +110,11 @@ impl Goal {
     }
 }
 
+/// A constant, or `None` for any value; and its place.
+type GoalArgument = (Option<Term>, Span);
+
 /// Returns the arguments of a goal, or the reason why one is invalid, with its place.
-fn arguments(head: &AtomSyntax) -> Result<Vec<(Option<Term>, Span)>, (String, Span)> {
+fn arguments(head: &AtomSyntax) -> Result<Vec<GoalArgument>, (String, Span)> {
     let mut variables = BTreeSet::new();
     let mut args = Vec::new();
     for arg in &head.args {

@@ -151,7 +151,7 @@ fn of_schema(text: &str, name: &str) -> Option<Term> {
             })
             .map(|value: f32| typed(value.to_string(), name)),
         "hexBinary" => {
-            let valid = collapsed.len() % 2 == 0 && collapsed.bytes().all(|byte| byte.is_ascii_hexdigit());
+            let valid = collapsed.len().is_multiple_of(2) && collapsed.bytes().all(|byte| byte.is_ascii_hexdigit());
             valid.then(|| typed(collapsed.to_ascii_uppercase(), name))
         }
         "base64Binary" => base64(&collapsed).map(|text| typed(text, name)),
@@ -237,7 +237,7 @@ fn base64(text: &str) -> Option<String> {
     let padding = text.len() - digits.len();
     let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let value = |byte: u8| alphabet.iter().position(|letter| *letter == byte);
-    if text.len() % 4 != 0 || padding > 2 || !digits.bytes().all(|byte| value(byte).is_some()) {
+    if !text.len().is_multiple_of(4) || padding > 2 || !digits.bytes().all(|byte| value(byte).is_some()) {
         return None;
     }
     // The bits of the last digit that belong to no byte are zero.
