@@ -20,7 +20,7 @@ RUNS = sys.argv[3] if len(sys.argv) > 3 else "100"
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 QUESTIONS = [
     ["list"],
-    ["query", "failure-rates"],
+    ["query", "--named", "failure-rates"],
     ["query", "SELECT (COUNT(*) AS ?n) WHERE { ?s a act:Run }"],
     ["analyse"],
 ]
