@@ -29,7 +29,7 @@ pub use findings::{Findings, RuleFault, WitnessRow};
 pub use judgement::{Judgement, Outcome};
 pub use printable::{printable, printable_in_colour};
 pub use query_texts::{
-    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls,
+    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls, string_end,
 };
 pub use rotation::{tilt_of, yaw_of};
 pub use run_facts::{ActionFacts, RunFacts, Triple};

@@ -89,7 +89,7 @@ fn split_token(query: &str) -> Option<(&str, &str)> {
     let first = query.chars().next()?;
     let length = match first {
         '#' => query.find('\n').unwrap_or(query.len()),
-        '"' | '\'' => string_length(query, first),
+        '"' | '\'' => string_end(query, 0, first),
         '<' => match query.find(|c: char| c == '>' || c.is_whitespace()) {
             Some(end) if query[end..].starts_with('>') => end + 1,
             _ => 1,
@@ -168,21 +168,23 @@ fn opens(text: &str) -> bool {
     text.starts_with('(')
 }
 
-/// Returns the length of the string that a text begins with.
-fn string_length(text: &str, quote: char) -> usize {
+/// Returns the end of the string in a SPARQL query that begins at `start` with this quotation mark, one or three of them.
+/// Unit: bytes.
+#[must_use]
+pub fn string_end(query: &str, start: usize, quote: char) -> usize {
     let triple = quote.to_string().repeat(3);
-    let close = if text.starts_with(&triple) { triple } else { quote.to_string() };
-    let mut at = close.len();
-    while let Some(c) = text[at..].chars().next() {
-        if text[at..].starts_with(&close) {
+    let close = if query[start..].starts_with(&triple) { triple } else { quote.to_string() };
+    let mut at = start + close.len();
+    while let Some(c) = query[at..].chars().next() {
+        if query[at..].starts_with(&close) {
             return at + close.len();
         }
         at += c.len_utf8();
         if c == '\\' {
-            at += text[at..].chars().next().map_or(0, char::len_utf8);
+            at += query[at..].chars().next().map_or(0, char::len_utf8);
         }
     }
-    text.len()
+    query.len()
 }
 
 fn limited(length: usize, most: usize) -> Result<(), TextTooLong> {

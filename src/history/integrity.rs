@@ -41,7 +41,7 @@ impl History {
     /// read.
     ///
     /// # Errors
-    /// `H003`, `H004` there is no history that this program can read; `H007` nothing of its store can be read.
+    /// `H003` or `H004` if this program can't read the history; `H007` if the whole store is unreadable.
     pub fn examine(dir: &Path) -> Result<(Integrity, Self), Diagnostics> {
         let folder = Folder::to_read(dir)?;
         let mut found = Integrity::default();

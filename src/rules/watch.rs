@@ -118,7 +118,7 @@ impl Watch {
         self.limit.saturating_sub(self.held.get())
     }
 
-    /// Returns an error if there is no room for some memory.
+    /// Returns an error if the memory budget has fewer bytes left than required.
     pub(crate) fn room(&self, bytes: usize) -> Result<(), Stop> {
         if self.held.get().saturating_add(bytes) <= self.limit {
             return Ok(());
@@ -132,14 +132,14 @@ impl Watch {
         self.made.set(0);
     }
 
-    /// Accounts for the text that a built-in is about to make. Returns `None` if there is no time or memory for it.
+    /// Accounts for the text that a built-in will create. Returns `None` if the time or memory budget is spent.
     pub(crate) fn make(&self, bytes: usize) -> Option<()> {
         self.made.set(self.made.get().saturating_add(bytes));
         self.room(self.made.get()).ok()?;
         self.work(bytes)
     }
 
-    /// Accounts for text that a built-in processes. Returns `None` if there is no time for it.
+    /// Accounts for the text that a built-in processes. Returns `None` if the time budget is spent.
     pub(crate) fn work(&self, bytes: usize) -> Option<()> {
         self.work.set(self.work.get().saturating_add(bytes));
         if self.work.get() < WORK_PER_CHECK {

@@ -27,7 +27,7 @@ impl<'t> Ids<'t> for Universe<'t> {
         self
     }
 
-    /// Adds the value if it is new; `None` if there is no memory for it.
+    /// Adds the value if it is new. Returns `None` if the memory budget is spent.
     fn id_of(&mut self, term: Term, watch: &Watch) -> Option<TermId> {
         self.create(term, watch).ok()
     }
