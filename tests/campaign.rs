@@ -223,7 +223,7 @@ fn an_interrupted_campaign_keeps_its_runs_and_says_so() {
 }
 
 #[test]
-fn a_second_process_on_the_same_history_is_refused() {
+fn a_second_writer_on_the_same_history_is_refused_and_a_reader_is_not() {
     let project = project();
     let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
         .args(["run", "configs/pick.toml", "--runs", "400", "--history", "h"])
@@ -239,11 +239,13 @@ fn a_second_process_on_the_same_history_is_refused() {
         assert!(start.elapsed() < Duration::from_secs(120));
         std::thread::sleep(Duration::from_millis(20));
     }
-    let second = actcheck(project.path(), &["list", "--history", "h"]);
+    let second = actcheck(project.path(), &["run", "configs/pick.toml", "--runs", "1", "--history", "h"]);
+    let reader = actcheck(project.path(), &["list", "--history", "h"]);
     child.kill().unwrap();
     child.wait().unwrap();
     assert_eq!(second.status.code(), Some(2));
     assert!(stderr(&second).contains("another process"), "{}", stderr(&second));
+    assert_eq!(reader.status.code(), Some(0), "{}", stderr(&reader));
     assert!(!listed(project.path(), "h").is_empty());
 }
 

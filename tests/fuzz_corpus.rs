@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 #[path = "../fuzz/src/lib.rs"]
-mod entrances;
+pub mod entrances;
 
 /// The inputs of a target, sorted.
 fn inputs(target: &str) -> Vec<PathBuf> {

@@ -61,7 +61,7 @@ fn explain_knows_every_code_and_suggests_the_nearest() {
     let page = stdout(&actcheck(root(), &["explain", "--format", "markdown"]));
     assert_eq!(page, std::fs::read_to_string(root().join("src/codes.md")).unwrap(), "src/codes.md is out of date");
     for (wrong, help) in
-        [("C0003", "did you mean `C003`"), ("R999", "did you mean `R091`"), ("oops", "a letter and three digits")]
+        [("C0003", "did you mean `C003`"), ("R999", "did you mean `R093`"), ("oops", "a letter and three digits")]
     {
         let output = actcheck(root(), &["explain", wrong]);
         assert_eq!(output.status.code(), Some(2));

@@ -308,7 +308,7 @@ fn an_exported_run_finds_its_program() {
     std::fs::create_dir(folder.path().join("cases")).unwrap();
     let exported = actcheck(folder.path(), &["export", id, "--history", ".actcheck", "-o", "cases/one.toml"]);
     assert!(exported.status.success(), "{}", stderr(&exported));
-    let again = actcheck(folder.path(), &["run", "cases/one.toml", "--history", "h", "--format", "json"]);
+    let again = actcheck(folder.path(), &["run", "cases/one.toml", "--trust", "--history", "h", "--format", "json"]);
     let replayed: Value = serde_json::from_str(&stdout(&again)).unwrap_or_else(|_| panic!("{}", stderr(&again)));
     assert!(replayed.to_string().contains("\"same_trace\":true"), "{replayed:#}");
 }

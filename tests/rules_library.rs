@@ -14,7 +14,7 @@ fn target() -> PathBuf {
 fn a_program_outside_the_workspace_judges_and_explains() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rules_library/Cargo.toml");
     let run = Command::new(env!("CARGO"))
-        .args(["run", "--quiet", "--release", "--locked", "--offline", "--manifest-path"])
+        .args(["run", "--quiet", "--locked", "--offline", "--manifest-path"])
         .arg(&manifest)
         .env("CARGO_TARGET_DIR", target())
         // `.ci/timed` sets it for the test program. Build scripts would notice it and rebuild dependencies, here and in

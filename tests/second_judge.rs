@@ -4,7 +4,21 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use tempfile::TempDir;
+
 use crate::support::{actcheck, edit, foreign, project, root, shipped, stderr, stdout};
+
+/// A shipped campaign, run completely; of whole tasks, half of the runs with coarse physics, which take a sixth of the time.
+fn made(campaign: &str) -> (TempDir, u64) {
+    if campaign == "pick" {
+        return (shipped("pick").copied(), 15);
+    }
+    let folder = project();
+    let config = format!("configs/{campaign}.toml");
+    let ran = actcheck(folder.path(), &["run", &config, "--runs", "8", "--jobs", "2", "--history", "h"]);
+    assert!(ran.status.code().is_some_and(|code| code < 2), "{}", stderr(&ran));
+    (folder, 8)
+}
 
 /// Exports the history `h` of a folder with all facts, and judges it anew.
 fn judged_anew(python: &Path, folder: &Path) -> Output {
@@ -54,12 +68,13 @@ fn a_second_judgement_without_the_rules_agrees_with_every_outcome() {
             ],
         ),
     ] {
-        let output = judged_anew(python, shipped(campaign).copied().path());
+        let (folder, runs) = made(campaign);
+        let output = judged_anew(python, folder.path());
         let report = stdout(&output);
         assert!(output.status.success(), "{campaign}: {report}{}", stderr(&output));
-        // All 15 runs of the campaign, up to outcomes on their limit.
+        // All runs, up to outcomes on their limit.
         for property in properties {
-            assert!(agreed(&report, property) >= 14, "{campaign}: {property}: {report}");
+            assert!(agreed(&report, property) >= runs - 1, "{campaign}: {property}: {report}");
         }
         assert!(!report.contains("not judged"), "{report}");
     }

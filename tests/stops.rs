@@ -29,7 +29,7 @@ const ENDLESS: [(&str, &str); 2] = [
 ];
 
 fn asked() -> Budget {
-    Budget { tuples: usize::MAX, secs: f64::MAX, stop: Arc::new(AtomicBool::new(true)) }
+    Budget { tuples: usize::MAX, bytes: usize::MAX, secs: f64::MAX, stop: Arc::new(AtomicBool::new(true)) }
 }
 
 #[test]

@@ -3,6 +3,8 @@
 //! The targets below `fuzz_targets/` give libFuzzer's inputs to these functions; `tests/fuzz_corpus.rs` of the program
 //! includes this file and gives them the corpus as a regression test.
 
+pub mod imports;
+
 use std::path::Path;
 use std::sync::OnceLock;
 

@@ -9,6 +9,7 @@ mod external;
 mod forced;
 mod grasp;
 mod grip;
+mod link_points;
 mod memory;
 mod misperception;
 mod motion;

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use crate::grasp::{Approach, Grasp};
+use crate::link_points::LinkPoints;
 use crate::motion::{Samples, moved_links};
 use crate::operator::Operator;
 use crate::route::{Block, Ground, Pillar, length, wrapped};
@@ -130,7 +131,7 @@ pub(super) struct Planner<'a> {
     /// Initial joint positions.
     pub(super) start: Vec<f64>,
     postures: Vec<Vec<f64>>,
-    pub(super) points: Vec<(usize, Point3<f64>)>,
+    pub(super) points: Vec<LinkPoints>,
     /// Whether each link is part of the hand.
     pub(super) is_hand: Vec<bool>,
     pub(super) furniture: Vec<Block>,
@@ -156,6 +157,7 @@ impl<'a> Planner<'a> {
         let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
         let heads = heads(kinematics, layout, &start);
+        let points = LinkPoints::grouped(&points);
         Self { kinematics, layout, base, start, postures, points, is_hand, furniture, things, ground, itself, heads }
     }
 

@@ -41,12 +41,9 @@ impl Planner<'_> {
 
     /// Cost of one leg. Returns `None` if something is in the way.
     fn leg_cost(&self, from: &[f64], to: &[f64], travel: f64) -> Option<f64> {
-        let nearest = self.clearance(from, to);
-        let lack_of_room = (AMPLE_BODY_CLEAR_M - nearest.body_m).max(0.0);
-        let is_free =
-            nearest.hand_m >= FURNITURE_CLEAR_M && nearest.body_m >= BODY_CLEAR_M && nearest.things_m >= LEAST_CLEAR_M;
-        is_free
-            .then(|| travel + (AMPLE_CLEAR_M - nearest.things_m).max(0.0) * THING_COST + lack_of_room * FURNITURE_COST)
+        let nearest = self.clearance(from, to)?;
+        let lack_of_room = AMPLE_BODY_CLEAR_M - nearest.body_m;
+        Some(travel + (AMPLE_CLEAR_M - nearest.things_m) * THING_COST + lack_of_room * FURNITURE_COST)
     }
 
     /// Whether the path is free of self-collisions.
@@ -83,25 +80,29 @@ impl Planner<'_> {
         legs.zip(drive).map(|(a, b)| way(a, b)).sum::<f64>() - way(&self.start, end)
     }
 
-    /// Smallest distances to furniture and to objects along the path between two postures.
-    fn clearance(&self, from: &[f64], to: &[f64]) -> Nearest {
-        let mut nearest = Nearest { hand_m: f64::INFINITY, body_m: f64::INFINITY, things_m: f64::INFINITY };
+    /// Smallest distances to furniture and to objects along the path between two postures, up to the distance beyond
+    /// which more brings no benefit. Returns `None` if the path is not free.
+    fn clearance(&self, from: &[f64], to: &[f64]) -> Option<Nearest> {
+        let mut nearest = Nearest::AMPLE;
         for step in 0..=N_CHECKS {
             let share = step as f64 / N_CHECKS as f64;
             let positions: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + (b - a) * share).collect();
             let links = self.kinematics.links(&positions);
-            for (link, point) in &self.points {
-                let point = links[*link] * point;
-                let of_furniture = if self.is_hand[*link] { &mut nearest.hand_m } else { &mut nearest.body_m };
+            for points in &self.points {
+                let pose = &links[points.link];
+                let of_furniture = if self.is_hand[points.link] { &mut nearest.hand_m } else { &mut nearest.body_m };
                 for block in &self.furniture {
-                    *of_furniture = of_furniture.min(block.distance(&point));
+                    *of_furniture = points.nearest(pose, *of_furniture, |point| block.distance(point));
                 }
                 for pillar in &self.things {
-                    nearest.things_m = nearest.things_m.min(pillar.distance(&point));
+                    nearest.things_m = points.nearest(pose, nearest.things_m, |point| pillar.distance(point));
+                }
+                if !nearest.is_free() {
+                    return None;
                 }
             }
         }
-        nearest
+        Some(nearest)
     }
 }
 
@@ -113,4 +114,14 @@ struct Nearest {
     body_m: f64,
     /// Of all links to objects.
     things_m: f64,
+}
+
+impl Nearest {
+    /// Distances beyond which more brings no benefit.
+    const AMPLE: Self = Self { hand_m: FURNITURE_CLEAR_M, body_m: AMPLE_BODY_CLEAR_M, things_m: AMPLE_CLEAR_M };
+
+    /// Whether nothing is in the way.
+    fn is_free(&self) -> bool {
+        self.hand_m >= FURNITURE_CLEAR_M && self.body_m >= BODY_CLEAR_M && self.things_m >= LEAST_CLEAR_M
+    }
 }

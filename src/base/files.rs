@@ -1,9 +1,16 @@
 //! Files of a project: on disk, or embedded in the binary.
 
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 
 use crate::Source;
 use crate::shipped;
+
+/// Longest file that is read as a whole. Unit: bytes.
+const LONGEST: u64 = 1 << 30;
+/// Longest text of a configuration, a model, a rule or an ontology. Unit: bytes.
+const LONGEST_TEXT: u64 = 64 << 20;
 
 /// A source of files, by path.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,26 +25,42 @@ impl Files {
     /// Reads a file's bytes.
     ///
     /// # Errors
-    /// As [`Files::read`], except that the file need not be UTF-8.
+    /// As [`Files::read`], except that the file need not be UTF-8 and may have up to 1 GiB.
     pub fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, String> {
+        self.read_up_to(path, LONGEST)
+    }
+
+    fn read_up_to(&self, path: &Path, longest: u64) -> Result<Vec<u8>, String> {
         match self {
             Self::Shipped => {
                 shipped::read(&slashed(&normalised(path))).ok_or_else(|| "no built-in file has this path".to_owned())
             }
-            Self::Disk => std::fs::read(path).map_err(|error| describe(&error)),
+            Self::Disk => read_regular(path, longest),
         }
     }
 
-    /// Reads a text. The source's name is the path, prefixed with `built-in:` for embedded files.
+    /// Reads a text of at most 64 MiB. The source's name is the path, prefixed with `built-in:` for embedded files.
     ///
     /// # Errors
-    /// Returns the reason as a lower-case sentence without the path.
+    /// Returns the reason as a lower-case sentence without the path. Devices and pipes are refused: they may have no end.
     pub fn read(&self, path: &Path) -> Result<Source, String> {
+        self.read_text(path, LONGEST_TEXT)
+    }
+
+    /// Reads a text as [`Files::read`] does, of up to 1 GiB: a program may contain its facts.
+    ///
+    /// # Errors
+    /// As [`Files::read`].
+    pub fn read_program(&self, path: &Path) -> Result<Source, String> {
+        self.read_text(path, LONGEST)
+    }
+
+    fn read_text(&self, path: &Path, longest: u64) -> Result<Source, String> {
         let name = match self {
             Self::Shipped => format!("built-in:{}", slashed(&normalised(path))),
             Self::Disk => path.display().to_string(),
         };
-        let text = String::from_utf8(self.read_bytes(path)?).map_err(|_| "it is not UTF-8 text")?;
+        let text = String::from_utf8(self.read_up_to(path, longest)?).map_err(|_| "it is not UTF-8 text")?;
         Ok(Source::new(name, text))
     }
 
@@ -92,6 +115,25 @@ impl Files {
         paths.dedup();
         paths
     }
+}
+
+/// Reads a regular file: opening a pipe may wait for ever, and a device may have no end.
+fn read_regular(path: &Path, longest: u64) -> Result<Vec<u8>, String> {
+    let data = std::fs::metadata(path).map_err(|error| describe(&error))?;
+    if data.is_dir() {
+        return Err("it is a folder".to_owned());
+    }
+    if !data.is_file() {
+        return Err("it is a device or a pipe, not a file".to_owned());
+    }
+    let file = File::open(path).map_err(|error| describe(&error))?;
+    let mut bytes = Vec::with_capacity(usize::try_from(data.len().min(longest)).unwrap_or_default());
+    // Some files are longer than their metadata says.
+    file.take(longest + 1).read_to_end(&mut bytes).map_err(|error| describe(&error))?;
+    if bytes.len() as u64 > longest {
+        return Err(format!("it is longer than {} MiB", longest >> 20));
+    }
+    Ok(bytes)
 }
 
 /// Removes `.` and `..` from a path as far as possible without reading the disk.

@@ -9,14 +9,18 @@ mod findings;
 mod judgement;
 pub mod names;
 mod printable;
+mod query_texts;
 mod rotation;
 mod run_facts;
+mod scratch;
 mod shard;
 mod shipped;
 mod source;
 mod suggest;
 mod term;
 mod write_atomic;
+mod xml_guard;
+mod xml_limits;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
 pub use digest::{Digest, digest_of, program_digest, set_program_digest};
@@ -24,10 +28,16 @@ pub use files::Files;
 pub use findings::{Findings, RuleFault, WitnessRow};
 pub use judgement::{Judgement, Outcome};
 pub use printable::{printable, printable_in_colour};
+pub use query_texts::{
+    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls, string_end,
+};
 pub use rotation::{tilt_of, yaw_of};
 pub use run_facts::{ActionFacts, RunFacts, Triple};
+pub use scratch::ScratchFolder;
 pub use shard::{ParseShardError, Shard};
 pub use source::{Source, Span};
 pub use suggest::{did_you_mean, nearest};
 pub use term::{Term, TermId, Terms};
-pub use write_atomic::write_atomic;
+pub use write_atomic::{NewFile, write_atomic};
+pub use xml_guard::{XmlGuard, XmlProgress};
+pub use xml_limits::check_xml;

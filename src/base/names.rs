@@ -25,6 +25,9 @@ pub const EARL: &str = "http://www.w3.org/ns/earl#";
 /// Provenance.
 pub const PROV: &str = "http://www.w3.org/ns/prov#";
 
+/// Longest id of a campaign or a run. Unit: bytes.
+const LONGEST_ID: usize = 128;
+
 /// Prefixes that shipped queries and messages may use. If one namespace begins with another, the longer
 /// one comes first.
 pub const PREFIXES: [(&str, &str); 11] = [
@@ -56,6 +59,13 @@ pub fn obj(id: &str) -> String {
     format!("{OBJ}{id}")
 }
 
+/// Returns `true` if a text can be the id of a campaign or a run: letters, digits, `-` and `_`, beginning with a letter or
+/// digit. Ids are parts of file names, so an id of a foreign history must not lead out of a folder.
+pub fn is_id(text: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    text.len() <= LONGEST_ID && text.starts_with(|c: char| c.is_ascii_alphanumeric()) && text.chars().all(allowed)
+}
+
 /// Returns the local name of an IRI: the part after its last `#` or `/`.
 pub fn local(iri: &str) -> &str {
     iri.rsplit(['#', '/']).next().unwrap_or(iri)
@@ -72,6 +82,7 @@ pub fn shorten(iri: &str) -> String {
     }
     format!("<{iri}>")
 }
+
 /// Whether a text is an absolute IRI that every RDF parser accepts. (A few exotic IRIs are not recognised, such as those
 /// with IPv6 addresses.)
 pub fn is_iri(text: &str) -> bool {
@@ -123,6 +134,30 @@ pub fn escaped(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_id_is_part_of_a_file_name_and_nothing_else() {
+        for id in ["k7f3", "k7f3-12", "1f00_shrunk", &"a".repeat(128)] {
+            assert!(is_id(id), "{id}");
+        }
+        for wrong in [
+            "",
+            ".",
+            "..",
+            "../../x",
+            "a/b",
+            "a\\b",
+            "-rf",
+            "a b",
+            "a\0",
+            "é",
+            "a.trace",
+            "a\u{1b}[2J",
+            &"a".repeat(129),
+        ] {
+            assert!(!is_id(wrong), "{wrong}");
+        }
+    }
 
     #[test]
     fn a_category_is_an_iri_or_becomes_one() {

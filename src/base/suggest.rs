@@ -1,9 +1,13 @@
 //! "Did you mean": the known name nearest to a mistyped one.
 
+/// Longest name that is compared: the time for it grows with the square of its length. Unit: bytes.
+const LONGEST: usize = 200;
+
 /// Returns the candidate most similar to `name`, or `None` if none is similar enough for a likely typing error.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
+        .filter(|candidate| name.len() <= LONGEST && candidate.len() <= LONGEST)
         .map(|candidate| (similarity(name, candidate), candidate))
         // 0.75: "freind" finds "friend", "mass" does not find "glass_1".
         .filter(|(similarity, _)| *similarity >= 0.75)

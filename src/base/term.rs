@@ -1,10 +1,12 @@
 //! RDF terms with typed values, and their interning.
 
 use std::cmp::Ordering;
-use std::collections::HashMap;
 use std::fmt;
-use std::hash::{Hash, Hasher};
+use std::hash::{BuildHasher, Hash, Hasher};
 use std::sync::Arc;
+
+use foldhash::fast::RandomState;
+use hashbrown::HashTable;
 
 use crate::names;
 
@@ -60,7 +62,7 @@ impl Term {
         }
     }
 
-    fn key(&self) -> (u8, &str, &str, u64) {
+    fn key(&self) -> Key<'_> {
         match self {
             Self::Iri(iri) => (0, iri, "", 0),
             Self::Blank(label) => (1, label, "", 0),
@@ -128,11 +130,23 @@ impl fmt::Display for Term {
 pub type TermId = u32;
 
 /// An interner of terms.
+///
+/// The table of IDs has no copy of the terms: a large import has tens of millions of them.
 #[derive(Debug, Clone, Default)]
 pub struct Terms {
     by_id: Vec<Term>,
-    ids: HashMap<Term, TermId>,
+    ids: HashTable<TermId>,
+    hasher: RandomState,
+    /// IDs of small integers, or [`ABSENT`]: a column of numbers would otherwise jump about in a table of gigabytes.
+    small: Vec<TermId>,
+    /// Memory of the texts. Unit: bytes.
+    text_bytes: usize,
 }
+
+const ABSENT: TermId = TermId::MAX;
+
+/// The identity of a term: its kind, its texts and its number.
+type Key<'a> = (u8, &'a str, &'a str, u64);
 
 impl Terms {
     /// Creates an empty interner.
@@ -142,18 +156,25 @@ impl Terms {
 
     /// Returns the ID of a term, interning the term if it is new.
     pub fn intern(&mut self, term: Term) -> TermId {
-        if let Some(id) = self.ids.get(&term) {
-            return *id;
-        }
-        let id = TermId::try_from(self.by_id.len()).expect("a run has far fewer than 2^32 terms");
-        self.by_id.push(term.clone());
-        self.ids.insert(term, id);
-        id
+        let (hash, found) = self.find(term.key());
+        found.unwrap_or_else(|| self.add(hash, term))
+    }
+
+    /// Returns the ID of a plain string literal. Allocates only if it is new.
+    pub fn intern_string(&mut self, text: &str) -> TermId {
+        let (hash, found) = self.find((2, text, "", 0));
+        found.unwrap_or_else(|| self.add(hash, Term::string(text)))
+    }
+
+    /// Returns the ID of an IRI. Allocates only if it is new.
+    pub fn intern_iri(&mut self, iri: &str) -> TermId {
+        let (hash, found) = self.find((0, iri, "", 0));
+        found.unwrap_or_else(|| self.add(hash, Term::iri(iri)))
     }
 
     /// Returns the ID of a term, or `None` if it is not interned.
     pub fn id(&self, term: &Term) -> Option<TermId> {
-        self.ids.get(term).copied()
+        self.find(term.key()).1
     }
 
     /// Returns the term of an ID. Panics if the ID is out of range.
@@ -170,6 +191,57 @@ impl Terms {
     pub fn is_empty(&self) -> bool {
         self.by_id.is_empty()
     }
+
+    /// Returns the approximate memory of all terms. Unit: bytes.
+    pub fn bytes(&self) -> usize {
+        let ids = self.small.len() + 2 * self.ids.len();
+        self.text_bytes + self.by_id.len() * size_of::<Term>() + ids * size_of::<TermId>()
+    }
+
+    /// Returns a term's hash, and its ID if it is interned.
+    fn find(&self, key: Key<'_>) -> (u64, Option<TermId>) {
+        if let Some(id) = small(key).and_then(|value| self.small.get(value)).filter(|id| **id != ABSENT) {
+            return (0, Some(*id));
+        }
+        let hash = hash(&self.hasher, key);
+        (hash, self.ids.find(hash, |id| self.by_id[*id as usize].key() == key).copied())
+    }
+
+    fn add(&mut self, new_hash: u64, term: Term) -> TermId {
+        let id = TermId::try_from(self.by_id.len()).expect("a run has far fewer than 2^32 terms");
+        let (_, text, more, _) = term.key();
+        // The table has at most two places for each term.
+        let place = small(term.key()).filter(|value| *value < 2 * self.by_id.len() + 1024);
+        // A shared text has two counters before it.
+        self.text_bytes +=
+            [text, more].iter().filter(|text| !text.is_empty()).map(|text| text.len() + 16).sum::<usize>();
+        self.by_id.push(term);
+        if let Some(place) = place {
+            if self.small.len() <= place {
+                self.small.resize(place + 1, ABSENT);
+            }
+            self.small[place] = id;
+            return id;
+        }
+        let Self { by_id, ids, hasher, .. } = self;
+        ids.insert_unique(new_hash, id, |id| hash(hasher, by_id[*id as usize].key()));
+        id
+    }
+}
+
+/// Returns the value of an integer that is not negative.
+fn small((kind, _, _, number): Key<'_>) -> Option<usize> {
+    if kind == 4 { usize::try_from(number ^ (1 << 63)).ok().filter(|value| *value >> 63 == 0) } else { None }
+}
+
+fn hash(hasher: &RandomState, (kind, text, more, number): Key<'_>) -> u64 {
+    let mut state = hasher.build_hasher();
+    state.write_u64(number ^ u64::from(kind));
+    if !text.is_empty() {
+        state.write(text.as_bytes());
+        state.write(more.as_bytes());
+    }
+    state.finish()
 }
 
 #[cfg(test)]
@@ -185,6 +257,32 @@ mod tests {
                 .map(|term| terms.intern(term))
                 .collect();
         assert_eq!(ids, [0, 1, 2, 3, 0]);
+    }
+
+    #[test]
+    fn texts_interned_without_a_term_are_the_same_terms() {
+        let mut terms = Terms::new();
+        let iri = terms.intern(Term::iri("a"));
+        assert_eq!((terms.intern_iri("a"), terms.intern_string("a")), (iri, iri + 1));
+        assert_eq!((terms.intern(Term::string("a")), terms.intern_string("")), (iri + 1, iri + 2));
+        assert_eq!(terms.id(&Term::string("")), Some(iri + 2));
+        assert!(terms.bytes() > 3 * size_of::<Term>() && terms.len() == 3);
+    }
+
+    #[test]
+    fn integers_of_all_sizes_are_found() {
+        let mut terms = Terms::new();
+        // Some are too large for the table of small ones, until it has grown.
+        let values: Vec<i64> =
+            [i64::MAX, i64::MIN, -1, 3_000, 5_000].into_iter().chain(0..4_000).chain([1 << 40]).collect();
+        for _ in 0..2 {
+            for value in &values {
+                let id = terms.intern(Term::Integer(*value));
+                assert_eq!((terms.term(id), terms.id(&Term::Integer(*value))), (&Term::Integer(*value), Some(id)));
+            }
+            assert_eq!(terms.len(), 4_005);
+        }
+        assert_eq!(terms.id(&Term::Integer(4_500)), None);
     }
 
     #[test]

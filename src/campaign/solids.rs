@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use actcheck_base::{Diagnostic, Diagnostics, Digest};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Files};
 use actcheck_config::Campaign;
 use actcheck_data::{Mesh, ObjectModel, Part, Shape};
 use actcheck_world as world;
@@ -86,7 +86,7 @@ impl HullCache {
 
 /// Reads a cache file. Returns `None` if it is missing, corrupt or in another format.
 fn read(path: &Path) -> Option<Vec<Shape>> {
-    let bytes = fs::read(path).ok()?;
+    let bytes = Files::Disk.read_bytes(path).ok()?;
     let (head, body) = bytes.split_at_checked(bytes.iter().position(|byte| *byte == b'\n')? + 1)?;
     let solids: Vec<Shape> =
         if head == head_of(body).as_bytes() { postcard::from_bytes(body).ok()? } else { return None };

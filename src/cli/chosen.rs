@@ -34,9 +34,9 @@ pub struct ChosenRuns {
 }
 
 impl ChosenRuns {
-    /// Opens the history of the runs.
+    /// Opens the history of the runs for reading.
     pub(super) fn open(&self) -> Result<History, Diagnostics> {
-        history_dir::open(&self.history)
+        history_dir::open_to_read(&self.history)
     }
 
     /// Returns the filter that selects their rows in tables.

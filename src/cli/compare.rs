@@ -67,7 +67,7 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     Ok(summary.exit_code())
 }
 
-/// The open histories. Each is opened only once, because it is locked while open.
+/// The open histories. Each is opened only once, so that both sides see the same state.
 #[derive(Default)]
 struct Histories {
     open: BTreeMap<PathBuf, History>,
@@ -81,7 +81,7 @@ impl Histories {
         };
         let key = std::fs::canonicalize(&dir).unwrap_or_else(|_| dir.clone());
         if !self.open.contains_key(&key) {
-            self.open.insert(key.clone(), History::open_existing(&dir)?);
+            self.open.insert(key.clone(), History::open_to_read(&dir)?);
         }
         Ok(&self.open[&key])
     }

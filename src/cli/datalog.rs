@@ -6,12 +6,13 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
-use crate::options::{ProofFormat, duration};
+use crate::options::{ProofFormat, duration, memory};
 use crate::{explanations, output};
-use actcheck_base::{Diagnostic, Diagnostics, Files};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source};
 use actcheck_report::{Table, TableFormat};
 use actcheck_rules::Budget;
-use actcheck_rules::standalone::{self, Program};
+use actcheck_rules::explain::Explanation;
+use actcheck_rules::standalone::{self, Loading, Program};
 
 /// `actcheck datalog`
 #[derive(Debug, Args)]
@@ -21,7 +22,8 @@ pub struct DatalogArgs {
     /// Folder for the exported files
     #[arg(short = 'D', long = "export-dir", value_name = "DIR", default_value = "results")]
     pub output: PathBuf,
-    /// Explain why this fact holds or does not, such as 'p(1, _)', instead of exporting
+    /// Explain why this fact holds or does not, such as 'p(1, _)', instead of exporting. Exit code: 0 it holds, 1 it does
+    /// not
     #[arg(long, value_name = "FACT")]
     pub trace: Option<String>,
     /// How the number of tuples of each predicate is printed, or with --trace the explanation (dot: only explanations)
@@ -30,22 +32,34 @@ pub struct DatalogArgs {
     /// Stop after this many derived tuples
     #[arg(long, value_name = "N", default_value_t = 100_000_000)]
     pub max_tuples: usize,
+    /// Stop at this memory of tuples and texts, approximately, such as 512MiB or 4GiB
+    #[arg(long, value_name = "SIZE", default_value = "4GiB", value_parser = memory)]
+    pub max_memory: usize,
     /// Stop after this time, such as 90s, 10m or 2h
     #[arg(long, alias = "max-secs", value_name = "DURATION", default_value = "10m", value_parser = duration)]
     pub max_time: f64,
+    /// Leave out rows and statements of imported files that can't be read, with a warning
+    #[arg(long)]
+    pub lenient: bool,
 }
 
-/// Runs a standalone program, or explains why one of its facts holds or does not.
-pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
-    let budget = Budget { tuples: args.max_tuples, secs: args.max_time, stop: Arc::clone(stop) };
+/// Runs a standalone program, or explains why one of its facts holds or does not. Returns the exit code: 1 if the fact
+/// to explain does not hold.
+pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<u8, Diagnostics> {
+    let (tuples, bytes, secs) = (args.max_tuples, args.max_memory, args.max_time);
+    let budget = Budget { tuples, bytes, secs, stop: Arc::clone(stop) };
+    let loading = Loading { budget: budget.clone(), lenient: args.lenient };
     if let Some(statement) = &args.trace {
-        let source = Files::Disk.read(&args.file).map_err(|why| {
+        let source = Files::Disk.read_program(&args.file).map_err(|why| {
             Diagnostic::error("X005", format!("{}: {why}", args.file.display())).help("name a file with rules (.rls)")
         })?;
         let folder = args.file.parent().unwrap_or(Path::new("."));
-        let program = Program::load_until(&source, folder, stop)?;
+        let program = Program::load_as(&source, folder, &loading)?;
+        output::print_diagnostics(&program.warnings);
+        program.check_goal(statement)?;
         let explained = program.explain(statement, &budget);
         let explained = explained.map_err(|fault| Diagnostic::error("X008", fault.to_string()).in_source(&source))?;
+        output::print_diagnostics(&unknown_terms(statement, &explained));
         output::print(&match args.format {
             ProofFormat::Text => explained.to_text(),
             ProofFormat::Csv => {
@@ -56,7 +70,7 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnos
             ProofFormat::Json => format!("{:#}\n", explained.to_json()),
             ProofFormat::Dot => explained.to_dot(),
         });
-        return Ok(());
+        return Ok(u8::from(!explained.holds()));
     }
     let format = match args.format {
         ProofFormat::Text => TableFormat::Table,
@@ -68,7 +82,7 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnos
                 .into());
         }
     };
-    let summary = standalone::run(&args.file, &args.output, &budget)?;
+    let summary = standalone::run_as(&args.file, &args.output, &loading)?;
     output::print_diagnostics(&summary.warnings);
     let mut table = Table::new(["predicate", "tuples"]);
     for (predicate, tuples) in summary.tuples {
@@ -79,5 +93,18 @@ pub fn datalog(args: &DatalogArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnos
         summary.written.iter().map(|(file, lines)| format!("{}: {lines} lines", file.display())).collect();
     // CSV and JSON are one document.
     output::tell(&written, format != TableFormat::Table);
-    Ok(())
+    Ok(0)
+}
+
+/// Warns about the constants of a goal that the program does not have.
+fn unknown_terms(statement: &str, explained: &Explanation) -> Diagnostics {
+    let source = Source::new("goal", statement.trim());
+    let mut warnings = Diagnostics::new();
+    for term in &explained.unknown {
+        let help = term.similar.as_ref().map(|similar| format!("did you mean `{similar}`?"));
+        let help = help.unwrap_or_else(|| "a constant of the goal is usually a constant of some fact".to_owned());
+        let message = format!("`{}` occurs neither in the rules nor in any tuple", term.text);
+        warnings.push(Diagnostic::warning("R093", message).at(&source, term.span.clone()).help(help));
+    }
+    warnings
 }

@@ -14,7 +14,7 @@ use actcheck_config::SCHEMA;
 
 /// Parses the process's arguments and runs the command.
 ///
-/// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed, 2 the command failed, 130
+/// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed or a traced fact does not hold, 2 the command failed, 130
 /// interrupted.
 pub fn run(sources_digest: &'static str) -> ExitCode {
     set_program_digest(sources_digest);
@@ -26,7 +26,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Report(args) => crate::report::report(&args).map(|()| 0),
         Command::Run(args) => crate::run::run(&args),
         Command::Replay(args) => crate::replay::replay(&args),
-        Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop)),
+        Command::Check(args) => stop::interruptible(|stop| check::check(&args, stop).map(|()| 0)),
         Command::Compare(args) => crate::compare::compare(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
         Command::Explain(args) => explain::explain(&args).map(|()| 0),
@@ -41,7 +41,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Query(args) => query::query(&args).map(|()| 0),
         Command::Rules(args) => rules::rules(&args).map(|()| 0),
         Command::Recheck(args) => recheck::recheck(&args),
-        Command::Why(args) => stop::interruptible(|stop| why::why(&args, stop)),
+        Command::Why(args) => stop::interruptible(|stop| why::why(&args, stop).map(|()| 0)),
         Command::New(args) => new::new(&args).map(|()| 0),
         Command::Datalog(args) => stop::interruptible(|stop| datalog::datalog(&args, stop)),
         Command::Schema => {

@@ -3,7 +3,7 @@
 use clap::Args;
 
 use crate::options::{Format, HistoryArgs};
-use crate::{compare, history_dir, output};
+use crate::{compare, history_dir, integrity, output};
 use actcheck_analysis::HealthMeter;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::{History, RunFilter};
@@ -14,16 +14,23 @@ use actcheck_report::{HealthSummary, health_json, health_table, health_text};
 pub struct HealthArgs {
     /// Id of the campaign [default: the newest]
     pub campaign: Option<String>,
+    /// Compare the files of the whole history with their checksums and with each other, and name the damaged ones; a
+    /// damaged mirror (the folder `tables`) is written anew
+    #[arg(long, conflicts_with = "campaign")]
+    pub integrity: bool,
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
-    /// How it is printed (csv: the table of parameters)
+    /// How it is printed (csv: the table of parameters, or of damage)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
 }
 
 /// Prints the health of a campaign. Returns the exit code.
 pub fn health(args: &HealthArgs) -> Result<u8, Diagnostics> {
+    if args.integrity {
+        return integrity::examine(&args.history, args.format);
+    }
     let history = history_dir::open_to_read(&args.history)?;
     let campaign = match &args.campaign {
         Some(id) => id.clone(),

@@ -17,7 +17,7 @@ pub fn open(args: &HistoryArgs) -> Result<History, Diagnostics> {
     History::open_existing(&folder(args)?)
 }
 
-/// Like [`open`], but read-only: other processes may read the history at the same time.
+/// Like [`open`], but the state of this moment for reading: other processes may read and write the history.
 ///
 /// # Errors
 /// As [`open`].
@@ -43,7 +43,7 @@ pub fn folder(args: &HistoryArgs) -> Result<PathBuf, Diagnostics> {
 pub fn open_if_any(args: &HistoryArgs) -> Result<Option<History>, Diagnostics> {
     match (&args.history, find(Path::new("."))) {
         (None, Err(faults)) if faults.iter().all(|fault| fault.code == NONE_FOUND) => Ok(None),
-        _ => open(args).map(Some),
+        _ => open_to_read(args).map(Some),
     }
 }
 

@@ -31,6 +31,10 @@ pub struct MergeArgs {
     /// Leave this campaign out: ID, or DIR#ID as messages name it; may be given several times
     #[arg(long, value_name = "CAMPAIGN")]
     pub leave_out: Vec<String>,
+    /// Copy all readable data of damaged histories; lost runs are listed, and resuming their campaigns makes
+    /// them again
+    #[arg(long)]
+    pub salvage: bool,
     /// How the resulting campaigns are printed
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
@@ -38,7 +42,7 @@ pub struct MergeArgs {
 
 /// Merges histories and prints the resulting campaigns. Returns the exit code.
 pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
-    let sources = open_all(args)?;
+    let (sources, mut warnings) = open_all(args)?;
     let known = is_there(&args.into).then(|| History::open_existing(&args.into)).transpose()?;
     let options = MergeOptions { rename: args.rename, leave_out: args.leave_out.clone() };
     let plan = plan(&sources, known.as_ref(), &options)?;
@@ -60,7 +64,6 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
         });
     }
     output::print(&printed(&plan, args.format));
-    let mut warnings = Diagnostics::new();
     merged.warning().into_iter().for_each(|warning| warnings.push(warning));
     plan.campaigns.iter().filter_map(lacking).for_each(|warning| warnings.push(warning));
     if !warnings.is_empty() {
@@ -69,21 +72,45 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
     Ok(u8::from(plan.campaigns.iter().any(|campaign| !campaign.missing.is_empty())))
 }
 
-/// Opens each history once, except the destination: its runs need no copying.
-fn open_all(args: &MergeArgs) -> Result<Vec<History>, Diagnostics> {
+/// Opens each history once for reading, except the destination: its runs need no copying. Returns them with warnings
+/// about damage.
+fn open_all(args: &MergeArgs) -> Result<(Vec<History>, Diagnostics), Diagnostics> {
     let same = |dir: &Path| std::fs::canonicalize(dir).unwrap_or_else(|_| dir.to_path_buf());
-    let (mut seen, mut sources, mut faults) = (vec![same(&args.into)], Vec::new(), Diagnostics::new());
+    let (mut seen, mut sources) = (vec![same(&args.into)], Vec::new());
+    let (mut faults, mut warnings) = (Diagnostics::new(), Diagnostics::new());
     for dir in &args.dirs {
         if seen.contains(&same(dir)) {
             continue;
         }
         seen.push(same(dir));
-        match History::open_existing(dir) {
-            Ok(history) => sources.push(history),
+        let opened = if args.salvage {
+            History::open_to_salvage(dir)
+        } else {
+            History::open_to_read(dir).map(|history| (history, Vec::new()))
+        };
+        match opened {
+            Ok((history, lost)) => {
+                lost_runs(dir, &lost).into_iter().for_each(|warning| warnings.push(warning));
+                sources.push(history);
+            }
             Err(found) => faults.extend(found),
         }
     }
-    faults.or(sources)
+    faults.or((sources, warnings))
+}
+
+/// H007: a warning about runs that can't be read.
+fn lost_runs(dir: &Path, lost: &[String]) -> Option<Diagnostic> {
+    let mut named: Vec<&str> = lost.iter().take(MAX_LISTED).map(String::as_str).collect();
+    if lost.len() > MAX_LISTED {
+        named.push("…");
+    }
+    let message = format!("{} runs of `{}` can't be read any more: {}", lost.len(), dir.display(), named.join(", "));
+    (!lost.is_empty()).then(|| {
+        Diagnostic::warning("H007", message).help(
+            "`actcheck run --resume ID --history DIR` in the merged history makes them again, with the same results",
+        )
+    })
 }
 
 /// Whether the folder has a version file, and so must be a history.

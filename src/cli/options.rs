@@ -80,6 +80,29 @@ pub fn duration(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses an amount of memory such as `512MiB`, `4GiB` or `2GB` into bytes. A plain number is a number of bytes.
+///
+/// # Errors
+/// A message if the text is none of these, or not above zero.
+pub fn memory(text: &str) -> Result<usize, String> {
+    const UNITS: [(&str, f64); 7] = [
+        ("KiB", 1024.0),
+        ("MiB", 1_048_576.0),
+        ("GiB", 1_073_741_824.0),
+        ("kB", 1e3),
+        ("MB", 1e6),
+        ("GB", 1e9),
+        ("B", 1.0),
+    ];
+    let text = text.trim();
+    let (number, unit) =
+        UNITS.iter().find_map(|(unit, bytes)| Some((text.strip_suffix(unit)?, *bytes))).unwrap_or((text, 1.0));
+    match number.trim().parse::<f64>() {
+        Ok(amount) if amount * unit >= 1.0 && amount.is_finite() => Ok((amount * unit) as usize),
+        _ => Err(format!("`{text}` must be an amount of memory above zero, such as 512MiB or 4GiB")),
+    }
+}
+
 /// Parses a significance level or false discovery rate.
 ///
 /// # Errors
@@ -101,6 +124,16 @@ mod tests {
             assert!(level(wrong).is_err(), "{wrong}");
         }
         assert_eq!(level("0.05"), Ok(0.05));
+    }
+
+    #[test]
+    fn amounts_of_memory_have_units_and_plain_numbers_are_bytes() {
+        for (text, bytes) in [("512MiB", 512 << 20), ("4 GiB", 4 << 30), ("1.5kB", 1500), ("7", 7), ("7B", 7)] {
+            assert_eq!(memory(text), Ok(bytes), "{text}");
+        }
+        for wrong in ["", "0", "-1MB", "inf", "NaN", "much", "10 apples"] {
+            assert!(memory(wrong).is_err_and(|message| message.contains("GiB")), "{wrong}");
+        }
     }
 
     #[test]

@@ -45,16 +45,22 @@ pub fn colour() -> bool {
     std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }
 
-/// Writes all faults with their places, and the number of errors.
+/// Most diagnostics that are printed at once: the excerpt of each takes time in proportion to its file.
+const MOST_PRINTED: usize = 200;
+
+/// Writes faults with their places, the first 200 if there are more, and the number of errors.
 pub fn print_diagnostics(faults: &Diagnostics) {
     let mut text = String::new();
     let handler = handler();
-    for fault in faults.iter() {
+    for fault in faults.iter().take(MOST_PRINTED) {
         let fault = with_file_in_message(fault);
         if handler.render_report(&mut text, &fault).is_err() {
             text.push_str(&fault.to_string());
         }
         text.push('\n');
+    }
+    if let Some(more @ 1..) = faults.len().checked_sub(MOST_PRINTED) {
+        text.push_str(&format!("{more} more are not printed\n"));
     }
     let errors = faults.iter().filter(|fault| fault.severity == Severity::Error).count();
     if errors > 1 {

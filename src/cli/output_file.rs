@@ -1,22 +1,19 @@
 //! Writes results into files, completely or not at all.
 
-use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 
-use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics, NewFile};
 
 /// Writes a file. If that fails, for instance on a full disk, the previous content is kept.
 ///
 /// # Errors
 /// X007: it can't be written.
 pub(super) fn write(file: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Diagnostics> {
-    // Write the target of a link, not the link itself.
-    let target = fs::canonicalize(file).unwrap_or_else(|_| file.to_path_buf());
-    let written = match fs::metadata(&target) {
-        // Pipes and terminals are written directly; directories are rejected by the OS.
-        Ok(found) if !found.is_file() => fs::write(&target, bytes),
-        _ => write_atomic(&target, bytes.as_ref()),
-    };
+    let written = NewFile::create(file).and_then(|new| {
+        new.writer()?.write_all(bytes.as_ref())?;
+        new.finish()
+    });
     written.map_err(|error| cannot_write(file, &error).into())
 }
 
@@ -28,6 +25,8 @@ pub(super) fn cannot_write(file: &Path, why: impl std::fmt::Display) -> Diagnost
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::work::quietly;
-use crate::{case, clock};
+use crate::{case, clock, trust};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign as campaign;
 use actcheck_campaign::{Env, RunContext, run_cases};
@@ -13,18 +13,24 @@ use actcheck_report::CaseSummary;
 use actcheck_rules::Budget;
 
 /// Prepares the cases of a campaign, sorted by file name. Of a campaign in parts, only the first part gets them.
-/// Their runs go into the campaign's history.
+/// Their runs go into the campaign's history. Unless `trusted`, they must not start a program of their own.
 ///
 /// # Errors
-/// All faults of all cases at once: those of any configuration, or `S065` if a file is not a case.
-pub fn prepare(env: &Env, budget: &Budget) -> Result<Vec<(String, Env)>, Diagnostics> {
+/// All faults of all cases at once: those of any configuration, `S065` if a file is not a case, or `X059` if it starts a
+/// program other than the campaign's.
+pub fn prepare(env: &Env, budget: &Budget, trusted: bool) -> Result<Vec<(String, Env)>, Diagnostics> {
     let folder = campaign::regressions_folder(&env.campaign.source)?;
     let overrides = Overrides { history: Some(env.campaign.history.clone()), ..Overrides::default() };
     let mut faults = Diagnostics::new();
     let mut cases = Vec::new();
     for file in files(&folder)? {
         match Env::prepare_within(&file, &overrides, budget.clone()) {
-            Ok(case) if case.campaign.case.is_some() => cases.push((name_of(&file), case)),
+            Ok(case) if case.campaign.case.is_some() => {
+                if !trusted && let Err(fault) = trust::check_case(&case, Some(&env.campaign.launcher)) {
+                    faults.extend(fault);
+                }
+                cases.push((name_of(&file), case));
+            }
             Ok(other) => faults.push(
                 Diagnostic::error("S065", "this file is not a case: it has no `[case]`")
                     .in_source(&other.campaign.source)

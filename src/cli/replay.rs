@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use crate::options::{Format, HistoryArgs};
 use crate::replay_text::{replay_json, replay_table, replay_text};
 use crate::work::{all_cores, quietly};
-use crate::{clock, history_dir, output};
+use crate::{clock, history_dir, output, trust};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::{Env, Fit, Replay, ReplayOptions, RunContext, StoredCampaign, replay_all};
 use actcheck_data::Choices;
@@ -39,6 +39,9 @@ pub struct ReplayArgs {
     /// Run with this configuration instead of the one in the history
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Start the program that the history names, even if its configuration is not there or names another one
+    #[arg(long)]
+    pub trust: bool,
     /// Number of workers, each with one simulation; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
@@ -52,7 +55,7 @@ pub struct ReplayArgs {
 
 /// Runs stored runs again and prints whether they are the same. Returns the exit code.
 pub fn replay(args: &ReplayArgs) -> Result<u8, Diagnostics> {
-    let history = history_dir::open(&args.history)?;
+    let history = history_dir::open_to_read(&args.history)?;
     let runs = runs(&history, args)?;
     let campaigns = recall(&history, &runs, args)?;
     let bar = ProgressBar::with_draw_target(Some(runs.len() as u64), ProgressDrawTarget::stderr());
@@ -126,7 +129,11 @@ fn recall(
     for run in runs {
         let id = &run.row.campaign;
         if !campaigns.contains_key(id) {
-            campaigns.insert(id.clone(), Env::from_history(history, id, args.config.as_deref())?);
+            let recalled = Env::from_history(history, id, args.config.as_deref())?;
+            if args.config.is_none() && !args.trust {
+                trust::check_stored(&recalled.0, history, &recalled.1)?;
+            }
+            campaigns.insert(id.clone(), recalled);
         }
     }
     Ok(campaigns)

@@ -59,6 +59,10 @@ pub struct RunArgs {
     /// Shrink one run of each failure mode afterwards, as `actcheck shrink` does
     #[arg(long)]
     pub shrink: bool,
+    /// Start the programs that cases name: CONFIG itself, if it is a case, and those of the folder `regressions`. Without
+    /// it, they run only with the reference skills or with the campaign's own program
+    #[arg(long)]
+    pub trust: bool,
     /// Folder of the history [default: `.actcheck` beside the configuration]
     #[arg(long, value_name = "DIR")]
     pub history: Option<PathBuf>,

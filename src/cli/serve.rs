@@ -61,7 +61,7 @@ fn at_most_a_day(text: &str) -> Result<f64, String> {
 /// Serves until Ctrl-C.
 pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
     let folder = history_dir::folder(&args.history)?;
-    // A wrong folder is reported now; a history that a campaign is writing is served after the campaign ends.
+    // A wrong folder is reported now; a history that a campaign is just creating is served once it exists.
     if let Err(faults) = History::open_to_read(&folder)
         && faults.iter().any(|fault| fault.code != "H002")
     {

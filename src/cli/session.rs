@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::options::HistoryArgs;
 use crate::run_args::RunArgs;
-use crate::{configurations, history_dir, regressions};
+use crate::{configurations, history_dir, regressions, trust};
 use actcheck_base::{Diagnostics, digest_of};
 use actcheck_campaign::{Env, LastFailed, unfinished};
 use actcheck_config as config;
@@ -56,9 +56,12 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
         }
     };
     if env.campaign.case.is_some() {
+        if !args.trust {
+            trust::check_case(&env, None)?;
+        }
         return Ok(Opened::Case(Box::new(env)));
     }
-    let cases = regressions::prepare(&env, budget)?;
+    let cases = regressions::prepare(&env, budget, args.trust)?;
     let (history, goes_on) = match going_on {
         Some((history, record)) => (history, Some(record.id)),
         None => (History::open(&env.campaign.history)?, None),

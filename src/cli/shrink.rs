@@ -8,7 +8,7 @@ use clap::Args;
 use crate::options::{Format, HistoryArgs, duration};
 use crate::picture::Picture;
 use crate::work::{all_cores, quietly};
-use crate::{clock, history_dir, output, stop};
+use crate::{clock, history_dir, output, stop, trust};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk};
 use actcheck_campaign::{Env, RunContext};
@@ -40,6 +40,9 @@ pub struct ShrinkArgs {
     /// The configuration to run with [default: the campaign's own, from the history]
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Start the program that the history names, even if its configuration is not there or names another one
+    #[arg(long)]
+    pub trust: bool,
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
@@ -59,7 +62,10 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
     let picture = args.picture.as_deref().map(Picture::new).transpose()?;
     let history = history_dir::open(&args.history)?;
     let run = history.run(&args.run)?;
-    let (env, _) = Env::from_history(&history, &run.row.campaign, args.config.as_deref())?;
+    let (env, record) = Env::from_history(&history, &run.row.campaign, args.config.as_deref())?;
+    if args.config.is_none() && !args.trust {
+        trust::check_stored(&env, &history, &record)?;
+    }
     let context = RunContext { clock: clock::system(), disturb: None };
     let until = args.time.map(|secs| (context.clock.secs)() + secs);
     let asked = stop::on_interrupt(|| eprintln!("stopping; the smallest scene so far follows"));

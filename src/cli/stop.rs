@@ -36,7 +36,7 @@ pub fn end_now() -> ! {
 
 /// Does a command's work so that Ctrl-C can end it at any moment: through the flag if the work checks it, else after
 /// one second. Returns the exit code.
-pub fn interruptible(work: impl FnOnce(&Arc<AtomicBool>) -> Result<(), Diagnostics>) -> Result<u8, Diagnostics> {
+pub fn interruptible(work: impl FnOnce(&Arc<AtomicBool>) -> Result<u8, Diagnostics>) -> Result<u8, Diagnostics> {
     let flag = on_interrupt(|| {
         std::thread::sleep(GRACE);
         end_now();
@@ -47,7 +47,7 @@ pub fn interruptible(work: impl FnOnce(&Arc<AtomicBool>) -> Result<(), Diagnosti
             tell();
             Ok(INTERRUPTED)
         }
-        done => done.map(|()| 0),
+        done => done,
     }
 }
 

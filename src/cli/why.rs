@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::options::{HistoryArgs, ProofFormat};
 use crate::{explanations, history_dir, output, show};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Judgement, Outcome, did_you_mean, names};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Findings, Judgement, Outcome, did_you_mean, names};
 use actcheck_history::{ActionDetail, RunDetail};
 use actcheck_ontology as ontology;
 use actcheck_report::{Table, TableFormat};
@@ -48,7 +48,8 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
         for property in asked(action, args) {
             let title = format!("{} {}, {}", run.row.run, names::local(&action.action), names::local(&property));
             let explained = rules.explain(&seen, &property, &budget);
-            let explained = explained.map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
+            let mut explained = explained.map_err(|fault| Diagnostic::error("X008", format!("{title}: {fault}")))?;
+            explained.notes.extend(differs(action, &property, explained.findings.as_ref()));
             let columns = [run.row.run.as_str(), &(step + 1).to_string(), &action.action, &property];
             match args.format {
                 ProofFormat::Csv => table.rows.push(explanations::row(&columns, &explained)),
@@ -86,6 +87,17 @@ pub(super) fn ontology_file(named: Option<&Path>) -> (Files, PathBuf) {
 fn asked(action: &ActionDetail, args: &WhyArgs) -> Vec<String> {
     let all = action.judgements.iter().filter(|judgement| is_asked(judgement, args));
     all.map(|judgement| judgement.property.clone()).collect()
+}
+
+/// Returns a remark if the run was judged otherwise than the current rules judge it.
+fn differs(action: &ActionDetail, property: &str, found: Option<&Findings>) -> Option<String> {
+    let recorded = action.judgements.iter().find(|judgement| judgement.property == property)?.outcome;
+    let current = found?.outcome();
+    let decided = matches!(recorded, Outcome::Passed | Outcome::Failed) && recorded != current;
+    decided.then(|| {
+        let (recorded, current) = (recorded.word(), current.word());
+        format!("the run was judged as {recorded}; by the current rules and ontology it is {current} (see `actcheck recheck`)")
+    })
 }
 
 fn is_asked(judgement: &Judgement, args: &WhyArgs) -> bool {

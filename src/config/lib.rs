@@ -11,6 +11,9 @@ mod foreign;
 mod load;
 pub mod model;
 mod model_library;
+#[cfg(test)]
+#[path = "../../tests/support/mutations.rs"]
+mod mutations;
 mod other_counts;
 mod paths;
 mod ranges;

@@ -52,6 +52,18 @@ pub struct Skill {
 }
 
 impl Skill {
+    /// Returns `true` if both start the same program: with the same arguments and environment, in the same folder.
+    pub fn starts_as(&self, other: &Self) -> bool {
+        let words = |skill: &Self| -> Vec<PathBuf> {
+            let args = skill.args.iter().map(Path::new);
+            args.map(|word| if word.is_absolute() { canonical(word) } else { word.to_path_buf() }).collect()
+        };
+        canonical(&self.program) == canonical(&other.program)
+            && words(self) == words(other)
+            && self.env == other.env
+            && canonical(&self.dir) == canonical(&other.dir)
+    }
+
     /// Returns the value of `test_launcher` for a configuration in another folder; `seen` converts the file's path.
     /// Returns `None` if the value does not depend on the folder.
     pub fn launcher(&self, seen: impl Fn(&Path) -> String) -> Option<String> {
@@ -60,6 +72,11 @@ impl Skill {
         let words = [file.as_str()].into_iter().chain(behind.iter().map(String::as_str));
         shlex::try_join(words).ok()
     }
+}
+
+/// A path in its shortest absolute form, if it is one.
+fn canonical(path: &Path) -> PathBuf {
+    std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
 /// Largest accepted time limit: an hour. Unit: seconds.
@@ -273,7 +290,7 @@ fn through(
 }
 
 /// Finds a program in `PATH`. Like the disk, `PATH` is part of the machine that the configuration refers to.
-fn on_path(name: &str) -> Option<PathBuf> {
+pub(super) fn on_path(name: &str) -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
     std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| is_executable(path))
 }

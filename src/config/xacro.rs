@@ -1,12 +1,38 @@
 //! Expands xacro to URDF with the external program `xacro`.
+//!
+//! A xacro file is a program: it may run for ever, and print without end. The program and everything that it starts end
+//! after a minute, and when actcheck ends for any reason.
 
-use std::path::Path;
-use std::process::{Command, Stdio};
+use std::io::Read;
+use std::os::unix::process::CommandExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
 
+use crate::skill::on_path;
 use actcheck_base::Source;
 
 /// The program, as installed by ROS or by `pip install xacro`.
 const PROGRAM: &str = "xacro";
+/// Time limit of an expansion; the largest robots take a few seconds.
+const LIMIT: Duration = Duration::from_secs(60);
+/// Longest expansion. Unit: bytes.
+const LONGEST: u64 = 16 << 20;
+/// Longest error output that is kept. Unit: bytes.
+const LONGEST_ERROR: u64 = 64 << 10;
+
+/// Runs a command in a process group that is killed when the input ends: that is when actcheck closes it, or ends.
+const GUARDED: &str = r#"exec 3<&0
+"$@" 3<&- </dev/null &
+program=$!
+{ read -r _ <&3; kill -s KILL -- "-$$"; } >/dev/null 2>&1 &
+guard=$!
+exec 3<&-
+wait "$program"
+code=$?
+kill -s KILL "$guard"
+exit "$code""#;
 
 /// A failed expansion.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,26 +51,111 @@ pub(super) fn is_xacro(path: &Path) -> bool {
 /// Expands a xacro file to URDF with the program `xacro`.
 ///
 /// # Errors
-/// The program can't be started, reports an error in the file, or prints something other than UTF-8.
+/// The program can't be started, takes longer than a minute, prints more than 16 MiB, reports an error in the file, or
+/// prints something other than UTF-8.
 pub(super) fn expand(path: &Path) -> Result<Source, Unexpanded> {
+    let program = on_path(PROGRAM).ok_or_else(|| not_started(path, "it is not in `PATH`"))?;
+    expand_with(&program, path, LIMIT)
+}
+
+fn expand_with(program: &PathBuf, path: &Path, limit: Duration) -> Result<Source, Unexpanded> {
     let shown = path.display();
-    let output = Command::new(PROGRAM).arg(path).stdin(Stdio::null()).output().map_err(|error| Unexpanded {
-        message: format!("cannot start the program `xacro` to expand {shown}: {error}"),
-        help: format!("install it (`pip install xacro`), or expand the file elsewhere: `xacro {shown} > robot.urdf`"),
-    })?;
+    let output = run(program, path, limit).map_err(|error| not_started(path, &error.to_string()))?;
+    let refused = |message: String| Unexpanded {
+        message,
+        help: format!("expand it elsewhere, and name the result: `xacro {shown} > robot.urdf`"),
+    };
+    let Some(output) = output else {
+        return Err(refused(format!("xacro did not expand {shown} within {} s", limit.as_secs_f64())));
+    };
+    if output.text.len() as u64 > LONGEST {
+        return Err(refused(format!("the expansion of {shown} is longer than {} MiB", LONGEST >> 20)));
+    }
     if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
+        let said = String::from_utf8_lossy(&output.error);
         let said: Vec<&str> = said.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
         return Err(Unexpanded {
             message: format!("xacro cannot expand {shown}: {}", plain(&said.join("; "))),
             help: format!("run `xacro {shown}` to see the error; the packages that it refers to must be installed"),
         });
     }
-    let text = String::from_utf8(output.stdout).map_err(|_| Unexpanded {
+    let text = String::from_utf8(output.text).map_err(|_| Unexpanded {
         message: format!("the expansion of {shown} is not UTF-8 text"),
         help: "check the file's encoding".to_owned(),
     })?;
     Ok(Source::new(format!("{shown} (expanded)"), text))
+}
+
+fn not_started(path: &Path, why: &str) -> Unexpanded {
+    let shown = path.display();
+    Unexpanded {
+        message: format!("cannot start the program `xacro` to expand {shown}: {why}"),
+        help: format!("install it (`pip install xacro`), or expand the file elsewhere: `xacro {shown} > robot.urdf`"),
+    }
+}
+
+/// The output of a program.
+struct Output {
+    status: ExitStatus,
+    text: Vec<u8>,
+    error: Vec<u8>,
+}
+
+/// Runs a program with a file as its argument. Returns `None` if it takes longer than `limit`.
+fn run(program: &PathBuf, path: &Path, limit: Duration) -> std::io::Result<Option<Output>> {
+    let mut command = Command::new("/bin/sh");
+    command.args(["-c", GUARDED, "sh"]).arg(program).arg(path);
+    command.process_group(0).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn()?;
+    let received = read_both(&mut child).recv_timeout(limit);
+    let (text, error) = match received {
+        // With output left to read, the program still runs.
+        Ok((text, error)) if text.len() as u64 <= LONGEST => (text, error),
+        Ok((text, error)) => {
+            end(&mut child)?;
+            return Ok(Some(Output { status: ExitStatus::default(), text, error }));
+        }
+        Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+            end(&mut child)?;
+            return Ok(None);
+        }
+    };
+    // The shell waits for the program and its guard, which hold no pipe any more; the guard ends with the input.
+    let status = child.wait()?;
+    Ok(Some(Output { status, text, error }))
+}
+
+/// Closes the input, so that the process group is killed, and waits for its end.
+fn end(child: &mut Child) -> std::io::Result<()> {
+    drop(child.stdin.take());
+    child.wait().map(drop)
+}
+
+/// Reads both outputs of a process, each in its own thread, so that neither fills its pipe.
+fn read_both(child: &mut Child) -> Receiver<(Vec<u8>, Vec<u8>)> {
+    let (sender, receiver) = channel();
+    let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
+    std::thread::spawn(move || {
+        let error = std::thread::spawn(move || beginning(stderr, LONGEST_ERROR));
+        let text = beginning(stdout, LONGEST + 1);
+        // With too much output, the program may run on, and its error output may never end.
+        let error = if text.len() as u64 > LONGEST { Vec::new() } else { error.join().unwrap_or_default() };
+        // The receiver is gone if this took too long.
+        let _ = sender.send((text, error));
+    });
+    receiver
+}
+
+/// Reads up to `most` bytes; of shorter limits than the output's length, the rest is dropped until the pipe ends.
+fn beginning(pipe: Option<impl Read>, most: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let Some(mut pipe) = pipe else { return bytes };
+    // An unreadable rest counts as the end.
+    let _ = pipe.by_ref().take(most).read_to_end(&mut bytes);
+    if most <= LONGEST {
+        let _ = std::io::copy(&mut pipe, &mut std::io::sink());
+    }
+    bytes
 }
 
 /// Removes colours and other terminal codes.
@@ -59,4 +170,99 @@ fn plain(text: &str) -> String {
         }
     }
     plain
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt as _;
+
+    use super::*;
+    use crate::foreign::{self, Lookup};
+    use crate::mutations::cases;
+    use actcheck_base::{Diagnostics, Files};
+
+    /// Expands a file with a shell script in the place of xacro.
+    fn expanded(script: &str, limit: Duration) -> Result<Source, Unexpanded> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let program = folder.path().join("xacro");
+        fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("a script");
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is executable");
+        expand_with(&program, Path::new("r.urdf.xacro"), limit)
+    }
+
+    #[test]
+    fn output_and_exit_code_are_those_of_the_program() {
+        let source = expanded("echo \"<robot/>\"; echo warning >&2", LIMIT).expect("it expands");
+        assert_eq!((&*source.text, &*source.name), ("<robot/>\n", "r.urdf.xacro (expanded)"));
+        let fault = expanded("echo 'no such arm' >&2; exit 3", LIMIT).expect_err("it fails");
+        assert_eq!(fault.message, "xacro cannot expand r.urdf.xacro: no such arm");
+    }
+
+    /// The program prints mutated texts, and the expansion is read as a robot's URDF.
+    #[test]
+    fn mutated_expansions_are_read_or_refused() {
+        const WORDS: [&str; 8] = [
+            "<xacro:if value=\"${x}\">",
+            "${",
+            "$(find a)",
+            "\u{1b}[31m",
+            "<link name=\"l\"/>",
+            "<!DOCTYPE a [",
+            "&x;",
+            "\u{80}",
+        ];
+        let folder = tempfile::tempdir().expect("a folder");
+        let (program, printed) = (folder.path().join("xacro"), folder.path().join("printed"));
+        fs::write(&program, format!("#!/bin/sh\ncat '{}'\n[ ! -e \"$1\" ] || exit 1\n", printed.display()))
+            .expect("a script");
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is executable");
+        let urdf =
+            b"<robot name=\"r\"><link name=\"a\"><inertial><mass value=\"1\"/></inertial></link><link name=\"b\"/>\
+            <joint name=\"j\" type=\"prismatic\"><parent link=\"a\"/><child link=\"b\"/><limit lower=\"0\" upper=\"1\" \
+            effort=\"1\" velocity=\"1\"/></joint></robot>";
+        cases("xacro", 20, |mut random| {
+            fs::write(&printed, random.text(urdf, &WORDS, &[])).expect("a text");
+            match expand_with(&program, Path::new("r.urdf.xacro"), LIMIT) {
+                Ok(source) => {
+                    let lookup = Lookup { files: &Files::Disk, folders: Vec::new() };
+                    let mut found = Diagnostics::new();
+                    foreign::robot::read(&source, Path::new("r.urdf.xacro"), &lookup, &mut found);
+                    assert!(found.iter().all(|fault| fault.message.len() < 10_000));
+                }
+                Err(fault) => assert!(!fault.message.is_empty()),
+            }
+        });
+    }
+
+    /// An endless loop in a xacro file went on for 33 minutes after actcheck was gone.
+    #[test]
+    fn an_expansion_without_end_is_ended_with_everything_it_started() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let note = folder.path().join("pids");
+        let script = format!("echo $$ > '{0}'; sleep 1000 & echo $! >> '{0}'; wait", note.display());
+        let fault = expanded(&script, Duration::from_millis(500)).expect_err("it takes too long");
+        assert_eq!(fault.message, "xacro did not expand r.urdf.xacro within 0.5 s");
+        let pids = fs::read_to_string(&note).expect("both processes were started");
+        assert_eq!(pids.lines().count(), 2, "{pids}");
+        let state = |pid: &str| fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+        let is_over = |pid: &str| state(pid).is_empty() || state(pid).contains(") Z ");
+        // A signal that was sent may not have been delivered yet.
+        let ends = |pid: &str| {
+            (0..1_000).any(|_| {
+                std::thread::sleep(Duration::from_millis(5));
+                is_over(pid)
+            })
+        };
+        assert!(pids.lines().all(ends), "still running: {pids}");
+    }
+
+    #[test]
+    fn an_expansion_without_end_in_length_is_refused() {
+        let fault = expanded("while :; do echo '<robot name=\"a very long robot, again and again\"/>'; done", LIMIT);
+        assert_eq!(fault.expect_err("it is too long").message, "the expansion of r.urdf.xacro is longer than 16 MiB");
+        let fault =
+            expanded("while echo error >&2; do :; done", Duration::from_millis(300)).expect_err("it never ends");
+        assert!(fault.message.contains("within 0.3 s"), "{}", fault.message);
+    }
 }

@@ -1,7 +1,7 @@
 //! The history as RDF files, for other tools.
 
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
 
 use oxigraph::io::{RdfFormat, RdfSerializer};
@@ -10,7 +10,7 @@ use oxigraph::model::GraphNameRef;
 use crate::rdf_text::serializer;
 use crate::write_run::run_node;
 use crate::{History, RdfSyntax, graphs};
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::{Diagnostic, Diagnostics, NewFile};
 use actcheck_facts::extract_complete;
 
 impl History {
@@ -21,9 +21,9 @@ impl History {
     pub fn write_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
         let store = self.store()?;
         let write = || -> Result<(), String> {
-            let writer = BufWriter::new(File::create(file).map_err(|error| error.to_string())?);
+            let (file, writer) = begin(file).map_err(|error| error.to_string())?;
             let mut writer = store.dump_to_writer(RdfFormat::NQuads, writer).map_err(|error| error.to_string())?;
-            writer.flush().map_err(|error| error.to_string())
+            writer.flush().and_then(|()| file.finish()).map_err(|error| error.to_string())
         };
         write().map_err(|why| unwritten(file, &why))
     }
@@ -36,7 +36,7 @@ impl History {
     pub fn write_complete_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
         let store = self.store()?;
         let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
-        let writer = BufWriter::new(File::create(file).map_err(|error| failed(&error))?);
+        let (new, writer) = begin(file).map_err(|error| failed(&error))?;
         let mut writer = RdfSerializer::from_format(RdfFormat::NQuads).for_writer(writer);
         for quad in store.iter() {
             let quad = quad.map_err(|error| failed(&error))?;
@@ -50,7 +50,11 @@ impl History {
                 writer.serialize_quad(&quad).map_err(|error| failed(&error))?;
             }
         }
-        writer.finish().and_then(|mut writer| writer.flush()).map_err(|error| failed(&error))
+        writer
+            .finish()
+            .and_then(|mut writer| writer.flush())
+            .and_then(|()| new.finish())
+            .map_err(|error| failed(&error))
     }
 
     /// Writes the default graph as Turtle: campaigns, runs, executions, scenes and outcomes. Turtle can't represent the
@@ -62,14 +66,21 @@ impl History {
         let store = self.store()?;
         let serializer = serializer(RdfSyntax::Turtle);
         let write = || -> Result<(), String> {
-            let writer = BufWriter::new(File::create(file).map_err(|error| error.to_string())?);
+            let (file, writer) = begin(file).map_err(|error| error.to_string())?;
             let mut writer = store
                 .dump_graph_to_writer(GraphNameRef::DefaultGraph, serializer, writer)
                 .map_err(|error| error.to_string())?;
-            writer.flush().map_err(|error| error.to_string())
+            writer.flush().and_then(|()| file.finish()).map_err(|error| error.to_string())
         };
         write().map_err(|why| unwritten(file, &why))
     }
+}
+
+/// A file that appears under its name when it is complete, and its writer.
+fn begin(file: &Path) -> io::Result<(NewFile, BufWriter<File>)> {
+    let file = NewFile::create(file)?;
+    let writer = BufWriter::new(file.writer()?);
+    Ok((file, writer))
 }
 
 fn unwritten(file: &Path, why: &str) -> Diagnostics {

@@ -60,10 +60,39 @@ pub(super) fn store(dir: &Path, doing: &str, error: &StorageError) -> Diagnostic
     }
 }
 
+/// A reader can't write its temporary files.
+pub(super) fn temporary(dir: &Path, error: &std::io::Error) -> Diagnostics {
+    let folder = std::env::temp_dir();
+    let message = format!(
+        "the history `{}` can't be read: temporary files in `{}` can't be written: {}",
+        dir.display(),
+        folder.display(),
+        lower(&error.to_string())
+    );
+    Diagnostic::error("H001", message).help("free some space there, or name another folder with `TMPDIR`").into()
+}
+
+/// H007: a file of the store differs from its checksum.
+pub(super) fn damaged_file(dir: &Path, name: &str) -> Diagnostics {
+    damaged(dir, &format!("`store/{name}` has changed since it was written"))
+}
+
 /// H007: stored data can't be read any more.
 pub(super) fn damaged(dir: &Path, what: &str) -> Diagnostics {
     Diagnostic::error("H007", format!("the history `{}` is damaged: {}", dir.display(), lower(what)))
-        .help("restore the folder from a backup, or name another one with `--history DIR`")
+        .help(
+            "`actcheck health --integrity` lists the damage; `actcheck merge --salvage DIR --into NEW` copies all \
+             readable data; or restore the folder from a backup",
+        )
+        .into()
+}
+
+/// H026: an id can't be part of a file name.
+pub(super) fn foreign_id(dir: &Path, kind: &str, id: &str) -> Diagnostics {
+    let id: String = id.chars().take(80).collect();
+    let message = format!("the history `{}` has a {kind} with the id `{id}`, which is not an id", dir.display());
+    Diagnostic::error("H026", message)
+        .help("an id has only letters, digits, `-` and `_`: actcheck did not write this history, so don't trust it")
         .into()
 }
 

@@ -1,12 +1,14 @@
 //! The folder of a history: its layout, its version, and its lock.
 //!
-//! `VERSION` names the format; `lock` is held while a process has the folder open; `store/` is the RDF store; `traces/`
-//! has one file for each run; `hulls/` caches the convex solids of meshes, which can be recomputed at any time.
+//! `VERSION` names the format; `lock` is held while a process writes; `store/` is the RDF store, and `seal/` has the
+//! checksums of its files; `traces/` has one file for each run; `hulls/` caches the convex solids of meshes, which can be
+//! recomputed at any time.
 
-use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::thread::sleep;
+use std::time::Duration;
 
 use crate::fault;
 use actcheck_base::{Diagnostics, write_atomic};
@@ -14,13 +16,19 @@ use actcheck_base::{Diagnostics, write_atomic};
 /// Format of the folder that this program writes, and the newest that it reads.
 pub(super) const FORMAT: u64 = 1;
 const TITLE: &str = "actcheck history";
+/// Longest version file. Unit: bytes.
+const LONGEST_VERSION: u64 = 1_000;
+/// Number of tries to lock a folder: a reader holds the lock for a moment if it finds the store incomplete.
+const TRIES: usize = 10;
+/// Time between two tries.
+const PAUSE: Duration = Duration::from_millis(10);
 
-/// A folder that this process owns, or shares with other readers, until the value is dropped.
+/// A folder that this process owns, or only reads, until the value is dropped.
 #[derive(Debug)]
 pub(super) struct Folder {
     dir: PathBuf,
-    /// Holds the lock. The operating system releases it when the process ends, even after a crash.
-    _lock: File,
+    /// Holds the lock of an owner. The operating system releases it when the process ends, even after a crash.
+    _lock: Option<File>,
 }
 
 impl Folder {
@@ -39,7 +47,7 @@ impl Folder {
             }
             fs::create_dir_all(dir).map_err(|error| fault::io(dir, "creating the folder", &error))?;
         }
-        let folder = Self { dir: dir.to_path_buf(), _lock: lock(dir, File::try_lock)? };
+        let folder = Self { dir: dir.to_path_buf(), _lock: Some(lock(dir)?) };
         if !known {
             write_atomic(&dir.join("VERSION"), format!("{TITLE} {FORMAT}\n").as_bytes())
                 .map_err(|error| fault::io(dir, "writing its version", &error))?;
@@ -48,12 +56,18 @@ impl Folder {
         Ok(folder)
     }
 
-    /// Locks an existing folder for reading: other processes may read it at the same time, and none may write.
-    pub(super) fn lock_shared(dir: &Path) -> Result<Self, Diagnostics> {
+    /// An existing folder, to read it while other processes may read or write it.
+    pub(super) fn to_read(dir: &Path) -> Result<Self, Diagnostics> {
         if !has_version(dir)? {
             return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
         }
-        Ok(Self { dir: dir.to_path_buf(), _lock: lock(dir, File::try_lock_shared)? })
+        Ok(Self { dir: dir.to_path_buf(), _lock: None })
+    }
+
+    /// Whether another process owns the folder.
+    pub(super) fn is_locked(&self) -> bool {
+        let lock = File::open(self.dir.join("lock"));
+        lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }
 
     /// The folder as the user gave it.
@@ -66,9 +80,23 @@ impl Folder {
         self.dir.join("store")
     }
 
+    /// Where the checksums of the store's files are.
+    pub(super) fn seal(&self) -> PathBuf {
+        self.dir.join("seal")
+    }
+
     /// Where the traces are.
     pub(super) fn traces(&self) -> PathBuf {
         self.dir.join("traces")
+    }
+
+    /// The ids of the runs that have a trace, sorted.
+    pub(super) fn traced(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.traces()).into_iter().flatten().filter_map(Result::ok);
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut ids: Vec<String> = names.filter_map(|name| Some(name.strip_suffix(".trace")?.to_owned())).collect();
+        ids.sort();
+        ids
     }
 
     /// File of a run's trace.
@@ -79,7 +107,12 @@ impl Folder {
 
 /// Whether the folder has a history that this program can read.
 fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
-    let text = match fs::read_to_string(dir.join("VERSION")) {
+    let file = dir.join("VERSION");
+    // A pipe or a device of a foreign folder may have no end.
+    if fs::metadata(&file).is_ok_and(|data| !data.is_file() || data.len() > LONGEST_VERSION) {
+        return Err(fault::foreign(dir));
+    }
+    let text = match fs::read_to_string(&file) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
         Err(error) if error.kind() == ErrorKind::InvalidData => return Err(fault::foreign(dir)),
@@ -94,26 +127,30 @@ fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
 /// Whether a folder without a version holds any files other than those left by `actcheck check` or by an interrupted
 /// start.
 fn holds_other_things(dir: &Path) -> bool {
-    let ours = BTreeSet::from(["lock", "VERSION.tmp", "hulls"]);
+    let is_ours =
+        |name: &str| ["lock", "hulls"].contains(&name) || (name.starts_with("VERSION.") && name.ends_with(".tmp"));
     fs::read_dir(dir)
         .into_iter()
         .flatten()
         .filter_map(Result::ok)
-        .any(|entry| !entry.file_name().to_str().is_some_and(|name| ours.contains(name)))
+        .any(|entry| !entry.file_name().to_str().is_some_and(is_ours))
 }
 
-fn lock(dir: &Path, how: fn(&File) -> Result<(), TryLockError>) -> Result<File, Diagnostics> {
+fn lock(dir: &Path) -> Result<File, Diagnostics> {
     let file = OpenOptions::new()
         .create(true)
         .truncate(false)
         .write(true)
         .open(dir.join("lock"))
         .map_err(|error| fault::io(dir, "locking it", &error))?;
-    match how(&file) {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(fault::in_use(dir)),
-        // Some network file systems don't support locks; the store's own lock still protects it.
-        Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(file),
-        Err(TryLockError::Error(error)) => Err(fault::io(dir, "locking it", &error)),
+    for _ in 0..TRIES {
+        match file.try_lock() {
+            Ok(()) => return Ok(file),
+            Err(TryLockError::WouldBlock) => sleep(PAUSE),
+            // Some network file systems don't support locks; the store's own lock still protects it.
+            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => return Ok(file),
+            Err(TryLockError::Error(error)) => return Err(fault::io(dir, "locking it", &error)),
+        }
     }
+    Err(fault::in_use(dir))
 }

@@ -1,47 +1,96 @@
 //! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
-use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::time::Duration;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use oxigraph::sparql::{QueryEvaluationError, QueryResults, SparqlEvaluator};
-use oxigraph::store::Store;
+use oxigraph::model::{NamedNode, Term as StoreTerm};
+use oxigraph::sparql::{QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError};
 
+use crate::evaluation::{Unfinished, evaluate};
+use crate::fault;
+use crate::open::OpenStore;
 use crate::syntax_fault::syntax_fault;
-use crate::terms::from_store;
+use crate::terms::{from_store, to_store};
 use crate::{Cancel, QueryAnswer};
-use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, names};
+use actcheck_base::{
+    COUNTED_TEXT, Diagnostic, Diagnostics, MOST_NESTED_CALLS, Source, Span, TEXT_FUNCTIONS, Term, bounded_texts,
+    check_calls, names,
+};
 
 /// Words with which an update begins.
 const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREATE", "ADD", "MOVE", "COPY", "WITH"];
-/// Interval at which a waiting query checks whether it was stopped: too short to notice.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// Maximum length of the texts that a query makes. Unit: bytes.
+const MOST_TEXT: usize = 512 << 20;
+/// Maximum length of one of these texts. Unit: bytes.
+const LONGEST_TEXT: usize = 32 << 20;
 
 /// Answers a query.
-///
-/// The evaluation checks its token only when it reads the store, which a join of large results may not do for minutes.
-/// It therefore runs in its own thread; when the query is stopped, the thread is abandoned and ends at its next check.
-pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
+pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
-    let prepared =
-        evaluator(cancel).parse_query(&*text.text).map_err(|error| syntax_fault(text, &error.to_string()))?;
-    let (sender, receiver) = sync_channel(1);
-    let store = store.clone();
-    std::thread::spawn(move || {
-        let answer = prepared.on_store(&store).execute().and_then(collect);
-        drop(store);
-        // If the query was stopped, the receiver is gone.
-        let _ = sender.send(answer);
-    });
-    loop {
-        match receiver.recv_timeout(LOOK_EVERY) {
-            Ok(answer) => return answer.map_err(|error| evaluation_fault(text, &error).into()),
-            Err(RecvTimeoutError::Timeout) if cancel.is_cancelled() => return Err(stopped(text).into()),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into());
-            }
-        }
+    if let Err(at) = check_calls(&text.text) {
+        let message = format!("calls are nested more than {MOST_NESTED_CALLS} deep");
+        let help = "name the inner values, as in `BIND(CONCAT(?a, ?b) AS ?c)`";
+        return Err(Diagnostic::error("H010", message).at(text, at..at + 1).help(help).into());
     }
+    let syntax = |error: SparqlSyntaxError| syntax_fault(text, &error.to_string());
+    drop(evaluator(cancel).parse_query(&*text.text).map_err(syntax)?);
+    // Places in the text that is evaluated differ from the original's, so errors were reported before.
+    let made = Arc::new(AtomicUsize::new(0));
+    let bounded = with_text_functions(evaluator(cancel), cancel, &made);
+    let prepared = bounded.parse_query(&bounded_texts(&text.text)).map_err(syntax)?;
+    let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));
+    if made.load(Ordering::Relaxed) > MOST_TEXT {
+        return Err(too_much_text(text).into());
+    }
+    evaluated.map_err(|fault| match fault {
+        Unfinished::Stopped => stopped(text).into(),
+        Unfinished::Failed(error) => evaluation_fault(text, &error).into(),
+        Unfinished::Crashed => Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into(),
+        Unfinished::Damaged(error) => fault::damaged(dir, &error.to_string()),
+    })
+}
+
+/// Adds functions that make texts of limited length: the evaluator keeps them until the query ends. Beyond the limit, they
+/// stop the query. `made`: their length so far, in bytes.
+fn with_text_functions(evaluator: SparqlEvaluator, cancel: &Cancel, made: &Arc<AtomicUsize>) -> SparqlEvaluator {
+    let appended = (cancel.clone(), Arc::clone(made));
+    let evaluator =
+        evaluator.with_custom_function(NamedNode::new_unchecked(COUNTED_TEXT), move |args: &[StoreTerm]| {
+            let [text] = args else { return None };
+            let length = if let StoreTerm::Literal(literal) = text { literal.value().len() } else { 0 };
+            let (cancel, made) = &appended;
+            if made.fetch_add(length + 1, Ordering::Relaxed) > MOST_TEXT {
+                cancel.cancel();
+                return None;
+            }
+            Some(text.clone())
+        });
+    TEXT_FUNCTIONS.into_iter().fold(evaluator, |evaluator, (_, iri, function)| {
+        let (cancel, made) = (cancel.clone(), Arc::clone(made));
+        evaluator.with_custom_function(NamedNode::new_unchecked(iri), move |args: &[StoreTerm]| {
+            let args: Vec<Term> = args.iter().map(from_store).collect();
+            let left = LONGEST_TEXT.min(MOST_TEXT.saturating_sub(made.load(Ordering::Relaxed)));
+            let Ok(found) = function(&args, left) else {
+                made.fetch_add(MOST_TEXT + 1, Ordering::Relaxed);
+                cancel.cancel();
+                return None;
+            };
+            if let Some(Term::String(text) | Term::LangString(text, _)) = &found {
+                made.fetch_add(text.len(), Ordering::Relaxed);
+            }
+            found.as_ref().map(to_store)
+        })
+    })
+}
+
+fn too_much_text(text: &Source) -> Diagnostic {
+    let (one, all) = (LONGEST_TEXT >> 20, MOST_TEXT >> 20);
+    let message = format!("the query makes texts that are too long: over {one} MiB, or over {all} MiB together");
+    Diagnostic::error("H012", message)
+        .in_source(text)
+        .help("repeated concatenation doubles a text: write texts once, or filter the rows before")
 }
 
 fn stopped(text: &Source) -> Diagnostic {

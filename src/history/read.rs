@@ -7,6 +7,7 @@ use oxigraph::sparql::{QueryEvaluationError, QueryResults};
 use oxigraph::store::{StorageError, Store};
 
 use crate::Cancel;
+use crate::evaluation::{Unfinished, evaluate};
 use crate::query::evaluator;
 use crate::statements::iri;
 use actcheck_base::names;
@@ -129,11 +130,18 @@ pub(super) fn select(
     for (variable, value) in given {
         prepared = prepared.substitute_variable(Variable::new_unchecked(variable), value);
     }
-    let mut rows = Vec::new();
-    if let QueryResults::Solutions(solutions) = prepared.on_store(store).execute()? {
-        for solution in solutions {
-            rows.push(solution?.values().to_vec());
+    let rows = evaluate(store, &Cancel::new(), move |store| {
+        let mut rows = Vec::new();
+        if let QueryResults::Solutions(solutions) = prepared.on_store(store).execute()? {
+            for solution in solutions {
+                rows.push(solution?.values().to_vec());
+            }
         }
-    }
-    Ok(rows)
+        Ok(rows)
+    });
+    rows.map_err(|fault| match fault {
+        Unfinished::Failed(error) => error,
+        Unfinished::Damaged(error) => QueryEvaluationError::Dataset(error.into()),
+        Unfinished::Crashed | Unfinished::Stopped => QueryEvaluationError::Dataset("the evaluator crashed".into()),
+    })
 }

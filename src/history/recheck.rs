@@ -58,7 +58,7 @@ impl History {
     /// The store can't be read.
     pub fn newest(&self, run: &str, step: u32, properties: &[String]) -> Result<Vec<StoredJudgement>, Diagnostics> {
         let execution = execution(run, step);
-        newest(&self.store()?, &execution, properties).map_err(|error| self.fault("reading a run's outcomes", &error))
+        newest(&*self.store()?, &execution, properties).map_err(|error| self.fault("reading a run's outcomes", &error))
     }
 
     /// Stores the new judgements in one transaction: all of them or none. `at` is RFC 3339.

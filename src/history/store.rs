@@ -2,14 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::{PoisonError, RwLock};
+use std::sync::RwLock;
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
 use oxigraph::sparql::QueryEvaluationError;
-use oxigraph::store::{StorageError, Store};
+use oxigraph::store::StorageError;
 
 use crate::folder::Folder;
+use crate::open::Opened;
 use crate::read::{short_id, subjects, text_of};
 use crate::statements::iri;
 use crate::write_campaign::{self, campaign_node};
@@ -19,69 +20,21 @@ use crate::{
     RunVitals, detail, fault, query, trace_file, vitals,
 };
 use crate::{lists, read_campaign};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, RunFacts, Source, nearest, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, RunFacts, Source, names, nearest, write_atomic};
 use actcheck_data::{Choice, Trace};
 use actcheck_facts::extract;
 
-/// A history that only this process has open (except after [`History::open_to_read`], which shares it).
+/// A history that only this process may write, or that it only reads (after [`History::open_to_read`]).
 ///
 /// A run that [`History::commit`] stored survives a kill of the process, and after [`History::flush`] also a power cut.
 /// Its trace file is written first, so that every run in the store has one.
 pub struct History {
     // Dropped before the folder, which releases the lock. `None` only if reopening failed.
-    store: RwLock<Option<Store>>,
-    folder: Folder,
+    pub(super) opened: RwLock<Option<Opened>>,
+    pub(super) folder: Folder,
 }
 
 impl History {
-    /// Opens the history in a folder, and creates it if missing.
-    ///
-    /// # Errors
-    /// `H001` the folder can't be used, `H002` another process has it open, `H003` it holds other files, `H004` a newer
-    /// program wrote it, `H005` the disk is full, `H006`, `H007` it is damaged.
-    pub fn open(dir: &Path) -> Result<Self, Diagnostics> {
-        Self::open_folder(Folder::lock_exclusive(dir, true)?)
-    }
-
-    /// Opens the existing history in a folder.
-    ///
-    /// # Errors
-    /// As [`History::open`]; also `H003` if the folder has no history.
-    pub fn open_existing(dir: &Path) -> Result<Self, Diagnostics> {
-        Self::open_folder(Folder::lock_exclusive(dir, false)?)
-    }
-
-    /// Opens the existing history in a folder read-only. Other processes may do so at the same time.
-    ///
-    /// # Errors
-    /// As [`History::open_existing`]; `H002` while another process has it open for writing.
-    pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
-        let folder = Folder::lock_shared(dir)?;
-        let store = Store::open_read_only(folder.store());
-        let store = store.map_err(|error| fault::store(dir, "opening its store", &error))?;
-        Ok(Self { store: RwLock::new(Some(store)), folder })
-    }
-
-    fn open_folder(folder: Folder) -> Result<Self, Diagnostics> {
-        let store = open_store(&folder)?;
-        Ok(Self { store: RwLock::new(Some(store)), folder })
-    }
-
-    /// Returns a handle of the store. (All clones use the same store.)
-    pub(super) fn store(&self) -> Result<Store, Diagnostics> {
-        let store = self.store.read().unwrap_or_else(PoisonError::into_inner);
-        store.clone().ok_or_else(|| fault::damaged(self.dir(), "it could not be opened again"))
-    }
-
-    /// Closes and reopens the store. Only then does it delete logs whose content is already in its tables; they are as
-    /// large as the tables of a hundred runs.
-    pub(super) fn reopen(&self) -> Result<(), Diagnostics> {
-        let mut store = self.store.write().unwrap_or_else(PoisonError::into_inner);
-        *store = None;
-        *store = Some(open_store(&self.folder)?);
-        Ok(())
-    }
-
     /// The folder as the caller gave it.
     pub fn dir(&self) -> &Path {
         self.folder.dir()
@@ -103,8 +56,9 @@ impl History {
     /// Writes a campaign before its first run, and removes the leftovers of killed processes.
     ///
     /// # Errors
-    /// Writing failed: `H005`, `H006`.
+    /// Writing failed: `H005`, `H006`; `H026` its id is not an id.
     pub fn begin_campaign(&self, record: &CampaignRecord) -> Result<(), Diagnostics> {
+        self.check_ids("campaign", [&record.id])?;
         self.remove_orphans()?;
         self.store()?
             .extend(write_campaign::beginning(record))
@@ -140,6 +94,7 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`. Runs stored before are complete.
     pub fn commit(&self, record: &RunRecord) -> Result<(), Diagnostics> {
+        self.check_ids("run", [&record.id])?;
         let doing = format!("writing run {}", record.id);
         let bytes = trace_file::encode(&record.choices, &record.trace)
             .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
@@ -175,9 +130,11 @@ impl History {
     /// Returns all campaigns, sorted by start, then by id.
     ///
     /// # Errors
-    /// The store can't be read.
+    /// The store can't be read; `H026` an id is not an id.
     pub fn campaigns(&self) -> Result<Vec<CampaignRow>, Diagnostics> {
-        lists::campaigns(&self.store()?).map_err(|error| self.query_fault(&error))
+        let campaigns = lists::campaigns(&*self.store()?).map_err(|error| self.query_fault(&error))?;
+        self.check_ids("campaign", campaigns.iter().map(|campaign| &campaign.id))?;
+        Ok(campaigns)
     }
 
     /// Returns the record of a campaign.
@@ -186,7 +143,7 @@ impl History {
     /// `H014` there is no such campaign.
     pub fn campaign(&self, id: &str) -> Result<CampaignRecord, Diagnostics> {
         let record =
-            read_campaign::beginning(&self.store()?, id).map_err(|error| self.fault("reading a campaign", &error))?;
+            read_campaign::beginning(&*self.store()?, id).map_err(|error| self.fault("reading a campaign", &error))?;
         match record {
             Some(record) => Ok(record),
             None => {
@@ -205,9 +162,11 @@ impl History {
     /// has no runs.
     ///
     /// # Errors
-    /// The store can't be read.
+    /// The store can't be read; `H026` an id is not an id.
     pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
-        lists::runs(&self.store()?, filter).map_err(|error| self.query_fault(&error))
+        let runs = lists::runs(&*self.store()?, filter).map_err(|error| self.query_fault(&error))?;
+        self.check_ids("run", runs.iter().flat_map(|run| [&run.run, &run.campaign]))?;
+        Ok(runs)
     }
 
     /// Returns the ids of all campaigns except those of [`History::selected_campaigns`], sorted by start, each with its
@@ -226,6 +185,8 @@ impl History {
             let mut runs: Vec<String> =
                 runs.into_iter().map(|run| short_id(&text_of(&run.into())).to_owned()).collect();
             runs.sort();
+            self.check_ids("campaign", [&id])?;
+            self.check_ids("run", &runs)?;
             found.push((id, runs));
         }
         Ok(found)
@@ -237,7 +198,7 @@ impl History {
     /// # Errors
     /// The store can't be read.
     pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
-        lists::outcomes(&self.store()?, filter).map_err(|error| self.query_fault(&error))
+        lists::outcomes(&*self.store()?, filter).map_err(|error| self.query_fault(&error))
     }
 
     /// Returns the id of a run, given its id, its IRI, `run:ID`, or a unique prefix.
@@ -247,7 +208,7 @@ impl History {
     pub fn resolve(&self, name: &str) -> Result<String, Diagnostics> {
         let name = short_id(name.trim().trim_start_matches('<').trim_end_matches('>'));
         let name = name.strip_prefix("run:").unwrap_or(name);
-        if self.has_run(name)? {
+        if names::is_id(name) && self.has_run(name)? {
             return Ok(name.to_owned());
         }
         let known = self.ids("act:Run")?;
@@ -274,7 +235,7 @@ impl History {
     /// `H008` there is no such run.
     pub fn run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
         let id = self.resolve(name)?;
-        detail::read(&self.store()?, &run_node(&id)).map_err(|error| self.fault("reading a run", &error))
+        detail::read(&*self.store()?, &run_node(&id)).map_err(|error| self.fault("reading a run", &error))
     }
 
     /// Returns the trace of a run, named as in [`History::resolve`].
@@ -322,7 +283,7 @@ impl History {
         self.campaign(campaign)?;
         for row in self.runs(&RunFilter { campaign: Some(campaign.to_owned()), ..RunFilter::default() })? {
             let choices = self.decoded(&row.run, trace_file::decode_states)?.0;
-            let read = vitals::read(&self.store()?, &row.run, choices);
+            let read = vitals::read(&*self.store()?, &row.run, choices);
             each(&read.map_err(|error| self.fault("reading a run", &error))?);
         }
         Ok(())
@@ -355,7 +316,7 @@ impl History {
     /// # Errors
     /// As [`History::query`]; `H013` the query was stopped.
     pub fn query_from(&self, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
-        query::answer(&self.store()?, text, cancel)
+        query::answer(self.dir(), self.store()?, text, cancel)
     }
 
     /// Path of a run's trace file, which need not exist.
@@ -365,7 +326,7 @@ impl History {
 
     fn decoded<T>(&self, id: &str, decode: impl FnOnce(&[u8]) -> Result<T, String>) -> Result<T, Diagnostics> {
         let file = self.folder.trace(id);
-        let bytes = std::fs::read(&file).map_err(|error| {
+        let bytes = Files::Disk.read_bytes(&file).map_err(|error| {
             Diagnostic::error("H009", format!("the trace of run {id} can't be read from `{}`: {error}", file.display()))
                 .help("restore the file from a backup; the store's data on the run is intact")
         })?;
@@ -383,10 +344,19 @@ impl History {
     pub(super) fn ids(&self, class: &str) -> Result<Vec<String>, Diagnostics> {
         let class = iri(class);
         let found =
-            subjects(&self.store()?, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
+            subjects(&*self.store()?, "rdf:type", class.as_ref()).map_err(|error| self.fault("reading", &error))?;
         let mut ids: Vec<String> = found.into_iter().map(|node| short_id(&text_of(&node.into())).to_owned()).collect();
         ids.sort();
+        self.check_ids(if class.as_str().ends_with("Run") { "run" } else { "campaign" }, &ids)?;
         Ok(ids)
+    }
+
+    /// Ids are parts of file names, so those of a foreign history must not lead out of its folder.
+    fn check_ids<'a>(&self, kind: &str, ids: impl IntoIterator<Item = &'a String>) -> Result<(), Diagnostics> {
+        match ids.into_iter().find(|id| !names::is_id(id)) {
+            Some(id) => Err(fault::foreign_id(self.dir(), kind, id)),
+            None => Ok(()),
+        }
     }
 
     fn campaign_ids(&self) -> Result<Vec<String>, Diagnostics> {
@@ -441,19 +411,6 @@ impl History {
             }
         }
     }
-}
-
-fn open_store(folder: &Folder) -> Result<Store, Diagnostics> {
-    let path = folder.store();
-    let store = Store::open(&path).map_err(|error| fault::store(folder.dir(), "opening its store", &error))?;
-    // Each opening leaves a log of over 100 kB, which is only useful to the store's developers.
-    for entry in std::fs::read_dir(&path).into_iter().flatten().filter_map(Result::ok) {
-        if entry.file_name().to_string_lossy().starts_with("LOG.old.") {
-            // Harmless if it remains.
-            let _ = std::fs::remove_file(entry.path());
-        }
-    }
-    Ok(store)
 }
 
 /// Computes a campaign's id: a letter and three letters or digits, without characters that look alike.

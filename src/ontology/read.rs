@@ -10,7 +10,7 @@ use std::sync::Arc;
 use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 
 use crate::{file_iri, literal};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Span, Term, names};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source, Span, Term, check_xml, names};
 
 /// Importing this IRI adds the ontology embedded in the program, independent of the importing file's location.
 const SHIPPED: &str = "https://w3id.org/actcheck/ontology";
@@ -98,7 +98,7 @@ pub(super) fn read(files: &Files, root: &Path, found: &mut Diagnostics) -> Readi
 /// `document` distinguishes the blank nodes of several sources.
 ///
 /// # Errors
-/// `O002` for each syntax error, at most five.
+/// `O002` for each syntax error, at most five; `O013` if parsing XML could exhaust time or memory.
 pub fn triples_of(source: &Source, document: usize) -> Result<Vec<[Term; 3]>, Diagnostics> {
     let (mut statements, mut found) = (Vec::new(), Diagnostics::new());
     parse(source, document, "", &mut statements, &mut found);
@@ -138,6 +138,12 @@ fn imports_of(reading: &Reading, text: usize) -> Vec<Waiting> {
 /// Parses one source. Statements before and after a syntax error are kept.
 fn parse(source: &Source, text: usize, base: &str, statements: &mut Vec<Statement>, found: &mut Diagnostics) {
     let format = format_of(source);
+    if format == RdfFormat::RdfXml
+        && let Err(faults) = check_xml(source, "O013")
+    {
+        found.extend(faults);
+        return;
+    }
     let position = Rc::new(Cell::new(mark_length(source)));
     let lines = Lines { text: source.text.as_bytes(), position: Rc::clone(&position) };
     let parser = RdfParser::from_format(format).with_base_iri(base).unwrap_or_else(|_| RdfParser::from_format(format));
@@ -249,8 +255,8 @@ struct Lines<'a> {
 impl Read for Lines<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let rest = self.text.get(self.position.get()..).unwrap_or_default();
-        let line = rest.iter().position(|byte| *byte == b'\n').map_or(rest.len(), |newline| newline + 1);
-        let length = line.min(buffer.len());
+        let rest = &rest[..rest.len().min(buffer.len())];
+        let length = rest.iter().position(|byte| *byte == b'\n').map_or(rest.len(), |newline| newline + 1);
         buffer[..length].copy_from_slice(&rest[..length]);
         self.position.set(self.position.get() + length);
         Ok(length)

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 
 use crate::hello::{Joints, Role};
+use crate::message::short;
 use actcheck_actions::{Controls, ExternalFault};
 
 /// A command as it is on the wire.
@@ -130,7 +131,7 @@ impl Taken<'_> {
     fn joint(&mut self, name: &str) -> Result<usize, ExternalFault> {
         let Some((joint, role)) = self.joints.by_name.get(name) else {
             let help = actcheck_base::did_you_mean(name, self.joints.by_name.keys().map(String::as_str));
-            return Err(wrong(format!("the robot has no joint `{name}`: {help}")));
+            return Err(wrong(format!("the robot has no joint `{}`: {help}", short(name))));
         };
         if *role == Role::Gripper {
             return Err(wrong(format!("`{name}` is a finger joint; command it with `gripper`")));

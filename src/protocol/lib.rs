@@ -7,8 +7,13 @@
 mod answer;
 mod command;
 mod frame;
+#[cfg(test)]
+mod fuzz;
 mod hello;
 mod message;
+#[cfg(test)]
+#[path = "../../tests/support/mutations.rs"]
+mod mutations;
 mod observation;
 mod output;
 mod performance;

@@ -90,7 +90,7 @@ struct Typed<'a> {
 /// The message is not a JSON object with a `type`.
 pub fn kind_of(message: &[u8]) -> Result<String, ExternalFault> {
     let typed: Typed<'_> = serde_json::from_slice(message).map_err(|error| wrong("a message", &error, message))?;
-    Ok(typed.kind.into_owned())
+    Ok(short(&typed.kind))
 }
 
 /// Parses a message of a known type.
@@ -104,7 +104,19 @@ pub fn parse<'a, T: Deserialize<'a>>(kind: &str, message: &'a [u8]) -> Result<T,
 /// Longest quoted part of an invalid message. Unit: characters.
 const QUOTED: usize = 80;
 
+/// Longest name or reason of a message that is repeated in a fault. Unit: characters.
+const REPEATED: usize = 300;
+
+/// The beginning of a text: a message may hold a name of a megabyte.
+pub fn short(text: &str) -> String {
+    match text.char_indices().nth(REPEATED) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
 fn wrong(what: &str, error: &serde_json::Error, message: &[u8]) -> ExternalFault {
+    let error = short(&error.to_string());
     let text = String::from_utf8_lossy(&message[..message.len().min(4 * QUOTED)]);
     let quoted: String = text.chars().take(QUOTED).flat_map(char::escape_debug).collect();
     ExternalFault { late: false, reason: format!("it sent {what} that can't be parsed: {error}, in `{quoted}`") }

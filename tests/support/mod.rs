@@ -6,6 +6,7 @@ pub mod foreign;
 pub mod line;
 pub mod look;
 pub mod made_up;
+pub mod mutations;
 pub mod paged;
 pub mod planted;
 pub mod server;

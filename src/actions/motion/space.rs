@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use crate::link_points::LinkPoints;
 use crate::route::{Block, Pillar};
 use actcheck_world::{JointKind, Kinematics, Layout, SelfContact};
 
@@ -39,8 +40,8 @@ impl Room {
 pub struct ArmSpace<'a> {
     kinematics: &'a Kinematics,
     arm: &'a [usize],
-    /// Points on the links that the arm moves: link, and position on it.
-    points: Vec<(usize, Point3<f64>)>,
+    /// Points on the links that the arm moves.
+    points: Vec<LinkPoints>,
     furniture: &'a [Block],
     things: &'a [Pillar],
     itself: SelfContact,
@@ -68,6 +69,7 @@ impl<'a> ArmSpace<'a> {
         let itself = SelfContact::new(kinematics, right);
         let is_hand = moved_links(kinematics, layout.arm.last().copied().as_slice());
         let (arm, arm_farther_m) = (layout.arm.as_slice(), 0.0);
+        let points = LinkPoints::grouped(&points);
         Self { kinematics, arm, points, furniture, things, itself, is_hand, arm_farther_m, levers }
     }
 
@@ -116,14 +118,16 @@ impl<'a> ArmSpace<'a> {
 
     fn room_of(&self, links: &[Isometry3<f64>]) -> Room {
         let mut room = Room { furniture_m: f64::INFINITY, things_m: f64::INFINITY };
-        for (link, point) in &self.points {
-            let point = links[*link] * point;
-            let farther_m = if self.is_hand[*link] { 0.0 } else { self.arm_farther_m };
-            room.furniture_m = self
-                .furniture
-                .iter()
-                .fold(room.furniture_m.min(point.z), |least, block| least.min(block.distance(&point) - farther_m));
-            room.things_m = self.things.iter().fold(room.things_m, |least, pillar| least.min(pillar.distance(&point)));
+        for points in &self.points {
+            let pose = &links[points.link];
+            let farther_m = if self.is_hand[points.link] { 0.0 } else { self.arm_farther_m };
+            room.furniture_m = points.nearest(pose, room.furniture_m, |point| point.z);
+            for block in self.furniture {
+                room.furniture_m = points.nearest(pose, room.furniture_m, |point| block.distance(point) - farther_m);
+            }
+            for pillar in self.things {
+                room.things_m = points.nearest(pose, room.things_m, |point| pillar.distance(point));
+            }
         }
         room
     }

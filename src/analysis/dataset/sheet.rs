@@ -8,7 +8,7 @@ use polars::prelude::{DataFrame, ParquetWriter, PolarsError};
 
 use crate::dataset::columns::TableSpec;
 use crate::tables::{Cell, series, unwritten};
-use actcheck_base::Diagnostics;
+use actcheck_base::{Diagnostics, NewFile};
 
 /// Approximate maximum number of rows in memory.
 const ROWS_AT_ONCE: usize = 100_000;
@@ -17,6 +17,7 @@ const ROWS_AT_ONCE: usize = 100_000;
 pub(super) struct Sheet {
     spec: TableSpec,
     path: PathBuf,
+    file: NewFile,
     writer: BatchedWriter<File>,
     cells: Vec<Vec<Cell>>,
     waiting: usize,
@@ -29,12 +30,13 @@ impl Sheet {
     pub(super) fn begin(spec: TableSpec, folder: &Path) -> Result<Self, Diagnostics> {
         let path = folder.join(spec.file);
         let cells: Vec<Vec<Cell>> = spec.columns.iter().map(|_| Vec::new()).collect();
-        let open = || -> Result<BatchedWriter<File>, PolarsError> {
-            let empty = frame(&spec, cells.clone(), 0)?;
-            ParquetWriter::new(File::create(&path)?).batched(empty.schema())
+        let open = || -> Result<(NewFile, BatchedWriter<File>), PolarsError> {
+            let (empty, file) = (frame(&spec, cells.clone(), 0)?, NewFile::create(&path)?);
+            let writer = ParquetWriter::new(file.writer()?).batched(empty.schema())?;
+            Ok((file, writer))
         };
-        let writer = open().map_err(|error| unwritten(&path, &error))?;
-        Ok(Self { spec, path, writer, cells, waiting: 0, rows: 0 })
+        let (file, writer) = open().map_err(|error| unwritten(&path, &error))?;
+        Ok(Self { spec, path, file, writer, cells, waiting: 0, rows: 0 })
     }
 
     /// Adds a row. Cells are in the order of the columns.
@@ -50,10 +52,15 @@ impl Sheet {
         if self.waiting >= ROWS_AT_ONCE { self.flush() } else { Ok(()) }
     }
 
-    /// Writes the pending rows and closes the file.
-    pub(super) fn finish(mut self) -> Result<(PathBuf, usize), Diagnostics> {
+    /// Writes the pending rows and the end of the table, which does not have its name yet.
+    pub(super) fn complete(&mut self) -> Result<(), Diagnostics> {
         self.flush()?;
-        self.writer.finish().map_err(|error| unwritten(&self.path, &error))?;
+        self.writer.finish().map(drop).map_err(|error| unwritten(&self.path, &error))
+    }
+
+    /// Gives the complete table its name. Returns its path and number of rows.
+    pub(super) fn finish(self) -> Result<(PathBuf, usize), Diagnostics> {
+        self.file.finish().map_err(|error| unwritten(&self.path, &error))?;
         Ok((self.path, self.rows))
     }
 

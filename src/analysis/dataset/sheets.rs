@@ -31,7 +31,12 @@ impl Sheets {
         self.sheets.iter_mut().try_for_each(|(_, sheet)| sheet.make_room())
     }
 
-    /// Writes the pending rows and closes the files. Returns their paths and numbers of rows, in order.
+    /// Writes the pending rows and the ends of the tables, which do not have their names yet.
+    pub(super) fn complete(&mut self) -> Result<(), Diagnostics> {
+        self.sheets.iter_mut().try_for_each(|(_, sheet)| sheet.complete())
+    }
+
+    /// Gives the complete tables their names. Returns their paths and numbers of rows, in order.
     pub(super) fn finish(self) -> Result<Vec<(PathBuf, usize)>, Diagnostics> {
         self.sheets.into_iter().map(|(_, sheet)| sheet.finish()).collect()
     }

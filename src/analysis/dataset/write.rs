@@ -1,6 +1,5 @@
 //! Export of a dataset to a folder: its tables, and a description of their columns.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -11,8 +10,8 @@ use crate::dataset::fact_columns::{
 };
 use crate::dataset::sheets::Sheets;
 use crate::dataset::{fact_source, source};
-use crate::tables::{outcomes_schema, unwritten};
-use crate::{Hierarchy, Mirror, TableFilter, export_parquet};
+use crate::tables::{new_text, outcomes_schema, pending_parquet, unwritten};
+use crate::{Hierarchy, Mirror, TableFilter};
 use actcheck_base::Diagnostics;
 use actcheck_history::{History, RunDetail};
 
@@ -94,7 +93,7 @@ fn export(
     folder: &Path,
     mut add: impl FnMut(&RunDetail, &mut Sheets) -> Result<bool, Diagnostics>,
 ) -> Result<Dataset, Diagnostics> {
-    let (_, outcomes) = export_parquet(runs.mirror, runs.filter, runs.hierarchy, folder)?;
+    let outcomes = pending_parquet(runs.mirror, runs.filter, runs.hierarchy, folder)?;
     let mut dataset = Dataset { schema: folder.join("schema.json"), ..Dataset::default() };
     let mut sheets = Sheets::begin(tables, folder)?;
     for (campaign, ids) in runs.history.run_ids()? {
@@ -108,10 +107,12 @@ fn export(
             sheets.make_room()?;
         }
     }
+    sheets.complete()?;
+    let described = new_text(&dataset.schema, &format!("{:#}\n", schema(tables)))?;
+    // Everything is on the disk: from here on, files only get their names.
     dataset.tables = sheets.finish()?;
-    dataset.tables.push((folder.join("outcomes.parquet"), outcomes));
-    fs::write(&dataset.schema, format!("{:#}\n", schema(tables)))
-        .map_err(|error| unwritten(&dataset.schema, &error))?;
+    dataset.tables.push(outcomes.finish_table()?);
+    described.finish().map_err(|error| unwritten(&dataset.schema, &error))?;
     Ok(dataset)
 }
 

@@ -1,7 +1,8 @@
-//! The table beside a history, stored as several Parquet files.
+//! The table beside a history, stored as several Parquet files. The name of each has its digest, so that damage is noticed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerReader as _};
@@ -9,20 +10,53 @@ use polars::prelude::{DataFrame, ParquetReader, ParquetWriter, PolarsError, SerR
 use crate::TableRun;
 use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::frames::Rows;
-use actcheck_base::{Diagnostic, Diagnostics, digest_of};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, NewFile, ScratchFolder, digest_of, write_atomic};
 use actcheck_history::History;
 
 /// Maximum number of runs in a file, and so in memory at once.
 const RUNS_IN_A_FILE: usize = 2_000;
+/// Number of files of a campaign from which they are written anew as one: each look at a running campaign adds a file.
+const MOST_PARTS: usize = 16;
 /// File with the digest of the columns.
 const SCHEMA: &str = "SCHEMA";
 
 /// An up-to-date mirror of a history's store.
 #[derive(Debug)]
 pub struct Mirror {
+    /// Where new files are written.
     folder: PathBuf,
     /// Its files, sorted by the start of the campaign, then by the time of writing.
     files: Vec<(String, PathBuf)>,
+    /// The lock of the folder, or the folder of new files if that of the history can't be written.
+    _place: Place,
+}
+
+/// The place of a mirror's new files.
+#[derive(Debug)]
+enum Place {
+    /// Beside the history; the folder is locked.
+    Beside { _lock: File },
+    /// In a temporary folder: that of the history is read-only, or another process is changing it.
+    Scratch(ScratchFolder),
+    /// In a folder of the caller.
+    Given,
+}
+
+impl Place {
+    fn find(folder: &Path) -> Result<Self, Diagnostics> {
+        let lock = || -> std::io::Result<File> {
+            fs::create_dir_all(folder)?;
+            let lock = File::open(folder)?;
+            lock.try_lock()?;
+            // Whether files can be created there.
+            drop(NewFile::create(&folder.join(SCHEMA))?);
+            Ok(lock)
+        };
+        lock()
+            .map(|lock| Self::Beside { _lock: lock })
+            .or_else(|_| ScratchFolder::create().map(Self::Scratch))
+            .map_err(|error| unwritten(folder, &error))
+    }
 }
 
 /// The changes made by an update.
@@ -32,47 +66,73 @@ pub struct MirrorChange {
     pub added: usize,
     /// Number of runs that were already present.
     pub kept: usize,
+    /// Number of files that were damaged, and written anew.
+    pub damaged: usize,
 }
 
 impl Mirror {
-    /// Updates the mirror of a history: writes missing runs, and rewrites files that can't be read or hold runs that
-    /// the store lacks.
+    /// Updates the mirror of a history: writes missing runs, and rewrites files that are damaged or hold runs that
+    /// the store lacks. If the folder of the history is read-only, missing runs are written into a temporary folder,
+    /// which is removed with the returned value.
     ///
     /// The campaigns of [`History::selected_campaigns`] are left out, because their scenes were selected to fail.
     ///
     /// # Errors
     /// `A001` if it can't be written; errors of reading the history. All existing files are complete.
     pub fn update(history: &History) -> Result<(Self, MirrorChange), Diagnostics> {
-        let folder = history.dir().join("tables");
-        fs::create_dir_all(&folder).map_err(|error| unwritten(&folder, &error))?;
-        let digest = schema_digest();
-        if fs::read_to_string(folder.join(SCHEMA)).ok().as_deref() != Some(digest.as_str()) {
-            clear(&folder)?;
-            fs::write(folder.join(SCHEMA), digest).map_err(|error| unwritten(&folder, &error))?;
-        }
-        let mut mirror = Self { folder, files: Vec::new() };
-        let mut change = MirrorChange::default();
-        let mut present = mirror.present()?;
-        for (campaign, runs) in history.run_ids()? {
-            let files = present.remove(&campaign).unwrap_or_default();
-            mirror.update_campaign(history, &campaign, &runs, files, &mut change)?;
-        }
-        for file in present.into_values().flatten() {
-            fs::remove_file(&file).map_err(|error| unwritten(&file, &error))?;
-        }
-        Ok((mirror, change))
+        Self::updated(history, &tables_of(history), false)
     }
 
     /// Rebuilds the mirror of a history.
     ///
     /// # Errors
-    /// As [`Mirror::update`].
+    /// As [`Mirror::update`]; `A001` if the folder of the history can't be written.
     pub fn rebuild(history: &History) -> Result<(Self, MirrorChange), Diagnostics> {
-        let folder = history.dir().join("tables");
-        if folder.is_dir() {
-            clear(&folder)?;
+        Self::updated(history, &tables_of(history), true)
+    }
+
+    /// Returns the files of a history's mirror that are damaged or differ from the store and the traces, sorted by name.
+    /// Files of earlier versions and of runs that the store no longer has are not compared: an update replaces them.
+    ///
+    /// # Errors
+    /// The history can't be read.
+    pub fn damage(history: &History) -> Result<Vec<PathBuf>, Diagnostics> {
+        let known: BTreeSet<String> = history.run_ids()?.into_iter().flat_map(|(_, runs)| runs).collect();
+        let mut damaged = Vec::new();
+        for file in entries(&tables_of(history)).into_iter().filter(|file| is_table(file)) {
+            let is_of_today = named(&file).is_none_or(|name| name.digest.is_some());
+            if is_of_today && !(is_whole(&file) && is_as_stored(history, &file, &known)?) {
+                damaged.push(file);
+            }
         }
-        Self::update(history)
+        damaged.sort();
+        Ok(damaged)
+    }
+
+    fn updated(history: &History, tables: &Path, anew: bool) -> Result<(Self, MirrorChange), Diagnostics> {
+        let place = Place::find(tables)?;
+        let (folder, is_beside) = match &place {
+            Place::Scratch(_) if anew => {
+                return Err(unwritten(tables, &"it is read-only, or another process writes it"));
+            }
+            Place::Scratch(scratch) => (scratch.path().to_path_buf(), false),
+            Place::Beside { .. } | Place::Given => (tables.to_path_buf(), true),
+        };
+        let digest = schema_digest();
+        let is_current = fs::read_to_string(tables.join(SCHEMA)).ok().as_deref() == Some(digest.as_str());
+        if is_beside && (anew || !is_current) {
+            clear(tables)?;
+            write_atomic(&tables.join(SCHEMA), digest.as_bytes()).map_err(|error| unwritten(tables, &error))?;
+        }
+        let mut mirror = Self { folder, files: Vec::new(), _place: place };
+        let mut change = MirrorChange::default();
+        let mut present = if anew || !is_current { BTreeMap::new() } else { present(tables, is_beside) };
+        for (campaign, runs) in history.run_ids()? {
+            let files = present.remove(&campaign).unwrap_or_default();
+            mirror.update_campaign(history, &campaign, &runs, files, &mut change)?;
+        }
+        present.into_values().flatten().try_for_each(|file| mirror.remove(&file))?;
+        Ok((mirror, change))
     }
 
     /// Creates a mirror of runs from a source other than a history, in its own folder.
@@ -85,7 +145,7 @@ impl Mirror {
         runs: impl IntoIterator<Item = impl Into<TableRun>>,
     ) -> Result<Self, Diagnostics> {
         fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
-        let mut mirror = Self { folder: folder.to_path_buf(), files: Vec::new() };
+        let mut mirror = Self { folder: folder.to_path_buf(), files: Vec::new(), _place: Place::Given };
         let mut runs = runs.into_iter().peekable();
         while runs.peek().is_some() {
             let mut rows = Rows::default();
@@ -106,23 +166,6 @@ impl Mirror {
         self.files.iter().map(|(campaign, file)| (campaign.as_str(), file.as_path()))
     }
 
-    /// Returns the files by campaign, in the order of writing. Removes partial files of killed processes.
-    fn present(&self) -> Result<BTreeMap<String, Vec<PathBuf>>, Diagnostics> {
-        let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
-        let entries = fs::read_dir(&self.folder).map_err(|error| unwritten(&self.folder, &error))?;
-        for path in entries.filter_map(Result::ok).map(|entry| entry.path()) {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            if let Some((campaign, _)) = name.strip_suffix(".parquet").and_then(|stem| stem.rsplit_once('.')) {
-                found.entry(campaign.to_owned()).or_default().push(path);
-            } else if name.ends_with(".tmp") {
-                // A failure is harmless.
-                let _ = fs::remove_file(&path);
-            }
-        }
-        found.values_mut().for_each(|files| files.sort());
-        Ok(found)
-    }
-
     fn update_campaign(
         &mut self,
         history: &History,
@@ -132,17 +175,25 @@ impl Mirror {
         change: &mut MirrorChange,
     ) -> Result<(), Diagnostics> {
         let known: BTreeSet<&String> = runs.iter().collect();
-        let mut there = BTreeSet::new();
+        let (mut there, mut kept, mut outdated) = (BTreeSet::new(), Vec::new(), Vec::new());
         for file in files {
+            let whole = is_whole(&file);
+            change.damaged += usize::from(!whole);
             match runs_of(&file) {
-                Ok(runs) if runs.iter().all(|run| known.contains(run)) && there.is_disjoint(&runs) => {
+                Ok(runs) if whole && runs.iter().all(|run| known.contains(run)) && there.is_disjoint(&runs) => {
                     there.extend(runs);
-                    self.files.push((campaign.to_owned(), file));
+                    kept.push(file);
                 }
-                // From another history, duplicate, or corrupt: rewrite it from the store.
-                _ => fs::remove_file(&file).map_err(|error| unwritten(&file, &error))?,
+                // From another history, duplicate, or damaged: rewrite it from the store.
+                _ => outdated.push(file),
             }
         }
+        if kept.len() >= MOST_PARTS && there.len() < runs.len() {
+            outdated.append(&mut kept);
+            there.clear();
+        }
+        outdated.iter().try_for_each(|file| self.remove(file))?;
+        self.files.extend(kept.into_iter().map(|file| (campaign.to_owned(), file)));
         change.kept += there.len();
         let missing: Vec<&String> = runs.iter().filter(|run| !there.contains(*run)).collect();
         for runs in missing.chunks(RUNS_IN_A_FILE) {
@@ -157,24 +208,105 @@ impl Mirror {
         Ok(())
     }
 
-    /// Writes rows to a new file atomically.
-    fn write(&self, campaign: &str, rows: Rows) -> Result<PathBuf, Diagnostics> {
-        let taken = |number: &usize| self.files.iter().any(|(_, file)| *file == self.file(campaign, *number));
-        let number = (0..).find(|number| !taken(number)).unwrap_or_default();
-        let file = self.file(campaign, number);
-        let temporary = file.with_extension("tmp");
-        let written = || -> Result<(), PolarsError> {
-            let mut frame = rows.frame()?;
-            ParquetWriter::new(File::create(&temporary)?).finish(&mut frame)?;
-            Ok(fs::rename(&temporary, &file)?)
-        };
-        written().map_err(|error| unwritten(&file, &error))?;
-        Ok(file)
+    /// Removes a file of the history's mirror, if this process may change it.
+    fn remove(&self, file: &Path) -> Result<(), Diagnostics> {
+        if file.parent() != Some(self.folder.as_path()) {
+            return Ok(());
+        }
+        fs::remove_file(file).map_err(|error| unwritten(file, &error))
     }
 
-    fn file(&self, campaign: &str, number: usize) -> PathBuf {
-        self.folder.join(format!("{campaign}.{number:06}.parquet"))
+    /// Writes rows to a new file atomically.
+    fn write(&self, campaign: &str, rows: Rows) -> Result<PathBuf, Diagnostics> {
+        let number_of = |file: &Path| named(file).map(|name| name.number);
+        let last = self.files.iter().filter(|(of, _)| of == campaign).filter_map(|(_, file)| number_of(file)).max();
+        let number = last.map_or(0, |last| last + 1);
+        let written = || -> Result<PathBuf, PolarsError> {
+            let (mut frame, mut bytes) = (rows.frame()?, Cursor::new(Vec::new()));
+            ParquetWriter::new(&mut bytes).finish(&mut frame)?;
+            let bytes = bytes.into_inner();
+            let file = self.folder.join(format!("{campaign}.{number:06}.{}.parquet", digest_of_bytes(&bytes)));
+            write_atomic(&file, &bytes)?;
+            Ok(file)
+        };
+        written().map_err(|error| unwritten(&self.folder, &error))
     }
+}
+
+/// The parts of a file's name.
+struct TableName {
+    campaign: String,
+    number: usize,
+    /// `None` in names of earlier versions.
+    digest: Option<String>,
+}
+
+fn named(file: &Path) -> Option<TableName> {
+    let stem = file.file_name()?.to_str()?.strip_suffix(".parquet")?;
+    let (rest, last) = stem.rsplit_once('.')?;
+    let of_today = rest.rsplit_once('.').and_then(|(campaign, number)| {
+        Some(TableName { campaign: campaign.to_owned(), number: number.parse().ok()?, digest: Some(last.to_owned()) })
+    });
+    of_today.or_else(|| Some(TableName { campaign: rest.to_owned(), number: last.parse().ok()?, digest: None }))
+}
+
+/// Whether a file has the digest that its name says.
+fn is_whole(file: &Path) -> bool {
+    let digest = named(file).and_then(|name| name.digest);
+    digest.is_some_and(|digest| fs::read(file).is_ok_and(|bytes| digest_of_bytes(&bytes) == digest))
+}
+
+fn digest_of_bytes(bytes: &[u8]) -> String {
+    let mut digest = Digest::new();
+    digest.update(bytes);
+    digest.finish()
+}
+
+/// Whether a whole file has the rows that its runs have now.
+fn is_as_stored(history: &History, file: &Path, known: &BTreeSet<String>) -> Result<bool, Diagnostics> {
+    let Ok(runs) = runs_of(file) else { return Ok(false) };
+    if !runs.is_subset(known) {
+        return Ok(true);
+    }
+    let mut rows = Rows::default();
+    for run in &runs {
+        // Without its trace, a run's noise and effects can't be compared.
+        let Ok((choices, trace)) = history.recorded(run) else { return Ok(true) };
+        rows.add(&TableRun::new(history.run(run)?, &choices, &trace));
+    }
+    Ok(rows.frame().is_ok_and(|frame| read(file, None).is_ok_and(|there| there.equals_missing(&frame))))
+}
+
+/// The folder of a history's mirror.
+fn tables_of(history: &History) -> PathBuf {
+    history.dir().join("tables")
+}
+
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect()
+}
+
+fn is_table(file: &Path) -> bool {
+    file.extension().is_some_and(|ending| ending == "parquet")
+}
+
+/// Returns the files by campaign, in the order of writing. Removes partial files of killed processes, if this process
+/// may change the folder.
+fn present(tables: &Path, may_change: bool) -> BTreeMap<String, Vec<PathBuf>> {
+    let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+    for path in entries(tables) {
+        if let Some(name) = named(&path) {
+            found.entry(name.campaign).or_default().push(path);
+        } else if is_table(&path) {
+            // Its name is damaged.
+            found.entry(String::new()).or_default().push(path);
+        } else if may_change && path.extension().is_some_and(|ending| ending == "tmp") {
+            // A failure is harmless.
+            let _ = fs::remove_file(&path);
+        }
+    }
+    found.values_mut().for_each(|files| files.sort());
+    found
 }
 
 /// Reads a run. Noise and effects are unknown if its trace is missing, damaged, or of an unknown version.
@@ -237,7 +369,7 @@ fn schema_digest() -> String {
 
 /// Removes all files of a mirror.
 fn clear(folder: &Path) -> Result<(), Diagnostics> {
-    for path in fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok).map(|entry| entry.path()) {
+    for path in entries(folder) {
         if path.extension().is_some_and(|ending| ending == "parquet" || ending == "tmp") {
             fs::remove_file(&path).map_err(|error| unwritten(&path, &error))?;
         }

@@ -22,5 +22,5 @@ pub(super) use mirror::unwritten;
 pub use mirror::{Mirror, MirrorChange};
 pub use outcomes::{OutcomeTable, TableFilter, TextColumn};
 pub use row_source::Hierarchy;
-pub(super) use write::schema as outcomes_schema;
 pub use write::{export_csv, export_parquet};
+pub(super) use write::{new_text, pending_parquet, schema as outcomes_schema};

@@ -1,6 +1,7 @@
 //! Export of the table: one file in Parquet or CSV, and a description of its columns.
 
 use std::fs::{self, File};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use polars::prelude::{CsvWriter, DataFrame, ParquetWriter, PolarsError, SerWriter as _};
@@ -10,7 +11,7 @@ use crate::tables::columns::{ColumnKind, columns};
 use crate::tables::frames::{Rows, kinds_columns, with_kinds};
 use crate::tables::mirror::{Mirror, read, unread, unwritten};
 use crate::tables::{Hierarchy, TableFilter};
-use actcheck_base::Diagnostics;
+use actcheck_base::{Diagnostics, NewFile};
 
 /// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed. Returns the files and the number
 /// of rows.
@@ -23,9 +24,18 @@ pub fn export_parquet(
     hierarchy: &Hierarchy,
     folder: &Path,
 ) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
-    export(folder, "outcomes.parquet", |file| {
+    written(pending_parquet(mirror, filter, hierarchy, folder)?)
+}
+
+/// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed, without giving them their names.
+pub(crate) fn pending_parquet(
+    mirror: &Mirror,
+    filter: &TableFilter,
+    hierarchy: &Hierarchy,
+    folder: &Path,
+) -> Result<Pending, Diagnostics> {
+    export(folder, "outcomes.parquet", |file, writer| {
         let schema = empty(hierarchy).map_err(|error| unwritten(file, &error))?;
-        let writer = File::create(file).map_err(|error| unwritten(file, &error))?;
         let mut writer =
             ParquetWriter::new(writer).batched(schema.schema()).map_err(|error| unwritten(file, &error))?;
         let rows = each(mirror, filter, hierarchy, |frame| {
@@ -47,28 +57,64 @@ pub fn export_csv(
     hierarchy: &Hierarchy,
     folder: &Path,
 ) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
-    export(folder, "outcomes.csv", |file| {
+    written(export(folder, "outcomes.csv", |file, writer| {
         let schema = empty(hierarchy).map_err(|error| unwritten(file, &error))?;
-        let writer = File::create(file).map_err(|error| unwritten(file, &error))?;
         let mut writer = CsvWriter::new(writer).batched(schema.schema()).map_err(|error| unwritten(file, &error))?;
         let rows = each(mirror, filter, hierarchy, |frame| {
             writer.write_batch(frame).map_err(|error| unwritten(file, &error))
         })?;
         writer.finish().map_err(|error| unwritten(file, &error))?;
         Ok(rows)
-    })
+    })?)
+}
+
+/// A table and its description, complete but without their names.
+pub(crate) struct Pending {
+    table: (PathBuf, NewFile),
+    described: (PathBuf, NewFile),
+    rows: usize,
+}
+
+impl Pending {
+    /// Gives the table its name. Returns its path and number of rows.
+    pub(crate) fn finish_table(self) -> Result<(PathBuf, usize), Diagnostics> {
+        let (table, file) = self.table;
+        file.finish().map_err(|error| unwritten(&table, &error))?;
+        Ok((table, self.rows))
+    }
+}
+
+fn written(pending: Pending) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
+    let mut paths = Vec::new();
+    for (path, file) in [pending.table, pending.described] {
+        file.finish().map_err(|error| unwritten(&path, &error))?;
+        paths.push(path);
+    }
+    Ok((paths, pending.rows))
 }
 
 fn export(
     folder: &Path,
     name: &str,
-    write: impl FnOnce(&Path) -> Result<usize, Diagnostics>,
-) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
+    write: impl FnOnce(&Path, File) -> Result<usize, Diagnostics>,
+) -> Result<Pending, Diagnostics> {
     fs::create_dir_all(folder).map_err(|error| unwritten(folder, &error))?;
     let (table, described) = (folder.join(name), folder.join("schema.json"));
-    let rows = write(&table)?;
-    fs::write(&described, format!("{:#}\n", schema())).map_err(|error| unwritten(&described, &error))?;
-    Ok((vec![table, described], rows))
+    let file = NewFile::create(&table).map_err(|error| unwritten(&table, &error))?;
+    let writer = file.writer().map_err(|error| unwritten(&table, &error))?;
+    let rows = write(&table, writer)?;
+    let text = new_text(&described, &format!("{:#}\n", schema()))?;
+    Ok(Pending { table: (table, file), described: (described, text), rows })
+}
+
+/// Writes a text without giving the file its name.
+pub(crate) fn new_text(path: &Path, text: &str) -> Result<NewFile, Diagnostics> {
+    let write = || -> std::io::Result<NewFile> {
+        let file = NewFile::create(path)?;
+        file.writer()?.write_all(text.as_bytes())?;
+        Ok(file)
+    };
+    write().map_err(|error| unwritten(path, &error))
 }
 
 /// Returns the description of every column.

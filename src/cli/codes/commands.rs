@@ -218,6 +218,12 @@ const CODES_X: &[Code] = &[
         "print one of them, and name files for the others",
     ),
     code(
+        "X059",
+        "a case or a history would start a program without consent",
+        "it comes from someone else, or the campaign's own program has changed since",
+        "read the program, then run again with `--trust`; or remove the case",
+    ),
+    code(
         "X070",
         "the history has no campaign",
         "it is empty, or holds only shrunk runs and failed runs that ran again",

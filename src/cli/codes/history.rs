@@ -15,7 +15,7 @@ const CODES_H: &[Code] = &[
     code(
         "H002",
         "the history is open in another process",
-        "a campaign is running",
+        "a process is writing it, such as a campaign; only commands that read can be used meanwhile",
         "wait until it ends, or name another folder",
     ),
     code(
@@ -46,7 +46,7 @@ const CODES_H: &[Code] = &[
         "H007",
         "the history is damaged",
         "a file was changed or truncated from outside",
-        "restore the folder from a backup",
+        "`actcheck health --integrity` names the damaged files; `actcheck merge --salvage DIR --into NEW` copies all readable data, or restore the folder from a backup",
     ),
     code(
         "H008",
@@ -135,4 +135,10 @@ const CODES_H: &[Code] = &[
         "leave one out, and recheck the result",
     ),
     code("H025", "there is no such campaign to leave out", "the id is misspelt", "take the suggested id"),
+    code(
+        "H026",
+        "a campaign or run of a history has an id that is not an id",
+        "another program wrote or changed the history; such an id could name a file outside of the history",
+        "don't use the history; ids have only letters, digits, `-` and `_`",
+    ),
 ];

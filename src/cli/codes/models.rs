@@ -181,4 +181,10 @@ const CODES_W: &[Code] = &[
         "the profile and the URDF disagree",
         "choose a value within the limits in the help",
     ),
+    code(
+        "W055",
+        "an XML file of a model exceeds a limit of its structure",
+        "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels",
+        "don't use the file, or export the model again",
+    ),
 ];

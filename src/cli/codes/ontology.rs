@@ -73,4 +73,10 @@ const CODES_O: &[Code] = &[
         "it declares none and imports none",
         "declare one, such as `act:Pick a act:Action`, or import an ontology that does",
     ),
+    code(
+        "O013",
+        "an ontology in RDF/XML exceeds a limit of its structure",
+        "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels",
+        "don't use the file, or convert it to Turtle",
+    ),
 ];

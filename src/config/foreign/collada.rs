@@ -2,6 +2,9 @@
 //!
 //! Ignores `up_axis`, as Gazebo does: coordinates are used unchanged.
 
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
 use nalgebra::{Matrix4, Point3, Rotation3, Unit, Vector3};
 
 use crate::foreign::mesh_file::{MOST_TRIANGLES, checked};
@@ -12,6 +15,13 @@ use actcheck_data::Mesh;
 /// Limits on the depth and the number of nodes; only nodes that instance each other in a cycle exceed them.
 const DEEPEST: usize = 64;
 const MOST_NODES: usize = 100_000;
+
+/// Largest number of vertices with those of all instances, used or not.
+const MOST_VERTICES: usize = 3 * MOST_TRIANGLES;
+/// Largest offset of an input among the indices of a corner; files have a handful of inputs.
+const LARGEST_OFFSET: usize = 255;
+/// Longest text of a transform, which is read again for every instance. Unit: bytes.
+const LONGEST_TRANSFORM: usize = 1_000;
 
 /// Unsupported elements with a surface. Lines and points have none, so they are ignored.
 const UNREAD: [&str; 3] = ["trifans", "tristrips", "polygons"];
@@ -32,7 +42,7 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
     if root.tag_name().name() != "COLLADA" {
         return Err(fault(root, format!("its root is `<{}>` instead of `<COLLADA>`", root.tag_name().name())));
     }
-    let mut gathering = Gathering { root, vertices: Vec::new(), triangles: Vec::new(), depth: 0, n_nodes: 0 };
+    let mut gathering = Gathering::new(root);
     gathering.scene().map_err(|(node, reason)| fault(node, reason))?;
     if let Some(up) = xml::child(root, "asset").and_then(|asset| xml::child(asset, "up_axis"))
         && xml::text(up) != "Z_UP"
@@ -60,9 +70,19 @@ fn unit(root: Node) -> f64 {
 /// A faulty element and the reason.
 type Fault<'a> = (Node<'a>, String);
 
+/// A geometry in its own frame: its positions, and its triangles as indices of them. Unit: the file's.
+struct Geometry {
+    positions: Vec<Point3<f64>>,
+    triangles: Vec<[usize; 3]>,
+}
+
 /// The scene's triangles so far, in the file's unit.
 struct Gathering<'a> {
     root: Node<'a>,
+    /// Elements by kind and id; the first of several.
+    by_id: BTreeMap<(&'a str, &'a str), Node<'a>>,
+    /// Geometries that were read, by element: a scene may instance one thousands of times.
+    known: BTreeMap<Node<'a>, Rc<Geometry>>,
     vertices: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
     depth: usize,
@@ -70,6 +90,16 @@ struct Gathering<'a> {
 }
 
 impl<'a> Gathering<'a> {
+    fn new(root: Node<'a>) -> Self {
+        let mut by_id = BTreeMap::new();
+        for node in root.descendants().filter(Node::is_element) {
+            if let Some(id) = node.attribute("id") {
+                by_id.entry((node.tag_name().name(), id)).or_insert(node);
+            }
+        }
+        Self { root, by_id, known: BTreeMap::new(), vertices: Vec::new(), triangles: Vec::new(), depth: 0, n_nodes: 0 }
+    }
+
     /// Gathers the scene that the file instances, or else its first scene, or else every geometry without transforms.
     fn scene(&mut self) -> Result<(), Fault<'a>> {
         let named = xml::child(self.root, "scene").and_then(|scene| xml::child(scene, "instance_visual_scene"));
@@ -116,45 +146,72 @@ impl<'a> Gathering<'a> {
     }
 
     /// Finds the element that a `url` or `source` refers to.
-    fn target(&self, instance: Node<'a>, kind: &str) -> Result<Node<'a>, Fault<'a>> {
+    fn target(&self, instance: Node<'a>, kind: &'static str) -> Result<Node<'a>, Fault<'a>> {
         let url = instance.attribute("url").or_else(|| instance.attribute("source")).unwrap_or_default();
         let id = url.trim_start_matches('#');
-        self.root
-            .descendants()
-            .find(|node| node.tag_name().name() == kind && node.attribute("id") == Some(id))
-            .ok_or_else(|| (instance, format!("there is no `<{kind} id=\"{id}\">`")))
+        self.by_id.get(&(kind, id)).copied().ok_or_else(|| (instance, format!("there is no `<{kind} id=\"{id}\">`")))
     }
 
-    fn geometry(&mut self, geometry: Node<'a>, at: &Matrix4<f64>) -> Result<(), Fault<'a>> {
-        let Some(mesh) = xml::child(geometry, "mesh") else { return Ok(()) };
+    /// Adds a geometry to the scene.
+    fn geometry(&mut self, node: Node<'a>, at: &Matrix4<f64>) -> Result<(), Fault<'a>> {
+        let geometry = match self.known.get(&node) {
+            Some(known) => Rc::clone(known),
+            None => {
+                let read = Rc::new(self.read_geometry(node)?);
+                self.known.insert(node, Rc::clone(&read));
+                read
+            }
+        };
+        let before = self.vertices.len();
+        if before + geometry.positions.len() > MOST_VERTICES {
+            return Err((node, format!("its instances have more than {MOST_VERTICES} vertices")));
+        }
+        if self.triangles.len() + geometry.triangles.len() > MOST_TRIANGLES {
+            return Err((node, format!("its instances have more than {MOST_TRIANGLES} triangles")));
+        }
+        let placed = geometry.positions.iter().map(|position| <[f64; 3]>::from(at.transform_point(position).coords));
+        self.vertices.extend(placed);
+        for corners in &geometry.triangles {
+            let narrow = corners.map(|corner| u32::try_from(corner + before));
+            let [Ok(a), Ok(b), Ok(c)] = narrow else { return Err((node, "it is too large".to_owned())) };
+            self.triangles.push([a, b, c]);
+        }
+        Ok(())
+    }
+
+    fn read_geometry(&self, node: Node<'a>) -> Result<Geometry, Fault<'a>> {
+        let mut geometry = Geometry { positions: Vec::new(), triangles: Vec::new() };
+        let Some(mesh) = xml::child(node, "mesh") else { return Ok(geometry) };
         for primitive in mesh.children().filter(|child| child.is_element()) {
             match primitive.tag_name().name() {
-                "triangles" | "polylist" => self.primitive(primitive, at)?,
+                "triangles" | "polylist" => self.primitive(primitive, &mut geometry)?,
                 unread if UNREAD.contains(&unread) => {
                     return Err((primitive, format!("`<{unread}>` is not supported")));
                 }
                 _ => {}
             }
         }
-        Ok(())
+        Ok(geometry)
     }
 
     /// Adds triangles, or polygons split into triangle fans.
-    fn primitive(&mut self, primitive: Node<'a>, at: &Matrix4<f64>) -> Result<(), Fault<'a>> {
+    fn primitive(&self, primitive: Node<'a>, geometry: &mut Geometry) -> Result<(), Fault<'a>> {
         let inputs: Vec<Node> = xml::children(primitive, "input").collect();
-        let offset = |input: &Node| input.attribute("offset").and_then(|at| at.parse::<usize>().ok()).unwrap_or(0);
-        let stride = inputs.iter().map(offset).max().map_or(1, |last| last + 1);
-        let vertex = inputs.iter().find(|input| input.attribute("semantic") == Some("VERTEX"));
-        let vertex = vertex.ok_or_else(|| (primitive, "it has no input VERTEX".to_owned()))?;
+        let offsets = inputs.iter().map(|input| offset(*input)).collect::<Result<Vec<usize>, _>>()?;
+        let stride = offsets.iter().max().map_or(1, |last| last + 1);
+        let vertex = inputs.iter().zip(&offsets).find(|(input, _)| input.attribute("semantic") == Some("VERTEX"));
+        let (vertex, offset) = vertex.ok_or_else(|| (primitive, "it has no input VERTEX".to_owned()))?;
         let positions = self.positions(*vertex)?;
         let indices: Vec<usize> = list(xml::child(primitive, "p").unwrap_or(primitive), "p")?;
-        let corners: Vec<usize> =
-            indices.chunks_exact(stride).filter_map(|all| all.get(offset(vertex)).copied()).collect();
+        let corners: Vec<usize> = indices.chunks_exact(stride).filter_map(|all| all.get(*offset).copied()).collect();
         if corners.iter().any(|corner| *corner >= positions.len()) {
             return Err((primitive, "it refers to a missing vertex".to_owned()));
         }
-        let before = self.vertices.len();
-        self.vertices.extend(positions.iter().map(|position| <[f64; 3]>::from(at.transform_point(position).coords)));
+        let before = geometry.positions.len();
+        if before + positions.len() > MOST_VERTICES {
+            return Err((primitive, format!("it has more than {MOST_VERTICES} vertices")));
+        }
+        geometry.positions.extend(positions);
         let counts: Vec<usize> = match xml::child(primitive, "vcount") {
             Some(counts) => list(counts, "vcount")?,
             None => vec![3; corners.len() / 3],
@@ -166,19 +223,12 @@ impl<'a> Gathering<'a> {
             };
             rest = behind;
             for pair in polygon.get(1..).unwrap_or_default().windows(2) {
-                self.triangle(primitive, [polygon[0], pair[0], pair[1]].map(|corner| corner + before))?;
+                if geometry.triangles.len() >= MOST_TRIANGLES {
+                    return Err((primitive, format!("it has more than {MOST_TRIANGLES} triangles")));
+                }
+                geometry.triangles.push([polygon[0], pair[0], pair[1]].map(|corner| corner + before));
             }
         }
-        Ok(())
-    }
-
-    fn triangle(&mut self, primitive: Node<'a>, corners: [usize; 3]) -> Result<(), Fault<'a>> {
-        let narrow = corners.map(u32::try_from);
-        let [Ok(a), Ok(b), Ok(c)] = narrow else { return Err((primitive, "it is too large".to_owned())) };
-        if self.triangles.len() >= MOST_TRIANGLES {
-            return Err((primitive, format!("it has more than {MOST_TRIANGLES} triangles")));
-        }
-        self.triangles.push([a, b, c]);
         Ok(())
     }
 
@@ -198,6 +248,13 @@ impl<'a> Gathering<'a> {
     }
 }
 
+/// Returns the position of an input among the indices of a corner; 0 if it is not written.
+fn offset(input: Node<'_>) -> Result<usize, Fault<'_>> {
+    let Some(written) = input.attribute("offset") else { return Ok(0) };
+    let offset = written.trim().parse().ok().filter(|offset| *offset <= LARGEST_OFFSET);
+    offset.ok_or_else(|| (input, format!("an `offset` must be a number from 0 to {LARGEST_OFFSET}")))
+}
+
 /// Returns the product of a node's own transforms, in document order.
 fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
     let mut product = Matrix4::identity();
@@ -210,6 +267,9 @@ fn transform(node: Node<'_>) -> Result<Matrix4<f64>, Fault<'_>> {
             "lookat" | "skew" => return Err((element, format!("`<{kind}>` is not supported"))),
             _ => continue,
         };
+        if xml::text(element).len() > LONGEST_TRANSFORM {
+            return Err((element, format!("`<{kind}>` is longer than {LONGEST_TRANSFORM} characters")));
+        }
         let numbers: Vec<f64> = list(element, kind)?;
         if numbers.len() != length {
             return Err((element, format!("`<{kind}>` must hold {length} numbers")));

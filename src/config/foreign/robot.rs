@@ -24,7 +24,7 @@ pub(crate) struct RobotText {
 pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotText {
     let mut shapes = Shapes { lookup, path, digest: Digest::new() };
     let mut meshes = BTreeMap::new();
-    let document = match xml::parse(source) {
+    let document = match xml::parse_model(source) {
         Ok(document) => document,
         Err(faults) => {
             found.extend(faults);

@@ -25,7 +25,7 @@ pub(crate) struct SdfModel {
 
 /// Reads the model of an SDF file and its faults. The model is `None` if there are errors.
 pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
-    let document = match xml::parse(source) {
+    let document = match xml::parse_model(source) {
         Ok(document) => document,
         Err(faults) => return (None, faults),
     };

@@ -17,7 +17,7 @@ const LONGEST_CHAIN: usize = 256;
 
 /// Reads the object of a URDF file and its faults. The object is `None` if there are errors.
 pub(crate) fn read(source: &Source, path: &Path, lookup: &Lookup) -> (Option<SdfModel>, Diagnostics) {
-    let document = match xml::parse(source) {
+    let document = match xml::parse_model(source) {
         Ok(document) => document,
         Err(faults) => return (None, faults),
     };

@@ -47,7 +47,7 @@ pub(crate) fn read<'a>(
     model: impl Fn(&str) -> Option<&'a ObjectModel>,
     known: &[String],
 ) -> (Option<WorldMap>, Diagnostics) {
-    let document = match xml::parse(source) {
+    let document = match xml::parse_model(source) {
         Ok(document) => document,
         Err(faults) => return (None, faults),
     };

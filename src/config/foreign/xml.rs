@@ -2,7 +2,16 @@
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use actcheck_base::{Diagnostic, Diagnostics, Source, Span, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, check_xml, did_you_mean};
+
+/// Longest text of a model, robot or world; meshes have files of their own. Unit: bytes.
+const LONGEST_MODEL: usize = 16 << 20;
+/// Largest number of elements of one of the kinds in [`PARTS`]: each is simulated, or compared with all others.
+const MOST_PARTS: usize = 1_000;
+/// Kinds of elements that models and worlds consist of.
+const PARTS: [&str; 5] = ["link", "joint", "collision", "include", "model"];
+/// Largest number of errors, and of warnings, that are reported for one file.
+const MOST_FAULTS: usize = 200;
 
 /// An element of a document.
 pub(crate) type Node<'a> = roxmltree::Node<'a, 'a>;
@@ -18,8 +27,8 @@ pub(crate) enum Bound {
     Mass,
 }
 
-/// Largest mass and largest length of a body: a thousand tonnes and a thousand kilometres are no part of a robot's scene,
-/// and the physics engine can't calculate with much larger numbers. Units: kilograms, metres.
+/// Largest mass and largest length of a body: no scene of a robot has a thousand tonnes or a thousand kilometres, and the
+/// physics engine can't calculate with much larger numbers. Units: kilograms, metres.
 const LARGEST: f64 = 1e6;
 
 impl Bound {
@@ -46,8 +55,9 @@ impl Bound {
 /// Parses the document of a text.
 ///
 /// # Errors
-/// W031 at the first syntax error.
+/// W031 at the first syntax error; W055 if parsing could exhaust time or memory.
 pub(crate) fn parse(source: &Source) -> Result<roxmltree::Document<'_>, Diagnostics> {
+    check_xml(source, "W055")?;
     roxmltree::Document::parse(&source.text).map_err(|error| {
         let place = error.pos();
         let at = offset(&source.text, place.row as usize, place.col as usize);
@@ -59,6 +69,29 @@ pub(crate) fn parse(source: &Source) -> Result<roxmltree::Document<'_>, Diagnost
             .help("check that every element is closed and that every `<` in text is written `&lt;`")
             .into()
     })
+}
+
+/// Parses the document of a model, a robot or a world.
+///
+/// # Errors
+/// As [`parse`]; W055 also if it has more parts than can be simulated.
+pub(crate) fn parse_model(source: &Source) -> Result<roxmltree::Document<'_>, Diagnostics> {
+    let refused = |message: String, at: Span| {
+        Diagnostic::error("W055", message)
+            .at(source, at)
+            .help("use fewer and simpler parts; meshes have files of their own")
+    };
+    if source.text.len() > LONGEST_MODEL {
+        return Err(refused(format!("this model is longer than {} MiB", LONGEST_MODEL >> 20), 0..0).into());
+    }
+    let document = parse(source)?;
+    for part in PARTS {
+        let mut all = document.descendants().filter(|node| node.is_element() && node.tag_name().name() == part);
+        if let Some(next) = all.nth(MOST_PARTS) {
+            return Err(refused(format!("this model has more than {MOST_PARTS} `<{part}>`"), span(next)).into());
+        }
+    }
+    Ok(document)
 }
 
 /// Returns the byte offset of a line and a column, both 1-based, the column in characters.
@@ -94,21 +127,29 @@ pub(crate) fn text<'a>(node: Node<'a>) -> &'a str {
 pub(crate) struct Reader<'a> {
     pub(crate) source: &'a Source,
     pub(crate) found: Diagnostics,
+    n_errors: usize,
+    n_warnings: usize,
 }
 
 impl<'a> Reader<'a> {
     pub(crate) fn new(source: &'a Source) -> Self {
-        Self { source, found: Diagnostics::new() }
+        Self { source, found: Diagnostics::new(), n_errors: 0, n_warnings: 0 }
     }
 
-    /// Records an error of an element.
+    /// Records an error of an element. Those after the first 200 are dropped, as are warnings.
     pub(crate) fn error(&mut self, code: &'static str, node: Node, message: String, help: impl Into<String>) {
-        self.found.push(Diagnostic::error(code, message).at(self.source, span(node)).help(help));
+        self.n_errors += 1;
+        if self.n_errors <= MOST_FAULTS {
+            self.found.push(Diagnostic::error(code, message).at(self.source, span(node)).help(help));
+        }
     }
 
     /// Records a warning about an element, usually that it is ignored.
     pub(crate) fn warning(&mut self, code: &'static str, node: Node, message: String, help: impl Into<String>) {
-        self.found.push(Diagnostic::warning(code, message).at(self.source, span(node)).help(help));
+        self.n_warnings += 1;
+        if self.n_warnings <= MOST_FAULTS {
+            self.found.push(Diagnostic::warning(code, message).at(self.source, span(node)).help(help));
+        }
     }
 
     /// Returns a required child; reports W033 and returns `None` if it is missing.

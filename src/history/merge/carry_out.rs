@@ -14,7 +14,7 @@ use crate::statements::{Statements, iri, time};
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::run_node;
 use crate::{History, fault};
-use actcheck_base::{Diagnostic, Diagnostics, write_atomic};
+use actcheck_base::{Diagnostic, Diagnostics, Files, write_atomic};
 
 /// The result of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -115,7 +115,7 @@ impl Writer<'_> {
 
     fn run(&mut self, source: usize, run: &str, new: &str) -> Result<(), Diagnostics> {
         let doing = format!("writing run {new}");
-        match std::fs::read(self.sources[source].trace_path(run)) {
+        match Files::Disk.read_bytes(&self.sources[source].trace_path(run)) {
             Ok(bytes) => write_atomic(&self.into.trace_path(new), &bytes)
                 .map_err(|error| fault::io(self.into.dir(), &doing, &error))?,
             Err(_) => self.merged.without_trace.push(new.to_owned()),
@@ -150,7 +150,7 @@ impl Writer<'_> {
     /// All statements of a source about a campaign or run, with the ids of the destination.
     fn about(&self, source: usize, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
         let history = &self.sources[source];
-        let quads = about(&history.store()?, node).map_err(|error| history.fault("reading it", &error))?;
+        let quads = about(&*history.store()?, node).map_err(|error| history.fault("reading it", &error))?;
         Ok(self.renames[source].apply(quads))
     }
 
@@ -166,7 +166,7 @@ impl Writer<'_> {
         if new.is_empty() && old.is_empty() {
             return Ok(());
         }
-        replace(&self.into.store()?, new, old).map_err(|error| self.into.fault("writing merged data", &error))
+        replace(&*self.into.store()?, new, old).map_err(|error| self.into.fault("writing merged data", &error))
     }
 }
 

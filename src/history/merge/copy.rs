@@ -9,7 +9,7 @@ use oxigraph::store::{StorageError, Store};
 /// named graphs below its IRI.
 ///
 /// The properties of a run are not listed anywhere, so that data added by later versions is copied too.
-pub(super) fn about(store: &Store, root: &NamedNode) -> Result<Vec<Quad>, StorageError> {
+pub(crate) fn about(store: &Store, root: &NamedNode) -> Result<Vec<Quad>, StorageError> {
     let below = format!("{}/", root.as_str());
     let belongs = |node: &NamedOrBlankNode| match node {
         NamedOrBlankNode::NamedNode(node) => node.as_str().starts_with(&below),

@@ -13,4 +13,5 @@ mod renames;
 mod survey;
 
 pub use carry_out::{Merged, carry_out};
+pub(crate) use copy::about;
 pub use plan::{MergeOptions, MergePlan, PlannedMerge, plan};

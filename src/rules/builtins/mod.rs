@@ -3,7 +3,7 @@
 //! A function returns `None` if its arguments are outside its domain: the condition does not hold, or the variable gets
 //! no value.
 //!
-//! Never: depends on a predicate, a rule or a fact; a function depends only on its arguments.
+//! Never: depends on a predicate, a rule or a fact; a function depends only on its arguments, and stops at the budget.
 
 mod bits;
 mod geometry;
@@ -18,5 +18,5 @@ pub(crate) use numeric::{compare, equal};
 #[cfg(feature = "sparql")]
 pub(crate) use table::builtin_by_exact_name;
 pub(crate) use table::{Builtin, builtin, builtin_names};
-pub(crate) use text::compile_pattern;
+pub(crate) use text::{compile_pattern, matches};
 pub(crate) use value::Value;

@@ -1,6 +1,8 @@
 //! Table of the built-ins: name, number of arguments, function.
 
 use crate::builtins::{Value, bits, geometry, numeric, text, types};
+use crate::model::values::text_len;
+use crate::watch::Watch;
 use actcheck_base::Term;
 
 /// A built-in function.
@@ -11,8 +13,36 @@ pub(crate) struct Builtin {
     pub(crate) min_args: usize,
     /// Maximum number of arguments.
     pub(crate) max_args: usize,
-    /// The function. Returns `None` if the arguments are outside its domain.
-    pub(crate) apply: fn(&[Value<'_>]) -> Option<Term>,
+    apply: Apply,
+}
+
+/// A function. Returns `None` if the arguments are outside its domain.
+#[derive(Clone, Copy)]
+enum Apply {
+    /// Takes time linear in the texts.
+    Plain(fn(&[Value<'_>]) -> Option<Term>),
+    /// May take long, so that it checks the clock; also `None` if the budget is spent.
+    Watched(fn(&[Value<'_>], &Watch) -> Option<Term>),
+}
+
+/// Shorter texts are not accounted for.
+const SHORT: usize = 256;
+
+/// A function makes texts of at most this many times the length of its arguments: a byte becomes `%2F`.
+const GROWTH: usize = 3;
+
+impl Builtin {
+    /// Computes the function. Returns `None` if the arguments are outside its domain, or if the budget is spent.
+    pub(crate) fn call(&self, args: &[Value<'_>], watch: &Watch) -> Option<Term> {
+        let length: usize = args.iter().map(|arg| text_len(arg)).sum();
+        if length > SHORT {
+            watch.make(length.saturating_mul(GROWTH))?;
+        }
+        match self.apply {
+            Apply::Plain(function) => function(args),
+            Apply::Watched(function) => function(args, watch),
+        }
+    }
 }
 
 impl std::fmt::Debug for Builtin {
@@ -29,11 +59,15 @@ const fn entry(
     max_args: usize,
     apply: fn(&[Value<'_>]) -> Option<Term>,
 ) -> Builtin {
-    Builtin { name, min_args, max_args, apply }
+    Builtin { name, min_args, max_args, apply: Apply::Plain(apply) }
+}
+
+const fn watched(name: &'static str, apply: fn(&[Value<'_>], &Watch) -> Option<Term>) -> Builtin {
+    Builtin { name, min_args: 2, max_args: 2, apply: Apply::Watched(apply) }
 }
 
 /// Every built-in. The first six are also written as operators.
-static BUILTINS: [Builtin; 87] = [
+static BUILTINS: [Builtin; 89] = [
     entry("SUM", 1, MANY, numeric::sum),
     entry("MINUS", 2, 2, numeric::minus),
     entry("PRODUCT", 1, MANY, numeric::product),
@@ -84,8 +118,8 @@ static BUILTINS: [Builtin; 87] = [
     entry("STRENDS", 2, 2, text::ends),
     entry("STRBEFORE", 2, 2, text::before),
     entry("STRAFTER", 2, 2, text::after),
-    entry("REGEX", 2, 2, text::regex),
-    entry("LEVENSHTEIN", 2, 2, text::levenshtein),
+    watched("REGEX", text::regex),
+    watched("LEVENSHTEIN", text::levenshtein),
     entry("UCASE", 1, 1, text::ucase),
     entry("LCASE", 1, 1, text::lcase),
     entry("URIENCODE", 1, 1, text::uri_encode),
@@ -95,6 +129,7 @@ static BUILTINS: [Builtin; 87] = [
     entry("FLOAT", 1, 1, types::float),
     entry("IRI", 1, 1, types::iri),
     entry("DATATYPE", 1, 1, types::datatype),
+    entry("CANONICALVALUE", 1, 1, types::canonical),
     entry("LANG", 1, 1, types::lang),
     entry("STRLANG", 2, 2, types::str_lang),
     entry("isNumeric", 1, 1, types::is_numeric),
@@ -107,6 +142,7 @@ static BUILTINS: [Builtin; 87] = [
     entry("isBlank", 1, 1, types::is_null),
     entry("isBoolean", 1, 1, types::is_boolean),
     entry("isLiteral", 1, 1, types::is_literal),
+    entry("isOfDatatype", 2, 2, types::is_of_datatype),
     entry("geo3d:distance", 6, 6, geometry::distance),
     entry("geo3d:distance2d", 4, 4, geometry::distance2d),
     entry("geo3d:norm", 3, 3, geometry::norm),

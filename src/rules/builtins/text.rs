@@ -1,12 +1,21 @@
 //! String functions. Positions count characters from 1. Results keep the language tag if possible.
 
 use std::sync::Arc;
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::time::Duration;
 
 use crate::builtins::Value;
+use crate::watch::Watch;
 use actcheck_base::Term;
 
 /// Maximum size of a compiled pattern. Unit: bytes.
 const PATTERN_LIMIT: usize = 1 << 20;
+/// Compiling a pattern may take as long as reading this much text. Unit: bytes.
+const COMPILING: usize = 1 << 16;
+/// Matching a text of this length with the largest pattern takes under a second. Unit: bytes.
+const LONG_TEXT: usize = 1 << 12;
+/// Interval at which the clock is checked while a long text is matched.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Returns the text and language of a string, or `None` for another term.
 fn parts(term: &Term) -> Option<(&str, Option<&Arc<str>>)> {
@@ -108,9 +117,36 @@ pub(super) fn lcase(args: &[Value<'_>]) -> Option<Term> {
     map(args, str::to_lowercase)
 }
 
-pub(super) fn regex(args: &[Value<'_>]) -> Option<Term> {
-    let (text, pattern) = pair(args)?;
-    Some(Term::Boolean(compile_pattern(pattern).ok()?.is_match(text)))
+pub(super) fn regex(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
+    pair(args)?;
+    let (Term::String(text) | Term::LangString(text, _)) = args[0].as_ref() else { return None };
+    watch.work(COMPILING)?;
+    let pattern = compile_pattern(parts(&args[1])?.0).ok()?;
+    matches(&pattern, text, watch).map(Term::Boolean)
+}
+
+/// Returns whether a text contains a match. Returns `None` if the time is over.
+///
+/// Matching takes time linear in the text, but the factor may be the size of the pattern, and it can't be interrupted.
+/// A long text is therefore matched in a thread, which is left to itself if the time is over.
+pub(crate) fn matches(pattern: &regex::Regex, text: &Arc<str>, watch: &Watch) -> Option<bool> {
+    if text.len() <= LONG_TEXT {
+        watch.work(text.len())?;
+        return Some(pattern.is_match(text));
+    }
+    let (sender, receiver) = sync_channel(1);
+    let (pattern, text) = (pattern.clone(), Arc::clone(text));
+    // If no thread can be created, the sender is dropped and the receiver reports it.
+    let _ = std::thread::Builder::new().spawn(move || {
+        let _ = sender.send(pattern.is_match(&text));
+    });
+    loop {
+        match receiver.recv_timeout(LOOK_EVERY) {
+            Ok(found) => return Some(found),
+            Err(RecvTimeoutError::Timeout) => watch.check().ok()?,
+            Err(RecvTimeoutError::Disconnected) => return None,
+        }
+    }
 }
 
 /// Compiles a pattern. Matching takes time linear in the text.
@@ -123,8 +159,26 @@ pub(crate) fn compile_pattern(pattern: &str) -> Result<regex::Regex, String> {
     })
 }
 
-pub(super) fn levenshtein(args: &[Value<'_>]) -> Option<Term> {
-    pair(args).map(|(a, b)| count(strsim::levenshtein(a, b)))
+/// The number of edits between two texts, by rows of the distance table. The clock is checked at every row.
+pub(super) fn levenshtein(args: &[Value<'_>], watch: &Watch) -> Option<Term> {
+    let (a, b) = pair(args)?;
+    let (long, short) = if a.len() < b.len() { (b, a) } else { (a, b) };
+    watch.make(short.len().saturating_mul(size_of::<char>() + size_of::<usize>()))?;
+    let short: Vec<char> = short.chars().collect();
+    let mut row: Vec<usize> = (1..=short.len()).collect();
+    let mut distance = short.len();
+    for (above, first) in long.chars().enumerate() {
+        watch.work(short.len().max(1))?;
+        let mut diagonal = above;
+        distance = above + 1;
+        for (cell, second) in row.iter_mut().zip(&short) {
+            let substituted = diagonal + usize::from(first != *second);
+            diagonal = *cell;
+            distance = substituted.min(*cell + 1).min(distance + 1);
+            *cell = distance;
+        }
+    }
+    Some(count(distance))
 }
 
 pub(super) fn uri_encode(args: &[Value<'_>]) -> Option<Term> {

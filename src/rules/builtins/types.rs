@@ -1,6 +1,7 @@
 //! Type tests, conversions between types, and boolean functions.
 
 use crate::builtins::Value;
+use crate::model::datatypes;
 use crate::model::values::{self, Number};
 use actcheck_base::Term;
 
@@ -89,6 +90,14 @@ pub(super) fn iri(args: &[Value<'_>]) -> Option<Term> {
 
 pub(super) fn datatype(args: &[Value<'_>]) -> Option<Term> {
     Some(Term::iri(values::datatype(&args[0])))
+}
+
+pub(super) fn canonical(args: &[Value<'_>]) -> Option<Term> {
+    datatypes::canonical(&args[0])
+}
+
+pub(super) fn is_of_datatype(args: &[Value<'_>]) -> Option<Term> {
+    datatypes::belongs(&args[0], args[1].as_iri()?).map(Term::Boolean)
 }
 
 pub(super) fn lang(args: &[Value<'_>]) -> Option<Term> {

@@ -7,11 +7,13 @@ use crate::check::checking::{Checking, Role};
 use crate::check::expressions::{contains_aggregate, push_new};
 use crate::check::options::globals;
 use crate::check::safety;
+use crate::engine::budget::Budget;
 use crate::model::expression::{Expr, Variable};
 use crate::model::program::{Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule};
 use crate::model::universe::Universe;
 use crate::syntax::limits::{FAULT_LIMIT, LITERAL_LIMIT, VARIABLE_LIMIT};
 use crate::syntax::{AtomSyntax, Comparison, Expression, ExpressionKind, LiteralSyntax, RuleSyntax, Statement, Syntax};
+use crate::watch::Watch;
 use actcheck_base::{Source, Span, Term, TermId, Terms};
 
 /// Translates the rules and facts of a file. Statements with errors are reported and left out.
@@ -153,7 +155,9 @@ impl<'c, 'a> Translation<'c, 'a> {
             return None;
         }
         let nothing = Terms::new();
-        let value = expr.value(&[], &Universe::new(&nothing, None)).map(|value| value.into_owned());
+        let value = expr
+            .value(&[], &Universe::new(&nothing, None), &Watch::new(&Budget::default()))
+            .map(|value| value.into_owned());
         if value.is_none() {
             self.error("R037", &expression.span, "the expression has no value", "check the types of its arguments");
         }

@@ -1,11 +1,8 @@
 //! Aggregation: groups the matches of a body into rows of the head.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use crate::builtins;
-use crate::engine::meter::{Meter, Stop};
+use crate::engine::meter::{Meter, Stop, Watch};
 use crate::engine::plan::operand_value;
-use crate::model::expression::Variable;
 use crate::model::program::{AggregateKind, Aggregation, Operand, Rule};
 use crate::model::universe::Universe;
 use crate::model::values::{Number, double_term, is_beyond_64_bits};
@@ -17,7 +14,39 @@ pub(crate) fn projection(aggregation: &Aggregation) -> Vec<Operand> {
     aggregation.group.iter().chain(inputs).map(|variable| Operand::Variable(*variable)).collect()
 }
 
-/// Returns the head rows of an aggregating rule. `matches`: rows of the projection.
+/// Gives ids to computed values.
+pub(crate) trait Ids<'t> {
+    /// Returns the terms.
+    fn universe(&self) -> &Universe<'t>;
+    /// Returns the id of a value, or `None` if it has none.
+    fn id_of(&mut self, term: Term, watch: &Watch) -> Option<TermId>;
+}
+
+impl<'t> Ids<'t> for Universe<'t> {
+    fn universe(&self) -> &Universe<'t> {
+        self
+    }
+
+    /// Adds the value if it is new. Returns `None` if the memory budget is spent.
+    fn id_of(&mut self, term: Term, watch: &Watch) -> Option<TermId> {
+        self.create(term, watch).ok()
+    }
+}
+
+/// Terms to which no value is added.
+pub(crate) struct Known<'u, 't>(pub(crate) &'u Universe<'t>);
+
+impl<'t> Ids<'t> for Known<'_, 't> {
+    fn universe(&self) -> &Universe<'t> {
+        self.0
+    }
+
+    fn id_of(&mut self, term: Term, _: &Watch) -> Option<TermId> {
+        self.0.id(&term)
+    }
+}
+
+/// Returns the head rows of an aggregating rule. `matches`: rows of the projection, sorted and distinct.
 pub(crate) fn aggregate(
     rule: &Rule,
     aggregation: &Aggregation,
@@ -25,56 +54,57 @@ pub(crate) fn aggregate(
     universe: &mut Universe<'_>,
     meter: &mut Meter,
 ) -> Result<Vec<TermId>, Stop> {
-    let width = projection(aggregation).len();
+    let width = projection(aggregation).len().max(1);
     let keys = aggregation.group.len();
-    let mut groups: BTreeMap<&[TermId], Vec<&[TermId]>> = BTreeMap::new();
-    for row in matches.chunks_exact(width.max(1)) {
-        meter.step()?;
-        groups.entry(&row[..keys]).or_default().push(&row[keys..]);
-    }
+    let rows: Vec<&[TermId]> = matches.chunks_exact(width).collect();
     let mut out = Vec::new();
-    let mut binding = vec![0; rule.variables.len()];
-    for (key, rows) in groups {
-        meter.step()?;
-        bind(&mut binding, &aggregation.group, key);
-        if fill(aggregation, &rows, &mut binding, universe).is_some() {
-            out.extend(rule.head.args.iter().map(|arg| operand_value(*arg, &binding)));
+    for group in rows.chunk_by(|a, b| a[..keys] == b[..keys]) {
+        for _ in group {
+            meter.step()?;
+        }
+        match group_head(rule, aggregation, group, universe, &meter.watch) {
+            Some(head) => out.extend(head),
+            None => meter.watch.stopped()?,
         }
     }
     Ok(out)
 }
 
-fn bind(binding: &mut [TermId], variables: &[Variable], values: &[TermId]) {
-    for (variable, value) in variables.iter().zip(values) {
+/// Returns the head row of one group, which consists of rows of the projection. Returns `None` if the group is empty, if
+/// an aggregate has no value, or if the budget is spent.
+pub(crate) fn group_head<'t>(
+    rule: &Rule,
+    aggregation: &Aggregation,
+    group: &[&[TermId]],
+    ids: &mut impl Ids<'t>,
+    watch: &Watch,
+) -> Option<Vec<TermId>> {
+    let mut binding = vec![0; rule.variables.len()];
+    for (variable, value) in aggregation.group.iter().zip(*group.first()?) {
         binding[*variable] = *value;
     }
-}
-
-/// Computes the aggregates of a group and the variables that depend on them. Returns `None` if one has no value.
-fn fill(
-    aggregation: &Aggregation,
-    rows: &[&[TermId]],
-    binding: &mut [TermId],
-    universe: &mut Universe<'_>,
-) -> Option<()> {
-    let mut start = 0;
+    let mut start = aggregation.group.len();
     for part in &aggregation.aggregates {
         let end = start + 1 + part.distinct.len();
-        let distinct: BTreeSet<&[TermId]> = rows.iter().map(|row| &row[start..end]).collect();
-        let inputs = distinct.iter().map(|row| universe.term(row[0]));
+        watch.work(group.len() * size_of::<TermId>())?;
+        let mut distinct: Vec<&[TermId]> = group.iter().map(|row| &row[start..end]).collect();
+        distinct.sort_unstable();
+        distinct.dedup();
+        let inputs = distinct.iter().map(|row| ids.universe().term(row[0]));
         // Integers beyond 64 bits can't be computed with, and must not be skipped like non-numbers.
         if part.kind != AggregateKind::Count && inputs.clone().any(is_beyond_64_bits) {
             return None;
         }
         let value = combine(part.kind, inputs)?;
-        binding[part.output] = universe.intern(value);
+        binding[part.output] = ids.id_of(value, watch)?;
         start = end;
     }
     for (variable, value) in &aggregation.after {
-        let value = value.value(binding, universe)?.into_owned();
-        binding[*variable] = universe.intern(value);
+        watch.begin();
+        let value = value.value(&binding, ids.universe(), watch)?.into_owned();
+        binding[*variable] = ids.id_of(value, watch)?;
     }
-    Some(())
+    Some(rule.head.args.iter().map(|arg| operand_value(*arg, &binding)).collect())
 }
 
 /// Computes the value of an aggregate. Returns `None` if it needs numbers and no input is one.

@@ -13,8 +13,10 @@ use std::sync::atomic::AtomicBool;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Budget {
-    /// Maximum number of derived tuples.
+    /// Maximum number of derived tuples, without duplicates and given facts.
     pub tuples: usize,
+    /// Maximum memory of tuples, matches and created texts, approximately. Unit: bytes.
+    pub bytes: usize,
     /// Wall time. Unit: seconds.
     pub secs: f64,
     /// Set by another thread to stop the evaluation, but not before it has run for 0.2 s: short ones are finished.
@@ -23,7 +25,7 @@ pub struct Budget {
 
 impl Default for Budget {
     fn default() -> Self {
-        // A pick run derives some hundred tuples in under a millisecond, so both limits are far above realistic rules.
-        Self { tuples: 5_000_000, secs: 10.0, stop: Arc::default() }
+        // A pick run derives some hundred tuples in under a millisecond, so all limits are far above realistic rules.
+        Self { tuples: 5_000_000, bytes: 1 << 30, secs: 10.0, stop: Arc::default() }
     }
 }

@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use crate::check::stratify::Stratum;
 use crate::engine::aggregate::{aggregate, projection};
-use crate::engine::join::{Join, Sink};
+use crate::engine::collect::{Distinct, Sink, bytes_of_row};
+use crate::engine::join::Join;
 use crate::engine::meter::{Meter, Stop};
 use crate::engine::plan::{Indexes, Op, Part, RulePlan, Sizes, Variant, plan_rule};
 use crate::engine::relation::{Batch, Finished, Growing, finished, growing};
@@ -31,7 +32,7 @@ impl Tables {
 
     /// Removes and returns the rows of a predicate.
     pub(crate) fn take_rows(&mut self, predicate: PredicateId) -> Vec<TermId> {
-        self.list.get_mut(predicate).and_then(Option::take).map_or(Vec::new(), |table| table.index(0).to_vec())
+        self.list.get_mut(predicate).and_then(Option::take).map_or(Vec::new(), |table| table.into_rows())
     }
 
     pub(crate) fn set(&mut self, predicate: PredicateId, table: Box<dyn Finished>) {
@@ -129,7 +130,7 @@ pub(crate) fn evaluate_recording_rounds(
     rounds: Option<&mut Rounds>,
 ) -> Result<(), Stopped> {
     let mut run = Run { planned, predicates, indexes, universe, meter, rounds };
-    run.facts(layers);
+    run.facts(layers).map_err(|stop| Stopped { stop, rule: None })?;
     for stratum in &planned.strata {
         run.meter.check().map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
         if stratum.recursive {
@@ -141,8 +142,8 @@ pub(crate) fn evaluate_recording_rounds(
     Ok(())
 }
 
-/// Maximum size of the matches kept at once for an aggregating rule. Unit: terms of 4 bytes (1 GiB).
-const AGGREGATE_LIMIT: usize = 1 << 28;
+/// Memory of a recorded round without the row. Unit: bytes.
+const ROUND_BYTES: usize = 64;
 
 struct Run<'a, 'u, 't> {
     planned: &'a Planned,
@@ -158,15 +159,26 @@ type Grown = Vec<Box<dyn Growing>>;
 
 impl Run<'_, '_, '_> {
     /// Adds the facts of the text to the existing tuples.
-    fn facts(&mut self, layers: &mut Layers<'_>) {
+    fn facts(&mut self, layers: &mut Layers<'_>) -> Result<(), Stop> {
         for (predicate, facts) in &self.planned.facts {
             let mut rows = layers.rows(*predicate).to_vec();
+            if rows.is_empty() {
+                self.finish(*predicate, facts, layers);
+                continue;
+            }
             rows.extend(facts);
-            self.finish(*predicate, rows, layers);
+            self.meter.watch.hold(rows.len() / self.predicates.get(*predicate).width * self.row_bytes(*predicate))?;
+            self.finish(*predicate, &rows, layers);
         }
+        Ok(())
     }
 
-    fn finish(&self, predicate: PredicateId, rows: Vec<TermId>, layers: &mut Layers<'_>) {
+    /// Returns the memory of a tuple in all its orders. Unit: bytes.
+    fn row_bytes(&self, predicate: PredicateId) -> usize {
+        bytes_of_row(self.predicates.get(predicate).width, self.indexes.of(predicate).len())
+    }
+
+    fn finish(&self, predicate: PredicateId, rows: &[TermId], layers: &mut Layers<'_>) {
         let width = self.predicates.get(predicate).width;
         layers.own.set(predicate, finished(width, rows, self.indexes.of(predicate).clone()));
     }
@@ -174,25 +186,33 @@ impl Run<'_, '_, '_> {
     /// Evaluates a stratum without recursion: each rule once.
     fn once(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let Some(predicate) = stratum.predicates.first().copied() else { return Ok(()) };
-        let mut rows = layers.rows(predicate).to_vec();
+        let (width, orders) = (self.predicates.get(predicate).width, self.indexes.of(predicate).len());
+        let mut found = Distinct::new(width, layers.rows(predicate).to_vec(), orders);
+        let mut sink = Sink::new(Vec::new());
+        let mut empty = |sink: &mut Sink, meter: &Meter| {
+            found.add(sink, &meter.watch)?;
+            meter.room_for(found.new_rows())
+        };
         for rule in &stratum.rules {
             let stopped = |stop| Stopped { stop, rule: Some(*rule) };
-            let Some(plan) = &self.planned.plans[*rule] else { continue };
-            for variant in &plan.variants {
-                let derived = self.variant(*rule, variant, layers, None, &mut |_, _| Ok(())).map_err(stopped)?;
-                self.meter.derived(derived.len() / self.predicates.get(predicate).width).map_err(stopped)?;
-                rows.extend(derived);
+            for variant in self.planned.plans[*rule].iter().flat_map(|plan| &plan.variants) {
+                self.variant(*rule, variant, layers, None, &mut sink, &mut empty).map_err(stopped)?;
             }
         }
-        self.finish(predicate, rows, layers);
+        let stopped = |stop| Stopped { stop, rule: stratum.rules.last().copied() };
+        empty(&mut sink, self.meter).map_err(stopped)?;
+        self.meter.derived(found.new_rows()).map_err(stopped)?;
+        self.finish(predicate, &found.into_rows(), layers);
         Ok(())
     }
 
     /// Evaluates a recursive stratum in rounds, each over the tuples found in the previous one.
     fn recursive(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let mut grown = self.grow(stratum, layers);
+        // Number of new tuples of the round.
+        let mut new = 0;
         for rule in &stratum.rules {
-            self.insert_all(*rule, false, stratum, layers, &grown)?;
+            self.insert_all(*rule, false, stratum, layers, &grown, &mut new)?;
         }
         loop {
             let mut changed = false;
@@ -202,14 +222,14 @@ impl Run<'_, '_, '_> {
             if !changed {
                 break;
             }
-            self.record_rounds(stratum, &grown);
-            let found = grown.iter().map(|growing| growing.recent_len()).sum();
-            let recursive_rule = || stratum.rules.iter().copied().find(|rule| self.is_recursive(*rule));
-            let rule = recursive_rule();
-            self.meter.derived(found).map_err(|stop| Stopped { stop, rule })?;
-            self.meter.check().map_err(|stop| Stopped { stop, rule })?;
+            let rule = stratum.rules.iter().copied().find(|rule| self.is_recursive(*rule));
+            let stopped = |stop| Stopped { stop, rule };
+            self.record_rounds(stratum, &grown).map_err(stopped)?;
+            self.meter.derived(new).map_err(stopped)?;
+            self.meter.check().map_err(stopped)?;
+            new = 0;
             for rule in &stratum.rules {
-                self.insert_all(*rule, true, stratum, layers, &grown)?;
+                self.insert_all(*rule, true, stratum, layers, &grown, &mut new)?;
             }
         }
         for (predicate, growing) in stratum.predicates.iter().zip(grown) {
@@ -219,8 +239,8 @@ impl Run<'_, '_, '_> {
     }
 
     /// Records the round of the recent tuples, if rounds are requested.
-    fn record_rounds(&mut self, stratum: &Stratum, grown: &Grown) {
-        let Some(rounds) = &mut self.rounds else { return };
+    fn record_rounds(&mut self, stratum: &Stratum, grown: &Grown) -> Result<(), Stop> {
+        let Some(rounds) = &mut self.rounds else { return Ok(()) };
         rounds.next += 1;
         for (predicate, growing) in stratum.predicates.iter().zip(grown) {
             let mut batches = Vec::new();
@@ -228,8 +248,10 @@ impl Run<'_, '_, '_> {
             let width = self.predicates.get(*predicate).width;
             for row in batches.iter().flat_map(|batch| batch.chunks_exact(width)) {
                 rounds.of.insert((*predicate, row.to_vec()), rounds.next);
+                self.meter.watch.hold(ROUND_BYTES + bytes_of_row(width, 0))?;
             }
         }
+        Ok(())
     }
 
     fn is_recursive(&self, rule: usize) -> bool {
@@ -252,16 +274,17 @@ impl Run<'_, '_, '_> {
         let mut grown = Vec::new();
         for (predicate, wanted) in stratum.predicates.iter().zip(&wanted) {
             let growing = growing(self.predicates.get(*predicate).width, self.indexes.of(*predicate).clone(), wanted);
-            let known = layers.rows(*predicate).to_vec();
+            let mut known = layers.rows(*predicate).to_vec();
             if !known.is_empty() {
-                growing.insert(known);
+                growing.insert(&mut known);
             }
             grown.push(growing);
         }
         grown
     }
 
-    /// Adds the tuples derived by the variants of one rule that read recent tuples, or by those that don't.
+    /// Adds the tuples derived by the variants of one rule that read recent tuples, or by those that don't. `new`: number
+    /// of new tuples in this round.
     fn insert_all(
         &mut self,
         rule: usize,
@@ -269,24 +292,25 @@ impl Run<'_, '_, '_> {
         stratum: &Stratum,
         layers: &Layers<'_>,
         grown: &Grown,
+        new: &mut usize,
     ) -> Result<(), Stopped> {
         let Some(plan) = &self.planned.plans[rule] else { return Ok(()) };
-        let Ok(place) = stratum.predicates.binary_search(&self.planned.rules[rule].head.predicate) else {
-            return Ok(());
+        let predicate = self.planned.rules[rule].head.predicate;
+        let Ok(place) = stratum.predicates.binary_search(&predicate) else { return Ok(()) };
+        let (target, row_bytes) = (&grown[place], self.row_bytes(predicate));
+        let stopped = |stop| Stopped { stop, rule: Some(rule) };
+        let mut empty = |sink: &mut Sink, meter: &Meter| {
+            let count = target.insert(&mut sink.rows);
+            sink.adapt(target.added(), &meter.watch);
+            *new += count;
+            meter.watch.hold(count * row_bytes)?;
+            meter.room_for(*new)
         };
-        let target = &grown[place];
-        let mut flushed = 0;
+        let mut sink = Sink::new(Vec::new());
         for variant in plan.variants.iter().filter(|variant| variant.recent == recent) {
-            let mut flush = |sink: &mut Sink, left: usize| {
-                flushed += target.insert(std::mem::take(&mut sink.rows));
-                if flushed > left { Err(Stop::Tuples) } else { Ok(()) }
-            };
-            let rows = self
-                .variant(rule, variant, layers, Some((stratum, grown)), &mut flush)
-                .map_err(|stop| Stopped { stop, rule: Some(rule) })?;
-            target.insert(rows);
+            self.variant(rule, variant, layers, Some((stratum, grown)), &mut sink, &mut empty).map_err(stopped)?;
         }
-        Ok(())
+        if sink.rows.is_empty() { Ok(()) } else { empty(&mut sink, self.meter).map_err(stopped) }
     }
 
     /// Returns the rows that each step of a variant reads, and their widths. Returns `None` if an atom has no rows.
@@ -324,43 +348,46 @@ impl Run<'_, '_, '_> {
         Some((batches, widths))
     }
 
-    /// Returns the head rows that one variant derives.
+    /// Adds the head rows that one variant derives to a sink; `empty` empties it when it is full.
     fn variant(
         &mut self,
         rule: usize,
         variant: &Variant,
         layers: &Layers<'_>,
         grown: Option<(&Stratum, &Grown)>,
-        flush: &mut dyn FnMut(&mut Sink, usize) -> Result<(), Stop>,
-    ) -> Result<Vec<TermId>, Stop> {
+        sink: &mut Sink,
+        empty: &mut dyn FnMut(&mut Sink, &Meter) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
         let rule = &self.planned.rules[rule];
-        let Some((batches, widths)) = self.sources(variant, layers, grown) else { return Ok(Vec::new()) };
-        let operands = match &rule.aggregation {
-            Some(aggregation) => projection(aggregation),
-            None => rule.head.args.clone(),
+        let Some((batches, widths)) = self.sources(variant, layers, grown) else { return Ok(()) };
+        let Some(aggregation) = &rule.aggregation else {
+            sink.operands.clone_from(&rule.head.args);
+            return self.join(rule, variant, (&batches, &widths), sink, empty);
         };
-        let mut sink = Sink { operands, rows: Vec::new() };
-        let left = self.meter.tuples_left();
-        let aggregating = rule.aggregation.is_some();
-        Join {
-            ops: &variant.ops,
-            batches: &batches,
-            widths: &widths,
-            binding: vec![0; rule.variables.len()],
-            universe: self.universe,
-            meter: self.meter,
-            sink: &mut sink,
-            flush: &mut |sink| match aggregating {
-                true if sink.rows.len() > AGGREGATE_LIMIT => Err(Stop::Tuples),
-                true => Ok(()),
-                false => flush(sink, left),
-            },
-        }
-        .run(0)?;
-        Ok(match &rule.aggregation {
-            Some(aggregation) => aggregate(rule, aggregation, &sink.rows, self.universe, self.meter)?,
-            None => sink.rows,
-        })
+        let operands = projection(aggregation);
+        // The groups refer to the rows.
+        let mut matches = Distinct::new(operands.len().max(1), Vec::new(), 4);
+        let mut collected = Sink::new(operands);
+        let mut collect = |sink: &mut Sink, meter: &Meter| matches.add(sink, &meter.watch);
+        self.join(rule, variant, (&batches, &widths), &mut collected, &mut collect)?;
+        collect(&mut collected, self.meter)?;
+        let heads = aggregate(rule, aggregation, matches.rows(), self.universe, self.meter)?;
+        self.meter.watch.release(matches.new_bytes());
+        sink.rows.extend(heads);
+        if sink.rows.len() >= sink.limit { empty(sink, self.meter) } else { Ok(()) }
+    }
+
+    fn join(
+        &mut self,
+        rule: &Rule,
+        variant: &Variant,
+        (batches, widths): (&[Vec<Batch<'_>>], &[usize]),
+        sink: &mut Sink,
+        flush: &mut dyn FnMut(&mut Sink, &Meter) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        let binding = vec![0; rule.variables.len()];
+        let (universe, meter) = (&mut *self.universe, &mut *self.meter);
+        Join { ops: &variant.ops, batches, widths, binding, universe, meter, sink, flush }.run(0)
     }
 }
 

@@ -1,5 +1,8 @@
 //! Evaluates one variant of a rule: finds all bindings that satisfy its conditions by lookups in sorted rows.
 
+use std::borrow::Cow;
+
+use crate::engine::collect::Sink;
 use crate::engine::meter::{Meter, Stop};
 use crate::engine::plan::{Column, Op, operand_value};
 use crate::engine::relation::Batch;
@@ -7,15 +10,6 @@ use crate::model::expression::holds;
 use crate::model::program::{MAX_ARITY, Operand};
 use crate::model::universe::Universe;
 use actcheck_base::{Term, TermId};
-
-/// Collects the rows that a rule derives.
-#[derive(Debug, Default)]
-pub(crate) struct Sink {
-    /// The operands that form a row.
-    pub(crate) operands: Vec<Operand>,
-    /// Rows, one after another.
-    pub(crate) rows: Vec<TermId>,
-}
 
 /// The evaluation of one variant.
 pub(crate) struct Join<'a, 'u, 't> {
@@ -28,12 +22,9 @@ pub(crate) struct Join<'a, 'u, 't> {
     pub(crate) universe: &'u mut Universe<'t>,
     pub(crate) meter: &'u mut Meter,
     pub(crate) sink: &'u mut Sink,
-    /// Called when the sink holds many rows.
-    pub(crate) flush: &'u mut dyn FnMut(&mut Sink) -> Result<(), Stop>,
+    /// Called when the sink is full.
+    pub(crate) flush: &'u mut dyn FnMut(&mut Sink, &Meter) -> Result<(), Stop>,
 }
-
-/// Maximum length of a sink before it is flushed. Unit: terms of 4 bytes (64 MiB).
-const SINK_LIMIT: usize = 1 << 24;
 
 impl Join<'_, '_, '_> {
     /// Runs the steps from `at` on, for every binding that satisfies them.
@@ -52,24 +43,38 @@ impl Join<'_, '_, '_> {
                 if found { Ok(()) } else { self.run(at + 1) }
             }
             Some(Op::Assign { variable, value }) => {
-                let Some(term) = value.value(&self.binding, self.universe).map(std::borrow::Cow::into_owned) else {
-                    return Ok(());
+                let watch = &self.meter.watch;
+                watch.begin();
+                let Some(term) = value.value(&self.binding, self.universe, watch).map(Cow::into_owned) else {
+                    return watch.stopped();
                 };
-                self.binding[*variable] = self.universe.intern(term);
+                self.binding[*variable] = self.universe.create(term, watch)?;
                 self.run(at + 1)
             }
             Some(Op::Compare { op, left, right }) => {
-                let left = left.value(&self.binding, self.universe);
-                let right = right.value(&self.binding, self.universe);
-                match (left, right) {
-                    (Some(left), Some(right)) if holds(*op, &left, &right) => self.run(at + 1),
-                    _ => Ok(()),
-                }
+                let watch = &self.meter.watch;
+                watch.begin();
+                let left = left.value(&self.binding, self.universe, watch);
+                let right = right.value(&self.binding, self.universe, watch);
+                let found = left.zip(right).map(|(left, right)| holds(*op, &left, &right));
+                self.go_on(at, found)
             }
             Some(Op::Test { value }) => {
-                let value = value.value(&self.binding, self.universe);
-                if value.is_some_and(|value| *value == Term::Boolean(true)) { self.run(at + 1) } else { Ok(()) }
+                let watch = &self.meter.watch;
+                watch.begin();
+                let value = value.value(&self.binding, self.universe, watch);
+                let found = value.map(|value| *value == Term::Boolean(true));
+                self.go_on(at, found)
             }
+        }
+    }
+
+    /// Runs the next step if a condition holds. `None`: it has no value, or the budget is spent.
+    fn go_on(&mut self, at: usize, holds: Option<bool>) -> Result<(), Stop> {
+        match holds {
+            Some(true) => self.run(at + 1),
+            Some(false) => Ok(()),
+            None => self.meter.watch.stopped(),
         }
     }
 
@@ -119,7 +124,7 @@ impl Join<'_, '_, '_> {
         for operand in &self.sink.operands {
             self.sink.rows.push(operand_value(*operand, &self.binding));
         }
-        if self.sink.rows.len() >= SINK_LIMIT { (self.flush)(self.sink) } else { Ok(()) }
+        if self.sink.rows.len() >= self.sink.limit { (self.flush)(self.sink, self.meter) } else { Ok(()) }
     }
 }
 

@@ -94,7 +94,7 @@ impl Given {
         }
         let mut tables = Tables::new(predicates.len());
         for (predicate, rows) in rows.into_iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
-            tables.set(predicate, finished(predicates.get(predicate).width, rows, indexes.of(predicate).clone()));
+            tables.set(predicate, finished(predicates.get(predicate).width, &rows, indexes.of(predicate).clone()));
         }
         tables
     }
@@ -133,7 +133,7 @@ impl Readers<'_> {
 fn tables(rows: HashMap<PredicateId, Vec<TermId>>, predicates: &Predicates, indexes: &Indexes) -> Tables {
     let mut tables = Tables::new(predicates.len());
     for (predicate, rows) in rows {
-        tables.set(predicate, finished(predicates.get(predicate).width, rows, indexes.of(predicate).clone()));
+        tables.set(predicate, finished(predicates.get(predicate).width, &rows, indexes.of(predicate).clone()));
     }
     tables
 }

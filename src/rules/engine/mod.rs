@@ -4,6 +4,7 @@
 
 pub(crate) mod aggregate;
 pub(crate) mod budget;
+pub(crate) mod collect;
 pub(crate) mod evaluate;
 pub(crate) mod join;
 pub(crate) mod load;

@@ -6,8 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::check::stratify::Stratum;
 use crate::engine::aggregate::{aggregate, projection};
+use crate::engine::collect::bytes_of_row;
 use crate::engine::meter::{Meter, Stop};
 use crate::engine::plan::operand_value;
+use crate::engine::relation::sort_rows;
 use crate::model::expression::holds;
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Rule};
 use crate::model::universe::Universe;
@@ -15,6 +17,9 @@ use actcheck_base::{Term, TermId};
 
 /// Tuples by predicate.
 pub(crate) type Sets = BTreeMap<PredicateId, BTreeSet<Vec<TermId>>>;
+
+/// Memory of a row in a set without its values. Unit: bytes.
+const ROW_BYTES: usize = 64;
 
 /// Adds all tuples that the rules derive to `sets`.
 pub(crate) fn close(
@@ -37,9 +42,12 @@ pub(crate) fn close(
             if new.is_empty() {
                 break;
             }
-            meter.derived(new.len())?;
             for (predicate, row) in new {
-                sets.entry(predicate).or_default().insert(row);
+                let bytes = ROW_BYTES + bytes_of_row(row.len(), 0);
+                if sets.entry(predicate).or_default().insert(row) {
+                    meter.derived(1)?;
+                    meter.watch.hold(bytes)?;
+                }
             }
         }
     }
@@ -67,6 +75,8 @@ fn derive(rule: &Rule, sets: &Sets, universe: &mut Universe<'_>, meter: &mut Met
                     operands.iter().map(|arg| operand_value(*arg, &binding)).collect::<Vec<_>>()
                 })
                 .collect();
+            let mut rows = rows;
+            sort_rows(operands.len().max(1), &mut rows);
             aggregate(rule, aggregation, &rows, universe, meter)?.chunks(width).map(<[TermId]>::to_vec).collect()
         }
     })
@@ -82,7 +92,10 @@ fn matches(
     meter: &mut Meter,
 ) -> Result<(), Stop> {
     meter.step()?;
+    meter.watch.begin();
     let Some((first, rest)) = body.split_first() else {
+        // Later, each match becomes a row.
+        meter.watch.room(found.len() * (2 * ROW_BYTES + 2 * size_of_val(binding.as_slice())))?;
         found.push(binding.clone());
         return Ok(());
     };
@@ -108,18 +121,21 @@ fn matches(
             }
         }
         Literal::Assign { variable, value, .. } => {
-            let Some(value) = value.value(&values, universe).map(std::borrow::Cow::into_owned) else { return Ok(()) };
-            binding[*variable] = Some(universe.intern(value));
+            let Some(value) = value.value(&values, universe, &meter.watch).map(std::borrow::Cow::into_owned) else {
+                return meter.watch.stopped();
+            };
+            binding[*variable] = Some(universe.create(value, &meter.watch)?);
         }
         Literal::Compare { op, left, right, .. } => {
-            let (left, right) = (left.value(&values, universe), right.value(&values, universe));
+            let watch = &meter.watch;
+            let (left, right) = (left.value(&values, universe, watch), right.value(&values, universe, watch));
             if !matches!((left, right), (Some(left), Some(right)) if holds(*op, &left, &right)) {
-                return Ok(());
+                return watch.stopped();
             }
         }
         Literal::Test { value, .. } => {
-            if value.value(&values, universe).is_none_or(|value| *value != Term::Boolean(true)) {
-                return Ok(());
+            if value.value(&values, universe, &meter.watch).is_none_or(|value| *value != Term::Boolean(true)) {
+                return meter.watch.stopped();
             }
         }
     }

@@ -1,28 +1,55 @@
 //! Tuples of one predicate as datafrog relations of any width, in every column order that the rules use.
 
-use std::cell::Ref;
+use std::cell::{Ref, RefCell};
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
 use datafrog::{Iteration, Relation, Variable};
 
 use crate::engine::plan::{Order, Part};
+use crate::model::program::MAX_ARITY;
 use actcheck_base::TermId;
+
+/// Calls a function with the width of a predicate as a const generic.
+macro_rules! with_width {
+    ($width:expr, $call:ident ( $($arg:expr),* )) => {
+        match $width {
+            0 | 1 => $call::<1>($($arg),*),
+            2 => $call::<2>($($arg),*),
+            3 => $call::<3>($($arg),*),
+            4 => $call::<4>($($arg),*),
+            5 => $call::<5>($($arg),*),
+            6 => $call::<6>($($arg),*),
+            7 => $call::<7>($($arg),*),
+            8 => $call::<8>($($arg),*),
+            9 => $call::<9>($($arg),*),
+            10 => $call::<10>($($arg),*),
+            11 => $call::<11>($($arg),*),
+            12 => $call::<12>($($arg),*),
+            13 => $call::<13>($($arg),*),
+            14 => $call::<14>($($arg),*),
+            15 => $call::<15>($($arg),*),
+            _ => $call::<16>($($arg),*),
+        }
+    };
+}
 
 /// Tuples that no longer change. Rows are stored one after another, sorted by the index's column order.
 pub(crate) trait Finished: Send + Sync {
     /// Returns the rows in the order of an index. The index is built on first use.
     fn index(&self, index: usize) -> &[TermId];
+    /// Returns the rows in the order of the first index.
+    fn into_rows(self: Box<Self>) -> Vec<TermId>;
 }
 
 /// Tuples of a predicate whose rules are still being evaluated.
 pub(crate) trait Growing {
-    /// Adds rows, which take effect in the next round. Returns their number without duplicates among them.
-    fn insert(&self, rows: Vec<TermId>) -> usize;
+    /// Adds rows, which take effect in the next round. Returns the number of new ones.
+    fn insert(&self, rows: &mut Vec<TermId>) -> usize;
+    /// Returns the length of the rows added in this round. Unit: terms.
+    fn added(&self) -> usize;
     /// Begins a round: new tuples added since the last round become recent. Returns `false` if there are none.
     fn changed(&mut self) -> bool;
-    /// Returns the number of recent tuples.
-    fn recent_len(&self) -> usize;
     /// Appends the rows of a part in the order of an index, as sorted batches.
     fn batches<'a>(&'a self, part: Part, index: usize, found: &mut Vec<Batch<'a>>);
     /// Converts to finished tuples at the fixpoint.
@@ -71,6 +98,11 @@ impl<const W: usize> Finished for FinishedOf<W> {
         let relation = self.indexes[index].get_or_init(|| permuted(self.primary(), &self.orders[index]));
         relation.elements.as_flattened()
     }
+
+    fn into_rows(self: Box<Self>) -> Vec<TermId> {
+        let first = self.indexes.into_iter().next().and_then(OnceLock::into_inner);
+        first.map_or(Vec::new(), |relation| relation.elements.into_flattened())
+    }
 }
 
 /// One column order of growing tuples: a datafrog variable with its own iteration, so that all orders of a
@@ -81,10 +113,10 @@ struct Grown<const W: usize> {
 }
 
 impl<const W: usize> Grown<W> {
-    fn new(distinct: bool) -> Self {
+    fn new() -> Self {
         let mut iteration = Iteration::new();
-        // A permutation of distinct rows needs no deduplication.
-        let variable = if distinct { iteration.variable("") } else { iteration.variable_indistinct("") };
+        // Only new rows are inserted, so that no duplicates have to be removed.
+        let variable = iteration.variable_indistinct("");
         Self { iteration, variable }
     }
 }
@@ -93,25 +125,42 @@ struct GrowingOf<const W: usize> {
     orders: Arc<Vec<Order>>,
     indexes: Vec<Option<Grown<W>>>,
     primary: Grown<W>,
+    /// New rows of this round, sorted.
+    added: RefCell<Vec<TermId>>,
 }
 
 impl<const W: usize> GrowingOf<W> {
     /// `wanted`: the indexes that the stratum's rules read while the tuples grow.
     fn new(orders: Arc<Vec<Order>>, wanted: &[bool]) -> Self {
-        let indexes = wanted.iter().map(|wanted| wanted.then(|| Grown::new(false))).collect();
-        Self { orders, indexes, primary: Grown::new(true) }
+        let indexes = wanted.iter().map(|wanted| wanted.then(Grown::new)).collect();
+        Self { orders, indexes, primary: Grown::new(), added: RefCell::default() }
     }
 }
 
 impl<const W: usize> Growing for GrowingOf<W> {
-    fn insert(&self, rows: Vec<TermId>) -> usize {
-        let relation = relation_of::<W>(rows);
-        let count = relation.len();
-        self.primary.variable.insert(relation);
-        count
+    fn insert(&self, rows: &mut Vec<TermId>) -> usize {
+        sort_rows(W, rows);
+        for batch in self.primary.variable.stable.borrow().iter() {
+            remove_known::<W>(rows, batch);
+        }
+        remove_known::<W>(rows, &self.primary.variable.recent.borrow());
+        let mut added = self.added.borrow_mut();
+        let before = added.len();
+        merge_rows(W, &mut added, rows);
+        rows.clear();
+        (added.len() - before) / W
+    }
+
+    fn added(&self) -> usize {
+        self.added.borrow().len()
     }
 
     fn changed(&mut self) -> bool {
+        let added = self.added.take();
+        if !added.is_empty() {
+            self.primary.variable.insert(Relation { elements: added.as_chunks::<W>().0.to_vec() });
+        }
+        drop(added);
         let changed = self.primary.iteration.changed();
         for (index, grown) in self.indexes.iter_mut().enumerate().skip(1) {
             if let Some(grown) = grown {
@@ -121,10 +170,6 @@ impl<const W: usize> Growing for GrowingOf<W> {
             }
         }
         changed
-    }
-
-    fn recent_len(&self) -> usize {
-        self.primary.variable.recent.borrow().len()
     }
 
     fn batches<'a>(&'a self, part: Part, index: usize, found: &mut Vec<Batch<'a>>) {
@@ -144,8 +189,8 @@ impl<const W: usize> Growing for GrowingOf<W> {
     }
 
     fn complete(self: Box<Self>) -> Box<dyn Finished> {
-        let Self { orders, indexes, primary } = *self;
-        drop(indexes);
+        let Self { orders, indexes, primary, added } = *self;
+        drop((indexes, added));
         Box::new(FinishedOf::new(primary.variable.complete(), orders))
     }
 }
@@ -157,7 +202,90 @@ fn permuted<const W: usize>(rows: &[[TermId; W]], order: &[usize]) -> Relation<[
     Relation { elements: out }
 }
 
-fn relation_of<const W: usize>(rows: Vec<TermId>) -> Relation<[TermId; W]> {
+/// Sorts rows and removes duplicates.
+pub(crate) fn sort_rows(width: usize, rows: &mut Vec<TermId>) {
+    if width > MAX_ARITY {
+        let mut list: Vec<&[TermId]> = rows.chunks_exact(width).collect();
+        list.sort_unstable();
+        list.dedup();
+        *rows = list.concat();
+    } else {
+        with_width!(width, sort_in_place(rows));
+    }
+}
+
+fn sort_in_place<const W: usize>(rows: &mut Vec<TermId>) {
+    let list = rows.as_chunks_mut::<W>().0;
+    sort(list);
+    let mut kept = 0;
+    for idx in 0..list.len() {
+        if kept == 0 || list[kept - 1] != list[idx] {
+            list[kept] = list[idx];
+            kept += 1;
+        }
+    }
+    rows.truncate(kept * W);
+}
+
+/// Adds sorted rows without duplicates to others of the same kind.
+pub(crate) fn merge_rows(width: usize, rows: &mut Vec<TermId>, more: &[TermId]) {
+    if more.is_empty() {
+        return;
+    }
+    if rows.is_empty() || rows[rows.len() - width..] < more[..width] {
+        rows.extend_from_slice(more);
+        return;
+    }
+    if width > MAX_ARITY {
+        rows.extend_from_slice(more);
+        return sort_rows(width, rows);
+    }
+    *rows = with_width!(width, merged(rows, more));
+}
+
+fn merged<const W: usize>(rows: &[TermId], more: &[TermId]) -> Vec<TermId> {
+    let mut merged = Vec::with_capacity(rows.len() + more.len());
+    let (mut left, mut right) = (rows.as_chunks::<W>().0, more.as_chunks::<W>().0);
+    while let ([first, others @ ..], [second, rest @ ..]) = (left, right) {
+        let order = first.cmp(second);
+        merged.extend_from_slice(if order.is_gt() { second } else { first });
+        left = if order.is_gt() { left } else { others };
+        right = if order.is_lt() { right } else { rest };
+    }
+    merged.extend_from_slice(left.as_flattened());
+    merged.extend_from_slice(right.as_flattened());
+    merged
+}
+
+/// Removes the sorted rows that are among sorted known ones.
+fn remove_known<const W: usize>(rows: &mut Vec<TermId>, known: &[[TermId; W]]) {
+    let (mut rest, mut kept) = (known, 0);
+    for start in (0..rows.len()).step_by(W) {
+        let Ok(row) = <[TermId; W]>::try_from(&rows[start..start + W]) else { break };
+        rest = skip_less(rest, &row);
+        if rest.first() != Some(&row) {
+            rows.copy_within(start..start + W, kept);
+            kept += W;
+        }
+    }
+    rows.truncate(kept);
+}
+
+/// Skips the sorted rows that are less than a given one, by steps of doubling length and then by halves.
+fn skip_less<'r, const W: usize>(mut rows: &'r [[TermId; W]], row: &[TermId; W]) -> &'r [[TermId; W]] {
+    if rows.first().is_none_or(|first| first >= row) {
+        return rows;
+    }
+    let mut step = 1;
+    while step < rows.len() && rows[step] < *row {
+        rows = &rows[step..];
+        step *= 2;
+    }
+    let within = &rows[..rows.len().min(step + 1)];
+    &rows[within.partition_point(|other| other < row)..]
+}
+
+fn relation_of<const W: usize>(rows: &[TermId]) -> Relation<[TermId; W]> {
     let mut rows = rows.as_chunks::<W>().0.to_vec();
     sort(&mut rows);
     rows.dedup();
@@ -174,31 +302,7 @@ fn sort<const W: usize>(rows: &mut [[TermId; W]]) {
     }
 }
 
-/// Calls a function with the width of a predicate as a const generic.
-macro_rules! with_width {
-    ($width:expr, $call:ident ( $($arg:expr),* )) => {
-        match $width {
-            0 | 1 => $call::<1>($($arg),*),
-            2 => $call::<2>($($arg),*),
-            3 => $call::<3>($($arg),*),
-            4 => $call::<4>($($arg),*),
-            5 => $call::<5>($($arg),*),
-            6 => $call::<6>($($arg),*),
-            7 => $call::<7>($($arg),*),
-            8 => $call::<8>($($arg),*),
-            9 => $call::<9>($($arg),*),
-            10 => $call::<10>($($arg),*),
-            11 => $call::<11>($($arg),*),
-            12 => $call::<12>($($arg),*),
-            13 => $call::<13>($($arg),*),
-            14 => $call::<14>($($arg),*),
-            15 => $call::<15>($($arg),*),
-            _ => $call::<16>($($arg),*),
-        }
-    };
-}
-
-fn boxed_finished<const W: usize>(rows: Vec<TermId>, orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
+fn boxed_finished<const W: usize>(rows: &[TermId], orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
     Box::new(FinishedOf::<W>::new(relation_of(rows), orders))
 }
 
@@ -207,7 +311,7 @@ fn boxed_growing<const W: usize>(orders: Arc<Vec<Order>>, wanted: &[bool]) -> Bo
 }
 
 /// Creates finished tuples from rows in any order.
-pub(crate) fn finished(width: usize, rows: Vec<TermId>, orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
+pub(crate) fn finished(width: usize, rows: &[TermId], orders: Arc<Vec<Order>>) -> Box<dyn Finished> {
     with_width!(width, boxed_finished(rows, orders))
 }
 

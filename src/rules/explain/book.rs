@@ -1,11 +1,13 @@
 //! Explanations of properties.
 
+use std::cell::Cell;
+
 use crate::book::judge::{Judge, JudgeRules, RuleBook};
 use crate::engine::budget::Budget;
 use crate::engine::evaluate::{Layers, Planned, Rounds, Tables, evaluate_recording_rounds, fault};
-use crate::engine::meter::Meter;
+use crate::engine::meter::{Meter, Watch};
 use crate::engine::reading::{Verdict, findings};
-use crate::explain::goal::{Goal, PROOFS_SHOWN, goal_explained};
+use crate::explain::goal::{Goal, PROOFS_SHOWN, goal_explained, invalid_goal, stopped_early};
 use crate::explain::model::Explanation;
 use crate::explain::proof::Prover;
 use crate::explain::search::{ProofContext, stated_facts};
@@ -48,11 +50,15 @@ impl RuleBook {
     ) -> Result<Explanation, RuleFault> {
         match &self.property(property)?.rules {
             JudgeRules::Datalog { planned, verdict, scope, prefixes } => {
-                let goal = Goal::parse(statement, prefixes)?;
-                let predicate = goal.predicate(&self.predicates, &[*scope, 0])?;
+                let goal = Goal::parse(statement, prefixes).and_then(|goal| {
+                    let predicate = goal.predicate(&self.predicates, &[*scope, 0])?;
+                    Ok((goal, predicate))
+                });
+                let (goal, predicate) = goal.map_err(|faults| invalid_goal(&faults))?;
                 let mut evaluated = self.evaluate_for_proofs(facts, planned, verdict, budget)?;
-                let known = goal.known(&mut evaluated.universe);
-                Ok(goal_explained(statement, predicate, &known, &evaluated.context(self, planned)))
+                let (known, unknown) = goal.known(&mut evaluated.universe);
+                let context = evaluated.context(self, planned);
+                Ok(Explanation { unknown, ..goal_explained(statement, predicate, &known, &context) })
             }
             #[cfg(feature = "sparql")]
             JudgeRules::Sparql(_) => {
@@ -89,8 +95,9 @@ impl RuleBook {
         evaluate(planned, &mut layers)?;
         let findings = findings(verdict, &layers, &universe);
         let own = layers.own;
+        let watch = meter.into_watch();
         let stated = stated_facts(&[planned, &self.libraries, &self.fixed_rules], &self.predicates, &self.indexes);
-        Ok(Evaluated { universe, rounds, given, stated, enriched: enriched.own, own, findings })
+        Ok(Evaluated { universe, rounds, given, stated, enriched: enriched.own, own, watch, findings })
     }
 }
 
@@ -106,6 +113,7 @@ struct Evaluated<'a> {
     enriched: Tables,
     /// The tuples of the property's rules.
     own: Tables,
+    watch: Watch,
     findings: Result<Findings, RuleFault>,
 }
 
@@ -118,13 +126,21 @@ impl Evaluated<'_> {
             facts: vec![&self.given, &book.fixed_facts, &self.stated],
             rounds: &self.rounds,
             universe: &self.universe,
+            watch: &self.watch,
+            exhausted: Cell::new(false),
         }
     }
 }
 
 fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &ProofContext<'_>) -> Explanation {
-    let mut explanation =
-        Explanation { title: label.to_owned(), findings: None, proofs: Vec::new(), miss: None, notes: Vec::new() };
+    let mut explanation = Explanation {
+        title: label.to_owned(),
+        findings: None,
+        proofs: Vec::new(),
+        miss: None,
+        unknown: Vec::new(),
+        notes: Vec::new(),
+    };
     if let Some(decisive) = &verdict.decisive {
         let mut prover = Prover::new(context);
         let mut rows: Vec<&[u32]> = context.rows(decisive.predicate).collect();
@@ -138,6 +154,7 @@ fn explained(label: &str, findings: Findings, verdict: &Verdict, context: &Proof
             explanation.notes.push(format!("and {} more like this", findings.witness_count - shown));
         }
     }
+    explanation.notes.extend(stopped_early(context));
     if !findings.applicable {
         explanation.notes.push("the property is inapplicable here: `applicable` has no tuples".to_owned());
     }
@@ -157,5 +174,6 @@ fn of_query(label: &str, findings: Findings) -> Explanation {
         })
         .chain(["a SPARQL property is explained by its rows; only Datalog properties have proofs".to_owned()])
         .collect();
-    Explanation { title: label.to_owned(), findings: Some(findings), proofs: Vec::new(), miss: None, notes }
+    let (proofs, unknown) = (Vec::new(), Vec::new());
+    Explanation { title: label.to_owned(), findings: Some(findings), proofs, miss: None, unknown, notes }
 }

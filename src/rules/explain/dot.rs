@@ -8,7 +8,11 @@ impl Explanation {
     /// Returns a graph in Graphviz's DOT language: statements are boxes, facts are grey, missing conditions are dashed.
     pub fn to_dot(&self) -> String {
         let mut drawing = Drawing::default();
-        let root = drawing.node(&self.title, "shape=oval");
+        let title = match (&self.findings, self.holds()) {
+            (None, false) => format!("{}: is not derived", self.title),
+            _ => self.title.clone(),
+        };
+        let root = drawing.node(&title, "shape=oval");
         for proof in &self.proofs {
             let node = drawing.proof(proof);
             drawing.edge(root, node);

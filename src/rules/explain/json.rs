@@ -9,12 +9,13 @@ impl Explanation {
     pub fn to_json(&self) -> Value {
         json!({
             "title": self.title,
-            "holds": self.findings.as_ref().map(|findings| findings.holds),
+            "holds": self.holds(),
             "applicable": self.findings.as_ref().map(|findings| findings.applicable),
             "margin": self.findings.as_ref().and_then(|findings| findings.margin),
             "because": self.findings.as_ref().map(|findings| findings.because.clone()),
             "proofs": self.proofs.iter().map(proof).collect::<Vec<_>>(),
             "miss": self.miss.as_ref().map(miss),
+            "unknown": self.unknown.iter().map(|term| &term.text).collect::<Vec<_>>(),
             "notes": self.notes,
         })
     }
@@ -28,6 +29,7 @@ fn proof(of: &Proof) -> Value {
     let (kind, cited, matches, premises) = match &of.support {
         Support::Fact => ("fact", Value::Null, Value::Null, &[][..]),
         Support::Cut => ("cut", Value::Null, Value::Null, &[][..]),
+        Support::Omitted => ("omitted", Value::Null, Value::Null, &[][..]),
         Support::Rule { rule: cited, premises } => ("rule", rule(cited), Value::Null, premises.as_slice()),
         Support::Aggregate { rule: cited, matches, premises } => {
             ("aggregate", rule(cited), json!(matches), premises.as_slice())

@@ -4,8 +4,8 @@ use std::cell::Cell;
 
 use crate::engine::naive::unify;
 use crate::explain::model::{Failure, Miss};
-use crate::explain::proof::Prover;
-use crate::explain::search::{Binding, ProofContext, STEP_LIMIT, reading_order};
+use crate::explain::proof::{Prover, keep_group};
+use crate::explain::search::{Binding, ProofContext, reading_order};
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Rule};
 use crate::model::values::Number;
 use actcheck_base::TermId;
@@ -45,38 +45,41 @@ impl Attempt<'_> {
 
 impl<'a> ProofContext<'a> {
     /// Returns the closest attempt to derive a pattern: a predicate with some arguments known. Returns `None` if no
-    /// rule derives it.
+    /// rule has a matching head, or if the search was stopped before the first attempt.
     pub(super) fn miss(&self, predicate: PredicateId, known: &[Option<TermId>], depth: usize) -> Option<Miss> {
         let rules: Vec<&'a Rule> = self.rules_of(predicate).collect();
         let steps = Cell::new(0);
         let mut best: Option<Attempt<'a>> = None;
         for rule in rules {
-            let Some(binding) = open_binding(&rule.head, known, rule.variables.len()) else { continue };
-            let attempt = self.attempt(rule, binding, &steps);
-            if best.as_ref().is_none_or(|best| attempt.better_than(best)) {
+            let Some(mut binding) = open_binding(&rule.head, known, rule.variables.len()) else { continue };
+            if let Some(aggregation) = &rule.aggregation {
+                keep_group(&mut binding, &aggregation.group);
+            }
+            if let Some(attempt) = self.attempt(rule, binding, &steps)
+                && best.as_ref().is_none_or(|best| attempt.better_than(best))
+            {
                 best = Some(attempt);
             }
         }
         best.map(|attempt| self.build_miss(&attempt, known, depth))
     }
 
-    /// Evaluates a rule and returns the attempt that satisfied the largest fraction of its conditions.
-    fn attempt(&self, rule: &'a Rule, binding: Binding, steps: &Cell<usize>) -> Attempt<'a> {
+    /// Evaluates a rule and returns the attempt that satisfied the largest fraction of its conditions. Returns `None`
+    /// if the search was stopped before the first attempt.
+    fn attempt(&self, rule: &'a Rule, mut binding: Binding, steps: &Cell<usize>) -> Option<Attempt<'a>> {
         let order = reading_order(rule, &binding);
-        let mut best = Attempt { rule, order: order.clone(), depth: 0, binding: binding.clone(), distance: None };
-        let mut first = true;
-        self.follow(rule, &order, 0, &mut binding.clone(), steps, &mut |depth, binding, distance| {
+        let mut best: Option<Attempt<'a>> = None;
+        self.follow(rule, &order, 0, &mut binding, steps, &mut |depth, binding, distance| {
             let attempt = Attempt { rule, order: order.clone(), depth, binding: binding.clone(), distance };
-            if first || attempt.better_than(&best) {
-                best = attempt;
-                first = false;
+            if best.as_ref().is_none_or(|best| attempt.better_than(best)) {
+                best = Some(attempt);
             }
         });
         best
     }
 
     /// Calls `stopped` for every dead end with the number of satisfied conditions, the binding, and the distance of a
-    /// failed comparison.
+    /// failed comparison. The dead end of an aggregating rule may be that its aggregate has another value.
     fn follow(
         &self,
         rule: &Rule,
@@ -86,8 +89,15 @@ impl<'a> ProofContext<'a> {
         steps: &Cell<usize>,
         stopped: &mut dyn FnMut(usize, &Binding, Option<f64>),
     ) {
-        steps.set(steps.get() + 1);
-        let Some(idx) = order.get(depth).filter(|_| steps.get() < STEP_LIMIT) else { return };
+        if !self.may_go_on(steps) {
+            return;
+        }
+        let Some(idx) = order.get(depth) else {
+            if rule.aggregation.is_some() {
+                stopped(depth, binding, None);
+            }
+            return;
+        };
         let literal = &rule.body[*idx];
         let before = binding.clone();
         let Literal::Positive(atom) = literal else {
@@ -112,25 +122,52 @@ impl<'a> ProofContext<'a> {
         }
     }
 
-    /// Returns the absolute difference of the two sides of a numeric comparison, or `None` for another condition.
+    /// Returns the absolute difference of the two sides of a numeric comparison, or of a computed number and the
+    /// required one. Returns `None` for another condition.
     fn distance(&self, literal: &Literal, binding: &Binding) -> Option<f64> {
-        let Literal::Compare { left, right, .. } = literal else { return None };
         let side = |expr| Number::of(&self.value(expr, binding)?).map(Number::double);
-        Some((side(left)? - side(right)?).abs())
+        match literal {
+            Literal::Compare { left, right, .. } => Some((side(left)? - side(right)?).abs()),
+            Literal::Assign { variable, value, .. } => {
+                let wanted = Number::of(self.universe.term(binding[*variable]?))?.double();
+                Some((side(value)? - wanted).abs())
+            }
+            _ => None,
+        }
     }
 
     fn build_miss(&self, attempt: &Attempt<'a>, known: &[Option<TermId>], depth: usize) -> Miss {
         let rule = attempt.rule;
         let shown = |idx: &usize| self.literal(rule, &rule.body[*idx], &attempt.binding);
         let open = open_binding(&rule.head, known, rule.variables.len()).unwrap_or_default();
-        let failed = attempt.order.get(attempt.depth);
-        Miss {
-            goal: self.pattern(&rule.head, &open),
-            rule: Some(self.rule_ref(rule)),
-            satisfied: attempt.order.iter().take(attempt.depth).map(shown).collect(),
-            failed: failed.map_or(String::new(), shown),
-            failure: failed.map_or(Failure::NoValue, |idx| self.failure(&rule.body[*idx], &attempt.binding, depth)),
+        let goal = self.pattern(&rule.head, &open, &rule.variables);
+        let (failed, failure) = match attempt.order.get(attempt.depth).map(|idx| &rule.body[*idx]) {
+            Some(literal) => {
+                (self.unsatisfied(rule, literal, &attempt.binding), self.failure(literal, &attempt.binding, depth))
+            }
+            None => (format!("a group whose aggregate is {goal}"), self.other_aggregates(rule, &open)),
+        };
+        let satisfied = attempt.order.iter().take(attempt.depth).map(shown).collect();
+        Miss { goal, rule: Some(self.rule_ref(rule)), satisfied, failed, failure }
+    }
+
+    /// Returns the tuples of the group that an aggregating rule derives instead of the goal.
+    fn other_aggregates(&self, rule: &Rule, open: &Binding) -> Failure {
+        let mut group = open.clone();
+        if let Some(aggregation) = &rule.aggregation {
+            keep_group(&mut group, &aggregation.group);
         }
+        let of_group = self.rows(rule.head.predicate).filter(|row| unify(&rule.head, row, &mut group.clone()));
+        let nearest = of_group.take(NEAREST_SHOWN).map(|row| self.statement(rule.head.predicate, row)).collect();
+        Failure::NoMatch { nearest, because: None }
+    }
+
+    /// Describes a pattern that no rule has a matching head for.
+    pub(super) fn underivable(&self, predicate: PredicateId, known: &[Option<TermId>]) -> Miss {
+        let args = known.iter().map(|id| id.map_or(Operand::Any, Operand::Constant)).collect();
+        let goal = self.pattern(&Atom { predicate, args, span: 0..0 }, &Vec::new(), &[]);
+        let failure = Failure::NoMatch { nearest: self.nearest(predicate, known), because: None };
+        Miss { failed: goal.clone(), goal, rule: None, satisfied: Vec::new(), failure }
     }
 
     fn failure(&self, literal: &Literal, binding: &Binding, depth: usize) -> Failure {
@@ -144,7 +181,11 @@ impl<'a> ProofContext<'a> {
                 (Some(_), Some(_)) => Failure::Comparison { distance: self.distance(literal, binding) },
                 _ => Failure::NoValue,
             },
-            Literal::Assign { .. } | Literal::Test { .. } => Failure::NoValue,
+            Literal::Assign { variable, value, .. } => match (binding[*variable], self.value(value, binding)) {
+                (Some(_), Some(_)) => Failure::Comparison { distance: self.distance(literal, binding) },
+                _ => Failure::NoValue,
+            },
+            Literal::Test { .. } => Failure::NoValue,
         }
     }
 
@@ -160,17 +201,20 @@ impl<'a> ProofContext<'a> {
             .collect();
         let because =
             if depth < DEPTH_LIMIT { self.miss(atom.predicate, &known, depth + 1).map(Box::new) } else { None };
+        Failure::NoMatch { nearest: self.nearest(atom.predicate, &known), because }
+    }
+
+    /// Returns the tuples that agree with a pattern in the most arguments.
+    fn nearest(&self, predicate: PredicateId, known: &[Option<TermId>]) -> Vec<String> {
         let mut near: Vec<(usize, &[TermId])> = self
-            .rows(atom.predicate)
+            .rows(predicate)
             .map(|row| {
                 (known.iter().zip(row).filter(|(known, value)| known.is_some_and(|k| k == **value)).count(), row)
             })
             .filter(|(agreeing, _)| *agreeing > 0)
             .collect();
         near.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(b.1)));
-        let nearest =
-            near.into_iter().take(NEAREST_SHOWN).map(|(_, row)| self.statement(atom.predicate, row)).collect();
-        Failure::NoMatch { nearest, because }
+        near.into_iter().take(NEAREST_SHOWN).map(|(_, row)| self.statement(predicate, row)).collect()
     }
 }
 

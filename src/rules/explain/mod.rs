@@ -15,4 +15,4 @@ mod search;
 mod shown;
 mod text;
 
-pub use model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support};
+pub use model::{Explanation, Failure, Miss, Premise, Proof, RuleRef, Support, UnknownTerm};

@@ -1,6 +1,6 @@
 //! Data model of an explanation.
 
-use actcheck_base::Findings;
+use actcheck_base::{Findings, Span};
 
 /// Explains why a property or goal holds or does not hold: a tree, which [`Explanation::to_text`] formats.
 ///
@@ -38,8 +38,29 @@ pub struct Explanation {
     pub proofs: Vec<Proof>,
     /// The closest attempt, if there are no deciding tuples.
     pub miss: Option<Miss>,
+    /// Constants of the goal that occur neither in the rules nor in any tuple.
+    pub unknown: Vec<UnknownTerm>,
     /// Remarks, for example that a query has no proof.
     pub notes: Vec<String>,
+}
+
+impl Explanation {
+    /// Returns whether the property holds, or whether the goal is derived.
+    pub fn holds(&self) -> bool {
+        self.findings.as_ref().map_or(!self.proofs.is_empty(), |findings| findings.holds)
+    }
+}
+
+/// A constant of a goal that occurs neither in the rules nor in any tuple.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct UnknownTerm {
+    /// The constant as written.
+    pub text: String,
+    /// Its place in the text of the goal.
+    pub span: Span,
+    /// A known term with a similar name.
+    pub similar: Option<String>,
 }
 
 /// A statement with its support.
@@ -74,8 +95,10 @@ pub enum Support {
         /// The conditions of the first few matches, one match after another.
         premises: Vec<Premise>,
     },
-    /// It is proved elsewhere in this explanation, or the proof was cut because it is too long.
+    /// It is proved elsewhere in this explanation.
     Cut,
+    /// It is derived, but its proof is too long to find or to show.
+    Omitted,
 }
 
 /// One satisfied condition of a rule.
@@ -110,7 +133,7 @@ pub struct RuleRef {
 pub struct Miss {
     /// The goal, with `_` for unbound arguments.
     pub goal: String,
-    /// The closest rule, or `None` if no rule derives the goal.
+    /// The closest rule, or `None` if no rule has a matching head.
     pub rule: Option<RuleRef>,
     /// The conditions that were satisfied together, with their values.
     pub satisfied: Vec<String>,

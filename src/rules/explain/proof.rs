@@ -3,9 +3,11 @@
 use std::cell::Cell;
 use std::collections::BTreeSet;
 
+use crate::engine::aggregate::{Known, group_head, projection};
 use crate::engine::naive::unify;
+use crate::engine::plan::operand_value;
 use crate::explain::model::{Premise, Proof, Support};
-use crate::explain::search::{Binding, ProofContext, STEP_LIMIT, reading_order};
+use crate::explain::search::{Binding, ProofContext, reading_order};
 use crate::model::program::{Literal, PredicateId, Rule};
 use actcheck_base::TermId;
 
@@ -13,6 +15,8 @@ use actcheck_base::TermId;
 const DEPTH_LIMIT: usize = 40;
 /// Maximum number of matches shown for an aggregate.
 const MATCHES_SHOWN: usize = 3;
+/// An aggregate over more matches is not computed again for its proof.
+const MATCHES_COUNTED: usize = 1_000_000;
 
 /// Proves tuples; each derived tuple is expanded only once.
 pub(super) struct Prover<'g, 'a> {
@@ -32,7 +36,10 @@ impl<'g, 'a> Prover<'g, 'a> {
         if self.context.is_fact(predicate, row) {
             return Proof { statement, support: Support::Fact };
         }
-        if depth >= DEPTH_LIMIT || !self.shown.insert((predicate, row.to_vec())) {
+        if depth >= DEPTH_LIMIT {
+            return Proof { statement, support: Support::Omitted };
+        }
+        if !self.shown.insert((predicate, row.to_vec())) {
             return Proof { statement, support: Support::Cut };
         }
         let round = self.context.round(predicate, row);
@@ -50,7 +57,9 @@ impl<'g, 'a> Prover<'g, 'a> {
                 return Proof { statement, support };
             }
         }
-        Proof { statement, support: Support::Cut }
+        // Another occurrence must not refer to this one.
+        self.shown.remove(&(predicate, row.to_vec()));
+        Proof { statement, support: Support::Omitted }
     }
 
     /// Returns a binding that satisfies a rule's body using only premises of earlier rounds, or `None` if no binding
@@ -80,8 +89,7 @@ impl<'g, 'a> Prover<'g, 'a> {
             return false;
         };
         for row in self.context.candidates(atom, binding) {
-            self.steps.set(self.steps.get() + 1);
-            if self.steps.get() > STEP_LIMIT {
+            if !self.context.may_go_on(&self.steps) {
                 return false;
             }
             let before = binding.clone();
@@ -128,26 +136,42 @@ impl<'g, 'a> Prover<'g, 'a> {
         premises
     }
 
-    /// Returns the matches of the group from which an aggregating rule derived a head row, or `None` if the rule did
-    /// not derive the row.
+    /// Returns the matches of the group from which an aggregating rule derived a head row. Returns `None` if the group
+    /// yields another row, or if it has too many matches to compute it again.
     fn aggregate(&mut self, rule: &Rule, row: &[TermId], depth: usize) -> Option<Support> {
         let aggregation = rule.aggregation.as_ref()?;
         let mut binding = self.context.head_binding(rule, row)?;
-        for (variable, slot) in binding.iter_mut().enumerate() {
-            if !aggregation.group.contains(&variable) {
-                *slot = None;
-            }
-        }
+        keep_group(&mut binding, &aggregation.group);
         let order = reading_order(rule, &binding);
-        let (mut count, mut first) = (0, Vec::new());
-        self.satisfy(rule, &order, &mut binding, None, &mut |binding| {
+        let operands = projection(aggregation);
+        let (mut count, mut first, mut rows) = (0, Vec::new(), Vec::new());
+        let cut = self.satisfy(rule, &order, &mut binding, None, &mut |binding| {
             count += 1;
             if first.len() < MATCHES_SHOWN {
                 first.push(binding.clone());
             }
-            false
+            let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
+            rows.push(operands.iter().map(|operand| operand_value(*operand, &values)).collect::<Vec<_>>());
+            count >= MATCHES_COUNTED
         });
+        if cut || self.context.exhausted.get() {
+            return None;
+        }
+        let rows: Vec<&[TermId]> = rows.iter().map(Vec::as_slice).collect();
+        let found = group_head(rule, aggregation, &rows, &mut Known(self.context.universe), self.context.watch);
+        if found.as_deref() != Some(row) {
+            return None;
+        }
         let premises = first.iter().flat_map(|binding| self.premises(rule, binding, None, depth)).collect();
-        (count > 0).then(|| Support::Aggregate { rule: self.context.rule_ref(rule), matches: count, premises })
+        Some(Support::Aggregate { rule: self.context.rule_ref(rule), matches: count, premises })
+    }
+}
+
+/// Unbinds every variable of an aggregating rule that does not identify the group.
+pub(super) fn keep_group(binding: &mut Binding, group: &[usize]) {
+    for (variable, slot) in binding.iter_mut().enumerate() {
+        if !group.contains(&variable) {
+            *slot = None;
+        }
     }
 }

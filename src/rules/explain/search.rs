@@ -1,6 +1,9 @@
 //! Backward search: evaluates rules from their heads over finished tuples.
 
+use std::cell::Cell;
+
 use crate::engine::evaluate::{Planned, Rounds, Tables};
+use crate::engine::meter::Watch;
 use crate::engine::naive::unify;
 use crate::engine::plan::Indexes;
 use crate::engine::relation::finished;
@@ -23,6 +26,10 @@ pub(crate) struct ProofContext<'a> {
     pub(crate) facts: Vec<&'a Tables>,
     pub(crate) rounds: &'a Rounds,
     pub(crate) universe: &'a Universe<'a>,
+    /// The time and memory left for the explanation.
+    pub(crate) watch: &'a Watch,
+    /// Whether a search was stopped at its limit.
+    pub(crate) exhausted: Cell<bool>,
 }
 
 /// Returns the facts written in the programs or read by their imports, without derived tuples.
@@ -30,15 +37,27 @@ pub(super) fn stated_facts(programs: &[&Planned], predicates: &Predicates, index
     let mut facts = Tables::default();
     for (predicate, rows) in programs.iter().flat_map(|planned| &planned.facts) {
         let width = predicates.get(*predicate).width;
-        facts.set(*predicate, finished(width, rows.clone(), indexes.of(*predicate).clone()));
+        facts.set(*predicate, finished(width, rows, indexes.of(*predicate).clone()));
     }
     facts
 }
 
 /// Maximum number of rows read for one explanation, so that it stays fast enough for interactive use.
-pub(super) const STEP_LIMIT: usize = 20_000_000;
+const STEP_LIMIT: usize = 20_000_000;
+/// Steps between two checks of the clock.
+const STEPS_PER_CHECK: usize = 4096;
 
 impl<'a> ProofContext<'a> {
+    /// Counts a step of a search. Returns `false` if the search must stop.
+    pub(super) fn may_go_on(&self, steps: &Cell<usize>) -> bool {
+        steps.set(steps.get() + 1);
+        let checked = !steps.get().is_multiple_of(STEPS_PER_CHECK) || self.watch.check().is_ok();
+        if steps.get() > STEP_LIMIT || !checked {
+            self.exhausted.set(true);
+        }
+        !self.exhausted.get()
+    }
+
     /// Returns all tuples of a predicate.
     pub(super) fn rows(&self, predicate: PredicateId) -> impl Iterator<Item = &'a [TermId]> + use<'a> {
         let width = self.predicates.get(predicate).width;

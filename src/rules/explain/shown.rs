@@ -14,14 +14,22 @@ impl ProofContext<'_> {
         self.format_atom(predicate, args)
     }
 
-    /// Formats an atom with its bound values, and `_` for unbound arguments.
-    pub(super) fn pattern(&self, atom: &Atom, binding: &Binding) -> String {
+    /// Formats an atom with its bound values, and `_` for unbound arguments. Unbound variables that occur repeatedly keep
+    /// their names, because their values must be equal.
+    pub(super) fn pattern(&self, atom: &Atom, binding: &Binding, names: &[String]) -> String {
+        let is_repeated = |variable| atom.args.iter().filter(|arg| **arg == Operand::Variable(variable)).count() > 1;
+        let unbound = |variable: usize| match names.get(variable) {
+            Some(name) if !name.is_empty() && is_repeated(variable) => format!("?{name}"),
+            _ => "_".to_owned(),
+        };
         let args = atom
             .args
             .iter()
             .map(|arg| match arg {
                 Operand::Constant(id) => self.term(*id),
-                Operand::Variable(variable) => binding[*variable].map_or("_".into(), |id| self.term(id)),
+                Operand::Variable(variable) => {
+                    binding[*variable].map_or_else(|| unbound(*variable), |id| self.term(id))
+                }
                 Operand::Any => "_".into(),
             })
             .collect();
@@ -56,7 +64,7 @@ impl ProofContext<'_> {
     /// Formats a condition with its values.
     pub(super) fn literal(&self, rule: &Rule, literal: &Literal, binding: &Binding) -> String {
         match literal {
-            Literal::Positive(atom) => self.pattern(atom, binding),
+            Literal::Positive(atom) => self.pattern(atom, binding, &rule.variables),
             Literal::Negative(atom) => format!("not {}", self.negated(rule, atom, binding)),
             Literal::Assign { variable, span, .. } => {
                 let value = binding[*variable].map_or("(no value)".into(), |id| self.term(id));
@@ -74,12 +82,23 @@ impl ProofContext<'_> {
         }
     }
 
+    /// Formats a condition that is not satisfied. For an assignment, this is the computed value and the required one.
+    pub(super) fn unsatisfied(&self, rule: &Rule, literal: &Literal, binding: &Binding) -> String {
+        if let Literal::Assign { variable, value, span } = literal
+            && let (Some(wanted), Some(found)) = (binding[*variable], self.value(value, binding))
+        {
+            let text = self.source_text(rule, span.clone());
+            return format!("{text}, which gives {}, not {}", shown(&found), self.term(wanted));
+        }
+        self.literal(rule, literal, binding)
+    }
+
     /// Formats a negated atom. For a helper predicate, which is not in the rule text, returns the source text instead.
     pub(super) fn negated(&self, rule: &Rule, atom: &Atom, binding: &Binding) -> String {
         if self.predicates.get(atom.predicate).name.contains('~') {
             return self.source_text(rule, atom.span.clone());
         }
-        self.pattern(atom, binding)
+        self.pattern(atom, binding, &rule.variables)
     }
 
     /// Computes an expression. Returns `None` if a variable is unbound or the expression has no value.
@@ -90,7 +109,7 @@ impl ProofContext<'_> {
             return None;
         }
         let values: Vec<TermId> = binding.iter().map(|id| id.unwrap_or(0)).collect();
-        expr.value(&values, self.universe).map(std::borrow::Cow::into_owned)
+        expr.value(&values, self.universe, self.watch).map(std::borrow::Cow::into_owned)
     }
 
     fn source_text(&self, rule: &Rule, span: actcheck_base::Span) -> String {

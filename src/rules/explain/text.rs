@@ -8,12 +8,12 @@ impl Explanation {
     /// Formats the explanation as indented text, one statement per line.
     pub fn to_text(&self) -> String {
         let mut out = String::new();
-        let verdict = match (&self.findings, self.miss.is_some()) {
-            (Some(findings), _) if !findings.applicable => "is inapplicable",
-            (Some(findings), _) if findings.holds => "holds",
-            (Some(_), _) => "does not hold",
-            (None, true) => "is not derived",
-            (None, false) => "is derived",
+        let verdict = match &self.findings {
+            Some(findings) if !findings.applicable => "is inapplicable",
+            Some(findings) if findings.holds => "holds",
+            Some(_) => "does not hold",
+            None if self.holds() => "is derived",
+            None => "is not derived",
         };
         line(&mut out, 0, &format!("{}: {verdict}", self.title));
         for because in self.findings.iter().flat_map(|findings| &findings.because) {
@@ -24,6 +24,9 @@ impl Explanation {
         }
         if let Some(miss) = &self.miss {
             write_miss(&mut out, 1, miss);
+        }
+        for term in &self.unknown {
+            line(&mut out, 1, &format!("`{}` occurs neither in the rules nor in any tuple", term.text));
         }
         for note in &self.notes {
             line(&mut out, 1, note);
@@ -54,6 +57,7 @@ fn write_proof(out: &mut String, depth: usize, proof: &Proof) {
     match &proof.support {
         Support::Fact => line(out, depth, &format!("{}  (fact)", proof.statement)),
         Support::Cut => line(out, depth, &format!("{}  (shown above)", proof.statement)),
+        Support::Omitted => line(out, depth, &format!("{}  (derived; its proof is too long)", proof.statement)),
         Support::Rule { rule, premises } => {
             line(out, depth, &format!("{}  {}", proof.statement, cited(rule)));
             write_premises(out, depth + 1, premises);
@@ -78,12 +82,14 @@ fn write_premises(out: &mut String, depth: usize, premises: &[Premise]) {
 fn write_miss(out: &mut String, depth: usize, miss: &Miss) {
     match &miss.rule {
         Some(rule) => line(out, depth, &format!("{} came closest {}", miss.goal, cited(rule))),
-        None => line(out, depth, &format!("no rule derives {}", miss.goal)),
+        None => line(out, depth, &format!("{} is not a fact, and no rule has a matching head", miss.goal)),
     }
     for text in &miss.satisfied {
         line(out, depth + 1, &format!("ok      {text}"));
     }
-    line(out, depth + 1, &format!("missing {}", miss.failed));
+    if miss.rule.is_some() {
+        line(out, depth + 1, &format!("missing {}", miss.failed));
+    }
     match &miss.failure {
         Failure::NoMatch { nearest, because } => {
             for fact in nearest {

@@ -5,7 +5,9 @@ use std::cmp::Ordering;
 
 use crate::builtins::{self, Builtin, Value};
 use crate::model::universe::Universe;
+use crate::model::values::{lexical, text_len};
 use crate::syntax::Comparison;
+use crate::watch::Watch;
 use actcheck_base::{Term, TermId};
 
 /// Index of a variable within its rule.
@@ -37,31 +39,34 @@ impl Expr {
         }
     }
 
-    /// Computes the value. Returns `None` if a built-in has no result for its arguments.
-    pub(crate) fn value<'a>(&'a self, binding: &[TermId], terms: &'a Universe<'_>) -> Option<Value<'a>> {
+    /// Computes the value. Returns `None` if a built-in has no result for its arguments, or if the budget is spent
+    /// (see [`Watch::stopped`]).
+    pub(crate) fn value<'a>(&'a self, binding: &[TermId], terms: &'a Universe<'_>, watch: &Watch) -> Option<Value<'a>> {
         match self {
             Self::Constant(term) => Some(Cow::Borrowed(term)),
             Self::Variable(variable) => Some(Cow::Borrowed(terms.term(binding[*variable]))),
             Self::Call(builtin, args) => match args.as_slice() {
-                [a] => (builtin.apply)(&[a.value(binding, terms)?]),
-                [a, b] => (builtin.apply)(&[a.value(binding, terms)?, b.value(binding, terms)?]),
+                [a] => builtin.call(&[a.value(binding, terms, watch)?], watch),
+                [a, b] => builtin.call(&[a.value(binding, terms, watch)?, b.value(binding, terms, watch)?], watch),
                 _ => {
                     let args: Vec<Value<'a>> =
-                        args.iter().map(|arg| arg.value(binding, terms)).collect::<Option<_>>()?;
-                    (builtin.apply)(&args)
+                        args.iter().map(|arg| arg.value(binding, terms, watch)).collect::<Option<_>>()?;
+                    builtin.call(&args, watch)
                 }
             }
             .map(Cow::Owned),
-            Self::Matches(arg, pattern) => match arg.value(binding, terms)?.as_ref() {
+            Self::Matches(arg, pattern) => match arg.value(binding, terms, watch)?.as_ref() {
                 Term::String(text) | Term::LangString(text, _) => {
-                    Some(Cow::Owned(Term::Boolean(pattern.is_match(text))))
+                    Some(Cow::Owned(Term::Boolean(builtins::matches(pattern, text, watch)?)))
                 }
                 _ => None,
             },
             Self::Format(parts) => {
                 let mut text = String::new();
                 for part in parts {
-                    text.push_str(&crate::model::values::lexical(part.value(binding, terms)?.as_ref()));
+                    let part = part.value(binding, terms, watch)?;
+                    watch.make(text_len(&part))?;
+                    text.push_str(&lexical(&part));
                 }
                 Some(Cow::Owned(Term::string(text)))
             }

@@ -2,6 +2,8 @@
 //!
 //! Never: reports a diagnostic, or derives a tuple.
 
+pub(crate) mod datatypes;
+mod datetime;
 pub(crate) mod expression;
 pub(crate) mod given;
 pub(crate) mod program;

@@ -1,5 +1,7 @@
 //! Common term ids for the rules, the facts of a run, and the terms created by an evaluation.
 
+use crate::model::values::text_len;
+use crate::watch::{Stop, Watch};
 use actcheck_base::{Term, TermId, Terms};
 
 /// Terms of three origins with common ids. The terms of the rules and of the run are borrowed, not copied.
@@ -10,14 +12,19 @@ pub(crate) struct Universe<'a> {
     /// Common id of each term of the run, or [`UNKNOWN`] until first used.
     run_ids: Vec<TermId>,
     created: Terms,
+    /// Memory of the created terms. Unit: bytes.
+    created_bytes: usize,
 }
+
+/// Memory of a created term without its text: two copies of the term and its entry in the table. Unit: bytes.
+const TERM_BYTES: usize = 2 * size_of::<Term>() + 48;
 
 const UNKNOWN: TermId = TermId::MAX;
 
 impl<'a> Universe<'a> {
     /// Creates a universe of the rules' terms and, optionally, the terms of a run.
     pub(crate) fn new(book: &'a Terms, run: Option<&'a Terms>) -> Self {
-        Self { book, run, run_ids: vec![UNKNOWN; run.map_or(0, Terms::len)], created: Terms::new() }
+        Self { book, run, run_ids: vec![UNKNOWN; run.map_or(0, Terms::len)], created: Terms::new(), created_bytes: 0 }
     }
 
     fn run_start(&self) -> usize {
@@ -73,7 +80,26 @@ impl<'a> Universe<'a> {
         if let Some(id) = self.run.and_then(|run| run.id(&term)) {
             return number(self.run_start() + id as usize);
         }
-        number(self.created_start() + self.created.intern(term) as usize)
+        let (before, bytes) = (self.created.len(), TERM_BYTES + text_len(&term));
+        let id = self.created.intern(term);
+        if self.created.len() > before {
+            self.created_bytes += bytes;
+        }
+        number(self.created_start() + id as usize)
+    }
+
+    /// Returns the common id of a computed term, and accounts for its memory if it is new.
+    pub(crate) fn create(&mut self, term: Term, watch: &Watch) -> Result<TermId, Stop> {
+        let before = self.created_bytes;
+        let id = self.intern(term);
+        watch.hold(self.created_bytes - before)?;
+        Ok(id)
+    }
+
+    /// Returns all terms.
+    pub(crate) fn terms<'s>(&'s self) -> impl Iterator<Item = &'s Term> {
+        let of = |terms: &'s Terms| (0..terms.len()).map(move |id| terms.term(number(id)));
+        of(self.book).chain(self.run.into_iter().flat_map(of)).chain(of(&self.created))
     }
 }
 

@@ -53,7 +53,7 @@ pub(crate) fn double_term(value: f64) -> Term {
     Term::Double(if value == 0.0 { 0.0 } else { value })
 }
 
-/// The integer types of XML Schema, all stored as integers.
+/// The integer types of XML Schema, all stored as integers if they are in their range.
 const INTEGER_TYPES: [&str; 13] = [
     "integer",
     "int",
@@ -90,7 +90,9 @@ pub(crate) fn literal(text: &str, datatype: &str) -> Term {
             Some(term) => term,
             None => Term::Decimal(canonical.into()),
         }),
-        _ if INTEGER_TYPES.contains(&local) => integer(text).unwrap_or_else(other),
+        _ if INTEGER_TYPES.contains(&local) => integer(text)
+            .filter(|value| local == "integer" || crate::model::datatypes::belongs(value, datatype) == Some(true))
+            .unwrap_or_else(other),
         _ => other(),
     }
 }
@@ -131,7 +133,7 @@ fn xsd_float(text: &str) -> Option<f64> {
 
 /// Returns the canonical form of a decimal: no redundant zeros, and no dot without a fraction. Returns `None` if the
 /// text is not a decimal.
-fn decimal(text: &str) -> Option<String> {
+pub(crate) fn decimal(text: &str) -> Option<String> {
     let (negative, digits) = match text.strip_prefix('-') {
         Some(rest) => (true, rest),
         None => (false, text.strip_prefix('+').unwrap_or(text)),
@@ -146,6 +148,15 @@ fn decimal(text: &str) -> Option<String> {
     let whole = if whole.is_empty() { "0" } else { whole };
     let sign = if negative && (whole != "0" || !fraction.is_empty()) { "-" } else { "" };
     Some(if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") })
+}
+
+/// Returns the length of a term's text; 0 for numbers. Unit: bytes.
+pub(crate) fn text_len(term: &Term) -> usize {
+    match term {
+        Term::Iri(text) | Term::Blank(text) | Term::String(text) | Term::Decimal(text) => text.len(),
+        Term::LangString(text, more) | Term::Literal(text, more) => text.len() + more.len(),
+        Term::Integer(_) | Term::Double(_) | Term::Boolean(_) => 0,
+    }
 }
 
 /// Returns the lexical form of a term, as `STR` does.

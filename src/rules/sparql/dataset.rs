@@ -2,13 +2,14 @@
 
 use std::convert::Infallible;
 use std::hash::{Hash, Hasher};
+use std::rc::Rc;
 
 use oxrdf::{BlankNode, Literal, NamedNode, Term as RdfTerm};
 use spareval::{InternalQuad, QueryableDataset};
 
 use crate::model::rdf::from_rdf;
 use crate::model::universe::Universe;
-use crate::sparql::ledger::{Entry, Ledger};
+use crate::sparql::ledger::{Entry, Ledger, Weight};
 use actcheck_base::{Term, TermId, Terms, names};
 
 /// Statements in the two orders that lookups use.
@@ -93,15 +94,36 @@ pub(crate) struct View<'a> {
 /// A term held by the evaluator. Copying it may stop the evaluation.
 #[derive(Debug, Clone)]
 pub(crate) struct ViewTerm<'a> {
-    value: Value,
+    value: Value<'a>,
     _entry: Entry<'a>,
 }
 
 /// A term of the dataset by id, or a term created by the query.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Value {
+enum Value<'a> {
     Known(TermId),
-    Created(Box<RdfTerm>),
+    Created(Rc<Created<'a>>),
+}
+
+/// A term created by the query.
+#[derive(Debug)]
+struct Created<'a> {
+    term: RdfTerm,
+    _weight: Weight<'a>,
+}
+
+impl PartialEq for Created<'_> {
+    fn eq(&self, other: &Self) -> bool {
+        self.term == other.term
+    }
+}
+
+impl Eq for Created<'_> {}
+
+impl Hash for Created<'_> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.term.hash(state);
+    }
 }
 
 impl ViewTerm<'_> {
@@ -134,7 +156,7 @@ impl<'a> View<'a> {
         self.snapshot.graphs.iter().map(|(name, graph)| (*name, graph)).chain([(statements.name, &statements.graph)])
     }
 
-    fn handed_out(&self, value: Value) -> ViewTerm<'a> {
+    fn handed_out(&self, value: Value<'a>) -> ViewTerm<'a> {
         ViewTerm { value, _entry: Entry::new(self.ledger) }
     }
 }
@@ -184,15 +206,28 @@ impl<'a> QueryableDataset<'a> for View<'a> {
     }
 
     fn internalize_term(&self, term: RdfTerm) -> Result<ViewTerm<'a>, Infallible> {
-        let known = self.universe.id(&from_rdf(&term));
-        Ok(self.handed_out(known.map_or_else(|| Value::Created(Box::new(term)), Value::Known)))
+        if let Some(known) = self.universe.id(&from_rdf(&term)) {
+            return Ok(self.handed_out(Value::Known(known)));
+        }
+        let weight = Weight::new(self.ledger, length_of(&term));
+        let created = Created { term, _weight: weight };
+        Ok(self.handed_out(Value::Created(Rc::new(created))))
     }
 
     fn externalize_term(&self, term: ViewTerm<'a>) -> Result<RdfTerm, Infallible> {
         Ok(match term.value {
             Value::Known(id) => to_rdf(self.universe.term(id)),
-            Value::Created(term) => *term,
+            Value::Created(created) => created.term.clone(),
         })
+    }
+}
+
+/// Returns the length of a term's text. Unit: bytes.
+pub(crate) fn length_of(term: &RdfTerm) -> usize {
+    match term {
+        RdfTerm::NamedNode(node) => node.as_str().len(),
+        RdfTerm::BlankNode(node) => node.as_str().len(),
+        RdfTerm::Literal(literal) => literal.value().len(),
     }
 }
 

@@ -7,15 +7,19 @@ use oxrdf::{NamedNode, Term as RdfTerm};
 
 use crate::builtins;
 use crate::engine::budget::Budget;
-use crate::engine::meter::Stop;
+use crate::engine::meter::{Stop, mebibytes};
 use crate::engine::reading::smaller_margin;
 use crate::model::rdf::from_rdf;
 use crate::model::universe::Universe;
 use crate::model::values::lexical;
-use crate::sparql::dataset::{Snapshot, Statements, View, to_rdf};
+use crate::sparql::dataset::{Snapshot, Statements, View, length_of, to_rdf};
 use crate::sparql::ledger::Ledger;
 use crate::sparql::query_text::{first_group, groups, scan, variables};
-use actcheck_base::{Diagnostic, Diagnostics, Findings, RuleFault, Source, Span, WitnessRow, names};
+use crate::watch::Watch;
+use actcheck_base::{
+    COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Source, Span, TEXT_FUNCTIONS, Term,
+    WitnessRow, bounded_texts, check_calls, names,
+};
 use actcheck_ontology::{Ontology, Vocabulary};
 
 /// A prepared query.
@@ -38,11 +42,17 @@ impl Query {
         if !ontology.vocabulary.terms.is_empty() {
             check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
         }
+        if let Err(at) = check_calls(&source.text) {
+            let message = format!("calls are nested more than {MOST_NESTED_CALLS} deep");
+            let help = "name the inner values, as in `BIND(CONCAT(?a, ?b) AS ?c)`";
+            diagnostics.push(Diagnostic::error("R060", message).at(source, at..at + 1).help(help));
+            return Err(diagnostics);
+        }
         if let Err(error) = evaluator().parse_query(source.text.as_ref()) {
             diagnostics.push(syntax_fault(source, &error.to_string()));
             return Err(diagnostics);
         }
-        let text = bind_designators(&source.text, &ontology.designators);
+        let text = bounded_texts(&bind_designators(&source.text, &ontology.designators));
         let prepared = evaluator().parse_query(&text).map_err(|error| {
             let help = "a variable named like a designator is bound to its value; use it in the first group";
             Diagnostics::from(Diagnostic::error("R060", error.to_string()).in_source(source).help(help))
@@ -117,6 +127,12 @@ impl Query {
         match stop {
             Stop::Time => self.budget_spent(&format!("took more than {} s", budget.secs)),
             Stop::Tuples => self.budget_spent(&format!("held more than {} terms at once", budget.tuples)),
+            Stop::Bytes => {
+                let advice = "repeated concatenation doubles a text: write texts once";
+                let most = mebibytes(budget.bytes);
+                let how = format!("made a text that is too long for a budget of {most}");
+                RuleFault::BudgetSpent(format!("the query in {} {how}; {advice}", self.file))
+            }
             Stop::Requested => RuleFault::Interrupted,
         }
     }
@@ -148,10 +164,20 @@ fn evaluator() -> SparqlEvaluator {
             }
             let args: Vec<builtins::Value<'_>> =
                 args.iter().map(|arg| std::borrow::Cow::Owned(from_rdf(arg))).collect();
-            (function.apply)(&args).map(|term| to_rdf(&term))
+            function.call(&args, &Watch::new(&Budget::default())).map(|term| to_rdf(&term))
         });
     }
-    evaluator
+    for (_, iri, function) in TEXT_FUNCTIONS {
+        evaluator = evaluator.with_custom_function(NamedNode::new_unchecked(iri), move |args: &[RdfTerm]| {
+            let args: Vec<Term> = args.iter().map(from_rdf).collect();
+            Ledger::text(function, &args).map(|term| to_rdf(&term))
+        });
+    }
+    evaluator.with_custom_function(NamedNode::new_unchecked(COUNTED_TEXT), |args: &[RdfTerm]| {
+        let [text] = args else { return None };
+        Ledger::append(length_of(text));
+        Some(text.clone())
+    })
 }
 
 fn fault(error: &QueryEvaluationError) -> RuleFault {

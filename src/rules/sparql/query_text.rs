@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use actcheck_base::{Span, names};
+use actcheck_base::{Span, names, string_end};
 
 /// A word of the text.
 #[derive(Debug, Clone)]
@@ -53,22 +53,6 @@ pub(crate) fn scan(text: &str) -> Vec<Word> {
         }
     }
     words
-}
-
-fn string_end(text: &str, start: usize, quote: char) -> usize {
-    let triple: String = std::iter::repeat_n(quote, 3).collect();
-    let close = if text[start..].starts_with(&triple) { triple } else { quote.to_string() };
-    let mut at = start + close.len();
-    while let Some(c) = text[at..].chars().next() {
-        if text[at..].starts_with(&close) {
-            return at + close.len();
-        }
-        at += c.len_utf8();
-        if c == '\\' {
-            at += text[at..].chars().next().map_or(0, char::len_utf8);
-        }
-    }
-    text.len()
 }
 
 /// Returns the names of the variables in a query.

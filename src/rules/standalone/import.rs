@@ -1,28 +1,27 @@
 //! `@import`: reads the rows of a file as facts.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
-use oxrdf::GraphName;
-use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
+use oxrdfio::{RdfFormat, RdfParser};
 
 use crate::check::checking::{Checking, Role, counted};
-use crate::check::options::{OptionValue, options};
+use crate::engine::budget::Budget;
 use crate::model::program::{Predicates, Program};
-use crate::model::rdf::from_rdf;
-use crate::model::values::lexical;
-use crate::standalone::stoppable::Stoppable;
-use crate::standalone::table::{ColumnKind, LeftOut, delimiter_of, read_table};
+use crate::standalone::faults::Faults;
+use crate::standalone::input::{Compression, Ended, Limits, open};
+use crate::standalone::records::{Found, Records};
+use crate::standalone::settings::Settings;
+use crate::standalone::sink::Sink;
+use crate::standalone::statements::read_rdf;
+use crate::standalone::table::{ColumnKind, Layout, read_table};
 use crate::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
-use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, TermId, Terms, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, RuleFault, Source, Span, TermId, Terms, did_you_mean};
 
 /// Formats of imports.
 const FORMATS: [&str; 9] = ["csv", "dsv", "tsv", "rdf", "ntriples", "nquads", "turtle", "trig", "rdfxml"];
-const OPTIONS: [&str; 8] =
-    ["resource", "format", "delimiter", "quoting", "compression", "ignore_headers", "limit", "base"];
-/// Only this much of a file is read, after decompression. Unit: bytes.
-const SIZE_LIMIT: u64 = 4 << 30;
+const TABLE_OPTIONS: [&str; 7] =
+    ["resource", "format", "delimiter", "quoting", "compression", "ignore_headers", "limit"];
+const RDF_OPTIONS: [&str; 4] = ["resource", "compression", "limit", "base"];
 
 /// A file to import.
 #[derive(Debug)]
@@ -32,13 +31,14 @@ pub(super) struct Import {
     predicate: String,
     arity: usize,
     path: PathBuf,
+    compression: Compression,
     content: Content,
     limit: usize,
 }
 
 #[derive(Debug)]
 enum Content {
-    Table { delimiter: u8, quoting: bool, headers: bool, columns: Vec<ColumnKind> },
+    Table(Layout),
     Rdf { format: RdfFormat, base: Option<String> },
 }
 
@@ -58,84 +58,110 @@ pub(super) fn define_imports(checking: &mut Checking<'_>, syntax: &Syntax, folde
     imports
 }
 
+/// Returns `None` if an error was reported.
 fn define_import(checking: &mut Checking<'_>, syntax: &Syntax, transfer: &Transfer, folder: &Path) -> Option<Import> {
     let source = &syntax.source;
-    known_words(checking, source, transfer)?;
-    let options = options(checking, syntax, transfer);
-    let Some(resource) = text(&options, "resource") else {
-        let help = "write `csv{resource = \"file.csv\"}`";
-        checking.error("R071", source, &transfer.span, "the import has no `resource`", help);
+    known_format(checking, source, transfer)?;
+    let is_table = matches!(transfer.format.as_str(), "csv" | "dsv" | "tsv");
+    let mut settings = Settings::new(syntax, transfer, if is_table { &TABLE_OPTIONS } else { &RDF_OPTIONS });
+    let import = import_of(checking, syntax, transfer, folder, &mut settings, is_table);
+    let failed = settings.diagnostics.has_errors();
+    checking.diagnostics.extend(settings.diagnostics);
+    import.filter(|_| !failed)
+}
+
+/// Returns `None` if an error was reported.
+fn import_of(
+    checking: &mut Checking<'_>,
+    syntax: &Syntax,
+    transfer: &Transfer,
+    folder: &Path,
+    settings: &mut Settings<'_>,
+    is_table: bool,
+) -> Option<Import> {
+    let source = &syntax.source;
+    if !transfer.options.iter().any(|(name, _)| name == "resource") {
+        let help = format!("write `{}{{resource = \"file.{0}\"}}`", transfer.format);
+        settings.error(&transfer.span, "the import has no `resource`".to_owned(), &help);
         return None;
-    };
+    }
+    let resource = settings.text("resource")?;
     if resource.contains("://") {
         let help = "download it first; imports read local files only";
         checking.error("R072", source, &transfer.span, format!("`{resource}` is not a local file"), help);
         return None;
     }
     let path = folder.join(&resource);
-    let (content, arity) = match transfer.format.as_str() {
-        "csv" | "dsv" | "tsv" => table(checking, syntax, transfer, &options, &path)?,
-        _ => rdf(checking, source, transfer, &options, &path)?,
+    let compression = compression(settings, &path);
+    let (content, arity) = match is_table {
+        true => table(checking, syntax, transfer, settings, &path, compression)?,
+        false => rdf(checking, source, transfer, settings, &path)?,
     };
-    let limit = text(&options, "limit").and_then(|limit| limit.parse().ok()).unwrap_or(usize::MAX);
-    let predicate = transfer.predicate.clone();
-    Some(Import { source: source.clone(), span: transfer.span.clone(), predicate, arity, path, content, limit })
+    let limit = settings.count("limit").unwrap_or(usize::MAX);
+    let (predicate, span) = (transfer.predicate.clone(), transfer.span.clone());
+    Some(Import { source: source.clone(), span, predicate, arity, path, compression, content, limit })
 }
 
-type Options = std::collections::BTreeMap<String, OptionValue>;
-
-fn text(options: &Options, name: &str) -> Option<String> {
-    match options.get(name) {
-        Some(OptionValue::One(term)) => Some(lexical(term)),
-        _ => None,
-    }
-}
-
-/// Reports unknown formats and options. Returns `None` if the format is unknown.
-fn known_words(checking: &mut Checking<'_>, source: &Source, transfer: &Transfer) -> Option<()> {
+/// Reports an unknown format.
+fn known_format(checking: &mut Checking<'_>, source: &Source, transfer: &Transfer) -> Option<()> {
     let format = transfer.format.as_str();
-    if !FORMATS.contains(&format) {
-        let (message, help) = match format {
-            "json" | "sparql" => {
-                (format!("imports from {format} are not supported"), format!("formats: {}", FORMATS.join(", ")))
-            }
-            _ => (format!("unknown format `{format}`"), did_you_mean(format, FORMATS)),
-        };
-        checking.error("R070", source, &transfer.span, message, help);
-        return None;
+    if FORMATS.contains(&format) {
+        return Some(());
     }
-    for (name, value) in transfer.options.iter().filter(|(name, _)| !OPTIONS.contains(&name.as_str())) {
-        let message = format!("unknown option `{name}`");
-        checking.error("R071", source, &value.span, message, did_you_mean(name, OPTIONS));
-    }
-    Some(())
+    let (message, help) = match format {
+        "json" | "sparql" => {
+            (format!("imports from {format} are not supported"), format!("formats: {}", FORMATS.join(", ")))
+        }
+        _ => (format!("unknown format `{format}`"), did_you_mean(format, FORMATS)),
+    };
+    checking.error("R070", source, &transfer.span, message, help);
+    None
 }
 
-/// Returns the options of a table and the number of imported columns. Returns `None` if an error was reported.
+/// Returns the stated compression, or that of the file's name.
+fn compression(settings: &mut Settings<'_>, path: &Path) -> Compression {
+    let usual = match path.extension().is_some_and(|extension| extension == "gz") {
+        true => Compression::Gzip,
+        false => Compression::None,
+    };
+    let Some(word) = settings.text("compression") else { return usual };
+    match word.as_str() {
+        "gzip" => Compression::Gzip,
+        "none" => Compression::None,
+        _ => {
+            let help = did_you_mean(&word, ["gzip", "none"]);
+            settings.error(&settings.span("compression"), format!("unknown compression `{word}`"), &help);
+            usual
+        }
+    }
+}
+
+/// Returns the layout of a table and the number of imported columns. Returns `None` if an error was reported.
 fn table(
-    checking: &mut Checking<'_>,
+    checking: &Checking<'_>,
     syntax: &Syntax,
     transfer: &Transfer,
-    options: &Options,
+    settings: &mut Settings<'_>,
     path: &Path,
+    compression: Compression,
 ) -> Option<(Content, usize)> {
-    let flag = |name: &str, usual: bool| text(options, name).map_or(usual, |value| value == "true");
-    let (quoting, headers) = (flag("quoting", true), flag("ignore_headers", false));
-    let delimiter = delimiter_of(&transfer.format, text(options, "delimiter").as_deref());
-    let stated = match columns(options) {
-        Ok(columns) => columns,
-        Err(word) => {
-            let help = did_you_mean(&word, ColumnKind::NAMES);
-            checking.error("R071", &syntax.source, &transfer.span, format!("unknown column format `{word}`"), help);
-            return None;
+    let delimiter = settings.delimiter();
+    let (quoting, headers) = (settings.flag("quoting").unwrap_or(true), settings.flag("ignore_headers") == Some(true));
+    let known = match transfer.options.iter().any(|(name, _)| name == "format") {
+        true => settings.columns()?,
+        false => {
+            let used = arity_in_rules(checking, syntax, &transfer.predicate);
+            let count = used.or_else(|| columns_of_file(path, compression, delimiter, quoting));
+            vec![ColumnKind::Any; count.unwrap_or(0)]
         }
     };
-    let columns = stated.unwrap_or_else(|| {
-        let used = arity_in_rules(checking, syntax, &transfer.predicate);
-        vec![ColumnKind::Any; used.or_else(|| columns_of_file(path, delimiter)).unwrap_or(0)]
-    });
-    let arity = columns.iter().filter(|column| **column != ColumnKind::Skip).count();
-    Some((Content::Table { delimiter, quoting, headers, columns }, arity))
+    if known.is_empty() && std::fs::metadata(path).is_ok_and(|file| !file.is_file() || file.len() > 0) {
+        let help = "add `format = (any, …)` with one word for each column";
+        settings.error(&transfer.span, format!("the number of columns of `{}` is unknown", path.display()), help);
+        return None;
+    }
+    let arity = known.iter().filter(|column| **column != ColumnKind::Skip).count();
+    Some((Content::Table(Layout { delimiter, quoting, headers, columns: known }), arity))
 }
 
 /// Returns the RDF format of a file and its number of columns: 3 for triples, 4 for quads. Returns `None` if an error
@@ -144,7 +170,7 @@ fn rdf(
     checking: &mut Checking<'_>,
     source: &Source,
     transfer: &Transfer,
-    options: &Options,
+    settings: &mut Settings<'_>,
     path: &Path,
 ) -> Option<(Content, usize)> {
     let Some(format) = rdf_format(&transfer.format, path) else {
@@ -154,7 +180,17 @@ fn rdf(
         return None;
     };
     let arity = if format.supports_datasets() { 4 } else { 3 };
-    Some((Content::Rdf { format, base: text(options, "base") }, arity))
+    let base = settings.text("base");
+    if base.is_some() && matches!(format, RdfFormat::NTriples | RdfFormat::NQuads) {
+        let message = format!("an import of `{}` has no option `base`", transfer.format);
+        settings.error(&settings.span("base"), message, "N-Triples and N-Quads have no relative IRIs; remove it");
+    } else if let Some(base) = &base
+        && let Err(error) = RdfParser::from_format(format).with_base_iri(base)
+    {
+        let message = format!("`{base}` is not a base IRI: {}", error.to_string().to_lowercase());
+        settings.error(&settings.span("base"), message, "write an absolute IRI");
+    }
+    Some((Content::Rdf { format, base }, arity))
 }
 
 /// Returns the number of arguments of a predicate, or `None` if the program does not use it.
@@ -173,25 +209,16 @@ fn arity_in_rules(checking: &Checking<'_>, syntax: &Syntax, predicate: &str) -> 
     })
 }
 
-fn columns(options: &Options) -> Result<Option<Vec<ColumnKind>>, String> {
-    let terms = match options.get("format") {
-        None => return Ok(None),
-        Some(OptionValue::One(term)) => std::slice::from_ref(term),
-        Some(OptionValue::Many(terms)) => terms.as_slice(),
-    };
-    let kinds = terms.iter().map(|term| {
-        let word = lexical(term);
-        ColumnKind::from_word(&word).ok_or(word)
-    });
-    kinds.collect::<Result<Vec<_>, _>>().map(Some)
-}
-
-/// Returns the number of columns in the first row, or `None` if the file is empty or unreadable.
-fn columns_of_file(path: &Path, delimiter: u8) -> Option<usize> {
-    let reader = open(path).ok()?;
-    let mut table =
-        csv::ReaderBuilder::new().delimiter(delimiter).has_headers(false).flexible(true).from_reader(reader);
-    table.records().next()?.ok().map(|row| row.len())
+/// Returns the number of columns in the first row, or `None` if the file is empty, unreadable or a pipe.
+fn columns_of_file(path: &Path, compression: Compression, delimiter: u8, quoting: bool) -> Option<usize> {
+    // A pipe can be read only once.
+    if !std::fs::metadata(path).ok()?.is_file() {
+        return None;
+    }
+    let budget = Budget::default();
+    let limits = Limits::new(&budget);
+    let mut records = Records::new(open(path, compression, &limits).ok()?, delimiter, quoting);
+    (records.next().ok()? == Found::Row).then_some(records.len())
 }
 
 fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
@@ -204,113 +231,77 @@ fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
         _ => {
             let name = path.file_name()?.to_str()?;
             let name = name.strip_suffix(".gz").unwrap_or(name);
-            RdfFormat::from_extension(name.rsplit_once('.')?.1)
+            match RdfFormat::from_extension(name.rsplit_once('.')?.1)? {
+                // These have no name above.
+                RdfFormat::N3 | RdfFormat::JsonLd { .. } => None,
+                known => Some(known),
+            }
         }
     }
 }
 
-/// Opens a file and decompresses it if its name ends in `.gz`.
-fn open(path: &Path) -> Result<Box<dyn Read>, String> {
-    let file = std::fs::File::open(path).map_err(|error| error.to_string().to_lowercase())?;
-    let file = std::io::BufReader::new(file);
-    if path.extension().is_some_and(|extension| extension == "gz") {
-        return unpacked(file);
-    }
-    Ok(Box::new(file.take(SIZE_LIMIT)))
-}
-
-/// Decompresses a file.
-#[cfg(feature = "gzip")]
-fn unpacked(file: impl Read + 'static) -> Result<Box<dyn Read>, String> {
-    Ok(Box::new(flate2::read::MultiGzDecoder::new(file).take(SIZE_LIMIT)))
-}
-
-/// Reports that compressed files need the feature `gzip`.
-#[cfg(not(feature = "gzip"))]
-fn unpacked(_file: impl Read) -> Result<Box<dyn Read>, String> {
-    Err("this build can't decompress it; unpack it, or build `actcheck-rules` with the feature `gzip`".to_owned())
-}
-
 /// Second pass: adds the rows of a file to the program's facts.
+///
+/// A row or statement that can't be read is an error, or with `lenient` left out with a warning.
 pub(super) fn import(
     import: Import,
     predicates: &Predicates,
     terms: &mut Terms,
     program: &mut Program,
-    diagnostics: &mut Diagnostics,
-    stop: &AtomicBool,
-) {
-    let Some(id) = predicates.find(0, &import.predicate, None) else { return };
+    limits: &Limits<'_>,
+    lenient: bool,
+) -> Diagnostics {
+    let fault = |code, message: String| Diagnostic::error(code, message).at(&import.source, import.span.clone());
+    let Some(id) = predicates.find(0, &import.predicate, None) else { return Diagnostics::new() };
     let arity = predicates.get(id).arity;
-    let fault = |message: String, help: &str| {
-        Diagnostic::error("R072", message).at(&import.source, import.span.clone()).help(help)
-    };
     if arity != import.arity {
         let message = format!("`{}` has {}, but the file has {}", import.predicate, counted(arity), import.arity);
-        diagnostics.push(fault(message, "use every column, or skip some with `format = (any, skip, …)`"));
-        return;
+        return fault("R072", message).help("use every column, or skip some with `format = (any, skip, …)`").into();
     }
+    let others = program.facts.iter().filter(|(other, _)| **other != id);
+    let other_bytes = others.map(|(_, rows)| rows.len()).sum::<usize>() * size_of::<TermId>();
     let rows = program.facts.entry(id).or_default();
-    let reader = open(&import.path).map(|inner| Stoppable { inner, stop });
-    let read = reader.and_then(|reader| match &import.content {
-        Content::Table { delimiter, quoting, headers, columns } => {
-            read_table(reader, *delimiter, *quoting, *headers, columns, import.limit, terms, rows)
+    let mut sink = Sink { terms, rows, limits, other_bytes, unchecked: 0 };
+    let mut faults = Faults::default();
+    let path = import.path.display();
+    match read(&import, &mut sink, &mut faults) {
+        Err(reason) => match limits.ended() {
+            None => {
+                let help = "paths are relative to the program's folder";
+                fault("R072", format!("`{path}` can't be read: {reason}")).help(help).into()
+            }
+            Some(Ended::Interrupted) => fault("R091", RuleFault::Interrupted.to_string()).into(),
+            Some(ended) => {
+                let (limit, help) = match ended {
+                    Ended::Memory => ("memory", "import fewer rows or columns: `limit`, `skip`"),
+                    _ => ("time", "allow more time with `--max-time`; a pipe without a writer has no end"),
+                };
+                fault("R090", format!("the import of `{path}` exceeded the limit of {limit}")).help(help).into()
+            }
+        },
+        Ok(()) if faults.is_empty() => Diagnostics::new(),
+        Ok(()) if lenient => {
+            let warning = Diagnostic::warning("R074", faults.message(&import.path));
+            warning
+                .at(&import.source, import.span.clone())
+                .help("rows and statements that can't be read were left out")
+                .into()
         }
-        Content::Rdf { format, base } => read_rdf(reader, *format, base.as_deref(), import.limit, terms, rows),
-    });
-    match read {
-        Err(reason) => {
-            let message = format!("`{}` can't be read: {reason}", import.path.display());
-            diagnostics.push(fault(message, "paths are relative to the program's folder"));
-        }
-        Ok(LeftOut { count: 0, .. }) => {}
-        Ok(LeftOut { count, first }) => {
-            let message = format!("{count} rows of `{}` were left out; the first: {first}", import.path.display());
-            let help = "each row needs one field for each column, in the format of the column";
-            let warning = Diagnostic::warning("R074", message).at(&import.source, import.span.clone()).help(help);
-            diagnostics.push(warning);
+        Ok(()) => {
+            let help = "correct the file or the options of the import; `--lenient` leaves out these rows or statements";
+            fault("R074", faults.message(&import.path)).help(help).into()
         }
     }
 }
 
-fn read_rdf(
-    reader: impl Read,
-    format: RdfFormat,
-    base: Option<&str>,
-    limit: usize,
-    terms: &mut Terms,
-    rows: &mut Vec<TermId>,
-) -> Result<LeftOut, String> {
-    let mut left_out = LeftOut::default();
-    let mut parser = RdfParser::from_format(format);
-    if let Some(base) = base {
-        parser = parser.with_base_iri(base).map_err(|error| error.to_string())?;
+fn read(import: &Import, sink: &mut Sink<'_>, faults: &mut Faults) -> Result<(), String> {
+    let reader = open(&import.path, import.compression, sink.limits)?;
+    match &import.content {
+        Content::Table(layout) => read_table(reader, layout, import.limit, sink, faults),
+        Content::Rdf { format, base } => read_rdf(reader, *format, base.as_deref(), import.limit, sink, faults),
     }
-    let quads = format.supports_datasets();
-    // Nemo's name for the default graph.
-    let default_graph = Term::iri("tag:nemo:defaultgraph");
-    for quad in parser.for_reader(reader).take(limit) {
-        let quad = match quad {
-            Ok(quad) => quad,
-            Err(RdfParseError::Io(error)) => return Err(error.to_string()),
-            Err(RdfParseError::Syntax(error)) => {
-                left_out.add(|| error.to_string());
-                continue;
-            }
-        };
-        if quads {
-            let graph = match quad.graph_name {
-                GraphName::NamedNode(node) => Term::iri(node.as_str()),
-                GraphName::BlankNode(node) => Term::Blank(node.as_str().into()),
-                GraphName::DefaultGraph => default_graph.clone(),
-            };
-            rows.push(terms.intern(graph));
-        }
-        for term in [quad.subject.into(), quad.predicate.into(), quad.object] {
-            rows.push(terms.intern(from_rdf(&term)));
-        }
-    }
-    Ok(left_out)
+    .and_then(|()| sink.check())
+    .map_err(|error| error.to_string())
 }
 
 #[cfg(test)]
@@ -324,25 +315,34 @@ mod tests {
         0x02, 0x00, 0x47, 0x93, 0x6c, 0xaf, 0x08, 0x00, 0x00, 0x00,
     ];
 
-    fn load(folder: &std::path::Path) -> Result<Program, actcheck_base::Diagnostics> {
-        std::fs::write(folder.join("table.csv.gz"), PACKED).expect("the folder is writable");
-        Program::load(&Source::new("p.rls", "@import p :- csv{resource = \"table.csv.gz\"} ."), folder)
+    fn load(bytes: &[u8]) -> Result<Program, actcheck_base::Diagnostics> {
+        let folder = tempfile::tempdir().expect("there is a folder for temporary files");
+        std::fs::write(folder.path().join("table.csv.gz"), bytes).expect("the folder is writable");
+        let text = "@import p :- csv{resource = \"table.csv.gz\", format = (any, any)} .";
+        Program::load(&Source::new("p.rls", text), folder.path())
     }
 
     #[test]
     #[cfg(feature = "gzip")]
     fn a_compressed_table_is_imported() {
-        let folder = tempfile::tempdir().expect("there is a folder for temporary files");
-        let program = load(folder.path()).expect("the table is valid");
+        let program = load(&PACKED).expect("the table is valid");
         let closure = program.close(crate::standalone::Engine::Fast, &crate::Budget::default()).expect("it is small");
         assert_eq!((closure.arity("p"), closure.count("p")), (Some(2), 2));
     }
 
     #[test]
+    #[cfg(feature = "gzip")]
+    fn a_cut_compressed_table_is_refused() {
+        for length in 1..PACKED.len() {
+            let found = load(&PACKED[..length]).expect_err("it is cut").to_string();
+            assert!(found.contains("R072"), "{length}: {found}");
+        }
+    }
+
+    #[test]
     #[cfg(not(feature = "gzip"))]
     fn a_compressed_table_without_the_feature_is_reported() {
-        let folder = tempfile::tempdir().expect("there is a folder for temporary files");
-        let found = load(folder.path()).expect_err("the feature is off").to_string();
+        let found = load(&PACKED).expect_err("the feature is off").to_string();
         assert!(found.contains("R072") && found.contains("feature `gzip`"), "{found}");
     }
 }

@@ -3,12 +3,17 @@
 //! Never: depends on an action, a snapshot or an ontology; uses the network; writes outside the given folder.
 
 mod export;
+mod faults;
 mod import;
+mod input;
 mod program;
+mod records;
 mod run;
-mod stoppable;
+mod settings;
+mod sink;
+mod statements;
 mod table;
 mod unfinished;
 
-pub use program::{Closure, Engine, Program};
-pub use run::{Summary, run};
+pub use program::{Closure, Engine, Loading, Program};
+pub use run::{Summary, run, run_as};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
 
 use crate::check::checking::{Checking, Role, unique};
 use crate::check::stratify::stratify;
@@ -14,6 +14,7 @@ use crate::engine::plan::Indexes;
 use crate::model::program::{PredicateId, Predicates};
 use crate::model::universe::Universe;
 use crate::standalone::import::{define_imports, import};
+use crate::standalone::input::Limits;
 use crate::syntax::{Statement, Syntax, parse};
 use actcheck_base::{Diagnostics, RuleFault, Source, Term, TermId, Terms};
 
@@ -25,6 +26,28 @@ pub enum Engine {
     Fast,
     /// Nested loops over sets: slow and obviously correct.
     Naive,
+}
+
+/// How the imports of a program are read.
+///
+/// ```
+/// use actcheck_rules::standalone::Loading;
+///
+/// assert!(!Loading::default().lenient, "a row that can't be read is an error");
+/// ```
+#[derive(Debug, Clone)]
+pub struct Loading {
+    /// Limits on the memory of all facts and on the time, and a flag to stop.
+    pub budget: Budget,
+    /// Whether rows and statements that can't be read are left out with a warning.
+    pub lenient: bool,
+}
+
+impl Default for Loading {
+    /// Strict, with at most 4 GiB of facts and without a time limit.
+    fn default() -> Self {
+        Self { budget: Budget { bytes: 4 << 30, secs: f64::INFINITY, ..Budget::default() }, lenient: false }
+    }
 }
 
 /// A checked program with its facts. Unlike the rules of a property, it has only predicates of its own.
@@ -52,7 +75,8 @@ pub enum Engine {
 #[derive(Debug)]
 pub struct Program {
     pub(crate) syntax: Syntax,
-    pub(crate) terms: Terms,
+    /// Shared with closures, because a large import has tens of millions of terms.
+    pub(crate) terms: Arc<Terms>,
     pub(crate) predicates: Predicates,
     pub(crate) indexes: Indexes,
     pub(crate) planned: Planned,
@@ -78,7 +102,9 @@ pub struct Program {
 /// ```
 #[derive(Debug, Clone)]
 pub struct Closure {
-    terms: Vec<Term>,
+    /// The terms of the program, and those of the evaluation.
+    terms: Arc<Terms>,
+    created: Vec<Term>,
     /// Arity and rows of each predicate.
     tables: BTreeMap<String, (usize, Vec<TermId>)>,
 }
@@ -101,9 +127,21 @@ impl Closure {
 
     /// Returns the tuples of a predicate, in no particular order.
     pub fn tuples_unsorted(&self, predicate: &str) -> impl Iterator<Item = Vec<&Term>> {
+        self.rows_unsorted(predicate).map(move |row| row.iter().map(|id| self.term(*id)).collect())
+    }
+
+    /// Returns the rows of a predicate, in no particular order.
+    pub(super) fn rows_unsorted(&self, predicate: &str) -> impl Iterator<Item = &[TermId]> {
         let (arity, rows) = self.tables.get(predicate).map_or((0, &[][..]), |(arity, rows)| (*arity, rows.as_slice()));
-        rows.chunks_exact(arity.max(1))
-            .map(move |row| row[..arity].iter().map(|id| &self.terms[*id as usize]).collect())
+        rows.chunks_exact(arity.max(1)).map(move |row| &row[..arity])
+    }
+
+    /// Returns the term of an id in a row.
+    pub(super) fn term(&self, id: TermId) -> &Term {
+        match (id as usize).checked_sub(self.terms.len()) {
+            Some(created) => &self.created[created],
+            None => self.terms.term(id),
+        }
     }
 
     /// Returns the tuples of a predicate, sorted.
@@ -119,16 +157,17 @@ impl Program {
     /// Checks a program and reads its imports. Relative paths of imports are resolved against `folder`.
     ///
     /// # Errors
-    /// All errors with their places: syntax errors, invalid rules, and files that can't be read.
+    /// All errors with their places: syntax errors, invalid rules, files that can't be read, and rows of files.
     pub fn load(source: &Source, folder: &Path) -> Result<Self, Diagnostics> {
-        Self::load_until(source, folder, &AtomicBool::new(false))
+        Self::load_as(source, folder, &Loading::default())
     }
 
-    /// Like [`Program::load`], but imports fail once `stop` is set.
+    /// Like [`Program::load`], with limits on the imports, and on request without the rows that can't be read.
     ///
     /// # Errors
-    /// All errors with their places.
-    pub fn load_until(source: &Source, folder: &Path, stop: &AtomicBool) -> Result<Self, Diagnostics> {
+    /// All errors with their places; a limit was reached (`R090`), or the budget's `stop` was set (`R091`).
+    pub fn load_as(source: &Source, folder: &Path, loading: &Loading) -> Result<Self, Diagnostics> {
+        let limits = Limits::new(&loading.budget);
         let (syntax, mut diagnostics) = parse(source);
         let mut terms = Terms::new();
         let mut checking = Checking::new(&mut terms, None);
@@ -143,7 +182,12 @@ impl Program {
             return Err(diagnostics);
         }
         for table in imports {
-            import(table, &predicates, &mut terms, &mut program, &mut diagnostics, stop);
+            let found = import(table, &predicates, &mut terms, &mut program, &limits, loading.lenient);
+            diagnostics.extend(found);
+            // A later import would end at the same limit.
+            if limits.ended().is_some() {
+                return Err(diagnostics);
+            }
         }
         let strata = stratify(&program.rules, &predicates, &Universe::new(&terms, None)).unwrap_or_else(|found| {
             diagnostics.extend(found);
@@ -154,6 +198,7 @@ impl Program {
             .collect();
         let mut indexes = Indexes::new(&predicates);
         let planned = Planned::new(program, strata, &mut indexes, &|id| sizes[id]);
+        let terms = Arc::new(terms);
         diagnostics.clone().or(Self { syntax, terms, predicates, indexes, planned, warnings: diagnostics })
     }
 
@@ -172,7 +217,8 @@ impl Program {
             if row.len() != width || width == 0 {
                 return Err(format!("a row of `{predicate}` has {} terms instead of {width}", row.len()));
             }
-            facts.extend(row.iter().map(|term| self.terms.intern(term.clone())));
+            let terms = Arc::make_mut(&mut self.terms);
+            facts.extend(row.iter().map(|term| terms.intern(term.clone())));
         }
         Ok(())
     }
@@ -200,9 +246,7 @@ impl Program {
                 tables.insert(predicate.name.clone(), (predicate.arity, rows));
             }
         }
-        let created = universe.into_created();
-        let terms = (0..self.terms.len()).map(|id| self.terms.term(id as TermId).clone()).chain(created).collect();
-        Ok(Closure { terms, tables })
+        Ok(Closure { terms: Arc::clone(&self.terms), created: universe.into_created(), tables })
     }
 
     fn naive(

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::engine::budget::Budget;
 use crate::standalone::export::{exports, write};
-use crate::standalone::program::{Engine, Program};
+use crate::standalone::program::{Engine, Loading, Program};
 use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault};
 
 /// Results of running a program.
@@ -25,16 +25,25 @@ pub struct Summary {
 /// All errors of the program and its files; the budget was exceeded (`R090`); an export can't be written (`R073`); the
 /// budget's `stop` was set (`R091`).
 pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diagnostics> {
+    run_as(path, out_dir, &Loading { budget: budget.clone(), lenient: false })
+}
+
+/// Like [`run`], on request without the rows of imports that can't be read. The imports may take the
+/// budget's time, and then the evaluation too.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary, Diagnostics> {
     let source = Files::Disk
-        .read(path)
+        .read_program(path)
         .map_err(|reason| Diagnostic::error("R072", format!("`{}` can't be read: {reason}", path.display())))?;
-    let program = Program::load_until(&source, path.parent().unwrap_or(Path::new("")), &budget.stop)?;
+    let program = Program::load_as(&source, path.parent().unwrap_or(Path::new("")), loading)?;
     let mut diagnostics = Diagnostics::new();
     let exports = exports(&program, &mut diagnostics);
     if diagnostics.has_errors() {
         return Err(diagnostics);
     }
-    let closure = program.close(Engine::Fast, budget).map_err(|fault| {
+    let closure = program.close(Engine::Fast, &loading.budget).map_err(|fault| {
         if fault == RuleFault::Interrupted {
             return Diagnostic::error("R091", fault.to_string()).in_source(&source);
         }
@@ -44,7 +53,7 @@ pub fn run(path: &Path, out_dir: &Path, budget: &Budget) -> Result<Summary, Diag
     let mut summary = Summary { warnings: program.warnings, ..Summary::default() };
     summary.tuples = closure.predicates().map(|name| (name.to_owned(), closure.count(name))).collect();
     for export in exports {
-        let count = write(&export, out_dir, &closure, &budget.stop).map_err(|reason| {
+        let count = write(&export, out_dir, &closure, &loading.budget.stop).map_err(|reason| {
             let message = format!("`{}` can't be written: {reason}", out_dir.join(&export.path).display());
             Diagnostic::error("R073", message).in_source(&source)
         })?;

@@ -1,0 +1,79 @@
+"""How much does a campaign cost with readers of its history beside it, and how soon do they answer?
+
+Runs the same campaign in pairs, alone and beside a process that asks the growing history without a pause, in turns of
+order. Prints the ratio of the campaign's CPU times in each pair with their median, and the wall times of the answers.
+
+    python3 benches/readers.py [PROGRAM [PAIRS [RUNS]]]
+"""
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+PROGRAM = os.path.abspath(sys.argv[1]) if len(sys.argv) > 1 else "actcheck"
+PAIRS = int(sys.argv[2]) if len(sys.argv) > 2 else 5
+RUNS = sys.argv[3] if len(sys.argv) > 3 else "100"
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+QUESTIONS = [
+    ["list"],
+    ["query", "--named", "failure-rates"],
+    ["query", "SELECT (COUNT(*) AS ?n) WHERE { ?s a act:Run }"],
+    ["analyse"],
+]
+
+
+def asked(history, done, times, faults):
+    """Asks all questions again and again, one at a time."""
+    while not done.is_set():
+        for question in QUESTIONS:
+            started = time.monotonic()
+            command = [PROGRAM, *question, "--history", history]
+            answer = subprocess.run(command, capture_output=True, text=True)
+            times.setdefault(question[0], []).append(time.monotonic() - started)
+            # Before the first run, there is nothing to analyse.
+            if answer.returncode > 1 and "X044" not in answer.stderr and "H003" not in answer.stderr:
+                faults.append(answer.stderr)
+
+
+def campaign(folder, with_reader, times, faults):
+    """CPU time of one campaign, without that of its readers. Unit: seconds."""
+    history = os.path.join(folder, "h")
+    command = [PROGRAM, "run", "configs/pick.toml", "--runs", RUNS, "--jobs", "1", "--history", history]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    done = threading.Event()
+    reader = threading.Thread(target=asked, args=(history, done, times, faults))
+    if with_reader:
+        reader.start()
+    errors = process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    done.set()
+    if with_reader:
+        reader.join()
+    if os.waitstatus_to_exitcode(status) > 1:
+        sys.exit(f"the campaign failed: {errors.decode()}")
+    return usage.ru_utime + usage.ru_stime
+
+
+def main():
+    ratios, times, faults = [], {}, []
+    for pair in range(PAIRS):
+        secs = {}
+        for with_reader in (False, True) if pair % 2 == 0 else (True, False):
+            with tempfile.TemporaryDirectory() as folder:
+                secs[with_reader] = campaign(folder, with_reader, times, faults)
+        ratios.append(secs[True] / secs[False])
+        print(f"pair {pair + 1}: {secs[False]:.2f} s alone, {secs[True]:.2f} s beside readers: {ratios[-1]:.3f}", flush=True)
+    print(f"median ratio of CPU times: {statistics.median(ratios):.3f}")
+    for name, walls in times.items():
+        print(f"{name}: {len(walls)} answers, median {statistics.median(walls):.2f} s, longest {max(walls):.2f} s")
+    print(f"{len(faults)} refused")
+    for fault in faults[:3]:
+        print(fault)
+
+
+if __name__ == "__main__":
+    main()

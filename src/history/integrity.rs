@@ -1,0 +1,127 @@
+//! Compares the files of a history with their checksums and with each other.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::folder::Folder;
+use crate::salvage::scan;
+use crate::seal::{Found, Seal};
+use crate::{History, RunFilter, fault, trace_file};
+use actcheck_base::Diagnostics;
+
+/// A damaged or missing part of a history.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Damage {
+    /// The file, relative to the folder of the history.
+    pub file: PathBuf,
+    /// The run that it concerns; `None` if it concerns all.
+    pub run: Option<String>,
+    /// The kind of damage.
+    pub reason: String,
+}
+
+/// The result of an examination.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Integrity {
+    /// Damaged parts; empty if the history is intact.
+    pub damage: Vec<Damage>,
+    /// Number of runs.
+    pub runs: usize,
+    /// Number of tables of the store without a checksum, which only a killed process leaves: the next process that
+    /// writes the history adds it. Their content was read.
+    pub unlisted: usize,
+    /// Trace files without a run, which only a killed process leaves: the campaign makes these runs again when it is
+    /// resumed.
+    pub unused: Vec<PathBuf>,
+}
+
+impl History {
+    /// Examines a history, also a damaged one, without changing it: compares the store's files with their checksums, reads
+    /// the whole store, and compares every trace with its run. Returns the result, and the history as far as it can be
+    /// read.
+    ///
+    /// # Errors
+    /// `H003` or `H004` if this program can't read the history; `H007` if the whole store is unreadable.
+    pub fn examine(dir: &Path) -> Result<(Integrity, Self), Diagnostics> {
+        let folder = Folder::to_read(dir)?;
+        let mut found = Integrity::default();
+        match Seal::read(&folder) {
+            Found::Whole(seal) => {
+                let reason = "it has changed since it was written";
+                found.damage.extend(seal.damage(&folder, u64::MAX).into_iter().map(|name| of_store(&name, reason)));
+                found.damage.extend(seal.damaged_copies(&folder).into_iter().map(|name| Damage {
+                    file: Path::new("seal").join(name),
+                    run: None,
+                    reason: reason.to_owned(),
+                }));
+                found.unlisted = seal.unlisted(&folder);
+            }
+            Found::Missing => found.unlisted = Seal::default().unlisted(&folder),
+            Found::Damaged => found.damage.push(Damage {
+                file: PathBuf::from("seal/SUMS"),
+                run: None,
+                reason: "the list of checksums is damaged; the next process that writes the history replaces it"
+                    .to_owned(),
+            }),
+        }
+        let history = match Self::open_to_read(dir) {
+            Ok(history) => match scan(&*history.store()?) {
+                Ok(()) => history,
+                Err(error) => salvaged(dir, &error.to_string(), &mut found)?,
+            },
+            Err(faults) => salvaged(dir, &faults.to_string(), &mut found)?,
+        };
+        history.compare_traces(&mut found)?;
+        found.damage.sort_by(|one, other| (&one.file, &one.run).cmp(&(&other.file, &other.run)));
+        Ok((found, history))
+    }
+
+    /// Compares the traces with the runs of the store.
+    fn compare_traces(&self, found: &mut Integrity) -> Result<(), Diagnostics> {
+        let runs = self.runs(&RunFilter::default())?;
+        found.runs = runs.len();
+        let mut known = BTreeSet::new();
+        for run in &runs {
+            let file = self.trace_path(&run.run);
+            let reason = match std::fs::read(&file) {
+                Ok(bytes) => match trace_file::decode(&bytes) {
+                    Ok((_, trace)) if trace.hash == run.trace_hash => None,
+                    Ok((_, trace)) => Some(format!("it is the trace {}, not {}", trace.hash, run.trace_hash)),
+                    Err(why) => Some(why),
+                },
+                Err(error) => Some(error.to_string()),
+            };
+            let damage = |reason| Damage { file: relative(self.dir(), &file), run: Some(run.run.clone()), reason };
+            found.damage.extend(reason.map(damage));
+            known.insert(file);
+        }
+        let folder = std::fs::read_dir(self.folder.traces()).into_iter().flatten();
+        let files = folder.filter_map(|entry| Some(entry.ok()?.path()));
+        found.unused = files.filter(|file| !known.contains(file)).map(|file| relative(self.dir(), &file)).collect();
+        found.unused.sort();
+        Ok(())
+    }
+}
+
+/// Opens the readable part of a history, and adds its faults.
+fn salvaged(dir: &Path, why: &str, found: &mut Integrity) -> Result<History, Diagnostics> {
+    if found.damage.iter().all(|damage| !damage.file.starts_with("store")) {
+        found.damage.push(Damage { file: PathBuf::from("store"), run: None, reason: why.trim().to_owned() });
+    }
+    let (history, lost) = History::open_to_salvage(dir).map_err(|_| fault::damaged(dir, why.trim()))?;
+    let reason = "its statements can't be read";
+    found.damage.extend(lost.into_iter().map(|run| Damage {
+        file: PathBuf::from("store"),
+        run: Some(run),
+        reason: reason.to_owned(),
+    }));
+    Ok(history)
+}
+
+fn of_store(name: &str, reason: &str) -> Damage {
+    Damage { file: Path::new("store").join(name), run: None, reason: reason.to_owned() }
+}
+
+fn relative(dir: &Path, file: &Path) -> PathBuf {
+    file.strip_prefix(dir).unwrap_or(file).to_path_buf()
+}

@@ -1,0 +1,301 @@
+//! Damage to any file of a history is found or harmless, and readable data is saved.
+//!
+//! `ACTCHECK_FLIPS` sets the number of flipped bits.
+
+use std::collections::BTreeMap;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use actcheck::history::{History, RunFilter};
+
+use crate::support::planted::Dice;
+use crate::support::{actcheck, copy_made_history, stderr, stdout};
+
+/// Time limit of one command: it takes about a second, or is in an endless loop. Unit: seconds.
+const MOST_SECS: u64 = 60;
+
+/// Questions whose answers must not change.
+const QUESTIONS: [&[&str]; 5] = [
+    &["list", "--format", "csv", "--history", "h"],
+    &["query", "--named", "failure-rates", "--format", "csv", "--history", "h"],
+    &[
+        "query",
+        "--format",
+        "csv",
+        "SELECT ?p (COUNT(*) AS ?n) WHERE { ?s ?p ?o } GROUP BY ?p ORDER BY ?p",
+        "--history",
+        "h",
+    ],
+    &["analyse", "--format", "json", "--history", "h"],
+    &["export", "--turtle", "all.ttl", "--history", "h"],
+];
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let path = entry.path();
+        if path.is_dir() { found.extend(files(&path)) } else { found.push(path) }
+    }
+    found.sort();
+    found
+}
+
+/// Exit code and output of a command; `None` if it took too long.
+fn asked(folder: &Path, arguments: &[&str]) -> Option<(Option<i32>, String, String)> {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+        .args(arguments)
+        .current_dir(folder)
+        .env("NO_COLOR", "1")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut streams = (child.stdout.take().unwrap(), child.stderr.take().unwrap());
+    let output = std::thread::spawn(move || {
+        let mut text = String::new();
+        streams.0.read_to_string(&mut text).map(|_| text)
+    });
+    let errors = std::thread::spawn(move || {
+        let mut text = String::new();
+        streams.1.read_to_string(&mut text).map(|_| text)
+    });
+    let started = Instant::now();
+    let status = loop {
+        match child.try_wait().unwrap() {
+            Some(status) => break status,
+            None if started.elapsed() > Duration::from_secs(MOST_SECS) => {
+                child.kill().unwrap();
+                child.wait().unwrap();
+                return None;
+            }
+            None => std::thread::sleep(Duration::from_millis(5)),
+        }
+    };
+    Some((status.code(), output.join().unwrap().unwrap(), errors.join().unwrap().unwrap()))
+}
+
+/// The answers to all questions; the export's file is read back.
+fn answers(folder: &Path) -> Vec<Option<(Option<i32>, String, String)>> {
+    QUESTIONS
+        .iter()
+        .map(|question| {
+            let _ = std::fs::remove_file(folder.join("all.ttl"));
+            let mut answer = asked(folder, question)?;
+            if let Ok(text) = std::fs::read_to_string(folder.join("all.ttl")) {
+                let mut lines: Vec<&str> = text.lines().collect();
+                lines.sort_unstable();
+                answer.1 = lines.join("\n");
+            }
+            Some(answer)
+        })
+        .collect()
+}
+
+fn flip(file: &Path, dice: &mut Dice) -> (u64, u64) {
+    let mut bytes = std::fs::read(file).unwrap();
+    let (at, bit) = (dice.below(bytes.len() as u64), dice.below(8));
+    bytes[at as usize] ^= 1 << bit;
+    std::fs::write(file, bytes).unwrap();
+    (at, bit)
+}
+
+/// A copy of the made history in `h`.
+fn copied() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy_made_history(&folder.path().join("h"));
+    folder
+}
+
+#[test]
+fn an_intact_history_passes_its_examination() {
+    let folder = copied();
+    let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(stdout(&output), "h: store, 4 traces and mirror are intact\n");
+}
+
+/// No answer after a flipped bit may differ from the right one without an error, take for ever, or come from a crash.
+#[test]
+fn a_flipped_bit_in_any_file_is_found_or_harmless() {
+    let flips: usize = std::env::var("ACTCHECK_FLIPS").ok().and_then(|n| n.parse().ok()).unwrap_or(8);
+    let whole = copied();
+    let right = answers(whole.path());
+    assert!(right.iter().all(|answer| answer.as_ref().is_some_and(|(code, ..)| *code == Some(0))), "{right:?}");
+    let mut dice = Dice::new(19);
+    let mut table: BTreeMap<(String, &str), usize> = BTreeMap::new();
+    for number in 0..flips {
+        let folder = copied();
+        let all: Vec<PathBuf> = files(&folder.path().join("h"))
+            .into_iter()
+            .filter(|file| file.metadata().unwrap().len() > 0 && file.file_name().unwrap() != "LOG")
+            .collect();
+        // Each kind of file comes up as often as the others.
+        let kind = |file: &Path| {
+            let name = file.file_name().unwrap().to_string_lossy().into_owned();
+            let kind = file.extension().map_or_else(|| name.clone(), |ending| ending.to_string_lossy().into_owned());
+            let place = file.parent().unwrap().file_name().unwrap().to_string_lossy().into_owned();
+            format!("{place}/{}", kind.split('-').next().unwrap())
+        };
+        let mut kinds: Vec<String> = all.iter().map(|file| kind(file)).collect();
+        kinds.sort();
+        kinds.dedup();
+        let chosen = &kinds[number % kinds.len()];
+        let of_kind: Vec<&PathBuf> = all.iter().filter(|file| kind(file) == *chosen).collect();
+        let file = of_kind[dice.below(of_kind.len() as u64) as usize];
+        let (at, bit) = flip(file, &mut dice);
+        let place = format!("bit {bit} of byte {at} of {}", file.display());
+        let examined = asked(folder.path(), &["health", "--integrity", "--history", "h"]);
+        let (code, told, errors) = examined.unwrap_or_else(|| panic!("{place}: the examination does not end"));
+        assert!(code.is_some_and(|code| code <= 2), "{place}: {code:?} {errors}");
+        let found = code != Some(0);
+        let mut is_same = true;
+        for (idx, (answer, right)) in answers(folder.path()).into_iter().zip(&right).enumerate() {
+            let place = format!("{place}: {:?}", QUESTIONS[idx]);
+            let (code, output, errors) = answer.unwrap_or_else(|| panic!("{place}: no answer after {MOST_SECS} s"));
+            let code = code.unwrap_or_else(|| panic!("{place}: crashed: {errors}"));
+            assert!(code <= 2 && !errors.contains("panicked"), "{place}: {errors}");
+            let same = code == 0 && output == right.as_ref().unwrap().1;
+            assert!(same || code == 2, "{place}: another answer with exit code 0");
+            // The trace of a run is read by few commands; the examination reads all.
+            is_same &= same;
+        }
+        assert!(is_same || found, "{place}: {told}");
+        let result = match (found, is_same) {
+            (true, true) => "found, answers unchanged",
+            (true, false) => "found, answers refused",
+            (false, _) => "harmless",
+        };
+        *table.entry((chosen.clone(), result)).or_default() += 1;
+    }
+    for ((kind, result), times) in table {
+        println!("{kind:24} {times:4} {result}");
+    }
+}
+
+#[test]
+fn a_damaged_mirror_is_written_anew_and_the_numbers_are_the_same() {
+    let folder = copied();
+    let question = ["analyse", "--format", "json", "--history", "h"];
+    let right = actcheck(folder.path(), &question);
+    let tables = folder.path().join("h/tables");
+    let mirror = || files(&tables).into_iter().find(|file| file.extension().is_some_and(|e| e == "parquet")).unwrap();
+    let middle = std::fs::metadata(mirror()).unwrap().len() as usize / 2;
+    for examine in [false, true] {
+        let mut bytes = std::fs::read(mirror()).unwrap();
+        bytes[middle] ^= 1;
+        std::fs::write(mirror(), bytes).unwrap();
+        if examine {
+            let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
+            assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+            assert!(stdout(&output).contains("it differs from the store"), "{}", stdout(&output));
+            assert!(stderr(&output).contains("written anew"), "{}", stderr(&output));
+        }
+        let output = actcheck(folder.path(), &question);
+        assert_eq!(stdout(&output), stdout(&right), "{}", stderr(&output));
+        let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
+        assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+    }
+}
+
+/// The listed runs.
+fn listed(folder: &Path, history: &str) -> Vec<String> {
+    let output = actcheck(folder, &["list", "--format", "csv", "--history", history]);
+    let text = stdout(&output);
+    text.lines().map(str::to_owned).collect()
+}
+
+/// A store whose manifest is damaged can't be opened at all: its sealed copy replaces it.
+#[test]
+fn a_store_without_a_readable_manifest_is_saved_completely() {
+    let folder = copied();
+    let right = listed(folder.path(), "h");
+    let is_manifest = |file: &PathBuf| file.file_name().unwrap().to_string_lossy().starts_with("MANIFEST");
+    let manifest = files(&folder.path().join("h/store")).into_iter().find(is_manifest).unwrap();
+    std::fs::write(&manifest, b"nothing").unwrap();
+    let output = actcheck(folder.path(), &["list", "--history", "h"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("H007") && stderr(&output).contains("MANIFEST"), "{}", stderr(&output));
+    // A process that writes must not touch it: the library would remove the tables that the manifest does not list.
+    assert!(History::open_existing(&folder.path().join("h")).is_err());
+    let output = actcheck(folder.path(), &["merge", "--salvage", "h", "--into", "new"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(listed(folder.path(), "new"), right);
+}
+
+#[test]
+fn the_runs_that_a_damaged_table_loses_are_named_and_made_again() {
+    let folder = copied();
+    let right = listed(folder.path(), "h");
+    let is_table = |file: &PathBuf| file.extension().is_some_and(|ending| ending == "sst");
+    let tables: Vec<PathBuf> = files(&folder.path().join("h/store")).into_iter().filter(is_table).collect();
+    let largest = tables.iter().max_by_key(|file| file.metadata().unwrap().len()).unwrap();
+    let mut bytes = std::fs::read(largest).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x10;
+    std::fs::write(largest, bytes).unwrap();
+    let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(stdout(&output).contains(&*largest.file_name().unwrap().to_string_lossy()), "{}", stdout(&output));
+    assert!(stderr(&output).contains("merge --salvage"), "{}", stderr(&output));
+    let output = actcheck(folder.path(), &["merge", "--salvage", "h", "--into", "new"]);
+    assert!(output.status.code().is_some_and(|code| code < 2), "{}", stderr(&output));
+    let config = crate::support::root().join("configs/quick.toml").display().to_string();
+    let resumed = actcheck(folder.path(), &["run", &config, "--resume", "--history", "new", "--jobs", "1"]);
+    let resumed = stderr(&resumed);
+    let all = History::open_to_read(&folder.path().join("new")).unwrap().runs(&RunFilter::default()).unwrap();
+    assert_eq!(all.len(), 4, "{resumed}");
+    assert_eq!(listed(folder.path(), "new"), right);
+}
+
+/// Runs a test on a file system with little space, which is removed afterwards.
+fn on_small_disk(megabytes: u32, test: impl FnOnce(&Path) + std::panic::UnwindSafe) {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, size) = (folder.path().display().to_string(), format!("size={megabytes}m"));
+    let mounted = Command::new("mount").args(["-t", "tmpfs", "-o", &size, "tmpfs", &path]).status();
+    if !mounted.is_ok_and(|status| status.success()) {
+        crate::support::foreign::left_out("a test on a small file system", "it can't be mounted here");
+        return;
+    }
+    let outcome = std::panic::catch_unwind(|| test(folder.path()));
+    assert!(Command::new("umount").arg(&path).status().unwrap().success());
+    if let Err(panic) = outcome {
+        std::panic::resume_unwind(panic);
+    }
+}
+
+/// An export to a full disk left half a file under the final name, which other programs took for the whole one.
+#[test]
+fn an_export_to_a_full_disk_leaves_no_partial_file() {
+    let folder = copied();
+    let history = folder.path().join("h").display().to_string();
+    let exports: [&[&str]; 7] = [
+        &["export", "--nquads", "out"],
+        &["export", "--complete", "--nquads", "out"],
+        &["export", "--turtle", "out"],
+        &["export", "--csv", "out"],
+        &["export", "--parquet", "out"],
+        &["export", "--dataset", "out"],
+        &["report", "--html", "out"],
+    ];
+    on_small_disk(1, |disk| {
+        for export in exports {
+            // 20 kB are left: less than each of these takes.
+            std::fs::write(disk.join("ballast"), vec![1; (1 << 20) - 20_480]).unwrap();
+            let output = actcheck(disk, &[export, &["--history", &history]].concat());
+            assert_eq!(output.status.code(), Some(2), "{export:?}: {}", stdout(&output));
+            let left: Vec<PathBuf> =
+                files(disk).into_iter().filter(|file| file.file_name().unwrap() != "ballast").collect();
+            assert!(left.is_empty(), "{export:?}: {left:?}");
+            let _ = std::fs::remove_dir_all(disk.join("out"));
+        }
+        // The old file is kept.
+        std::fs::remove_file(disk.join("ballast")).unwrap();
+        std::fs::write(disk.join("out"), "old").unwrap();
+        std::fs::write(disk.join("ballast"), vec![1; (1 << 20) - 24_576]).unwrap();
+        let output = actcheck(disk, &["export", "--nquads", "out", "--history", &history]);
+        assert_eq!(output.status.code(), Some(2), "{}", stdout(&output));
+        assert_eq!(std::fs::read(disk.join("out")).unwrap(), b"old");
+    });
+}

@@ -1,0 +1,435 @@
+//! Mutated files from others: ontologies, models, robots, cases and histories are read or refused, without a panic, a
+//! hang, or memory beyond bounds, and every diagnostic can be shown. Mutated messages of a program and mutated outputs
+//! of xacro are tested in their crates.
+//!
+//! `ACTCHECK_FUZZ_MINUTES=10 cargo test --release --locked --test all fuzz_strangers::ontologies -- --nocapture`
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use actcheck::base::{Diagnostics, Files, Source};
+use actcheck::campaign::Env;
+use actcheck::config::{self, Overrides};
+use actcheck::history::merge::{MergeOptions, carry_out, plan};
+use actcheck::history::{History, RunFilter};
+use actcheck::ontology;
+use actcheck::world;
+use oxigraph::model::{Literal, NamedNode, Quad, Term};
+use oxigraph::store::Store;
+
+use crate::history::{sample_campaign, sample_run};
+use crate::support::copy;
+use crate::support::mutations::{Mutations, cases};
+
+/// Renders diagnostics as the program prints them: the first 200.
+fn show(found: &Diagnostics) {
+    let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none());
+    for fault in found.iter().take(200) {
+        assert!(fault.message.chars().count() <= 20_001, "a message of {} bytes", fault.message.len());
+        let mut out = String::new();
+        handler.render_report(&mut out, fault).unwrap();
+        assert!(fault.span.is_none() || !out.contains("Failed to read"), "{out}");
+    }
+}
+
+/// Words of XML and of the vocabularies in it.
+const XML: [&str; 22] = [
+    "<!DOCTYPE a [",
+    "<!ENTITY x \"&x;&x;\">",
+    "]>",
+    "&x;",
+    "&#x41;",
+    " xmlns:a=\"b\"",
+    " xmlns=\"\"",
+    " a=\"b\"",
+    "<a>",
+    "</a>",
+    "<a/>",
+    "<![CDATA[",
+    "]]>",
+    "<!--",
+    "-->",
+    "<?x",
+    " rdf:about=\"..\"",
+    " rdf:nodeID=\"n\"",
+    " rdf:parseType=\"Collection\"",
+    "<rdf:Description>",
+    " xml:base=\"x\"",
+    "file:///dev/zero",
+];
+
+#[test]
+fn ontologies() {
+    const TURTLE: [&str; 12] = [
+        "[",
+        "]",
+        "(",
+        ")",
+        " ;",
+        " .",
+        "<../../../x>",
+        "<file:///dev/zero>",
+        "@prefix a: <b> .",
+        "owl:imports",
+        "\"\"\"",
+        "^^xsd:integer",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = ["tests/data/pick.owl", "tests/data/kinds_of_pick.ttl", "ontology/actions.ttl"];
+    let texts = seeds.map(|name| (name.rsplit('.').next().unwrap(), std::fs::read(name).unwrap()));
+    let others: Vec<&[u8]> = texts.iter().map(|(_, text)| text.as_slice()).collect();
+    cases("ontologies", 60, |mut random| {
+        let (ending, text) = random.pick(&texts);
+        let tokens = if *ending == "owl" { &XML[..] } else { &TURTLE[..] };
+        let path = folder.path().join(format!("o.{ending}"));
+        std::fs::write(&path, random.text(text, tokens, &others)).unwrap();
+        if let Err(found) = ontology::load(&Files::Disk, &path) {
+            show(&found);
+        }
+    });
+}
+
+/// A folder with a model that uses the mesh `m.ENDING`, and the mesh.
+fn with_mesh(folder: &Path, ending: &str, mesh: &[u8]) -> PathBuf {
+    let model = folder.join("models/objects/lamp");
+    std::fs::create_dir_all(&model).unwrap();
+    let text = format!(
+        "<sdf version=\"1.6\"><model name=\"lamp\"><link name=\"l\"><collision name=\"c\"><geometry><mesh><uri>m.{ending}</uri>\
+         </mesh></geometry></collision></link></model></sdf>"
+    );
+    std::fs::write(model.join("model.sdf"), text).unwrap();
+    std::fs::write(model.join(format!("m.{ending}")), mesh).unwrap();
+    model
+}
+
+/// Reads a configuration with the models of a folder.
+fn read(folder: &Path, more: &str) {
+    let text = format!("tests = [[\"Pick\"]]\ntest_count = 1\nmodel_dir = \"models\"\n{more}");
+    let source = Source::new(folder.join("c.toml").display().to_string(), text);
+    match config::load_text(source, folder, &Overrides::default()) {
+        Ok(campaign) => show(&campaign.warnings),
+        Err(found) => show(&found),
+    }
+}
+
+const DAE: &str = "<COLLADA><asset><unit meter=\"0.01\"/><up_axis>Z_UP</up_axis></asset><library_geometries><geometry id=\"g\"><mesh>\
+    <source id=\"s\"><float_array count=\"12\">0 0 0 1 0 0 0 1 0 0 0 1</float_array><technique_common><accessor stride=\"3\"/>\
+    </technique_common></source><vertices id=\"v\"><input semantic=\"POSITION\" source=\"#s\"/></vertices><triangles count=\"4\">\
+    <input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><input semantic=\"NORMAL\" source=\"#n\" offset=\"1\"/>\
+    <p>0 0 2 0 1 0 0 0 1 0 3 0 0 0 3 0 2 0 1 0 2 0 3 0</p></triangles><polylist><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>\
+    <vcount>4 3</vcount><p>0 1 2 3 1 2 3</p></polylist></mesh></geometry></library_geometries><library_nodes><node id=\"n\">\
+    <instance_geometry url=\"#g\"/></node></library_nodes><library_visual_scenes><visual_scene id=\"x\"><node><matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix>\
+    <rotate>0 0 1 90</rotate><instance_node url=\"#n\"/><instance_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes>\
+    <scene><instance_visual_scene url=\"#x\"/></scene></COLLADA>";
+const OBJ: &str = "o cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nvt 0 0\ng a\nusemtl m\nf 1/1/1 3/1/1 2/1/1\nf 1//1 2//1 4//1\n\
+    f -4 -1 -2\nf 2 3 4\n";
+const STL: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nfacet normal 0 0 1\n\
+    outer loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 1 0 0\nendloop\nendfacet\nendsolid a\n";
+
+/// The same triangles in binary.
+fn binary_stl() -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes.extend(2_u32.to_le_bytes());
+    for corners in
+        [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0_f32, 0.0]]]
+    {
+        bytes.extend([0_u8; 12]);
+        corners.iter().flatten().for_each(|x| bytes.extend(x.to_le_bytes()));
+        bytes.extend([0_u8; 2]);
+    }
+    bytes
+}
+
+#[test]
+fn meshes() {
+    const WORDS: [&str; 16] = [
+        "<instance_geometry url=\"#g\"/>",
+        "<instance_node url=\"#n\"/>",
+        "<node>",
+        "</node>",
+        " offset=\"1\"",
+        " stride=\"0\"",
+        " id=\"g\"",
+        " url=\"#x\"",
+        "<vcount>",
+        "f 1 2 3\n",
+        "usemtl b\n",
+        "g b\n",
+        "v 1 1 1\n",
+        "endsolid\nsolid b\n",
+        "facet normal",
+        "vertex 1 1 1\n",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let binary = binary_stl();
+    let seeds: [(&str, &[u8]); 4] =
+        [("dae", DAE.as_bytes()), ("obj", OBJ.as_bytes()), ("stl", STL.as_bytes()), ("stl", binary.as_slice())];
+    cases("meshes", 200, |mut random| {
+        let (ending, text) = *random.pick(&seeds);
+        let mutated = random.text(text, &WORDS, &[DAE.as_bytes()]);
+        with_mesh(folder.path(), ending, &mutated);
+        read(folder.path(), "[pickObject]\nmodel_list = [\"lamp\"]\n");
+    });
+}
+
+#[test]
+fn models_and_worlds() {
+    const WORDS: [&str; 18] = [
+        "<link name=\"l\">",
+        "</link>",
+        "<joint name=\"j\" type=\"fixed\">",
+        "<include><uri>model://lamp</uri></include>",
+        "<collision name=\"c\">",
+        "<geometry>",
+        "<mesh><uri>file:///dev/zero</uri></mesh>",
+        "<pose>0 0 1 0 0 0</pose>",
+        "<box><size>1 1 1</size></box>",
+        "<mass>1</mass>",
+        "<inertial>",
+        "<scale>0 0 0</scale>",
+        "<submesh/>",
+        "\n[[parts]]\n",
+        "size_m = [1, 1, 1]\n",
+        "fixed = true\n",
+        "../../..",
+        "model://",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let robot = std::fs::read("models/robots/fixed_arm.urdf").unwrap();
+    let world = b"<sdf version=\"1.6\"><world name=\"w\"><include><uri>model://lamp</uri><pose>1 1 0 0 0 0</pose><static>true</static>\
+        </include></world></sdf>";
+    let model = with_mesh(folder.path(), "dae", DAE.as_bytes());
+    let sdf = std::fs::read(model.join("model.sdf")).unwrap();
+    let index = b"<model><name>lamp</name><sdf version=\"1.6\">model.sdf</sdf></model>";
+    let (shelf, kitchen) =
+        (std::fs::read("models/objects/shelf.toml").unwrap(), std::fs::read("models/worlds/kitchen.toml").unwrap());
+    let others: [&[u8]; 3] = [&robot, &sdf, &shelf];
+    let files: [(&str, &[u8]); 6] = [
+        ("objects/lamp/model.sdf", &sdf),
+        ("objects/lamp/model.config", index),
+        ("objects/cup.urdf", &robot),
+        ("objects/shelf.toml", &shelf),
+        ("worlds/kitchen.toml", &kitchen),
+        ("worlds/w.world", world),
+    ];
+    std::fs::create_dir_all(folder.path().join("models/worlds")).unwrap();
+    cases("models and worlds", 100, |mut random| {
+        let (name, text) = *random.pick(&files);
+        let path = folder.path().join("models").join(name);
+        let tokens: Vec<&str> = WORDS.iter().chain(&XML).copied().collect();
+        std::fs::write(&path, random.text(text, &tokens, &others)).unwrap();
+        read(
+            folder.path(),
+            "[pickObject]\nmodel_list = [\"lamp\", \"cup\", \"shelf\"]\n[world]\nworlds = [\"kitchen\", \"w\"]\n",
+        );
+        // The other files are as they were, except that most were not there.
+        std::fs::remove_file(&path).unwrap();
+        std::fs::write(model.join("model.sdf"), &sdf).unwrap();
+    });
+}
+
+#[test]
+fn robots() {
+    const WORDS: [&str; 14] = [
+        "<link name=\"l\"/>",
+        "<joint name=\"j\" type=\"continuous\"><parent link=\"l\"/><child link=\"l\"/></joint>",
+        "<mimic joint=\"j\"/>",
+        "<limit lower=\"0\" upper=\"0\" effort=\"0\" velocity=\"0\"/>",
+        "<axis xyz=\"0 0 0\"/>",
+        "<origin xyz=\"0 0 0\" rpy=\"0 0 0\"/>",
+        "<inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/>",
+        "<mass value=\"0\"/>",
+        " type=\"prismatic\"",
+        " multiplier=\"0\"",
+        "<collision><geometry><sphere radius=\"1\"/></geometry></collision>",
+        "<mesh filename=\"package://x/y.stl\"/>",
+        "<robot version=\"1.2\">",
+        " quat_xyzw=\"0 0 0 0\"",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = ["models/robots/fixed_arm", "models/robots/mobile_manipulator"].map(|name| {
+        let read = |ending: &str| std::fs::read(format!("{name}.{ending}")).unwrap();
+        (name.rsplit('/').next().unwrap(), read("toml"), read("urdf"))
+    });
+    cases("robots", 60, |mut random| {
+        let (name, profile, urdf) = random.pick(&seeds);
+        let tokens: Vec<&str> = WORDS.iter().chain(&XML).copied().collect();
+        let in_profile = random.below(4) == 0;
+        let profile = if in_profile {
+            random.text(profile, &["\n[[postures]]\n", "package_dirs = [\"/\"]\n"], &[])
+        } else {
+            profile.clone()
+        };
+        let urdf = if in_profile { urdf.clone() } else { random.text(urdf, &tokens, &[]) };
+        std::fs::write(folder.path().join("r.toml"), profile).unwrap();
+        std::fs::write(folder.path().join(format!("{name}.urdf")), urdf).unwrap();
+        let read = config::load_text(
+            Source::new("c.toml", "tests = [[\"Pick\"]]\ntest_count = 1\n[robot]\nprofile = \"r.toml\"\n"),
+            folder.path(),
+            &Overrides::default(),
+        );
+        match read {
+            Ok(campaign) => {
+                if let Err(error) = world::check_robot(&campaign.robot) {
+                    show(&error.diagnostic().into());
+                }
+            }
+            Err(found) => show(&found),
+        }
+    });
+}
+
+/// A case of a campaign with clutter, as `actcheck export` writes it.
+const CASE: &str = r#"
+tests = [["Pick"]]
+test_count = 1
+[objectSurface]
+object_surfaces = ["coffee_table", "table"]
+[pickObject]
+model_list = ["glass", "mug"]
+[surfaceObjects]
+model_list = ["can", "bottle"]
+count = [0, 4]
+[physics]
+mass_scale = [0.9, 1.1]
+[case]
+from = "k7f3-2"
+expect = ["NoGraspCollisions"]
+trace = "0123456789abcdef"
+[case.choices]
+surface.name = "coffee_table"
+target.model = "glass"
+target.x = 0.1
+target.y = -0.05
+target.yaw = 1.5
+other.count = 2
+other.1.model = "can"
+other.1.x = [0.0, 0.2]
+other.1.y = [0.1, 0.2]
+other.1.yaw = 0.0
+other.1.left_out = true
+other.2.model = "bottle"
+other.2.x = -0.2
+"#;
+
+#[test]
+fn case_files() {
+    const WORDS: [&str; 16] = [
+        "other.99.x = 1.0\n",
+        "target.model = 7\n",
+        "other.count = 4294967295\n",
+        "test_launcher = \"./x\"\n",
+        "[skill]\n",
+        "[case.choices.other]\n",
+        "[history]\ndir = \"/\"\n",
+        "= [[",
+        "= {",
+        "}",
+        "\"\"\"",
+        "sensor.seed = 1\n",
+        "ontology = \"/dev/zero\"\n",
+        "model_dir = \"..\"\n",
+        "a.b.c.d.e = 1\n",
+        "[robot]\nprofile = \"/dev/zero\"\n",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let pick = std::fs::read("configs/pick.toml").unwrap();
+    let overrides = Overrides { history: Some(folder.path().join("h")), ..Overrides::default() };
+    cases("case files", 12, |mut random| {
+        let bytes = random.text(CASE.as_bytes(), &WORDS, &[&pick]);
+        let Ok(text) = String::from_utf8(bytes) else { return };
+        match Env::prepare_text(Source::new("case.toml", text), folder.path(), &overrides) {
+            Ok(env) => show(&env.warnings()),
+            Err(found) => show(&found),
+        }
+    });
+}
+
+/// Changes some statements of a history's store, and some bytes of a trace.
+fn damage(history: &Path, random: &mut Mutations) {
+    const IDS: [&str; 6] = ["../../../x", "", "a b", "c1", "c1-1/1", "\u{1b}[2J"];
+    let store = Store::open(history.join("store")).unwrap();
+    let quads: Vec<Quad> = store.iter().map(Result::unwrap).collect();
+    for _ in 0..=random.below(6) {
+        let quad = random.pick(&quads).clone();
+        let mut other = quad.clone();
+        match random.below(5) {
+            0 => drop(store.remove(&quad)),
+            1 => other.object = random.pick(&quads).object.clone(),
+            2 => other.predicate = random.pick(&quads).predicate.clone(),
+            3 => {
+                let namespace = random.pick(&[
+                    "https://w3id.org/actcheck/run/",
+                    "https://w3id.org/actcheck/campaign/",
+                    "http://actions#",
+                ]);
+                let node = NamedNode::new_unchecked(format!("{namespace}{}", random.pick(&IDS)));
+                if random.below(2) == 0 { other.subject = node.into() } else { other.object = node.into() }
+            }
+            _ => {
+                let written = other.object.to_string();
+                let text = random.text(written.as_bytes(), &["\"", "^^", "1/0", "4/4", "2026-01-01T00:00:00Z"], &[]);
+                let text = String::from_utf8_lossy(&text).chars().take(2_000).collect::<String>();
+                other.object = match &quad.object {
+                    Term::Literal(literal) => Literal::new_typed_literal(text, literal.datatype()).into(),
+                    _ => Literal::new_simple_literal(text).into(),
+                };
+            }
+        }
+        if other != quad {
+            store.remove(&quad).unwrap();
+            store.insert(&other).unwrap();
+        }
+    }
+    store.flush().unwrap();
+    drop(store);
+    let traces = Files::Disk.list(&history.join("traces"));
+    if let (Some(file), 0) = (traces.first(), random.below(2)) {
+        let bytes = std::fs::read(file).unwrap();
+        std::fs::write(file, random.text(&bytes, &["\u{0}", "\u{7f}"], &[])).unwrap();
+    }
+}
+
+/// Merges a damaged history, and reads all that the result has.
+fn merge(theirs: &Path, ours: &Path) -> Result<(), Diagnostics> {
+    let sources = [History::open_existing(theirs)?];
+    let into = History::open(ours)?;
+    let options = MergeOptions { rename: true, leave_out: Vec::new() };
+    let plan = plan(&sources, Some(&into), &options)?;
+    carry_out(&plan, &sources, &into, &AtomicBool::new(false), || ())?;
+    for campaign in into.campaigns()? {
+        into.campaign(&campaign.id)?;
+    }
+    for run in into.runs(&RunFilter::default())? {
+        into.run(&run.run)?;
+        // A damaged trace is refused.
+        let _ = into.trace(&run.run).map_err(|found| show(&found));
+    }
+    Ok(())
+}
+
+#[test]
+fn merged_histories() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = folder.path().join("made");
+    {
+        let history = History::open(&made).unwrap();
+        for id in ["c1", "c2"] {
+            history.begin_campaign(&sample_campaign(id, 1)).unwrap();
+            (0..3).for_each(|index| history.commit(&sample_run(id, index)).unwrap());
+        }
+    }
+    let (inner, outer) = (folder.path().join("a/b/c"), folder.path().join("a"));
+    cases("merged histories", 3, |mut random| {
+        let _ = std::fs::remove_dir_all(&outer);
+        std::fs::create_dir_all(&inner).unwrap();
+        copy(&made, &inner.join("theirs"));
+        damage(&inner.join("theirs"), &mut random);
+        if let Err(found) = merge(&inner.join("theirs"), &inner.join("ours")) {
+            show(&found);
+        }
+        let around = [&outer, &outer.join("b")].map(|folder| std::fs::read_dir(folder).unwrap().count());
+        assert_eq!(around, [1, 1], "a file was written outside of the history");
+        assert_eq!(std::fs::read_dir(&inner).unwrap().count(), if inner.join("ours").exists() { 2 } else { 1 });
+    });
+}
