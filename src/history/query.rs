@@ -9,7 +9,7 @@ use oxigraph::store::Store;
 use crate::syntax_fault::syntax_fault;
 use crate::terms::from_store;
 use crate::{Cancel, QueryAnswer};
-use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, names};
+use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, names, sparql_excess};
 
 /// Words with which an update begins.
 const UPDATES: [&str; 10] = ["INSERT", "DELETE", "LOAD", "CLEAR", "DROP", "CREATE", "ADD", "MOVE", "COPY", "WITH"];
@@ -22,6 +22,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// It therefore runs in its own thread; when the query is stopped, the thread is abandoned and ends at its next check.
 pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
+    refuse_excess(text)?;
     let prepared =
         evaluator(cancel).parse_query(&*text.text).map_err(|error| syntax_fault(text, &error.to_string()))?;
     let (sender, receiver) = sync_channel(1);
@@ -41,6 +42,17 @@ pub(super) fn answer(store: &Store, text: &Source, cancel: &Cancel) -> Result<Qu
                 return Err(Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into());
             }
         }
+    }
+}
+
+/// Refuses a query that could exhaust the stack.
+pub(super) fn refuse_excess(text: &Source) -> Result<(), Diagnostics> {
+    match sparql_excess(&text.text) {
+        Some((span, message)) => {
+            let help = "split it, or shorten it";
+            Err(Diagnostic::error("H010", message).at(text, span).help(help).into())
+        }
+        None => Ok(()),
     }
 }
 

@@ -1,13 +1,14 @@
 //! Semi-naive evaluation, stratum by stratum, on datafrog relations.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::check::stratify::Stratum;
-use crate::engine::aggregate::{aggregate, projection};
-use crate::engine::join::{Join, Sink};
+use crate::engine::access::{Access, Own};
+use crate::engine::join::{Halt, Sink};
 use crate::engine::meter::{Meter, Stop};
-use crate::engine::plan::{Indexes, Op, Part, RulePlan, Sizes, Variant, plan_rule};
-use crate::engine::relation::{Batch, Finished, Growing, finished, growing};
+use crate::engine::plan::{Indexes, Op, Part, Parts, RulePlan, Scan, Sizes, Variant, plan_rule};
+use crate::engine::relation::{Finished, Growing, finished, growing};
+use crate::engine::variant::{Adapted, Context, allowance, attempt, replanned};
 use crate::model::program::{PredicateId, Predicates, Program, Rule};
 use crate::model::universe::Universe;
 use actcheck_base::{RuleFault, TermId};
@@ -67,7 +68,7 @@ pub(crate) struct Planned {
     pub(crate) strata: Vec<Stratum>,
     /// Facts of the text, as rows stored one after another.
     pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,
-    plans: Vec<Option<RulePlan>>,
+    pub(crate) plans: Vec<Option<RulePlan>>,
 }
 
 impl Planned {
@@ -128,35 +129,39 @@ pub(crate) fn evaluate_recording_rounds(
     meter: &mut Meter,
     rounds: Option<&mut Rounds>,
 ) -> Result<(), Stopped> {
-    let mut run = Run { planned, predicates, indexes, universe, meter, rounds };
-    run.facts(layers);
-    for stratum in &planned.strata {
-        run.meter.check().map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
-        if stratum.recursive {
-            run.recursive(stratum, layers)?;
-        } else {
-            run.once(stratum, layers)?;
-        }
-    }
-    Ok(())
+    let access = Access::new(predicates, indexes);
+    Run { planned, predicates, access, adapted: Adapted::new(), universe, meter, rounds }.all(layers)
 }
 
-/// Maximum size of the matches kept at once for an aggregating rule. Unit: terms of 4 bytes (1 GiB).
-const AGGREGATE_LIMIT: usize = 1 << 28;
-
-struct Run<'a, 'u, 't> {
-    planned: &'a Planned,
-    predicates: &'a Predicates,
-    indexes: &'a Indexes,
-    universe: &'u mut Universe<'t>,
-    meter: &'u mut Meter,
-    rounds: Option<&'u mut Rounds>,
+/// One evaluation of a program.
+pub(crate) struct Run<'a, 'u, 't> {
+    pub(crate) planned: &'a Planned,
+    pub(crate) predicates: &'a Predicates,
+    pub(crate) access: Access<'a>,
+    pub(crate) adapted: Adapted,
+    pub(crate) universe: &'u mut Universe<'t>,
+    pub(crate) meter: &'u mut Meter,
+    pub(crate) rounds: Option<&'u mut Rounds>,
 }
 
 /// The growing tuples of a stratum, in the order of its predicates.
-type Grown = Vec<Box<dyn Growing>>;
+pub(crate) type Grown = Vec<Box<dyn Growing>>;
 
 impl Run<'_, '_, '_> {
+    /// Evaluates all strata.
+    pub(crate) fn all(&mut self, layers: &mut Layers<'_>) -> Result<(), Stopped> {
+        self.facts(layers);
+        for stratum in &self.planned.strata {
+            self.meter.check().map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
+            if stratum.recursive {
+                self.recursive(stratum, layers)?;
+            } else {
+                self.once(stratum, layers)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Adds the facts of the text to the existing tuples.
     fn facts(&mut self, layers: &mut Layers<'_>) {
         for (predicate, facts) in &self.planned.facts {
@@ -168,7 +173,7 @@ impl Run<'_, '_, '_> {
 
     fn finish(&self, predicate: PredicateId, rows: Vec<TermId>, layers: &mut Layers<'_>) {
         let width = self.predicates.get(predicate).width;
-        layers.own.set(predicate, finished(width, rows, self.indexes.of(predicate).clone()));
+        layers.own.set(predicate, finished(width, rows, self.access.indexes.of(predicate).clone()));
     }
 
     /// Evaluates a stratum without recursion: each rule once.
@@ -177,9 +182,11 @@ impl Run<'_, '_, '_> {
         let mut rows = layers.rows(predicate).to_vec();
         for rule in &stratum.rules {
             let stopped = |stop| Stopped { stop, rule: Some(*rule) };
-            let Some(plan) = &self.planned.plans[*rule] else { continue };
-            for variant in &plan.variants {
-                let derived = self.variant(*rule, variant, layers, None, &mut |_, _| Ok(())).map_err(stopped)?;
+            for variant in 0..self.variants(*rule).len() {
+                let mut grown = Grown::new();
+                let derived = self
+                    .variant(*rule, variant, stratum, layers, &mut grown, &mut |_, _, _| Ok(()))
+                    .map_err(stopped)?;
                 self.meter.derived(derived.len() / self.predicates.get(predicate).width).map_err(stopped)?;
                 rows.extend(derived);
             }
@@ -191,25 +198,30 @@ impl Run<'_, '_, '_> {
     /// Evaluates a recursive stratum in rounds, each over the tuples found in the previous one.
     fn recursive(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let mut grown = self.grow(stratum, layers);
+        let readers = self.readers(stratum);
+        // The predicates that have new tuples, or had some in the last round.
+        let mut active: BTreeSet<usize> = (0..grown.len()).collect();
         for rule in &stratum.rules {
-            self.insert_all(*rule, false, stratum, layers, &grown)?;
+            for variant in 0..self.variants(*rule).len() {
+                if self.variants(*rule)[variant].delta.is_none() {
+                    self.insert_all(*rule, variant, stratum, layers, &mut grown)?;
+                }
+            }
         }
         loop {
-            let mut changed = false;
-            for growing in &mut grown {
-                changed |= growing.changed();
-            }
-            if !changed {
+            active.retain(|place| grown[*place].changed());
+            if active.is_empty() {
                 break;
             }
-            self.record_rounds(stratum, &grown);
-            let found = grown.iter().map(|growing| growing.recent_len()).sum();
-            let recursive_rule = || stratum.rules.iter().copied().find(|rule| self.is_recursive(*rule));
-            let rule = recursive_rule();
+            self.record_rounds(stratum, &active, &grown);
+            let found = active.iter().map(|place| grown[*place].recent_len()).sum();
+            let mut due: Vec<(usize, usize)> = active.iter().flat_map(|place| &readers[*place]).copied().collect();
+            due.sort_unstable();
+            let rule = due.first().map(|(rule, _)| *rule).or(stratum.rules.first().copied());
             self.meter.derived(found).map_err(|stop| Stopped { stop, rule })?;
             self.meter.check().map_err(|stop| Stopped { stop, rule })?;
-            for rule in &stratum.rules {
-                self.insert_all(*rule, true, stratum, layers, &grown)?;
+            for (rule, variant) in due {
+                active.extend(self.insert_all(rule, variant, stratum, layers, &mut grown)?);
             }
         }
         for (predicate, growing) in stratum.predicates.iter().zip(grown) {
@@ -218,13 +230,34 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
+    /// Returns the variants that read the recent tuples of each predicate of a stratum, as rule and position.
+    fn readers(&self, stratum: &Stratum) -> Vec<Vec<(usize, usize)>> {
+        let mut readers = vec![Vec::new(); stratum.predicates.len()];
+        for rule in &stratum.rules {
+            for (position, variant) in self.variants(*rule).iter().enumerate() {
+                if let Some(delta) = variant.delta
+                    && let Some(atom) = self.planned.rules[*rule].body[delta].atom()
+                    && let Ok(place) = stratum.predicates.binary_search(&atom.predicate)
+                {
+                    readers[place].push((*rule, position));
+                }
+            }
+        }
+        readers
+    }
+
+    fn variants(&self, rule: usize) -> &'_ [Variant] {
+        self.planned.plans[rule].as_ref().map_or(&[], |plan| &plan.variants)
+    }
+
     /// Records the round of the recent tuples, if rounds are requested.
-    fn record_rounds(&mut self, stratum: &Stratum, grown: &Grown) {
+    fn record_rounds(&mut self, stratum: &Stratum, active: &BTreeSet<usize>, grown: &Grown) {
         let Some(rounds) = &mut self.rounds else { return };
         rounds.next += 1;
-        for (predicate, growing) in stratum.predicates.iter().zip(grown) {
+        for place in active {
+            let predicate = &stratum.predicates[*place];
             let mut batches = Vec::new();
-            growing.batches(Part::Recent, 0, &mut batches);
+            grown[*place].batches(Part::Recent, 0, &mut batches);
             let width = self.predicates.get(*predicate).width;
             for row in batches.iter().flat_map(|batch| batch.chunks_exact(width)) {
                 rounds.of.insert((*predicate, row.to_vec()), rounds.next);
@@ -232,17 +265,13 @@ impl Run<'_, '_, '_> {
         }
     }
 
-    fn is_recursive(&self, rule: usize) -> bool {
-        self.planned.plans[rule].as_ref().is_some_and(|plan| plan.variants.iter().any(|variant| variant.recent))
-    }
-
     /// Creates the growing tuples of the stratum's predicates, with the known tuples inserted.
     fn grow(&self, stratum: &Stratum, layers: &Layers<'_>) -> Grown {
         let mut wanted: Vec<Vec<bool>> =
-            stratum.predicates.iter().map(|p| vec![false; self.indexes.of(*p).len()]).collect();
+            stratum.predicates.iter().map(|p| vec![false; self.access.indexes.of(*p).len()]).collect();
         for rule in &stratum.rules {
-            for op in self.planned.plans[*rule].iter().flat_map(|plan| &plan.variants).flat_map(|v| &v.ops) {
-                if let Op::Scan { predicate, index, .. } = op
+            for op in self.variants(*rule).iter().flat_map(|v| v.guards.iter().flatten().chain(&v.ops)) {
+                if let Op::Scan(Scan { predicate, index, .. }) = op
                     && let Ok(place) = stratum.predicates.binary_search(predicate)
                 {
                     wanted[place][*index] = true;
@@ -251,7 +280,7 @@ impl Run<'_, '_, '_> {
         }
         let mut grown = Vec::new();
         for (predicate, wanted) in stratum.predicates.iter().zip(&wanted) {
-            let growing = growing(self.predicates.get(*predicate).width, self.indexes.of(*predicate).clone(), wanted);
+            let growing = growing(self.predicates.get(*predicate).width, self.access.indexes.of(*predicate).clone(), wanted);
             let known = layers.rows(*predicate).to_vec();
             if !known.is_empty() {
                 growing.insert(known);
@@ -261,106 +290,86 @@ impl Run<'_, '_, '_> {
         grown
     }
 
-    /// Adds the tuples derived by the variants of one rule that read recent tuples, or by those that don't.
+    /// Adds the tuples that a variant derives. Returns the place of their predicate if there are any.
     fn insert_all(
         &mut self,
         rule: usize,
-        recent: bool,
+        variant: usize,
         stratum: &Stratum,
         layers: &Layers<'_>,
-        grown: &Grown,
-    ) -> Result<(), Stopped> {
-        let Some(plan) = &self.planned.plans[rule] else { return Ok(()) };
+        grown: &mut Grown,
+    ) -> Result<Option<usize>, Stopped> {
         let Ok(place) = stratum.predicates.binary_search(&self.planned.rules[rule].head.predicate) else {
-            return Ok(());
+            return Ok(None);
         };
-        let target = &grown[place];
         let mut flushed = 0;
-        for variant in plan.variants.iter().filter(|variant| variant.recent == recent) {
-            let mut flush = |sink: &mut Sink, left: usize| {
-                flushed += target.insert(std::mem::take(&mut sink.rows));
-                if flushed > left { Err(Stop::Tuples) } else { Ok(()) }
-            };
-            let rows = self
-                .variant(rule, variant, layers, Some((stratum, grown)), &mut flush)
-                .map_err(|stop| Stopped { stop, rule: Some(rule) })?;
-            target.insert(rows);
+        let mut flush = |grown: &Grown, sink: &mut Sink, left: usize| {
+            flushed += grown[place].insert(std::mem::take(&mut sink.rows));
+            if flushed > left { Err(Stop::Tuples) } else { Ok(()) }
+        };
+        let rows = self
+            .variant(rule, variant, stratum, layers, grown, &mut flush)
+            .map_err(|stop| Stopped { stop, rule: Some(rule) })?;
+        let any = flushed > 0 || !rows.is_empty();
+        if !rows.is_empty() {
+            grown[place].insert(rows);
         }
-        Ok(())
+        Ok(any.then_some(place))
     }
 
-    /// Returns the rows that each step of a variant reads, and their widths. Returns `None` if an atom has no rows.
-    fn sources<'b>(
-        &self,
-        variant: &Variant,
-        layers: &'b Layers<'_>,
-        grown: Option<(&Stratum, &'b Grown)>,
-    ) -> Option<(Vec<Vec<Batch<'b>>>, Vec<usize>)> {
-        let mut batches = Vec::with_capacity(variant.ops.len());
-        let mut widths = Vec::with_capacity(variant.ops.len());
-        for op in &variant.ops {
-            let (predicate, part, index) = match op {
-                Op::Scan { predicate, part, index, .. } => (*predicate, *part, *index),
-                Op::Absent { predicate, index, .. } => (*predicate, Part::All, *index),
-                _ => {
-                    batches.push(Vec::new());
-                    widths.push(1);
-                    continue;
-                }
-            };
-            let mut found = Vec::new();
-            let place =
-                grown.and_then(|(stratum, grown)| Some((stratum.predicates.binary_search(&predicate).ok()?, grown)));
-            match place {
-                Some((place, grown)) => grown[place].batches(part, index, &mut found),
-                None => found.extend(layers.get(predicate).map(|table| Batch::Plain(table.index(index)))),
-            }
-            if matches!(op, Op::Scan { .. }) && found.iter().all(|batch| batch.is_empty()) {
-                return None;
-            }
-            batches.push(found);
-            widths.push(self.predicates.get(predicate).width);
-        }
-        Some((batches, widths))
-    }
-
-    /// Returns the head rows that one variant derives.
+    /// Returns the head rows that one variant derives. If it reads more rows than expected, it is planned by samples and
+    /// begins again; tuples that it has already added are right in any case.
     fn variant(
         &mut self,
-        rule: usize,
-        variant: &Variant,
+        rule_idx: usize,
+        position: usize,
+        stratum: &Stratum,
         layers: &Layers<'_>,
-        grown: Option<(&Stratum, &Grown)>,
-        flush: &mut dyn FnMut(&mut Sink, usize) -> Result<(), Stop>,
+        grown: &mut Grown,
+        flush: &mut dyn FnMut(&Grown, &mut Sink, usize) -> Result<(), Stop>,
     ) -> Result<Vec<TermId>, Stop> {
-        let rule = &self.planned.rules[rule];
-        let Some((batches, widths)) = self.sources(variant, layers, grown) else { return Ok(Vec::new()) };
-        let operands = match &rule.aggregation {
-            Some(aggregation) => projection(aggregation),
-            None => rule.head.args.clone(),
+        let planned = self.planned;
+        let rule = &planned.rules[rule_idx];
+        let Some(planned) = planned.plans[rule_idx].as_ref().map(|plan| &plan.variants[position]) else {
+            return Ok(Vec::new());
         };
-        let mut sink = Sink { operands, rows: Vec::new() };
-        let left = self.meter.tuples_left();
-        let aggregating = rule.aggregation.is_some();
-        Join {
-            ops: &variant.ops,
-            batches: &batches,
-            widths: &widths,
-            binding: vec![0; rule.variables.len()],
-            universe: self.universe,
-            meter: self.meter,
-            sink: &mut sink,
-            flush: &mut |sink| match aggregating {
-                true if sink.rows.len() > AGGREGATE_LIMIT => Err(Stop::Tuples),
-                true => Ok(()),
-                false => flush(sink, left),
-            },
+        let adapted = self.adapted.get(&(rule_idx, position));
+        let (variant, allowed) =
+            adapted.map_or((planned, allowance(planned, rule, &self.access)), |(variant, allowed)| (variant, *allowed));
+        let mut context = Context { access: &mut self.access, universe: self.universe, meter: self.meter };
+        let own = stratum.recursive.then_some(Own { stratum, grown });
+        let flush_into = &mut |sink: &mut Sink, left| flush(grown, sink, left);
+        match attempt(&mut context, rule, variant, layers, own, allowed, flush_into) {
+            Ok(rows) => return Ok(rows),
+            Err(Halt::Stop(stop)) => return Err(stop),
+            Err(Halt::Replan) => {}
         }
-        .run(0)?;
-        Ok(match &rule.aggregation {
-            Some(aggregation) => aggregate(rule, aggregation, &sink.rows, self.universe, self.meter)?,
-            None => sink.rows,
+        let parts = Parts::new(rule, stratum, planned.delta);
+        let (variant, allowed) = replanned(&mut context, rule, &parts, layers, own);
+        add_indexes(&variant, stratum, &context.access.indexes, grown);
+        let own = stratum.recursive.then_some(Own { stratum, grown });
+        let flush_into = &mut |sink: &mut Sink, left| flush(grown, sink, left);
+        let rows = attempt(&mut context, rule, &variant, layers, own, u64::MAX, flush_into);
+        self.adapted.insert((rule_idx, position), (variant, allowed));
+        rows.map_err(|halt| match halt {
+            Halt::Stop(stop) => stop,
+            Halt::Replan => Stop::Time,
         })
+    }
+}
+
+/// Adds the indexes that a new plan reads to the growing tuples.
+fn add_indexes(variant: &Variant, stratum: &Stratum, indexes: &Indexes, grown: &mut Grown) {
+    if !stratum.recursive {
+        return;
+    }
+    for op in variant.guards.iter().flatten().chain(&variant.ops) {
+        if let Op::Scan(Scan { predicate, index, .. }) = op
+            && let Ok(place) = stratum.predicates.binary_search(predicate)
+            && !grown[place].has_index(*index)
+        {
+            grown[place].add_index(*index, indexes.of(*predicate));
+        }
     }
 }
 

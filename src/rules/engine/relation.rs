@@ -23,6 +23,10 @@ pub(crate) trait Growing {
     fn changed(&mut self) -> bool;
     /// Returns the number of recent tuples.
     fn recent_len(&self) -> usize;
+    /// Returns whether the rows are kept in the order of an index.
+    fn has_index(&self, index: usize) -> bool;
+    /// Keeps the rows also in the order of an index. `orders`: the column orders of all indexes.
+    fn add_index(&mut self, index: usize, orders: &Arc<Vec<Order>>);
     /// Appends the rows of a part in the order of an index, as sorted batches.
     fn batches<'a>(&'a self, part: Part, index: usize, found: &mut Vec<Batch<'a>>);
     /// Converts to finished tuples at the fixpoint.
@@ -35,6 +39,8 @@ pub(crate) enum Batch<'a> {
     Plain(&'a [TermId]),
     /// Rows of growing tuples.
     Held(Ref<'a, [TermId]>),
+    /// Rows of an index that one evaluation has added.
+    Shared(Arc<[TermId]>),
 }
 
 impl Deref for Batch<'_> {
@@ -44,6 +50,7 @@ impl Deref for Batch<'_> {
         match self {
             Self::Plain(rows) => rows,
             Self::Held(rows) => rows,
+            Self::Shared(rows) => rows,
         }
     }
 }
@@ -127,6 +134,25 @@ impl<const W: usize> Growing for GrowingOf<W> {
         self.primary.variable.recent.borrow().len()
     }
 
+    fn has_index(&self, index: usize) -> bool {
+        index == 0 || self.indexes.get(index).is_some_and(Option::is_some)
+    }
+
+    fn add_index(&mut self, index: usize, orders: &Arc<Vec<Order>>) {
+        self.orders = Arc::clone(orders);
+        let mut grown = Grown::new(false);
+        let order = &orders[index];
+        for batch in self.primary.variable.stable.borrow().iter() {
+            grown.variable.insert(permuted(batch, order));
+        }
+        // All rows become recent, then stable.
+        grown.iteration.changed();
+        grown.variable.insert(permuted(&self.primary.variable.recent.borrow(), order));
+        grown.iteration.changed();
+        self.indexes.resize_with(self.indexes.len().max(index + 1), || None);
+        self.indexes[index] = Some(grown);
+    }
+
     fn batches<'a>(&'a self, part: Part, index: usize, found: &mut Vec<Batch<'a>>) {
         let variable = match self.indexes.get(index) {
             Some(Some(grown)) if index > 0 => &grown.variable,
@@ -155,6 +181,10 @@ fn permuted<const W: usize>(rows: &[[TermId; W]], order: &[usize]) -> Relation<[
     let mut out: Vec<[TermId; W]> = rows.iter().map(|row| std::array::from_fn(|column| row[order[column]])).collect();
     sort(&mut out);
     Relation { elements: out }
+}
+
+fn permuted_rows_of<const W: usize>(rows: &[TermId], order: &[usize]) -> Arc<[TermId]> {
+    permuted::<W>(rows.as_chunks::<W>().0, order).elements.as_flattened().into()
 }
 
 fn relation_of<const W: usize>(rows: Vec<TermId>) -> Relation<[TermId; W]> {
@@ -214,4 +244,9 @@ pub(crate) fn finished(width: usize, rows: Vec<TermId>, orders: Arc<Vec<Order>>)
 /// Creates an empty set of growing tuples.
 pub(crate) fn growing(width: usize, orders: Arc<Vec<Order>>, wanted: &[bool]) -> Box<dyn Growing> {
     with_width!(width, boxed_growing(orders, wanted))
+}
+
+/// Permutes the columns of rows and sorts the result.
+pub(crate) fn permuted_rows(width: usize, rows: &[TermId], order: &[usize]) -> Arc<[TermId]> {
+    with_width!(width, permuted_rows_of(rows, order))
 }

@@ -15,7 +15,7 @@ use crate::model::values::lexical;
 use crate::sparql::dataset::{Snapshot, Statements, View, to_rdf};
 use crate::sparql::ledger::Ledger;
 use crate::sparql::query_text::{first_group, groups, scan, variables};
-use actcheck_base::{Diagnostic, Diagnostics, Findings, RuleFault, Source, Span, WitnessRow, names};
+use actcheck_base::{Diagnostic, Diagnostics, Findings, RuleFault, Source, Span, WitnessRow, names, sparql_excess};
 use actcheck_ontology::{Ontology, Vocabulary};
 
 /// A prepared query.
@@ -37,6 +37,10 @@ impl Query {
         let mut diagnostics = Diagnostics::new();
         if !ontology.vocabulary.terms.is_empty() {
             check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
+        }
+        if let Some((span, message)) = sparql_excess(&source.text) {
+            diagnostics.push(Diagnostic::error("R060", message).at(source, span).help("split it, or shorten it"));
+            return Err(diagnostics);
         }
         if let Err(error) = evaluator().parse_query(source.text.as_ref()) {
             diagnostics.push(syntax_fault(source, &error.to_string()));
