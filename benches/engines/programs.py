@@ -49,36 +49,36 @@ def tree(branches=3, depth=6):
     return edges
 
 
-def pointers(variables=2_500, statements=2_200):
+def pointers(variables=20_000, statements=11_000):
     """Statements of a program with pointers: `x = &y`, `x = y`, `x = *y`, `*x = y`."""
     rng = random.Random(2)
 
     def near(x):
-        return max(0, min(variables - 1, x + rng.randint(-40, 40)))
+        return max(0, min(variables - 1, x + rng.randint(-60, 60)))
 
     def pairs(count):
         starts = [rng.randrange(variables) for _ in range(count)]
         return sorted({(x, near(x)) for x in starts})
 
-    return {"addr": pairs(statements), "assign": pairs(statements), "load": pairs(statements // 4), "store": pairs(statements // 4)}
+    return {"addr": pairs(statements), "assign": pairs(statements), "load": pairs(statements // 8), "store": pairs(statements // 8)}
 
 
 def memory(scale=1.0):
     """Facts in the shape of Souffle's example hmmer: most statements copy pointers along, some load, few store."""
     rng = random.Random(3)
     count = lambda size: max(1, int(size * scale))
-    variables, objects = count(20_000), count(1_900)
+    variables, objects = count(32_000), count(1_900)
     values = range(variables)
 
     def flow(x):
-        return min(variables - 1, int(x + rng.expovariate(1 / 12)) + 1)
+        return min(variables - 1, int(x + rng.expovariate(1 / 40)) + 1)
 
     def distinct(size, draw):
         return sorted({draw() for _ in range(size)})
 
-    hub = lambda: int(variables * rng.random() ** 6)
+    hub = lambda: int(variables * rng.random() ** 1.5)
     return {
-        "directflow": distinct(count(31_000), lambda: (lambda x: (x, flow(x)))(rng.choice(values))),
+        "directflow": distinct(count(24_000), lambda: (lambda x: (x, flow(x)))(rng.choice(values))),
         "load": distinct(count(11_000), lambda: (rng.choice(values), hub())),
         "store": distinct(count(1_700), lambda: (rng.choice(values), hub())),
         "extreturn": distinct(count(400), lambda: (hub(), rng.choice(values))),

@@ -110,9 +110,13 @@ impl Join<'_, '_, '_> {
         let mut any = false;
         for rows in &batches[at] {
             let start = if length == 0 { 0 } else { lower_bound(rows, width, key) };
+            let mut settled: &[TermId] = &[];
             for row in rows[start..].chunks_exact(width) {
                 if row[..length] != *key {
                     break;
+                }
+                if !settled.is_empty() && row[..settled.len()] == *settled {
+                    continue;
                 }
                 self.read()?;
                 if self.bind(row, &scan.columns) {
@@ -120,6 +124,9 @@ impl Join<'_, '_, '_> {
                     any |= found;
                     if scan.once || (found && scan.exists) {
                         return Ok(found);
+                    }
+                    if found && scan.settled < width {
+                        settled = &row[..scan.settled];
                     }
                 }
             }
@@ -137,15 +144,16 @@ impl Join<'_, '_, '_> {
     fn meet(&mut self, at: usize, scan: &Scan) -> Result<bool, Halt> {
         let (values, length) = self.key(&scan.key);
         let key = &values[..length];
+        if !self.has_many(at, key) {
+            return self.scan(at, scan);
+        }
         let mut fewest = self.matches(at, key, usize::MAX);
         let mut chosen: Option<(&Rival, usize)> = None;
-        if fewest > FEW_ROWS {
-            for rival in &scan.rivals {
-                let (values, length) = self.key(&rival.key);
-                let count = self.matches(rival.at, &values[..length], fewest);
-                if count < fewest {
-                    (fewest, chosen) = (count, Some((rival, length)));
-                }
+        for rival in &scan.rivals {
+            let (values, length) = self.key(&rival.key);
+            let count = self.matches(rival.at, &values[..length], fewest);
+            if count < fewest {
+                (fewest, chosen) = (count, Some((rival, length)));
             }
         }
         let Some((rival, prefix)) = chosen else { return self.scan(at, scan) };
@@ -179,6 +187,15 @@ impl Join<'_, '_, '_> {
             }
         }
         Ok(any)
+    }
+
+    /// Returns whether a batch has more than a few rows that begin with a key.
+    fn has_many(&self, at: usize, key: &[TermId]) -> bool {
+        let width = self.widths[at];
+        self.batches[at].iter().any(|rows| {
+            let last = lower_bound(rows, width, key) + FEW_ROWS * width;
+            rows.get(last..last + key.len()).is_some_and(|row| row == key)
+        })
     }
 
     /// Counts the rows of a step that begin with a key, up to a limit.

@@ -123,6 +123,7 @@ fn scan(atom: &Atom, part: Part, bound: &mut [bool], indexes: &mut Indexes) -> O
         columns,
         once: false,
         exists: false,
+        settled: 0,
         rivals: Vec::new(),
     })
 }
@@ -134,7 +135,12 @@ pub(crate) fn mark(rule: &Rule, outputs: &[bool], ops: &mut [Op]) {
         match op {
             Op::Scan(scan) => {
                 scan.exists = unbound.is_empty();
-                unbound.retain(|v| !scan.columns.iter().any(|(_, c)| matches!(c, Column::Bind(bound) if bound == v)));
+                let binds = |v: &Variable| {
+                    scan.columns.iter().find(|(_, c)| matches!(c, Column::Bind(bound) if bound == v)).map(|(at, _)| at + 1)
+                };
+                let columns: Option<Vec<usize>> = unbound.iter().map(binds).collect();
+                scan.settled = columns.and_then(|columns| columns.into_iter().max()).unwrap_or(0);
+                unbound.retain(|v| binds(v).is_none());
             }
             Op::Assign { variable, .. } => unbound.retain(|v| v != variable),
             _ => {}
@@ -185,6 +191,10 @@ pub(crate) fn add_rivals(ops: &mut [Op], indexes: &mut Indexes, add: bool) {
             let (last, prefix): (Vec<_>, Vec<_>) =
                 check.key.iter().copied().zip(order.clone()).partition(|(o, _)| *o == Operand::Variable(*value));
             let [(_, column)] = last.as_slice() else { continue };
+            // All rows of the check are rarely fewer than those of the scan.
+            if prefix.is_empty() {
+                continue;
+            }
             let columns: Vec<usize> = prefix.iter().map(|(_, column)| *column).collect();
             let Some(index) = indexes.followed_by(check.predicate, &columns, *column, add) else { continue };
             let order = &indexes.of(check.predicate)[index];

@@ -176,7 +176,7 @@ fn the_chosen_order_reads_at_most_three_times_the_rows_of_the_best() {
 /// A rule with an unconnected condition, a recursive one and one with a negation; the join is planned anew all the time.
 #[test]
 fn rules_planned_anew_in_every_round_derive_the_same_as_the_naive_evaluator() {
-    for seed in 1..=25u64 {
+    for seed in 1..=12u64 {
         let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
         let mut text = String::from(
             "p(?x, ?z) :- p(?x, ?y), e(?y, ?z), node(?z), ?x != ?z .

@@ -111,6 +111,9 @@ pub(crate) struct Scan {
     pub(crate) once: bool,
     /// The head's variables are bound before this step, so one match of this step and all later ones is enough.
     pub(crate) exists: bool,
+    /// After this many columns, the head's variables are bound: rows that agree in them need one match in all. 0 if no
+    /// column is left, or some variable is bound later.
+    pub(crate) settled: usize,
     pub(crate) rivals: Vec<Rival>,
 }
 
