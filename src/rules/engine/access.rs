@@ -74,8 +74,7 @@ impl<'a> Access<'a> {
             return found;
         }
         let (width, order) = (self.predicates.get(predicate).width, &self.indexes.of(predicate)[index]);
-        let rows =
-            self.added.entry((predicate, index)).or_insert_with(|| permuted_rows(width, table.index(0), order));
+        let rows = self.added.entry((predicate, index)).or_insert_with(|| permuted_rows(width, table.index(0), order));
         found.push(Batch::Shared(Arc::clone(rows)));
         found
     }
@@ -89,7 +88,10 @@ impl<'a> Access<'a> {
         own: Option<Own<'_>>,
     ) -> Option<usize> {
         if let Some((own, place)) = own.and_then(|own| Some((own, own.place(predicate)?))) {
-            return self.indexes.all_beginning_with(predicate, columns).find(|index| own.grown[place].has_index(*index));
+            return self
+                .indexes
+                .all_beginning_with(predicate, columns)
+                .find(|index| own.grown[place].has_index(*index));
         }
         if let Some(index) = self.indexes.all_beginning_with(predicate, columns).next() {
             return Some(index);

@@ -280,7 +280,8 @@ impl Run<'_, '_, '_> {
         }
         let mut grown = Vec::new();
         for (predicate, wanted) in stratum.predicates.iter().zip(&wanted) {
-            let growing = growing(self.predicates.get(*predicate).width, self.access.indexes.of(*predicate).clone(), wanted);
+            let growing =
+                growing(self.predicates.get(*predicate).width, self.access.indexes.of(*predicate).clone(), wanted);
             let known = layers.rows(*predicate).to_vec();
             if !known.is_empty() {
                 growing.insert(known);

@@ -136,7 +136,10 @@ pub(crate) fn mark(rule: &Rule, outputs: &[bool], ops: &mut [Op]) {
             Op::Scan(scan) => {
                 scan.exists = unbound.is_empty();
                 let binds = |v: &Variable| {
-                    scan.columns.iter().find(|(_, c)| matches!(c, Column::Bind(bound) if bound == v)).map(|(at, _)| at + 1)
+                    scan.columns
+                        .iter()
+                        .find(|(_, c)| matches!(c, Column::Bind(bound) if bound == v))
+                        .map(|(at, _)| at + 1)
                 };
                 let columns: Option<Vec<usize>> = unbound.iter().map(binds).collect();
                 scan.settled = columns.and_then(|columns| columns.into_iter().max()).unwrap_or(0);

@@ -132,7 +132,13 @@ fn random_query(random: &mut Random) -> String {
             _ => 4,
         };
         let second = random.below(5);
-        let args = if unary { vec![first] } else if random.below(2) == 0 { vec![first, second] } else { vec![second, first] };
+        let args = if unary {
+            vec![first]
+        } else if random.below(2) == 0 {
+            vec![first, second]
+        } else {
+            vec![second, first]
+        };
         used.extend(&args);
         let names: Vec<String> = args.iter().map(|v| format!("?v{v}")).collect();
         atoms.push(format!("r{number}({})", names.join(", ")));

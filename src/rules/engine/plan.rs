@@ -51,7 +51,13 @@ impl Indexes {
 
     /// Finds an index that begins with the given columns (in any order), followed by another one. Adds it if it is
     /// missing and `add` is set.
-    pub(crate) fn followed_by(&mut self, predicate: PredicateId, columns: &[usize], last: usize, add: bool) -> Option<usize> {
+    pub(crate) fn followed_by(
+        &mut self,
+        predicate: PredicateId,
+        columns: &[usize],
+        last: usize,
+        add: bool,
+    ) -> Option<usize> {
         let begins = |order: &Order| {
             order[..columns.len()].iter().all(|column| columns.contains(column)) && order[columns.len()] == last
         };

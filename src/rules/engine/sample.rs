@@ -93,7 +93,8 @@ impl Sampler<'_, '_, '_> {
         let mut next = partial.clone();
         next.atoms.push(idx);
         let Literal::Positive(atom) = &self.rule.body[idx] else { return next };
-        let fixed: Vec<usize> = (0..atom.args.len()).filter(|column| is_fixed(atom.args[*column], &next.bound)).collect();
+        let fixed: Vec<usize> =
+            (0..atom.args.len()).filter(|column| is_fixed(atom.args[*column], &next.bound)).collect();
         for arg in &atom.args {
             if let Operand::Variable(variable) = arg {
                 next.bound[*variable] = true;
