@@ -15,7 +15,7 @@ use crate::terms::{from_store, to_store};
 use crate::{Cancel, QueryAnswer};
 use actcheck_base::{
     COUNTED_TEXT, Diagnostic, Diagnostics, MOST_NESTED_CALLS, Source, Span, TEXT_FUNCTIONS, Term, bounded_texts,
-    check_calls, names,
+    check_calls, names, sparql_excess,
 };
 
 /// Words with which an update begins.
@@ -29,6 +29,7 @@ const LONGEST_TEXT: usize = 32 << 20;
 /// Answers a query.
 pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
+    refuse_excess(text)?;
     if let Err(at) = check_calls(&text.text) {
         let message = format!("calls are nested more than {MOST_NESTED_CALLS} deep");
         let help = "name the inner values, as in `BIND(CONCAT(?a, ?b) AS ?c)`";
@@ -91,6 +92,17 @@ fn too_much_text(text: &Source) -> Diagnostic {
     Diagnostic::error("H012", message)
         .in_source(text)
         .help("repeated concatenation doubles a text: write texts once, or filter the rows before")
+}
+
+/// Refuses a query that could exhaust the stack.
+pub(super) fn refuse_excess(text: &Source) -> Result<(), Diagnostics> {
+    match sparql_excess(&text.text) {
+        Some((span, message)) => {
+            let help = "split it, or shorten it";
+            Err(Diagnostic::error("H010", message).at(text, span).help(help).into())
+        }
+        None => Ok(()),
+    }
 }
 
 fn stopped(text: &Source) -> Diagnostic {

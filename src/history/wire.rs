@@ -5,7 +5,7 @@ use std::io;
 use oxigraph::sparql::results::{QueryResultsFormat, QueryResultsSerializer};
 use oxigraph::sparql::{QueryEvaluationError, QueryResults, QuerySolutionIter, QueryTripleIter};
 
-use crate::query::{evaluation_fault, evaluator, refuse_update};
+use crate::query::{evaluation_fault, evaluator, refuse_excess, refuse_update};
 use crate::rdf_text::serializer;
 use crate::syntax_fault::syntax_fault;
 use crate::{Cancel, History, RdfSyntax};
@@ -76,6 +76,7 @@ impl History {
         most_rows: u64,
     ) -> Result<(WireSyntax, Vec<u8>), WireFault> {
         refuse_update(text).map_err(WireFault::Refused)?;
+        refuse_excess(text).map_err(WireFault::Refused)?;
         if let Some(span) = service(&text.text) {
             let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
             return Err(WireFault::Refused(fault.at(text, span).into()));
