@@ -232,6 +232,17 @@ fn recursion_computes_the_closure_of_a_chain() {
     assert!(closure.tuples("p").contains(&vec![Term::Integer(1), Term::Integer(1)]));
 }
 
+/// A cycle takes as many rounds as it has rules, so a round must not visit all of them.
+#[test]
+fn long_chains_and_cycles_of_rules_are_evaluated() {
+    let count = 20_000;
+    let chain: String = (0..count).rev().map(|i| format!("p{}(?x) :- p{i}(?x) .\n", i + 1)).collect();
+    for (text, last) in [(chain.clone(), count), (format!("{chain}p0(?x) :- p{count}(?x) ."), 0)] {
+        let closure = load(&format!("p0(1) .\n{text}")).close(Engine::Fast, &Budget::default()).unwrap();
+        assert_eq!(closure.count(&format!("p{last}")), 1);
+    }
+}
+
 #[test]
 fn a_nonterminating_program_is_stopped_and_its_rule_named() {
     let program = load("n(0) .\nn(?y) :- n(?x), ?y = ?x + 1 .");

@@ -16,6 +16,7 @@ mod scratch;
 mod shard;
 mod shipped;
 mod source;
+mod sparql_size;
 mod suggest;
 mod term;
 mod write_atomic;
@@ -29,13 +30,15 @@ pub use findings::{Findings, RuleFault, WitnessRow};
 pub use judgement::{Judgement, Outcome};
 pub use printable::{printable, printable_in_colour};
 pub use query_texts::{
-    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls, string_end,
+    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls,
+    check_calls_within, string_end,
 };
 pub use rotation::{tilt_of, yaw_of};
 pub use run_facts::{ActionFacts, RunFacts, Triple};
 pub use scratch::ScratchFolder;
 pub use shard::{ParseShardError, Shard};
 pub use source::{Source, Span};
+pub use sparql_size::sparql_excess;
 pub use suggest::{did_you_mean, nearest};
 pub use term::{Term, TermId, Terms};
 pub use write_atomic::{NewFile, write_atomic};

@@ -12,16 +12,22 @@ use spargebra::algebra::{AggregateExpression, AggregateFunction, Expression, Fun
 use spargebra::term::{NamedNodePattern, TermPattern, TriplePattern};
 use spargebra::{Query, SparqlParser};
 
-use actcheck_base::names;
+use actcheck_base::{check_calls_within, names, sparql_excess};
 
 /// Longest text of a light query. Unit: bytes. It bounds the depth of the parsed query.
 const LONGEST: usize = 8192;
-/// Deepest nesting of brackets in a light query: the parser needs memory and time for each level.
+/// Deepest nesting of brackets in a light query: the parser needs memory for each level.
 const DEEPEST: usize = 10;
+/// Deepest nesting of calls in a light query: the time of the parser doubles with each level.
+const MOST_CALLS: usize = 3;
 
 /// Parses a light query. Returns `None` for any other text, valid or not.
 pub(super) fn light(text: &str) -> Option<Query> {
-    if text.len() > LONGEST || depth(text) > DEEPEST {
+    if text.len() > LONGEST
+        || depth(text) > DEEPEST
+        || check_calls_within(text, MOST_CALLS).is_err()
+        || sparql_excess(text).is_some()
+    {
         return None;
     }
     let query = parser().parse_query(text).ok()?;
@@ -244,6 +250,7 @@ mod tests {
             "SELECT * { SERVICE <http://a> { ?a ?b ?c } }".to_owned(),
             format!("ASK {{ FILTER({}1{}) }}", "(".repeat(40), ")".repeat(40)),
             format!("ASK {{ FILTER(1{}) }}", "+1".repeat(5000)),
+            format!("ASK {{ FILTER({}1{}) }}", "xsd:integer(".repeat(4), ")".repeat(4)),
             "ASK {".to_owned(),
         ] {
             assert!(light(&text).is_none(), "{text}");

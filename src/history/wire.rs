@@ -8,9 +8,8 @@ use oxigraph::sparql::{
 };
 
 use crate::light::light;
-use crate::query::{evaluation_fault, evaluator, refuse_update};
+use crate::query::{evaluation_fault, prepare, refuse_excess, refuse_update};
 use crate::rdf_text::serializer;
-use crate::syntax_fault::syntax_fault;
 use crate::{Cancel, History, RdfSyntax};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span};
 
@@ -93,14 +92,15 @@ impl History {
         limits: WireLimits,
     ) -> Result<WireAnswer, WireFault> {
         refuse_update(text).map_err(WireFault::Refused)?;
+        refuse_excess(text).map_err(WireFault::Refused)?;
         if let Some(span) = service(&text.text) {
             let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
-        let prepared = evaluator(&Cancel::new())
-            .parse_query(&*text.text)
-            .map_err(|error| WireFault::Malformed(syntax_fault(text, &error.to_string()).into()))?;
-        self.evaluate(prepared, text, choose, limits)
+        let query = prepare(text, &Cancel::new()).map_err(WireFault::Malformed)?;
+        let answer = self.evaluate(query.prepared.clone(), text, choose, limits);
+        query.check_texts(text).map_err(WireFault::Refused)?;
+        answer
     }
 
     /// Answers a light query within the process of a server: one that stops soon after `cancel`, and that can't exhaust

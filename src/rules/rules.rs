@@ -295,6 +295,19 @@ mod tests {
 
     #[test]
     #[cfg(feature = "sparql")]
+    fn a_query_that_is_nested_too_deeply_is_refused_at_its_place() {
+        for query in [
+            format!("ASK {{ FILTER({}true{}) }}", "(".repeat(5_000), ")".repeat(5_000)),
+            format!("ASK {}{}", "{".repeat(5_000), "}".repeat(5_000)),
+            format!("ASK {{ {}{{ ?s ?p ?o }} }}", "{ ?s ?p ?o } UNION ".repeat(20_000)),
+        ] {
+            let found = Rules::builder().build("rules.rq", &query).expect_err("it would exhaust the stack");
+            assert!(found.iter().any(|fault| fault.code == "R060" && fault.place().is_some()), "{found}");
+        }
+    }
+
+    #[test]
+    #[cfg(feature = "sparql")]
     fn a_query_may_use_the_facts() {
         let ask = "ASK { GRAPH act:after { ?a <http://example.org/x> ?x FILTER(?x < 0.5) } }";
         let rules = Rules::builder().build("rules.rq", ask).expect("the query is valid");

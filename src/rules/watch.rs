@@ -92,6 +92,18 @@ impl Watch {
         }
     }
 
+    /// Returns a watch with the same deadline and the memory that is left. What it refuses doesn't stop the evaluation.
+    pub(crate) fn trial(&self) -> Self {
+        Self {
+            deadline: self.deadline.clone(),
+            limit: self.left(),
+            held: Cell::new(0),
+            made: Cell::new(0),
+            work: Cell::new(0),
+            stop: Cell::new(None),
+        }
+    }
+
     /// Checks the clock and the stop request.
     pub(crate) fn check(&self) -> Result<(), Stop> {
         self.deadline.check().inspect_err(|stop| self.stop.set(Some(*stop)))

@@ -3,7 +3,6 @@
 
 use std::io::{BufRead, Write};
 use std::path::Path;
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -54,8 +53,7 @@ pub(super) struct Answered {
 /// # Errors
 /// Reading or writing the streams fails.
 pub fn answer(history: &Path, input: impl BufRead, mut output: impl Write) -> std::io::Result<()> {
-    let snapshots = Arc::new(Snapshots::new(history));
-    snapshots.rest_in_background();
+    let snapshots = Snapshots::new(history);
     let watch = Watch::start();
     for line in input.lines() {
         let question: Question = serde_json::from_str(&line?)?;

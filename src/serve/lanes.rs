@@ -49,7 +49,7 @@ pub(super) enum Evaluated {
 /// All queues.
 #[derive(Debug)]
 pub(super) struct Lanes {
-    snapshots: Arc<Snapshots>,
+    snapshots: Snapshots,
     counts: Arc<Counts>,
     watchdog: Watchdog,
     /// One slice for each processor.
@@ -67,7 +67,7 @@ pub(super) struct Lanes {
 
 impl Lanes {
     /// Empty queues for at most `most_queries` processes.
-    pub fn new(snapshots: Arc<Snapshots>, counts: Arc<Counts>, worker: Worker, most_queries: usize) -> Self {
+    pub fn new(snapshots: Snapshots, counts: Arc<Counts>, worker: Worker, most_queries: usize) -> Self {
         Self {
             snapshots,
             counts,

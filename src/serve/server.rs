@@ -14,7 +14,7 @@ use hyper::service::service_fn;
 use hyper::{Method, Request, Response};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::runtime::Runtime;
-use tokio::sync::{OwnedSemaphorePermit, RwLock, Semaphore, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
 use crate::answer::{Question, too_large};
 use crate::body::AnswerBody;
@@ -82,10 +82,12 @@ pub struct Serving {
     /// Requests so far.
     pub counts: Arc<Counts>,
     runtime: Option<Runtime>,
+    lanes: Arc<Lanes>,
 }
 
 impl Drop for Serving {
     fn drop(&mut self) {
+        self.lanes.close();
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();
         }
@@ -111,15 +113,14 @@ pub fn serve(options: ServeOptions) -> std::io::Result<Serving> {
         tokio::net::TcpListener::from_std(listener)?
     };
     let app = Arc::new(App::new(options));
-    let counts = Arc::clone(&app.counts);
+    let (counts, lanes) = (Arc::clone(&app.counts), Arc::clone(&app.lanes));
     runtime.spawn(app.run(listener));
-    Ok(Serving { address, counts, runtime: Some(runtime) })
+    Ok(Serving { address, counts, runtime: Some(runtime), lanes })
 }
 
 /// State shared by all requests.
 struct App {
     options: ServeOptions,
-    snapshots: Arc<Snapshots>,
     lanes: Arc<Lanes>,
     report: Arc<LiveReport>,
     page: Bytes,
@@ -127,8 +128,8 @@ struct App {
     connections: Arc<Connections>,
     /// Memory for large answers, in [`MEMORY_UNIT`]s.
     memory: Arc<Semaphore>,
-    /// Queries share it; the report needs the history for itself.
-    history: Arc<RwLock<()>>,
+    /// Concurrent requests for the report wait for the same page.
+    rendering: Arc<tokio::sync::Mutex<()>>,
 }
 
 impl App {
@@ -140,26 +141,24 @@ impl App {
             kept: Mutex::new(None),
         };
         let page = page::page(&options.history.display().to_string(), &options.examples).into();
-        let (snapshots, counts) = (Arc::new(Snapshots::new(&options.history)), Arc::new(Counts::default()));
+        let counts = Arc::new(Counts::default());
         let worker = worker(&options.query_arguments);
-        let lanes = Lanes::new(Arc::clone(&snapshots), Arc::clone(&counts), worker, options.most_queries);
+        let lanes = Lanes::new(Snapshots::new(&options.history), Arc::clone(&counts), worker, options.most_queries);
         let units = usize::try_from(memory_units(options.most_bytes) * MOST_ANSWERS).unwrap_or(usize::MAX);
         Self {
-            snapshots,
             lanes: Arc::new(lanes),
             report: Arc::new(report),
             page,
             counts,
             connections: Connections::new(),
             memory: Arc::new(Semaphore::new(units.min(Semaphore::MAX_PERMITS))),
-            history: Arc::default(),
+            rendering: Arc::default(),
             options,
         }
     }
 
     /// Accepts connections until the runtime ends.
     async fn run(self: Arc<Self>, listener: tokio::net::TcpListener) {
-        self.snapshots.rest_in_background();
         let app = Arc::clone(&self);
         tokio::spawn(async move {
             loop {
@@ -254,8 +253,7 @@ impl App {
         let page = match self.report.cached() {
             Some(page) => page,
             None => {
-                let alone = Arc::clone(&self.history).write_owned().await;
-                self.lanes.close();
+                let alone = Arc::clone(&self.rendering).lock_owned().await;
                 let (report, (sender, receiver)) = (Arc::clone(&self.report), oneshot::channel());
                 std::thread::spawn(move || {
                     let page = report.render();
@@ -282,7 +280,6 @@ impl App {
         let accept = accepts.collect::<Vec<&str>>().join(",");
         let ServeOptions { most_rows, most_bytes, most_secs, most_memory, .. } = self.options;
         let question = Arc::new(Question { query, accept, most_rows, most_bytes, most_secs, most_memory });
-        let _reading = self.history.read().await;
         match self.lanes.evaluate(&question).await? {
             Evaluated::Here(answered) => Ok(answered.into()),
             Evaluated::There(asked) => self.asked(asked),

@@ -1,119 +1,104 @@
-//! The history that queries read: opened once and shared, until it changes or is not used for a moment.
+//! The state of the history that queries read: opened once and shared, and renewed when the history has changed.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant, SystemTime};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::time::{Duration, Instant};
 
 use actcheck_base::Diagnostics;
 use actcheck_history::History;
 
-/// Interval at which the files of a history in use are compared with those that were opened.
+/// Interval at which a history in use is checked for changes.
 const CHECK_EVERY: Duration = Duration::from_millis(100);
-/// Time after which an unused history is closed, so that a campaign can write to it.
-const IDLE: Duration = Duration::from_millis(50);
-/// Interval at which [`Snapshots::rest`] is to be called.
-const REST_EVERY: Duration = Duration::from_millis(25);
-
-/// Paths, sizes and modification times of a history's files.
-pub(super) type State = BTreeMap<PathBuf, (u64, Option<SystemTime>)>;
-
-/// Returns the state of some folders of a history.
-pub(super) fn state(history: &Path, folders: &[&str]) -> State {
-    let files = folders.iter().flat_map(|part| std::fs::read_dir(history.join(part)).into_iter().flatten());
-    files
-        .filter_map(Result::ok)
-        // The store's log files change with every access.
-        .filter(|entry| !entry.file_name().to_string_lossy().starts_with("LOG"))
-        .filter_map(|entry| entry.metadata().ok().map(|data| (entry.path(), (data.len(), data.modified().ok()))))
-        .collect()
-}
+/// While a process is writing the history, renewing takes at most this part of the time.
+const RENEWING_SHARE: u32 = 10;
 
 /// Opens a history to read when a query needs it.
-#[derive(Debug)]
 pub(super) struct Snapshots {
-    history: PathBuf,
-    held: Mutex<Option<Held>>,
+    dir: PathBuf,
+    open: RwLock<Option<Arc<History>>>,
+    started: Instant,
+    /// Time of the next check for changes. Unit: microseconds since the start.
+    next_check: AtomicU64,
+    /// Locked while the history is opened or renewed.
+    renewing: Mutex<()>,
 }
 
-struct Held {
-    history: Arc<History>,
-    state: State,
-    checked: Instant,
-    used: Instant,
-}
-
-impl std::fmt::Debug for Held {
+impl std::fmt::Debug for Snapshots {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Held").field("used", &self.used).finish_non_exhaustive()
+        f.debug_struct("Snapshots").field("dir", &self.dir).finish_non_exhaustive()
     }
 }
 
 impl Snapshots {
     /// Opens nothing yet.
-    pub fn new(history: &Path) -> Self {
-        Self { history: history.to_owned(), held: Mutex::default() }
+    pub fn new(dir: &Path) -> Self {
+        Self {
+            dir: dir.to_owned(),
+            open: RwLock::default(),
+            started: Instant::now(),
+            next_check: AtomicU64::new(0),
+            renewing: Mutex::default(),
+        }
     }
 
-    /// Returns the present history.
+    /// Returns the present history. Opens or renews it if necessary.
     ///
     /// # Errors
-    /// It can't be opened, for example because a campaign is writing.
+    /// It can't be opened.
     pub fn get(&self) -> Result<Arc<History>, Diagnostics> {
-        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
-        let now = Instant::now();
-        if let Some(known) = &mut *held
-            && now.duration_since(known.checked) > CHECK_EVERY
+        let _alone = self.renewing.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = self.known();
+        if let Some(history) = &known
+            && self.is_checked()
         {
-            known.checked = now;
-            if state(&self.history, &["store"]) != known.state {
-                *held = None;
+            return Ok(Arc::clone(history));
+        }
+        let began = Instant::now();
+        let history = match known {
+            Some(history) => {
+                history.refresh()?;
+                history
             }
-        }
-        if let Some(known) = &mut *held {
-            known.used = now;
-            return Ok(Arc::clone(&known.history));
-        }
-        let state = state(&self.history, &["store"]);
-        let history = Arc::new(History::open_to_read(&self.history)?);
-        *held = Some(Held { history: Arc::clone(&history), state, checked: now, used: now });
+            None => {
+                let history = Arc::new(History::open_to_read(&self.dir)?);
+                *self.open.write().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&history));
+                history
+            }
+        };
+        self.check_after(CHECK_EVERY.max(began.elapsed() * RENEWING_SHARE));
         Ok(history)
     }
 
-    /// Returns the present history if that takes no time: it is open, and was compared with its files a moment ago.
+    /// Returns the present history if that takes no time: it is open, and has not changed. Otherwise
+    /// [`Snapshots::get`] must be called.
     pub fn ready(&self) -> Option<Arc<History>> {
-        let mut held = self.held.try_lock().ok()?;
-        let known = held.as_mut()?;
-        let now = Instant::now();
-        if now.duration_since(known.checked) > CHECK_EVERY {
-            return None;
+        let history = self.known()?;
+        if !self.is_checked() {
+            let _alone = self.renewing.try_lock().ok()?;
+            if history.is_stale() {
+                return None;
+            }
+            self.check_after(CHECK_EVERY);
         }
-        known.used = now;
-        Some(Arc::clone(&known.history))
+        Some(history)
     }
 
     /// Closes the history as soon as running queries have ended.
     pub fn close(&self) {
-        *self.held.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        *self.open.write().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// Closes the history if it was not used for a while.
-    pub fn rest(&self) {
-        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
-        if held.as_ref().is_some_and(|held| held.used.elapsed() > IDLE) {
-            *held = None;
-        }
+    fn known(&self) -> Option<Arc<History>> {
+        self.open.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Starts a thread that calls [`Snapshots::rest`] now and then, as long as the value exists.
-    pub fn rest_in_background(self: &Arc<Self>) {
-        let weak = Arc::downgrade(self);
-        std::thread::spawn(move || {
-            while let Some(snapshots) = weak.upgrade() {
-                snapshots.rest();
-                drop(snapshots);
-                std::thread::sleep(REST_EVERY);
-            }
-        });
+    fn is_checked(&self) -> bool {
+        self.started.elapsed() < Duration::from_micros(self.next_check.load(Ordering::Acquire))
+    }
+
+    fn check_after(&self, time: Duration) {
+        let next = (self.started.elapsed() + time).as_micros();
+        self.next_check.store(u64::try_from(next).unwrap_or(u64::MAX), Ordering::Release);
     }
 }

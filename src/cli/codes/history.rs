@@ -63,7 +63,7 @@ const CODES_H: &[Code] = &[
     code(
         "H010",
         "a SPARQL query has a syntax error",
-        "a word, bracket or prefix is wrong or missing",
+        "a word, bracket or prefix is wrong or missing, or it is nested too deeply or too long",
         "correct the marked place",
     ),
     code("H011", "a query is an update", "histories are read-only", "use `SELECT`, `ASK`, `CONSTRUCT` or `DESCRIBE`"),

@@ -190,7 +190,7 @@ const CODES_R: &[Code] = &[
     code(
         "R060",
         "a SPARQL query has an error",
-        "a syntax error, or a designator is used outside the first group",
+        "a syntax error, a designator outside the first group, or too much nesting",
         "correct the marked place; see https://www.w3.org/TR/sparql11-query/",
     ),
     code(

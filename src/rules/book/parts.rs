@@ -1,6 +1,6 @@
 //! The parts of the libraries' rules: those that properties need, and those that read only the ontology.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::given::add_given;
 use crate::model::program::{Atom, Literal, Operand, Origin, Predicates, Program, Rule};
@@ -63,15 +63,15 @@ pub(super) fn needed<'p>(
     if snapshots {
         needed.extend((0..predicates.len()).filter(|id| predicates.get(*id).name == "state"));
     }
-    loop {
-        let before = needed.len();
-        for rule in &library.rules {
-            if needed.contains(&rule.head.predicate) {
-                needed.extend(bodies(std::slice::from_ref(rule)));
-            }
-        }
-        if needed.len() == before {
-            break;
+    let mut rules_of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (idx, rule) in library.rules.iter().enumerate() {
+        rules_of.entry(rule.head.predicate).or_default().push(idx);
+    }
+    let mut waiting: Vec<usize> = needed.iter().copied().collect();
+    while let Some(predicate) = waiting.pop() {
+        for rule in rules_of.get(&predicate).into_iter().flatten() {
+            let read = bodies(std::slice::from_ref(&library.rules[*rule]));
+            waiting.extend(read.into_iter().filter(|id| needed.insert(*id)));
         }
     }
     library.rules.retain(|rule| needed.contains(&rule.head.predicate));
@@ -84,17 +84,16 @@ pub(super) fn split_fixed(program: Program, predicates: &Predicates) -> (Program
     let mut moving: BTreeSet<usize> = (0..predicates.len())
         .filter(|id| predicates.get(*id).given && predicates.get(*id).name != "ontology")
         .collect();
-    loop {
-        let before = moving.len();
-        for rule in &program.rules {
-            let reads_moving = rule.body.iter().filter_map(Literal::atom).any(|atom| moving.contains(&atom.predicate));
-            if reads_moving {
-                moving.insert(rule.head.predicate);
-            }
+    let mut heads_of: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for rule in &program.rules {
+        for atom in rule.body.iter().filter_map(Literal::atom) {
+            heads_of.entry(atom.predicate).or_default().push(rule.head.predicate);
         }
-        if moving.len() == before {
-            break;
-        }
+    }
+    let mut waiting: Vec<usize> = moving.iter().copied().collect();
+    while let Some(predicate) = waiting.pop() {
+        let heads = heads_of.get(&predicate).into_iter().flatten();
+        waiting.extend(heads.copied().filter(|head| moving.insert(*head)));
     }
     let (mut fixed, mut rest) = (Program::default(), Program::default());
     for rule in program.rules {

@@ -1,14 +1,15 @@
 //! Semi-naive evaluation, stratum by stratum, on datafrog relations.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::check::stratify::Stratum;
-use crate::engine::aggregate::{aggregate, projection};
+use crate::engine::access::{Access, Own};
 use crate::engine::collect::{Distinct, Sink, bytes_of_row};
-use crate::engine::join::Join;
+use crate::engine::join::Halt;
 use crate::engine::meter::{Meter, Stop};
-use crate::engine::plan::{Indexes, Op, Part, RulePlan, Sizes, Variant, plan_rule};
-use crate::engine::relation::{Batch, Finished, Growing, finished, growing};
+use crate::engine::plan::{Indexes, Op, Part, Parts, RulePlan, Scan, Sizes, Variant, plan_rule};
+use crate::engine::relation::{Finished, Growing, finished, growing};
+use crate::engine::variant::{Adapted, Context, allowance, attempt, replanned};
 use crate::model::program::{PredicateId, Predicates, Program, Rule};
 use crate::model::universe::Universe;
 use actcheck_base::{RuleFault, TermId};
@@ -68,7 +69,7 @@ pub(crate) struct Planned {
     pub(crate) strata: Vec<Stratum>,
     /// Facts of the text, as rows stored one after another.
     pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,
-    plans: Vec<Option<RulePlan>>,
+    pub(crate) plans: Vec<Option<RulePlan>>,
 }
 
 impl Planned {
@@ -129,35 +130,42 @@ pub(crate) fn evaluate_recording_rounds(
     meter: &mut Meter,
     rounds: Option<&mut Rounds>,
 ) -> Result<(), Stopped> {
-    let mut run = Run { planned, predicates, indexes, universe, meter, rounds };
-    run.facts(layers).map_err(|stop| Stopped { stop, rule: None })?;
-    for stratum in &planned.strata {
-        run.meter.check().map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
-        if stratum.recursive {
-            run.recursive(stratum, layers)?;
-        } else {
-            run.once(stratum, layers)?;
-        }
-    }
-    Ok(())
+    let access = Access::new(predicates, indexes);
+    Run { planned, predicates, access, adapted: Adapted::new(), universe, meter, rounds }.all(layers)
 }
 
 /// Memory of a recorded round without the row. Unit: bytes.
 const ROUND_BYTES: usize = 64;
 
-struct Run<'a, 'u, 't> {
-    planned: &'a Planned,
-    predicates: &'a Predicates,
-    indexes: &'a Indexes,
-    universe: &'u mut Universe<'t>,
-    meter: &'u mut Meter,
-    rounds: Option<&'u mut Rounds>,
+/// One evaluation of a program.
+pub(crate) struct Run<'a, 'u, 't> {
+    pub(crate) planned: &'a Planned,
+    pub(crate) predicates: &'a Predicates,
+    pub(crate) access: Access<'a>,
+    pub(crate) adapted: Adapted,
+    pub(crate) universe: &'u mut Universe<'t>,
+    pub(crate) meter: &'u mut Meter,
+    pub(crate) rounds: Option<&'u mut Rounds>,
 }
 
 /// The growing tuples of a stratum, in the order of its predicates.
-type Grown = Vec<Box<dyn Growing>>;
+pub(crate) type Grown = Vec<Box<dyn Growing>>;
 
 impl Run<'_, '_, '_> {
+    /// Evaluates all strata.
+    pub(crate) fn all(&mut self, layers: &mut Layers<'_>) -> Result<(), Stopped> {
+        self.facts(layers).map_err(|stop| Stopped { stop, rule: None })?;
+        for stratum in &self.planned.strata {
+            self.meter.check().map_err(|stop| Stopped { stop, rule: stratum.rules.first().copied() })?;
+            if stratum.recursive {
+                self.recursive(stratum, layers)?;
+            } else {
+                self.once(stratum, layers)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Adds the facts of the text to the existing tuples.
     fn facts(&mut self, layers: &mut Layers<'_>) -> Result<(), Stop> {
         for (predicate, facts) in &self.planned.facts {
@@ -175,18 +183,18 @@ impl Run<'_, '_, '_> {
 
     /// Returns the memory of a tuple in all its orders. Unit: bytes.
     fn row_bytes(&self, predicate: PredicateId) -> usize {
-        bytes_of_row(self.predicates.get(predicate).width, self.indexes.of(predicate).len())
+        bytes_of_row(self.predicates.get(predicate).width, self.access.indexes.of(predicate).len())
     }
 
     fn finish(&self, predicate: PredicateId, rows: &[TermId], layers: &mut Layers<'_>) {
         let width = self.predicates.get(predicate).width;
-        layers.own.set(predicate, finished(width, rows, self.indexes.of(predicate).clone()));
+        layers.own.set(predicate, finished(width, rows, self.access.indexes.of(predicate).clone()));
     }
 
     /// Evaluates a stratum without recursion: each rule once.
     fn once(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let Some(predicate) = stratum.predicates.first().copied() else { return Ok(()) };
-        let (width, orders) = (self.predicates.get(predicate).width, self.indexes.of(predicate).len());
+        let (width, orders) = (self.predicates.get(predicate).width, self.access.indexes.of(predicate).len());
         let mut found = Distinct::new(width, layers.rows(predicate).to_vec(), orders);
         let mut sink = Sink::new(Vec::new());
         let mut empty = |sink: &mut Sink, meter: &Meter| {
@@ -195,8 +203,10 @@ impl Run<'_, '_, '_> {
         };
         for rule in &stratum.rules {
             let stopped = |stop| Stopped { stop, rule: Some(*rule) };
-            for variant in self.planned.plans[*rule].iter().flat_map(|plan| &plan.variants) {
-                self.variant(*rule, variant, layers, None, &mut sink, &mut empty).map_err(stopped)?;
+            for variant in 0..self.variants(*rule).len() {
+                let mut empty = |_: &Grown, sink: &mut Sink, meter: &Meter| empty(sink, meter);
+                let grown = &mut Grown::new();
+                self.variant(*rule, variant, stratum, layers, grown, &mut sink, &mut empty).map_err(stopped)?;
             }
         }
         let stopped = |stop| Stopped { stop, rule: stratum.rules.last().copied() };
@@ -209,27 +219,33 @@ impl Run<'_, '_, '_> {
     /// Evaluates a recursive stratum in rounds, each over the tuples found in the previous one.
     fn recursive(&mut self, stratum: &Stratum, layers: &mut Layers<'_>) -> Result<(), Stopped> {
         let mut grown = self.grow(stratum, layers);
+        let readers = self.readers(stratum);
+        // The predicates that have new tuples, or had some in the last round.
+        let mut active: BTreeSet<usize> = (0..grown.len()).collect();
         // Number of new tuples of the round.
         let mut new = 0;
         for rule in &stratum.rules {
-            self.insert_all(*rule, false, stratum, layers, &grown, &mut new)?;
+            for variant in 0..self.variants(*rule).len() {
+                if self.variants(*rule)[variant].delta.is_none() {
+                    self.insert_all(*rule, variant, stratum, layers, &mut grown, &mut new)?;
+                }
+            }
         }
         loop {
-            let mut changed = false;
-            for growing in &mut grown {
-                changed |= growing.changed();
-            }
-            if !changed {
+            active.retain(|place| grown[*place].changed());
+            if active.is_empty() {
                 break;
             }
-            let rule = stratum.rules.iter().copied().find(|rule| self.is_recursive(*rule));
+            let mut due: Vec<(usize, usize)> = active.iter().flat_map(|place| &readers[*place]).copied().collect();
+            due.sort_unstable();
+            let rule = due.first().map(|(rule, _)| *rule).or(stratum.rules.first().copied());
             let stopped = |stop| Stopped { stop, rule };
-            self.record_rounds(stratum, &grown).map_err(stopped)?;
+            self.record_rounds(stratum, &active, &grown).map_err(stopped)?;
             self.meter.derived(new).map_err(stopped)?;
             self.meter.check().map_err(stopped)?;
             new = 0;
-            for rule in &stratum.rules {
-                self.insert_all(*rule, true, stratum, layers, &grown, &mut new)?;
+            for (rule, variant) in due {
+                active.extend(self.insert_all(rule, variant, stratum, layers, &mut grown, &mut new)?);
             }
         }
         for (predicate, growing) in stratum.predicates.iter().zip(grown) {
@@ -238,13 +254,34 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
+    /// Returns the variants that read the recent tuples of each predicate of a stratum, as rule and position.
+    fn readers(&self, stratum: &Stratum) -> Vec<Vec<(usize, usize)>> {
+        let mut readers = vec![Vec::new(); stratum.predicates.len()];
+        for rule in &stratum.rules {
+            for (position, variant) in self.variants(*rule).iter().enumerate() {
+                if let Some(delta) = variant.delta
+                    && let Some(atom) = self.planned.rules[*rule].body[delta].atom()
+                    && let Ok(place) = stratum.predicates.binary_search(&atom.predicate)
+                {
+                    readers[place].push((*rule, position));
+                }
+            }
+        }
+        readers
+    }
+
+    fn variants(&self, rule: usize) -> &'_ [Variant] {
+        self.planned.plans[rule].as_ref().map_or(&[], |plan| &plan.variants)
+    }
+
     /// Records the round of the recent tuples, if rounds are requested.
-    fn record_rounds(&mut self, stratum: &Stratum, grown: &Grown) -> Result<(), Stop> {
+    fn record_rounds(&mut self, stratum: &Stratum, active: &BTreeSet<usize>, grown: &Grown) -> Result<(), Stop> {
         let Some(rounds) = &mut self.rounds else { return Ok(()) };
         rounds.next += 1;
-        for (predicate, growing) in stratum.predicates.iter().zip(grown) {
+        for place in active {
+            let predicate = &stratum.predicates[*place];
             let mut batches = Vec::new();
-            growing.batches(Part::Recent, 0, &mut batches);
+            grown[*place].batches(Part::Recent, 0, &mut batches);
             let width = self.predicates.get(*predicate).width;
             for row in batches.iter().flat_map(|batch| batch.chunks_exact(width)) {
                 rounds.of.insert((*predicate, row.to_vec()), rounds.next);
@@ -254,17 +291,13 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    fn is_recursive(&self, rule: usize) -> bool {
-        self.planned.plans[rule].as_ref().is_some_and(|plan| plan.variants.iter().any(|variant| variant.recent))
-    }
-
     /// Creates the growing tuples of the stratum's predicates, with the known tuples inserted.
     fn grow(&self, stratum: &Stratum, layers: &Layers<'_>) -> Grown {
         let mut wanted: Vec<Vec<bool>> =
-            stratum.predicates.iter().map(|p| vec![false; self.indexes.of(*p).len()]).collect();
+            stratum.predicates.iter().map(|p| vec![false; self.access.indexes.of(*p).len()]).collect();
         for rule in &stratum.rules {
-            for op in self.planned.plans[*rule].iter().flat_map(|plan| &plan.variants).flat_map(|v| &v.ops) {
-                if let Op::Scan { predicate, index, .. } = op
+            for op in self.variants(*rule).iter().flat_map(|v| v.guards.iter().flatten().chain(&v.ops)) {
+                if let Op::Scan(Scan { predicate, index, .. }) = op
                     && let Ok(place) = stratum.predicates.binary_search(predicate)
                 {
                     wanted[place][*index] = true;
@@ -273,7 +306,8 @@ impl Run<'_, '_, '_> {
         }
         let mut grown = Vec::new();
         for (predicate, wanted) in stratum.predicates.iter().zip(&wanted) {
-            let growing = growing(self.predicates.get(*predicate).width, self.indexes.of(*predicate).clone(), wanted);
+            let growing =
+                growing(self.predicates.get(*predicate).width, self.access.indexes.of(*predicate).clone(), wanted);
             let mut known = layers.rows(*predicate).to_vec();
             if !known.is_empty() {
                 growing.insert(&mut known);
@@ -283,23 +317,24 @@ impl Run<'_, '_, '_> {
         grown
     }
 
-    /// Adds the tuples derived by the variants of one rule that read recent tuples, or by those that don't. `new`: number
-    /// of new tuples in this round.
+    /// Adds the tuples that a variant derives. Returns the place of their predicate if some are new. `new`: number of new
+    /// tuples in this round.
     fn insert_all(
         &mut self,
         rule: usize,
-        recent: bool,
+        variant: usize,
         stratum: &Stratum,
         layers: &Layers<'_>,
-        grown: &Grown,
+        grown: &mut Grown,
         new: &mut usize,
-    ) -> Result<(), Stopped> {
-        let Some(plan) = &self.planned.plans[rule] else { return Ok(()) };
+    ) -> Result<Option<usize>, Stopped> {
         let predicate = self.planned.rules[rule].head.predicate;
-        let Ok(place) = stratum.predicates.binary_search(&predicate) else { return Ok(()) };
-        let (target, row_bytes) = (&grown[place], self.row_bytes(predicate));
+        let Ok(place) = stratum.predicates.binary_search(&predicate) else { return Ok(None) };
+        let row_bytes = self.row_bytes(predicate);
         let stopped = |stop| Stopped { stop, rule: Some(rule) };
-        let mut empty = |sink: &mut Sink, meter: &Meter| {
+        let before = *new;
+        let mut empty = |grown: &Grown, sink: &mut Sink, meter: &Meter| {
+            let target = &grown[place];
             let count = target.insert(&mut sink.rows);
             sink.adapt(target.added(), &meter.watch);
             *new += count;
@@ -307,88 +342,78 @@ impl Run<'_, '_, '_> {
             meter.room_for(*new)
         };
         let mut sink = Sink::new(Vec::new());
-        for variant in plan.variants.iter().filter(|variant| variant.recent == recent) {
-            self.variant(rule, variant, layers, Some((stratum, grown)), &mut sink, &mut empty).map_err(stopped)?;
+        self.variant(rule, variant, stratum, layers, grown, &mut sink, &mut empty).map_err(stopped)?;
+        if !sink.rows.is_empty() {
+            empty(grown, &mut sink, self.meter).map_err(stopped)?;
         }
-        if sink.rows.is_empty() { Ok(()) } else { empty(&mut sink, self.meter).map_err(stopped) }
+        Ok((*new > before).then_some(place))
     }
 
-    /// Returns the rows that each step of a variant reads, and their widths. Returns `None` if an atom has no rows.
-    fn sources<'b>(
-        &self,
-        variant: &Variant,
-        layers: &'b Layers<'_>,
-        grown: Option<(&Stratum, &'b Grown)>,
-    ) -> Option<(Vec<Vec<Batch<'b>>>, Vec<usize>)> {
-        let mut batches = Vec::with_capacity(variant.ops.len());
-        let mut widths = Vec::with_capacity(variant.ops.len());
-        for op in &variant.ops {
-            let (predicate, part, index) = match op {
-                Op::Scan { predicate, part, index, .. } => (*predicate, *part, *index),
-                Op::Absent { predicate, index, .. } => (*predicate, Part::All, *index),
-                _ => {
-                    batches.push(Vec::new());
-                    widths.push(1);
-                    continue;
-                }
-            };
-            let mut found = Vec::new();
-            let place =
-                grown.and_then(|(stratum, grown)| Some((stratum.predicates.binary_search(&predicate).ok()?, grown)));
-            match place {
-                Some((place, grown)) => grown[place].batches(part, index, &mut found),
-                None => found.extend(layers.get(predicate).map(|table| Batch::Plain(table.index(index)))),
-            }
-            if matches!(op, Op::Scan { .. }) && found.iter().all(|batch| batch.is_empty()) {
-                return None;
-            }
-            batches.push(found);
-            widths.push(self.predicates.get(predicate).width);
-        }
-        Some((batches, widths))
-    }
-
-    /// Adds the head rows that one variant derives to a sink; `empty` empties it when it is full.
+    /// Adds the head rows that one variant derives to a sink; `empty` empties it when it is full. If the variant reads more
+    /// rows than expected, it is planned by samples and begins again; tuples that it has already added are right in any
+    /// case.
+    #[expect(clippy::too_many_arguments, reason = "the parts of one evaluation, borrowed separately")]
     fn variant(
         &mut self,
-        rule: usize,
-        variant: &Variant,
+        rule_idx: usize,
+        position: usize,
+        stratum: &Stratum,
         layers: &Layers<'_>,
-        grown: Option<(&Stratum, &Grown)>,
+        grown: &mut Grown,
         sink: &mut Sink,
-        empty: &mut dyn FnMut(&mut Sink, &Meter) -> Result<(), Stop>,
+        empty: &mut dyn FnMut(&Grown, &mut Sink, &Meter) -> Result<(), Stop>,
     ) -> Result<(), Stop> {
-        let rule = &self.planned.rules[rule];
-        let Some((batches, widths)) = self.sources(variant, layers, grown) else { return Ok(()) };
-        let Some(aggregation) = &rule.aggregation else {
-            sink.operands.clone_from(&rule.head.args);
-            return self.join(rule, variant, (&batches, &widths), sink, empty);
+        let planned = self.planned;
+        let rule = &planned.rules[rule_idx];
+        let Some(planned) = planned.plans[rule_idx].as_ref().map(|plan| &plan.variants[position]) else {
+            return Ok(());
         };
-        let operands = projection(aggregation);
-        // The groups refer to the rows.
-        let mut matches = Distinct::new(operands.len().max(1), Vec::new(), 4);
-        let mut collected = Sink::new(operands);
-        let mut collect = |sink: &mut Sink, meter: &Meter| matches.add(sink, &meter.watch);
-        self.join(rule, variant, (&batches, &widths), &mut collected, &mut collect)?;
-        collect(&mut collected, self.meter)?;
-        let heads = aggregate(rule, aggregation, matches.rows(), self.universe, self.meter)?;
-        self.meter.watch.release(matches.new_bytes());
-        sink.rows.extend(heads);
-        if sink.rows.len() >= sink.limit { empty(sink, self.meter) } else { Ok(()) }
+        let adapted = self.adapted.get(&(rule_idx, position));
+        let (variant, allowed) =
+            adapted.map_or((planned, allowance(planned, rule, &self.access)), |(variant, allowed)| (variant, *allowed));
+        let mut context = Context { access: &mut self.access, universe: self.universe, meter: self.meter };
+        let own = stratum.recursive.then_some(Own { stratum, grown });
+        let mut flush = |sink: &mut Sink, meter: &Meter| empty(grown, sink, meter);
+        match attempt(&mut context, rule, variant, layers, own, allowed, sink, &mut flush) {
+            Ok(()) => return Ok(()),
+            Err(Halt::Stop(stop)) => return Err(stop),
+            Err(Halt::Replan) => {}
+        }
+        let parts = Parts::new(rule, stratum, planned.delta);
+        let (variant, allowed) = replanned(&mut context, rule, &parts, layers, own);
+        add_indexes(&variant, stratum, &context, grown)?;
+        let own = stratum.recursive.then_some(Own { stratum, grown });
+        let mut flush = |sink: &mut Sink, meter: &Meter| empty(grown, sink, meter);
+        let ended = attempt(&mut context, rule, &variant, layers, own, u64::MAX, sink, &mut flush);
+        self.adapted.insert((rule_idx, position), (variant, allowed));
+        ended.map_err(|halt| match halt {
+            Halt::Stop(stop) => stop,
+            Halt::Replan => Stop::Time,
+        })
     }
+}
 
-    fn join(
-        &mut self,
-        rule: &Rule,
-        variant: &Variant,
-        (batches, widths): (&[Vec<Batch<'_>>], &[usize]),
-        sink: &mut Sink,
-        flush: &mut dyn FnMut(&mut Sink, &Meter) -> Result<(), Stop>,
-    ) -> Result<(), Stop> {
-        let binding = vec![0; rule.variables.len()];
-        let (universe, meter) = (&mut *self.universe, &mut *self.meter);
-        Join { ops: &variant.ops, batches, widths, binding, universe, meter, sink, flush }.run(0)
+/// Adds the indexes that a new plan reads to the growing tuples.
+fn add_indexes(
+    variant: &Variant,
+    stratum: &Stratum,
+    context: &Context<'_, '_, '_, '_>,
+    grown: &mut Grown,
+) -> Result<(), Stop> {
+    if !stratum.recursive {
+        return Ok(());
     }
+    for op in variant.guards.iter().flatten().chain(&variant.ops) {
+        if let Op::Scan(Scan { predicate, index, .. }) = op
+            && let Ok(place) = stratum.predicates.binary_search(predicate)
+            && !grown[place].has_index(*index)
+        {
+            let orders = context.access.indexes.of(*predicate);
+            let rows = grown[place].add_index(*index, orders);
+            context.meter.watch.hold(rows * bytes_of_row(orders[0].len(), 0))?;
+        }
+    }
+    Ok(())
 }
 
 /// Returns the fault of a stopped evaluation, with the rule's name and place.

@@ -4,12 +4,27 @@ use std::borrow::Cow;
 
 use crate::engine::collect::Sink;
 use crate::engine::meter::{Meter, Stop};
-use crate::engine::plan::{Column, Op, operand_value};
+use crate::engine::plan::{Column, Op, Rival, Scan, operand_value};
 use crate::engine::relation::Batch;
 use crate::model::expression::holds;
 use crate::model::program::{MAX_ARITY, Operand};
 use crate::model::universe::Universe;
 use actcheck_base::{Term, TermId};
+
+/// Why a join ended before its end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Halt {
+    /// The evaluation must stop.
+    Stop(Stop),
+    /// The join read more rows than expected: another order may be better.
+    Replan,
+}
+
+impl From<Stop> for Halt {
+    fn from(stop: Stop) -> Self {
+        Self::Stop(stop)
+    }
+}
 
 /// The evaluation of one variant.
 pub(crate) struct Join<'a, 'u, 't> {
@@ -22,17 +37,23 @@ pub(crate) struct Join<'a, 'u, 't> {
     pub(crate) universe: &'u mut Universe<'t>,
     pub(crate) meter: &'u mut Meter,
     pub(crate) sink: &'u mut Sink,
+    /// Number of rows that may be read before the join halts to be planned again.
+    pub(crate) rows_left: u64,
     /// Called when the sink is full.
     pub(crate) flush: &'u mut dyn FnMut(&mut Sink, &Meter) -> Result<(), Stop>,
 }
 
+/// Number of rows that are read rather than compared with the number of other rows.
+const FEW_ROWS: usize = 16;
+
 impl Join<'_, '_, '_> {
-    /// Runs the steps from `at` on, for every binding that satisfies them.
-    pub(crate) fn run(&mut self, at: usize) -> Result<(), Stop> {
+    /// Runs the steps from `at` on, for every binding that satisfies them. Returns whether there was one.
+    pub(crate) fn run(&mut self, at: usize) -> Result<bool, Halt> {
         let ops = self.ops;
         match ops.get(at) {
             None => self.emit(),
-            Some(Op::Scan { key, columns, once, .. }) => self.scan(at, key, columns, *once),
+            Some(Op::Scan(scan)) if !scan.rivals.is_empty() => self.meet(at, scan),
+            Some(Op::Scan(scan)) => self.scan(at, scan),
             Some(Op::Absent { key, .. }) => {
                 let (values, length) = self.key(key);
                 let width = self.widths[at];
@@ -40,13 +61,14 @@ impl Join<'_, '_, '_> {
                     let start = lower_bound(rows, width, &values[..length]);
                     rows.get(start..start + width).is_some_and(|row| row[..length] == values[..length])
                 });
-                if found { Ok(()) } else { self.run(at + 1) }
+                if found { Ok(false) } else { self.run(at + 1) }
             }
             Some(Op::Assign { variable, value }) => {
                 let watch = &self.meter.watch;
                 watch.begin();
                 let Some(term) = value.value(&self.binding, self.universe, watch).map(Cow::into_owned) else {
-                    return watch.stopped();
+                    watch.stopped()?;
+                    return Ok(false);
                 };
                 self.binding[*variable] = self.universe.create(term, watch)?;
                 self.run(at + 1)
@@ -70,11 +92,14 @@ impl Join<'_, '_, '_> {
     }
 
     /// Runs the next step if a condition holds. `None`: it has no value, or the budget is spent.
-    fn go_on(&mut self, at: usize, holds: Option<bool>) -> Result<(), Stop> {
+    fn go_on(&mut self, at: usize, holds: Option<bool>) -> Result<bool, Halt> {
         match holds {
             Some(true) => self.run(at + 1),
-            Some(false) => Ok(()),
-            None => self.meter.watch.stopped(),
+            Some(false) => Ok(false),
+            None => {
+                self.meter.watch.stopped()?;
+                Ok(false)
+            }
         }
     }
 
@@ -86,27 +111,113 @@ impl Join<'_, '_, '_> {
         (values, key.len())
     }
 
-    fn scan(&mut self, at: usize, key: &[Operand], columns: &[(usize, Column)], once: bool) -> Result<(), Stop> {
-        let (values, length) = self.key(key);
+    fn scan(&mut self, at: usize, scan: &Scan) -> Result<bool, Halt> {
+        let (values, length) = self.key(&scan.key);
         let key = &values[..length];
         let width = self.widths[at];
         let batches = self.batches;
+        let mut any = false;
         for rows in &batches[at] {
             let start = if length == 0 { 0 } else { lower_bound(rows, width, key) };
+            let mut settled: &[TermId] = &[];
             for row in rows[start..].chunks_exact(width) {
                 if row[..length] != *key {
                     break;
                 }
-                self.meter.step()?;
-                if self.bind(row, columns) {
-                    self.run(at + 1)?;
-                    if once {
-                        return Ok(());
+                self.read()?;
+                if !settled.is_empty() && row[..settled.len()] == *settled {
+                    continue;
+                }
+                if self.bind(row, &scan.columns) {
+                    let found = self.run(at + 1)?;
+                    any |= found;
+                    if scan.once || (found && scan.exists) {
+                        return Ok(found);
+                    }
+                    if found && scan.settled < width {
+                        settled = &row[..scan.settled];
                     }
                 }
             }
         }
-        Ok(())
+        Ok(any)
+    }
+
+    /// Counts one row read.
+    fn read(&mut self) -> Result<(), Halt> {
+        self.rows_left = self.rows_left.checked_sub(1).ok_or(Halt::Replan)?;
+        Ok(self.meter.step()?)
+    }
+
+    /// Like a scan, but if a later check has fewer rows that fit, reads these and looks them up in the scan's rows.
+    fn meet(&mut self, at: usize, scan: &Scan) -> Result<bool, Halt> {
+        let (values, length) = self.key(&scan.key);
+        let key = &values[..length];
+        if !self.has_many(at, key) {
+            return self.scan(at, scan);
+        }
+        let mut fewest = self.matches(at, key, usize::MAX);
+        let mut chosen: Option<(&Rival, usize)> = None;
+        for rival in &scan.rivals {
+            let (values, length) = self.key(&rival.key);
+            let count = self.matches(rival.at, &values[..length], fewest);
+            if count < fewest {
+                (fewest, chosen) = (count, Some((rival, length)));
+            }
+        }
+        let Some((rival, prefix)) = chosen else { return self.scan(at, scan) };
+        let (rival_values, _) = self.key(&rival.key);
+        let [(_, Column::Bind(variable))] = scan.columns.as_slice() else { return self.scan(at, scan) };
+        let (batches, width) = (self.batches, self.widths[rival.at]);
+        let mut any = false;
+        for rows in &batches[rival.at] {
+            let start = lower_bound(rows, width, &rival_values[..prefix]);
+            let mut last = None;
+            for row in rows[start..].chunks_exact(width) {
+                if row[..prefix] != rival_values[..prefix] {
+                    break;
+                }
+                self.read()?;
+                let value = row[prefix];
+                if last.replace(value) == Some(value) {
+                    continue;
+                }
+                let mut wanted = values;
+                wanted[length] = value;
+                if self.matches(at, &wanted[..=length], 1) == 0 {
+                    continue;
+                }
+                self.binding[*variable] = value;
+                let found = self.run(at + 1)?;
+                any |= found;
+                if found && scan.exists {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(any)
+    }
+
+    /// Returns whether a batch has more than a few rows that begin with a key.
+    fn has_many(&self, at: usize, key: &[TermId]) -> bool {
+        let width = self.widths[at];
+        self.batches[at].iter().any(|rows| {
+            let last = lower_bound(rows, width, key) + FEW_ROWS * width;
+            rows.get(last..last + key.len()).is_some_and(|row| row == key)
+        })
+    }
+
+    /// Counts the rows of a step that begin with a key, up to a limit.
+    fn matches(&self, at: usize, key: &[TermId], limit: usize) -> usize {
+        let width = self.widths[at];
+        let mut count = 0;
+        for rows in &self.batches[at] {
+            count += equal_range(rows, width, key).len() / width;
+            if count >= limit {
+                break;
+            }
+        }
+        count
     }
 
     fn bind(&mut self, row: &[TermId], columns: &[(usize, Column)]) -> bool {
@@ -120,12 +231,39 @@ impl Join<'_, '_, '_> {
         true
     }
 
-    fn emit(&mut self) -> Result<(), Stop> {
+    fn emit(&mut self) -> Result<bool, Halt> {
         for operand in &self.sink.operands {
             self.sink.rows.push(operand_value(*operand, &self.binding));
         }
-        if self.sink.rows.len() >= self.sink.limit { (self.flush)(self.sink, self.meter) } else { Ok(()) }
+        if self.sink.rows.len() >= self.sink.limit {
+            (self.flush)(self.sink, self.meter)?;
+        }
+        Ok(true)
     }
+}
+
+/// Returns the place of the rows that begin with a key. Unit: terms, not rows.
+pub(crate) fn equal_range(rows: &[TermId], width: usize, key: &[TermId]) -> std::ops::Range<usize> {
+    if key.is_empty() {
+        return 0..rows.len();
+    }
+    let start = lower_bound(rows, width, key);
+    let equal = |row: usize| {
+        let at = start + row * width;
+        rows.get(at..at + key.len()).is_some_and(|row| row == key)
+    };
+    // Doubling steps, because most ranges are short.
+    let mut high = 1;
+    while equal(high - 1) {
+        high *= 2;
+    }
+    let mut low = high / 2;
+    high = (high - 1).min((rows.len() - start) / width);
+    while low < high {
+        let middle = low.midpoint(high);
+        if equal(middle) { low = middle + 1 } else { high = middle }
+    }
+    start..start + low * width
 }
 
 /// Returns the start of the first row that is not less than a key. Unit: terms, not rows.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::check::stratify::Stratum;
+use crate::engine::lower::{add_rivals, groups, literal_variables, lower, mark, operand_variables, outputs};
 use crate::model::expression::{Expr, Variable};
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
 use crate::syntax::Comparison;
@@ -28,8 +29,14 @@ impl Indexes {
         &self.orders[predicate]
     }
 
+    /// Returns the indexes that begin with the given columns (in any order).
+    pub(crate) fn all_beginning_with(&self, predicate: PredicateId, columns: &[usize]) -> impl Iterator<Item = usize> {
+        let begins = |order: &Order| order[..columns.len()].iter().all(|column| columns.contains(column));
+        self.orders[predicate].iter().enumerate().filter(move |(_, order)| begins(order)).map(|(index, _)| index)
+    }
+
     /// Finds or adds an index that begins with the given columns (in any order).
-    fn beginning_with(&mut self, predicate: PredicateId, columns: &[usize]) -> usize {
+    pub(crate) fn beginning_with(&mut self, predicate: PredicateId, columns: &[usize]) -> usize {
         let orders = Arc::make_mut(&mut self.orders[predicate]);
         let begins = |order: &Order| order[..columns.len()].iter().all(|column| columns.contains(column));
         if let Some(found) = orders.iter().position(begins) {
@@ -40,6 +47,31 @@ impl Indexes {
         order.extend((0..width).filter(|column| !columns.contains(column)));
         orders.push(order);
         orders.len() - 1
+    }
+
+    /// Finds an index that begins with the given columns (in any order), followed by another one. Adds it if it is
+    /// missing and `add` is set.
+    pub(crate) fn followed_by(
+        &mut self,
+        predicate: PredicateId,
+        columns: &[usize],
+        last: usize,
+        add: bool,
+    ) -> Option<usize> {
+        let begins = |order: &Order| {
+            order[..columns.len()].iter().all(|column| columns.contains(column)) && order[columns.len()] == last
+        };
+        let orders = &self.orders[predicate];
+        let found = orders.iter().position(begins);
+        if found.is_some() || !add {
+            return found;
+        }
+        let fixed: Vec<usize> = columns.iter().copied().chain([last]).collect();
+        let rest = (0..orders[0].len()).filter(|column| !fixed.contains(column));
+        let order = fixed.iter().copied().chain(rest).collect();
+        let orders = Arc::make_mut(&mut self.orders[predicate]);
+        orders.push(order);
+        Some(orders.len() - 1)
     }
 }
 
@@ -63,20 +95,39 @@ pub(crate) enum Column {
     Same(Variable),
 }
 
+/// A later step that checks the value which a scan binds. Its rows may be read instead, if they are fewer.
+#[derive(Debug, Clone)]
+pub(crate) struct Rival {
+    /// Position of the check.
+    pub(crate) at: usize,
+    /// The check's key without the value, in the order of its index. The value's column is next.
+    pub(crate) key: Vec<Operand>,
+}
+
+/// Reads the tuples that begin with a key.
+#[derive(Debug, Clone)]
+pub(crate) struct Scan {
+    pub(crate) predicate: PredicateId,
+    pub(crate) part: Part,
+    pub(crate) index: usize,
+    pub(crate) key: Vec<Operand>,
+    /// Offsets in the index's order, with how to match each.
+    pub(crate) columns: Vec<(usize, Column)>,
+    /// None of the bound variables is read later, so one match is enough.
+    pub(crate) once: bool,
+    /// The head's variables are bound before this step, so one match of this step and all later ones is enough.
+    pub(crate) exists: bool,
+    /// After this many columns, the head's variables are bound: rows that agree in them need one match in all. 0 if no
+    /// column is left, or some variable is bound later.
+    pub(crate) settled: usize,
+    pub(crate) rivals: Vec<Rival>,
+}
+
 /// One step of a rule's evaluation.
 #[derive(Debug, Clone)]
 pub(crate) enum Op {
-    /// Continues for each tuple that begins with the key.
-    Scan {
-        predicate: PredicateId,
-        part: Part,
-        index: usize,
-        key: Vec<Operand>,
-        /// Offsets in the index's order, with how to match each.
-        columns: Vec<(usize, Column)>,
-        /// None of the bound variables is read later, so one match is enough.
-        once: bool,
-    },
+    /// Continues for each matching tuple.
+    Scan(Scan),
     /// Continues only if no tuple begins with the key.
     Absent {
         predicate: PredicateId,
@@ -100,9 +151,14 @@ pub(crate) enum Op {
 /// One way to evaluate a rule: over all tuples, or with one condition restricted to recent tuples.
 #[derive(Debug, Clone)]
 pub(crate) struct Variant {
+    /// Conditions that share no variable with the head or with each other: each needs one match only.
+    pub(crate) guards: Vec<Vec<Op>>,
+    /// The other conditions.
     pub(crate) ops: Vec<Op>,
-    /// Whether a condition is restricted to recent tuples.
-    pub(crate) recent: bool,
+    /// The condition that is restricted to recent tuples.
+    pub(crate) delta: Option<usize>,
+    /// Whether the conditions can be evaluated in more than one order.
+    pub(crate) has_choice: bool,
 }
 
 /// A rule's variants.
@@ -114,190 +170,149 @@ pub(crate) struct RulePlan {
 /// Expected number of tuples of a predicate; `None` if unknown.
 pub(crate) type Sizes<'a> = &'a dyn Fn(PredicateId) -> Option<usize>;
 
-/// Plans a rule of a stratum.
-pub(crate) fn plan_rule(rule: &Rule, stratum: &Stratum, indexes: &mut Indexes, sizes: Sizes<'_>) -> RulePlan {
-    let own: Vec<usize> = rule
-        .body
-        .iter()
-        .enumerate()
-        .filter(|(_, literal)| {
-            matches!(literal, Literal::Positive(atom)
-                if stratum.recursive && stratum.predicates.binary_search(&atom.predicate).is_ok())
-        })
-        .map(|(idx, _)| idx)
-        .collect();
-    if own.is_empty() {
-        let part = |_| Part::All;
-        return RulePlan { variants: vec![Variant { ops: order(rule, None, &part, indexes, sizes), recent: false }] };
+/// Returns the order in which the atoms of a group of conditions are read, the delta first.
+pub(crate) type AtomOrder<'a> = &'a mut dyn FnMut(&[usize], Option<usize>) -> Vec<usize>;
+
+/// The conditions of a rule in groups without common variables, each with the order of its atoms.
+pub(crate) struct Orders {
+    /// Groups that share no variable with the head: each needs one match only.
+    guards: Vec<(Vec<usize>, Vec<usize>)>,
+    /// All other conditions.
+    main: (Vec<usize>, Vec<usize>),
+    has_choice: bool,
+}
+
+impl Orders {
+    pub(crate) fn new(rule: &Rule, parts: &Parts, order: AtomOrder<'_>) -> Self {
+        let outputs = outputs(rule);
+        let in_head = |idx: &usize| literal_variables(&rule.body[*idx]).iter().any(|v| outputs[*v]);
+        let (main, guards): (Vec<_>, Vec<_>) = groups(rule).into_iter().partition(|group| group.iter().any(in_head));
+        let mut main = main.concat();
+        main.sort_unstable();
+        let mut has_choice = false;
+        let mut ordered = |group: Vec<usize>| {
+            let atoms = group.iter().filter(|idx| matches!(rule.body[**idx], Literal::Positive(_))).count();
+            let first = parts.delta.filter(|delta| group.contains(delta));
+            has_choice |= atoms > if first.is_some() { 2 } else { 1 };
+            let order = order(&group, first);
+            (group, order)
+        };
+        let guards = guards.into_iter().map(&mut ordered).collect();
+        let main = ordered(main);
+        Self { guards, main, has_choice }
     }
-    let variants = own
-        .iter()
+}
+
+/// Which tuples a condition reads, by its position in the body.
+pub(crate) struct Parts {
+    /// Conditions that read predicates of the rule's own recursive stratum.
+    own: Vec<usize>,
+    /// The condition that is restricted to recent tuples.
+    pub(crate) delta: Option<usize>,
+}
+
+impl Parts {
+    pub(crate) fn new(rule: &Rule, stratum: &Stratum, delta: Option<usize>) -> Self {
+        Self { own: own_atoms(rule, stratum), delta }
+    }
+
+    /// Returns the tuples that a condition reads. A pair of recent tuples is found only once: by the first of the two
+    /// conditions.
+    pub(crate) fn of(&self, idx: usize) -> Part {
+        match self.delta.map(|delta| idx.cmp(&delta)) {
+            Some(std::cmp::Ordering::Equal) => Part::Recent,
+            Some(std::cmp::Ordering::Less) if self.own.contains(&idx) => Part::Old,
+            _ => Part::All,
+        }
+    }
+}
+
+fn own_atoms(rule: &Rule, stratum: &Stratum) -> Vec<usize> {
+    let own = |literal: &Literal| {
+        matches!(literal, Literal::Positive(atom)
+            if stratum.recursive && stratum.predicates.binary_search(&atom.predicate).is_ok())
+    };
+    (0..rule.body.len()).filter(|idx| own(&rule.body[*idx])).collect()
+}
+
+/// Plans a rule of a stratum before its tuples are known.
+pub(crate) fn plan_rule(rule: &Rule, stratum: &Stratum, indexes: &mut Indexes, sizes: Sizes<'_>) -> RulePlan {
+    let own = own_atoms(rule, stratum);
+    let deltas: Vec<Option<usize>> = if own.is_empty() { vec![None] } else { own.into_iter().map(Some).collect() };
+    let variants = deltas
+        .into_iter()
         .map(|delta| {
-            // A pair of recent tuples is found only once: by the first of the two conditions.
-            let part = |idx: usize| match idx.cmp(delta) {
-                std::cmp::Ordering::Equal => Part::Recent,
-                std::cmp::Ordering::Less if own.contains(&idx) => Part::Old,
-                _ => Part::All,
-            };
-            Variant { ops: order(rule, Some(*delta), &part, indexes, sizes), recent: true }
+            let parts = Parts::new(rule, stratum, delta);
+            let orders = Orders::new(rule, &parts, &mut |group, first| by_connection(rule, group, first, sizes));
+            plan_variant(rule, &parts, &orders, indexes, false)
         })
         .collect();
     RulePlan { variants }
 }
 
-/// Orders the conditions greedily: tests as early as possible, then the atom with the fewest expected matches.
-fn order(
-    rule: &Rule,
-    first: Option<usize>,
-    part: &dyn Fn(usize) -> Part,
-    indexes: &mut Indexes,
-    sizes: Sizes<'_>,
-) -> Vec<Op> {
-    let mut bound = vec![false; rule.variables.len()];
-    let mut left: Vec<usize> = (0..rule.body.len()).collect();
-    let mut ops = Vec::new();
-    let mut next = first;
-    while !left.is_empty() {
-        let chosen = next
-            .take()
-            .or_else(|| left.iter().copied().find(|idx| tests(&rule.body[*idx], &bound)))
-            .or_else(|| best_atom(rule, &left, &bound, sizes))
-            .unwrap_or(left[0]);
-        left.retain(|idx| *idx != chosen);
-        ops.push(step(&rule.body[chosen], part(chosen), &mut bound, indexes));
-    }
-    mark_once(rule, &mut ops);
-    ops
-}
-
-/// Returns whether a condition only tests or computes, and all its inputs are bound.
-fn tests(literal: &Literal, bound: &[bool]) -> bool {
-    !matches!(literal, Literal::Positive(_)) && literal.needs().iter().all(|v| bound[*v])
-}
-
-/// Returns the atom with the fewest expected matches, the first one of equals. Returns `None` if no atom is left.
-fn best_atom(rule: &Rule, left: &[usize], bound: &[bool], sizes: Sizes<'_>) -> Option<usize> {
-    let expected = |atom: &Atom| {
-        // Unknown sizes count as 1000 tuples. A constant or bound variable is assumed to keep one tuple of ten.
-        let size = sizes(atom.predicate).unwrap_or(1000) as f64;
-        let fixed = atom
-            .args
-            .iter()
-            .filter(|arg| match arg {
-                Operand::Constant(_) => true,
-                Operand::Variable(v) => bound[*v],
-                Operand::Any => false,
-            })
-            .count();
-        if fixed == atom.args.len() { 0.0 } else { size / 10f64.powi(i32::try_from(fixed).unwrap_or(9)) }
+/// Plans one variant with given orders of atoms. `add`: whether an index may be added only to read the smaller of two
+/// sets of rows that must share a value.
+pub(crate) fn plan_variant(rule: &Rule, parts: &Parts, orders: &Orders, indexes: &mut Indexes, add: bool) -> Variant {
+    let mut lowered = |(group, atoms): &(Vec<usize>, Vec<usize>), outputs: &[bool]| {
+        let mut ops = lower(rule, group, atoms, parts, indexes);
+        mark(rule, outputs, &mut ops);
+        add_rivals(&mut ops, indexes, add);
+        ops
     };
-    let mut best: Option<(f64, usize)> = None;
-    for idx in left {
-        if let Literal::Positive(atom) = &rule.body[*idx] {
-            let cost = expected(atom);
-            if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, *idx));
-            }
-        }
-    }
-    best.map(|(_, idx)| idx)
-}
-
-fn step(literal: &Literal, part: Part, bound: &mut [bool], indexes: &mut Indexes) -> Op {
-    match literal {
-        Literal::Positive(atom) => scan(atom, part, bound, indexes),
-        Literal::Negative(atom) => {
-            let (index, key) = lookup(atom, bound, indexes);
-            Op::Absent { predicate: atom.predicate, index, key }
-        }
-        Literal::Assign { variable, value, .. } => {
-            bound[*variable] = true;
-            Op::Assign { variable: *variable, value: value.clone() }
-        }
-        Literal::Compare { op, left, right, .. } => Op::Compare { op: *op, left: left.clone(), right: right.clone() },
-        Literal::Test { value, .. } => Op::Test { value: value.clone() },
+    Variant {
+        guards: orders.guards.iter().map(|guard| lowered(guard, &[])).collect(),
+        ops: lowered(&orders.main, &outputs(rule)),
+        delta: parts.delta,
+        has_choice: orders.has_choice,
     }
 }
 
-/// Returns the index whose order begins with the fixed columns of an atom, and the key in that order.
-fn lookup(atom: &Atom, bound: &[bool], indexes: &mut Indexes) -> (usize, Vec<Operand>) {
-    let fixed: Vec<usize> = (0..atom.args.len())
-        .filter(|column| match atom.args[*column] {
-            Operand::Constant(_) => true,
-            Operand::Variable(v) => bound[v],
-            Operand::Any => false,
-        })
-        .collect();
-    let index = indexes.beginning_with(atom.predicate, &fixed);
-    let order = &indexes.of(atom.predicate)[index];
-    let key = order[..fixed.len()].iter().map(|column| atom.args[*column]).collect();
-    (index, key)
-}
-
-fn scan(atom: &Atom, part: Part, bound: &mut [bool], indexes: &mut Indexes) -> Op {
-    let (index, key) = lookup(atom, bound, indexes);
-    let order = &indexes.of(atom.predicate)[index];
-    let mut columns = Vec::new();
-    for (offset, column) in order.iter().enumerate().skip(key.len()) {
-        if let Operand::Variable(variable) = atom.args[*column] {
-            if bound[variable] {
-                columns.push((offset, Column::Same(variable)));
-            } else {
-                bound[variable] = true;
-                columns.push((offset, Column::Bind(variable)));
-            }
-        }
-    }
-    Op::Scan { predicate: atom.predicate, part, index, key, columns, once: false }
-}
-
-/// Marks the scans that need only one match because their variables are not read afterwards.
-fn mark_once(rule: &Rule, ops: &mut [Op]) {
-    let mut read = vec![false; rule.variables.len()];
-    let mut mark = |variables: &[Variable]| variables.iter().for_each(|v| read[*v] = true);
-    match &rule.aggregation {
-        // This also holds for aggregates, because they use distinct values.
-        Some(aggregation) => {
-            mark(&aggregation.group);
-            aggregation.aggregates.iter().for_each(|a| {
-                mark(&a.distinct);
-                mark(&[a.input]);
-            });
-        }
-        None => mark(&operand_variables(&rule.head.args)),
-    }
-    for op in ops.iter_mut().rev() {
-        let mut used = Vec::new();
-        match op {
-            Op::Scan { key, columns, once, .. } => {
-                *once = columns.iter().all(|(_, column)| matches!(column, Column::Bind(v) if !read[*v]));
-                if *once {
-                    columns.clear();
-                }
-                used.extend(operand_variables(key));
-                used.extend(columns.iter().filter_map(|(_, column)| match column {
-                    Column::Same(v) => Some(*v),
-                    Column::Bind(_) => None,
-                }));
-            }
-            Op::Absent { key, .. } => used.extend(operand_variables(key)),
-            Op::Assign { value, .. } | Op::Test { value } => value.variables(&mut used),
-            Op::Compare { left, right, .. } => {
-                left.variables(&mut used);
-                right.variables(&mut used);
-            }
-        }
-        used.into_iter().for_each(|v| read[v] = true);
-    }
-}
-
-fn operand_variables(args: &[Operand]) -> Vec<Variable> {
-    args.iter()
-        .filter_map(|arg| match arg {
-            Operand::Variable(v) => Some(*v),
+/// Orders the atoms of a group before their tuples are known: those that share variables with earlier ones first, then
+/// by expected number of matches.
+pub(crate) fn by_connection(rule: &Rule, group: &[usize], first: Option<usize>, sizes: Sizes<'_>) -> Vec<usize> {
+    let mut bound = vec![false; rule.variables.len()];
+    let mut left: Vec<(usize, &Atom)> = group
+        .iter()
+        .filter_map(|idx| match &rule.body[*idx] {
+            Literal::Positive(atom) => Some((*idx, atom)),
             _ => None,
         })
-        .collect()
+        .collect();
+    let mut sorted = Vec::new();
+    let mut next = first;
+    while !left.is_empty() {
+        let place = next
+            .take()
+            .and_then(|first| left.iter().position(|(idx, _)| *idx == first))
+            .unwrap_or_else(|| best_atom(&left, &bound, sizes));
+        let (idx, atom) = left.remove(place);
+        operand_variables(&atom.args).into_iter().for_each(|v| bound[v] = true);
+        sorted.push(idx);
+    }
+    sorted
+}
+
+/// Returns the place of the atom to read next, the first one of equals.
+fn best_atom(left: &[(usize, &Atom)], bound: &[bool], sizes: Sizes<'_>) -> usize {
+    let rank = |atom: &Atom| {
+        // Unknown sizes count as 1000 tuples. A constant or bound variable is assumed to keep one tuple of ten.
+        let size = sizes(atom.predicate).unwrap_or(1000) as f64;
+        let constants = atom.args.iter().filter(|arg| matches!(arg, Operand::Constant(_))).count();
+        let shared = operand_variables(&atom.args).into_iter().filter(|v| bound[*v]).count();
+        let fixed = constants + shared;
+        let expected =
+            if fixed == atom.args.len() { 0.0 } else { size / 10f64.powi(i32::try_from(fixed).unwrap_or(9)) };
+        // The first atom, and one whose columns are all fixed, need no shared variable.
+        (bound.contains(&true) && shared == 0 && expected > 0.0, expected)
+    };
+    let mut best = (0, (true, f64::INFINITY));
+    for (place, (_, atom)) in left.iter().enumerate() {
+        let rank = rank(atom);
+        if (!rank.0 && best.1.0) || (rank.0 == best.1.0 && rank.1 < best.1.1) {
+            best = (place, rank);
+        }
+    }
+    best.0
 }
 
 /// Returns the value of an operand under a binding. [`Operand::Any`] is never part of a key or a head.

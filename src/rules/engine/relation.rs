@@ -50,6 +50,10 @@ pub(crate) trait Growing {
     fn added(&self) -> usize;
     /// Begins a round: new tuples added since the last round become recent. Returns `false` if there are none.
     fn changed(&mut self) -> bool;
+    /// Returns whether the rows are kept in the order of an index.
+    fn has_index(&self, index: usize) -> bool;
+    /// Keeps the rows also in the order of an index. `orders`: the column orders of all indexes. Returns the number of rows.
+    fn add_index(&mut self, index: usize, orders: &Arc<Vec<Order>>) -> usize;
     /// Appends the rows of a part in the order of an index, as sorted batches.
     fn batches<'a>(&'a self, part: Part, index: usize, found: &mut Vec<Batch<'a>>);
     /// Converts to finished tuples at the fixpoint.
@@ -62,6 +66,8 @@ pub(crate) enum Batch<'a> {
     Plain(&'a [TermId]),
     /// Rows of growing tuples.
     Held(Ref<'a, [TermId]>),
+    /// Rows of an index that one evaluation has added.
+    Shared(Arc<[TermId]>),
 }
 
 impl Deref for Batch<'_> {
@@ -71,6 +77,7 @@ impl Deref for Batch<'_> {
         match self {
             Self::Plain(rows) => rows,
             Self::Held(rows) => rows,
+            Self::Shared(rows) => rows,
         }
     }
 }
@@ -170,6 +177,29 @@ impl<const W: usize> Growing for GrowingOf<W> {
             }
         }
         changed
+    }
+
+    fn has_index(&self, index: usize) -> bool {
+        index == 0 || self.indexes.get(index).is_some_and(Option::is_some)
+    }
+
+    fn add_index(&mut self, index: usize, orders: &Arc<Vec<Order>>) -> usize {
+        self.orders = Arc::clone(orders);
+        let mut grown = Grown::new();
+        let order = &orders[index];
+        let mut count = 0;
+        for batch in self.primary.variable.stable.borrow().iter() {
+            count += batch.len();
+            grown.variable.insert(permuted(batch, order));
+        }
+        // All rows become recent, then stable.
+        grown.iteration.changed();
+        let recent = self.primary.variable.recent.borrow();
+        grown.variable.insert(permuted(&recent, order));
+        grown.iteration.changed();
+        self.indexes.resize_with(self.indexes.len().max(index + 1), || None);
+        self.indexes[index] = Some(grown);
+        count + recent.len()
     }
 
     fn batches<'a>(&'a self, part: Part, index: usize, found: &mut Vec<Batch<'a>>) {
@@ -285,6 +315,10 @@ fn skip_less<'r, const W: usize>(mut rows: &'r [[TermId; W]], row: &[TermId; W])
     &rows[within.partition_point(|other| other < row)..]
 }
 
+fn permuted_rows_of<const W: usize>(rows: &[TermId], order: &[usize]) -> Arc<[TermId]> {
+    permuted::<W>(rows.as_chunks::<W>().0, order).elements.as_flattened().into()
+}
+
 fn relation_of<const W: usize>(rows: &[TermId]) -> Relation<[TermId; W]> {
     let mut rows = rows.as_chunks::<W>().0.to_vec();
     sort(&mut rows);
@@ -318,4 +352,9 @@ pub(crate) fn finished(width: usize, rows: &[TermId], orders: Arc<Vec<Order>>) -
 /// Creates an empty set of growing tuples.
 pub(crate) fn growing(width: usize, orders: Arc<Vec<Order>>, wanted: &[bool]) -> Box<dyn Growing> {
     with_width!(width, boxed_growing(orders, wanted))
+}
+
+/// Permutes the columns of rows and sorts the result.
+pub(crate) fn permuted_rows(width: usize, rows: &[TermId], order: &[usize]) -> Arc<[TermId]> {
+    with_width!(width, permuted_rows_of(rows, order))
 }

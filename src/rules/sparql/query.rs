@@ -18,7 +18,7 @@ use crate::sparql::query_text::{first_group, groups, scan, variables};
 use crate::watch::Watch;
 use actcheck_base::{
     COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Source, Span, TEXT_FUNCTIONS, Term,
-    WitnessRow, bounded_texts, check_calls, names,
+    WitnessRow, bounded_texts, check_calls, names, sparql_excess,
 };
 use actcheck_ontology::{Ontology, Vocabulary};
 
@@ -41,6 +41,10 @@ impl Query {
         let mut diagnostics = Diagnostics::new();
         if !ontology.vocabulary.terms.is_empty() {
             check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
+        }
+        if let Some((span, message)) = sparql_excess(&source.text) {
+            diagnostics.push(Diagnostic::error("R060", message).at(source, span).help("split it, or shorten it"));
+            return Err(diagnostics);
         }
         if let Err(at) = check_calls(&source.text) {
             let message = format!("calls are nested more than {MOST_NESTED_CALLS} deep");
