@@ -36,7 +36,7 @@ UNITS = {"us": 1e-3, "ms": 1, "s": 1e3}
 
 def rate(url, connections, seconds):
     """Answered requests per second, percentiles 50 and 99 in ms, and responses other than 2xx and 3xx."""
-    command = ["wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "--latency", url]
+    command = ["wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "--timeout", "60s", "--latency", url]
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     times = [re.search(rf"{share}%\s+([\d.]+)(us|ms|s)", text).groups() for share in (50, 99)]
     p50, p99 = [float(value) * UNITS[unit] for value, unit in times]
@@ -138,10 +138,10 @@ def heavy(url, light, given):
     print("\nqueries that are not light, 64 connections")
     for beside in (False, True):
         lights = []
-        thread = threading.Thread(target=lambda: lights.append(rate(light, 16, given.seconds)))
+        thread = threading.Thread(target=lambda: lights.append(rate(light, 16, 4 * given.seconds)))
         if beside:
             thread.start()
-        answered, p50, p99, refused = rate(url, 64, given.seconds)
+        answered, p50, p99, refused = rate(url, 64, 4 * given.seconds)
         if beside:
             thread.join()
         print(f"{'beside light ones' if beside else 'alone'}: {answered:.0f} req/s, p50 {p50:.0f} ms, p99 {p99:.0f} ms, refused {refused}")

@@ -34,6 +34,8 @@ use crate::worker::{Asked, Worker};
 const MOST_HEAD: usize = 128 << 10;
 /// Stack of a thread that evaluates light queries; only the used part takes memory. Unit: bytes.
 const STACK: usize = 64 << 20;
+/// Threads for connections for each processor: a query may occupy one for a moment.
+const THREADS: usize = 2;
 /// Threads that evaluate light queries, besides one for each processor: for stopped queries that have not ended yet.
 const SPARE_THREADS: usize = 6;
 /// Number of the largest allowed answers that may wait for their clients at a time.
@@ -103,7 +105,7 @@ pub fn serve(options: ServeOptions) -> std::io::Result<Serving> {
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(processors().min(4))
+        .worker_threads(processors() * THREADS)
         .max_blocking_threads(processors() + SPARE_THREADS)
         .thread_stack_size(STACK)
         .enable_all()
