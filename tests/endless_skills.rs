@@ -60,8 +60,15 @@ fn the_time_limit_ends_a_run_whose_skill_polls_or_is_silent() {
 
 #[test]
 fn one_interrupt_ends_a_skill_that_polls_or_is_silent() {
-    for (program, skill) in [("polls.py", ""), ("faulty.py", "timeout_s = 3600.0\nenv = { FAULT = \"silent\" }")] {
-        let folder = project(program, skill, "action_secs = 3600");
+    let faulty = |fault| format!("timeout_s = 3600.0\nstartup_s = 3600.0\nenv = {{ FAULT = \"{fault}\" }}");
+    let programs = [
+        ("polls.py", String::new()),
+        ("faulty.py", faulty("silent")),
+        ("faulty.py", faulty("never_connects")),
+        ("faulty.py", faulty("silent_at_start")),
+    ];
+    for (program, skill) in programs {
+        let folder = project(program, &skill, "action_secs = 3600");
         let mut simulator = Command::new(env!("CARGO_BIN_EXE_actcheck"))
             .args(["run", "c.toml"])
             .current_dir(folder.path())

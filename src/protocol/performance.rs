@@ -68,11 +68,12 @@ impl<'a> Performance<'a> {
     /// The program. It is started if it is not running, or if it is still busy with an action that a crash of the
     /// simulation ended.
     fn started(&mut self, world: &World) -> Result<&mut Session, ExternalFault> {
+        let stop = &*self.stop;
         let worker = &mut self.lent.worker;
         let programs = self.lent.programs;
         let session = match worker.session.take().filter(|session| session.idle) {
             Some(session) => session,
-            None => Session::start((&programs.skill, worker.number), &programs.tested, world, self.clock_secs)
+            None => Session::start((&programs.skill, worker.number), &programs.tested, world, self.clock_secs, stop)
                 .map_err(|(fault, output)| {
                     self.output = Some(output);
                     fault
@@ -107,7 +108,11 @@ impl<'a> Performance<'a> {
 impl ExternalSkill for Performance<'_> {
     fn begin_run(&mut self, world: &World) -> Result<(), ExternalFault> {
         let RunName { run, index, seed } = self.run.clone();
-        let begun = self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }));
+        let stop = Arc::clone(&self.stop);
+        let begun =
+            self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }, &stop));
+        // A stop ends the wait, which is no fault of the program.
+        self.stopped |= begun.is_err() && stop.load(Ordering::Relaxed);
         begun.map_err(|fault| self.give_up(fault))
     }
 

@@ -7,7 +7,7 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill, killpg};
@@ -99,8 +99,13 @@ impl Process {
     /// Waits for the program to connect.
     ///
     /// # Errors
-    /// The program exits first, or does not connect in time.
-    pub fn accept(&mut self, limit_secs: f64, clock_secs: fn() -> f64) -> Result<UnixStream, ExternalFault> {
+    /// The program exits first, or does not connect in time, or `stop` is set.
+    pub fn accept(
+        &mut self,
+        limit_secs: f64,
+        clock_secs: fn() -> f64,
+        stop: &AtomicBool,
+    ) -> Result<UnixStream, ExternalFault> {
         let began = clock_secs();
         let mut waited_secs: f64 = 0.0;
         loop {
@@ -111,6 +116,9 @@ impl Process {
             }
             if let Some(how) = self.ended() {
                 return Err(broke(format!("{how} before it connected to the address in ACTCHECK_ADDRESS")));
+            }
+            if stop.load(Ordering::Relaxed) {
+                return Err(ExternalFault { late: true, reason: "it was stopped before it connected".to_owned() });
             }
             if waited_secs.max(clock_secs() - began) >= limit_secs {
                 let reason = format!("it did not connect to the address in ACTCHECK_ADDRESS within {limit_secs} s");

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::frame::Wire;
 use crate::hello::{Joints, introduction};
@@ -44,16 +45,17 @@ impl Session {
     ///
     /// # Errors
     /// The program can't be started, is late, uses another protocol version, violates the protocol, or performs none of
-    /// the tested actions. The error includes its last output lines.
+    /// the tested actions, or `stop` is set. The error includes its last output lines.
     pub fn start(
         (skill, worker): (&Skill, usize),
         tested: &BTreeSet<String>,
         world: &World,
         clock_secs: fn() -> f64,
+        stop: &AtomicBool,
     ) -> Result<Self, (ExternalFault, Vec<String>)> {
         let mut process = Process::start(skill, worker).map_err(|fault| (fault, Vec::new()))?;
         let began = clock_secs();
-        let stream = process.accept(skill.startup_secs, clock_secs).map_err(|fault| (fault, process.end()))?;
+        let stream = process.accept(skill.startup_secs, clock_secs, stop).map_err(|fault| (fault, process.end()))?;
         let wire = Wire::new(stream, clock_secs).map_err(|error| {
             let reason = format!("its connection can't be used: {error}");
             (ExternalFault { late: false, reason }, process.end())
@@ -70,7 +72,7 @@ impl Session {
             lost: false,
             refused: false,
         };
-        match session.introduce(&introduction(world, worker, skill.privileged), tested) {
+        match session.introduce(&introduction(world, worker, skill.privileged), tested, stop) {
             Ok(()) => {
                 session.timeout_secs = skill.timeout_secs;
                 Ok(session)
@@ -79,14 +81,25 @@ impl Session {
         }
     }
 
-    fn introduce(&mut self, ours: &impl serde::Serialize, tested: &BTreeSet<String>) -> Result<(), ExternalFault> {
-        let result = self.exchange_hello(ours, tested);
+    fn introduce(
+        &mut self,
+        ours: &impl serde::Serialize,
+        tested: &BTreeSet<String>,
+        stop: &AtomicBool,
+    ) -> Result<(), ExternalFault> {
+        let result = self.exchange_hello(ours, tested, stop);
         result.map_err(|fault| self.refuse(fault))
     }
 
-    fn exchange_hello(&mut self, ours: &impl serde::Serialize, tested: &BTreeSet<String>) -> Result<(), ExternalFault> {
+    fn exchange_hello(
+        &mut self,
+        ours: &impl serde::Serialize,
+        tested: &BTreeSet<String>,
+        stop: &AtomicBool,
+    ) -> Result<(), ExternalFault> {
         self.send(ours, &[])?;
-        let message = self.receive()?;
+        let range = self.wait(&|| stop.load(Ordering::Relaxed))?;
+        let message = self.wire.payload(range);
         expect(&kind_of(message)?, "hello")?;
         let hello: Hello = parse("hello", message)?;
         if hello.protocol != PROTOCOL {
@@ -109,11 +122,12 @@ impl Session {
     /// Begins a new run.
     ///
     /// # Errors
-    /// A fault of the program.
-    pub fn reset(&mut self, reset: &ToProgram<'_>) -> Result<(), ExternalFault> {
+    /// A fault of the program, or `stop` is set.
+    pub fn reset(&mut self, reset: &ToProgram<'_>, stop: &AtomicBool) -> Result<(), ExternalFault> {
         self.printed_before = self.process.output.n_bytes();
         self.send(reset, &[])?;
-        let message = self.receive()?;
+        let range = self.wait(&|| stop.load(Ordering::Relaxed))?;
+        let message = self.wire.payload(range);
         expect(&kind_of(message)?, "ready")?;
         parse("ready", message).map(|Plain { .. }| ())
     }
