@@ -111,15 +111,8 @@ impl Process {
         let until = Instant::now().checked_add(time);
         let is_new = std::mem::replace(&mut self.is_new, false);
         let written = self.stdin.as_mut().is_some_and(|stdin| writeln!(stdin, "{question}").is_ok());
-        while written {
-            match self.answers.recv_timeout(left(until).min(LOOK_EVERY)) {
-                Ok(Piece::Answer(head, body)) => return Asked::Answer(head, body),
-                Ok(Piece::TooMuch) => return Asked::TooMuch,
-                Err(RecvTimeoutError::Timeout) if is_gone() => return Asked::Gone,
-                Err(RecvTimeoutError::Timeout) if left(until).is_zero() => return Asked::Late,
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
-            }
+        if written && let Some(asked) = self.wait(until, is_gone) {
+            return asked;
         }
         match self.exit_code() {
             Some(watch::TIME_SPENT) => Asked::Late,
@@ -127,6 +120,20 @@ impl Process {
             // It exits between questions if it holds much memory.
             Some(0) if !is_new => Asked::NotTaken,
             _ => Asked::Crashed,
+        }
+    }
+
+    /// Waits for the answer. Returns `None` if the process closed its output.
+    fn wait(&self, until: Option<Instant>, is_gone: &dyn Fn() -> bool) -> Option<Asked> {
+        loop {
+            match self.answers.recv_timeout(left(until).min(LOOK_EVERY)) {
+                Ok(Piece::Answer(head, body)) => return Some(Asked::Answer(head, body)),
+                Ok(Piece::TooMuch) => return Some(Asked::TooMuch),
+                Err(RecvTimeoutError::Timeout) if is_gone() => return Some(Asked::Gone),
+                Err(RecvTimeoutError::Timeout) if left(until).is_zero() => return Some(Asked::Late),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return None,
+            }
         }
     }
 
