@@ -99,7 +99,7 @@ fn none_of_many_clients_is_refused() {
 }
 
 #[test]
-fn clients_that_never_finish_a_request_delay_nobody() {
+fn clients_that_never_finish_a_request_do_not_delay_others() {
     let server = Server::alone(&[]);
     let slow = [
         "GET /sparql?query=ASK%7B%7D HTTP/1.1\r\nHost: localhost\r\nX-",

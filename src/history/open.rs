@@ -232,7 +232,7 @@ mod tests {
         // The manifest grows with each part that is created.
         for length in (0..written.len()).step_by(41) {
             fs::write(&manifest, &written[..length]).expect("it can be written");
-            let owner = Folder::lock_exclusive(&dir, false).expect("nobody else has it");
+            let owner = Folder::lock_exclusive(&dir, false).expect("it is not locked");
             let during = codes(&reader);
             drop(owner);
             let after = codes(&reader);

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use tokio::runtime::Handle;
 use tokio::task::AbortHandle;
 
 /// Time within which a client must accept the next piece of an answer. Unit: milliseconds.
@@ -68,9 +69,13 @@ impl Connections {
         Arc::new(Self { open: Mutex::default(), next: AtomicU64::new(0), started: Instant::now(), most })
     }
 
-    /// Serves a new connection. If there are too many, the oldest one without a request is closed. Returns `false`, with
+    /// Serves a new connection on a thread. If there are too many, the oldest one without a request is closed. Returns `false`, with
     /// `serve` unused, if all of them have one.
-    pub fn add<F: Future<Output = ()> + Send + 'static>(self: &Arc<Self>, serve: impl FnOnce(Arc<Doing>) -> F) -> bool {
+    pub fn add<F: Future<Output = ()> + Send + 'static>(
+        self: &Arc<Self>,
+        thread: &Handle,
+        serve: impl FnOnce(Arc<Doing>) -> F,
+    ) -> bool {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         if open.len() >= self.most {
             let waits = |(doing, _): &(Arc<Doing>, AbortHandle)| doing.state.load(Ordering::Relaxed) == WAITS;
@@ -83,7 +88,7 @@ impl Connections {
         let doing = Arc::new(Doing { state: AtomicU64::new(WAITS), started: self.started });
         let (serving, all) = (serve(Arc::clone(&doing)), Arc::clone(self));
         // The task can't remove its entry before it is made, because the lock is held.
-        let task = tokio::spawn(async move {
+        let task = thread.spawn(async move {
             serving.await;
             all.open.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
         });
@@ -133,7 +138,7 @@ mod tests {
             });
             let mut all = Vec::new();
             for number in 0..4 {
-                let added = connections.add(|doing| {
+                let added = connections.add(&Handle::current(), |doing| {
                     all.push(Arc::clone(&doing));
                     std::future::pending()
                 });
@@ -147,7 +152,7 @@ mod tests {
             connections.close_stalled();
             assert_eq!(connections.len(), 2);
             all[0].waits();
-            assert!(connections.add(|_| std::future::ready(())));
+            assert!(connections.add(&Handle::current(), |_| std::future::ready(())));
         });
     }
 }

@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
-use tokio::task::spawn_blocking;
 use tokio::time::timeout;
 
 use crate::answer::{Answered, Light, Question, light, unopened};
@@ -52,6 +52,8 @@ pub(super) struct Lanes {
     snapshots: Snapshots,
     counts: Arc<Counts>,
     watchdog: Watchdog,
+    /// Its threads evaluate slices.
+    evaluating: Handle,
     /// One slice for each processor.
     slices: Arc<Semaphore>,
     /// Hashes of queries that were not light or took more than a slice.
@@ -66,12 +68,13 @@ pub(super) struct Lanes {
 }
 
 impl Lanes {
-    /// Empty queues for at most `most_queries` processes.
+    /// Empty queues for at most `most_queries` processes. Called in the runtime whose threads evaluate slices.
     pub fn new(snapshots: Snapshots, counts: Arc<Counts>, worker: Worker, most_queries: usize) -> Self {
         Self {
             snapshots,
             counts,
             watchdog: Watchdog::start(MOMENT),
+            evaluating: Handle::current(),
             slices: Arc::new(Semaphore::new(processors())),
             heavy: Mutex::default(),
             worker,
@@ -123,7 +126,7 @@ impl Lanes {
         let slice = timeout(LIGHT_WAIT, Arc::clone(&self.slices).acquire_owned()).await.ok()?.ok()?;
         let stopper = Stopper(Cancel::new());
         let (lanes, question, cancel) = (Arc::clone(self), Arc::clone(question), stopper.0.clone());
-        let task = spawn_blocking(move || {
+        let task = self.evaluating.spawn_blocking(move || {
             let _slice = slice;
             match lanes.snapshots.get() {
                 Ok(history) => light(&history, &question, LIGHT_BYTES, &cancel),

@@ -22,6 +22,7 @@ mod report;
 mod request;
 mod server;
 mod snapshot;
+mod threads;
 mod watch;
 mod watchdog;
 mod worker;

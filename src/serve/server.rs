@@ -28,6 +28,7 @@ use crate::reply::{NO_POLICY, PAGE_POLICY, REPORT_POLICY, Reply, response};
 use crate::report::LiveReport;
 use crate::request::{PATIENCE, origin, read, text};
 use crate::snapshot::Snapshots;
+use crate::threads::Threads;
 use crate::worker::{Asked, Worker};
 
 /// Maximum size of the head of a request: twice the longest target that the library accepts. Unit: bytes.
@@ -35,7 +36,7 @@ const MOST_HEAD: usize = 128 << 10;
 /// Stack of a thread that evaluates light queries; only the used part takes memory. Unit: bytes.
 const STACK: usize = 64 << 20;
 /// Threads for connections for each processor: a query may occupy one for a moment.
-const THREADS: usize = 2;
+const THREADS: usize = 4;
 /// Threads that evaluate light queries, besides one for each processor: for stopped queries that have not ended yet.
 const SPARE_THREADS: usize = 6;
 /// Number of the largest allowed answers that may wait for their clients at a time.
@@ -105,16 +106,15 @@ pub fn serve(options: ServeOptions) -> std::io::Result<Serving> {
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(processors() * THREADS)
+        .worker_threads(1)
         .max_blocking_threads(processors() + SPARE_THREADS)
         .thread_stack_size(STACK)
         .enable_all()
         .build()?;
-    let listener = {
-        let _inside = runtime.enter();
-        tokio::net::TcpListener::from_std(listener)?
-    };
-    let app = Arc::new(App::new(options));
+    let inside = runtime.enter();
+    let listener = tokio::net::TcpListener::from_std(listener)?;
+    let app = Arc::new(App::new(options, Threads::start(processors() * THREADS, STACK)?));
+    drop(inside);
     let (counts, lanes) = (Arc::clone(&app.counts), Arc::clone(&app.lanes));
     runtime.spawn(app.run(listener));
     Ok(Serving { address, counts, runtime: Some(runtime), lanes })
@@ -128,6 +128,7 @@ struct App {
     page: Bytes,
     counts: Arc<Counts>,
     connections: Arc<Connections>,
+    threads: Threads,
     /// Memory for large answers, in [`MEMORY_UNIT`]s.
     memory: Arc<Semaphore>,
     /// Concurrent requests for the report wait for the same page.
@@ -135,7 +136,7 @@ struct App {
 }
 
 impl App {
-    fn new(options: ServeOptions) -> Self {
+    fn new(options: ServeOptions, threads: Threads) -> Self {
         let worker = |arguments: &[String]| Worker { program: options.program.clone(), arguments: arguments.to_vec() };
         let report = LiveReport {
             worker: worker(&options.report_arguments),
@@ -153,6 +154,7 @@ impl App {
             page,
             counts,
             connections: Connections::new(),
+            threads,
             memory: Arc::new(Semaphore::new(units.min(Semaphore::MAX_PERMITS))),
             rendering: Arc::default(),
             options,
@@ -183,11 +185,14 @@ impl App {
             };
             // Without it, small answers wait for the acknowledgement of earlier ones; the connection works anyway.
             let _ = stream.set_nodelay(true);
+            let Some(thread) = self.threads.next() else { continue };
             let (app, mut slot) = (Arc::clone(&self), Some(stream));
-            let added = self.connections.add(|doing| {
+            let added = self.connections.add(thread, |doing| {
                 let stream = slot.take();
                 async move {
-                    if let Some(stream) = stream {
+                    // It was accepted on another thread.
+                    let stream = stream.and_then(|stream| stream.into_std().ok());
+                    if let Some(Ok(stream)) = stream.map(tokio::net::TcpStream::from_std) {
                         app.converse(stream, doing).await;
                     }
                 }

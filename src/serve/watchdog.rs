@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use actcheck_history::Cancel;
 
-/// Cancels what it watches after a time.
+/// Cancels watched queries after a time.
 #[derive(Debug)]
 pub(super) struct Watchdog {
     shared: Arc<Shared>,
