@@ -7,7 +7,7 @@ use regex::Regex;
 
 use crate::support::checkout::{Checkout, blocks};
 use crate::support::expected::assert_expected;
-use crate::support::{actcheck, root, script, stdout};
+use crate::support::{actcheck, edit, root, script, stderr, stdout};
 
 /// Pages with commands. Each has a test, so that they run side by side.
 const WITH_COMMANDS: [&str; 7] =
@@ -194,10 +194,9 @@ fn steps(workflow: &str) -> Vec<String> {
     steps
 }
 
-/// Runs the steps of a workflow in a repository whose main branch has the project, and returns everything printed.
-fn workflow_works(name: &str, environment: &[(&str, &str)]) -> (Checkout, String) {
+/// A checkout that is a repository whose main branch has the project, without downloads.
+fn repository() -> Checkout {
     let checkout = Checkout::fresh();
-    // Nothing is downloaded.
     script(&checkout.path().join("bin/pip"), "#!/bin/sh\ntest \"$1 $2\" = 'install actcheck.whl'\n");
     checkout.run(
         "git init --quiet --initial-branch main && git add configs ontology rules models && \
@@ -205,33 +204,45 @@ fn workflow_works(name: &str, environment: &[(&str, &str)]) -> (Checkout, String
          git remote add origin \"$PWD\" && git fetch --quiet origin",
         &[],
     );
-    let workflow = read(&root().join("docs/ci").join(name));
-    let steps = steps(&workflow);
-    assert!(steps.len() >= 4, "{steps:#?}");
-    let mut printed = String::new();
-    for step in steps {
-        printed.push_str(&checkout.run(&format!("set -e\n{step}"), environment));
-    }
-    (checkout, printed)
+    checkout
 }
 
-/// The environment of both workflows: a short campaign, and a file in place of the wheel.
-const SHORT: [(&str, &str); 3] = [("CONFIG", "configs/pick.toml"), ("RUNS", "4"), ("ACTCHECK_WHEEL", "actcheck.whl")];
+/// Runs the steps of a workflow before its comparison, each of which must succeed, and returns the comparison.
+fn before_the_gate(checkout: &Checkout, name: &str, environment: &[(&str, &str)]) -> String {
+    let steps = steps(&read(&root().join("docs/ci").join(name)));
+    assert!(steps.len() >= 4, "{steps:#?}");
+    let (gate, others) = steps.split_last().unwrap();
+    assert!(gate.starts_with("actcheck compare "), "{gate}");
+    for step in others {
+        checkout.run(&format!("set -e\n{step}"), environment);
+    }
+    gate.clone()
+}
+
+/// The environment of both workflows: a short campaign that shows a large change, and a file in place of the wheel.
+const SHORT: [(&str, &str); 3] = [("CONFIG", "configs/pick.toml"), ("RUNS", "12"), ("ACTCHECK_WHEEL", "actcheck.whl")];
 
 #[test]
-fn the_github_workflow_compares_and_reports() {
+fn the_github_workflow_reports_and_accepts_an_equal_change() {
     let environment = [&SHORT[..], &[("GITHUB_BASE_REF", "main"), ("GITHUB_STEP_SUMMARY", "summary.md")]].concat();
-    let (checkout, _) = workflow_works("github.yml", &environment);
+    let checkout = repository();
+    let gate = before_the_gate(&checkout, "github.yml", &environment);
     for file in ["report.html", "junit.xml", "summary.md"] {
         assert!(!read(&checkout.path().join(file)).is_empty(), "{file} is empty");
     }
+    checkout.run(&gate, &environment);
 }
 
 #[test]
-fn the_gitlab_pipeline_compares_and_reports() {
+fn the_gitlab_pipeline_reports_and_refuses_a_worse_change() {
     let environment = [&SHORT[..], &[("CI_MERGE_REQUEST_TARGET_BRANCH_NAME", "main")]].concat();
-    let (checkout, _) = workflow_works("gitlab.yml", &environment);
+    let checkout = repository();
+    // The change demands an impossible lift; the base in its own worktree does not.
+    edit(&checkout.path().join("rules/moved_object.rls"), "?d > 0.02", "?d > 20.0");
+    let gate = before_the_gate(&checkout, "gitlab.yml", &environment);
     for file in ["report.html", "junit.xml"] {
         assert!(!read(&checkout.path().join(file)).is_empty(), "{file} is empty");
     }
+    let output = checkout.shell(&gate, &environment);
+    assert_eq!(output.status.code(), Some(1), "{}{}", stdout(&output), stderr(&output));
 }

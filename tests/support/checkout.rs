@@ -2,7 +2,7 @@
 //! so small that a campaign takes a second.
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use super::{COARSEST, copy, edit, project_with, root, script, stderr};
@@ -66,24 +66,29 @@ impl Checkout {
         self.folder.path()
     }
 
-    /// Runs commands in a shell, and returns their outputs. Panics if the last one fails, one of actcheck has an unexpected
-    /// exit code, or a query has an empty answer.
-    pub fn run(&self, commands: &str, environment: &[(&str, &str)]) -> String {
+    /// Runs commands in a shell.
+    pub fn shell(&self, commands: &str, environment: &[(&str, &str)]) -> Output {
         // Long campaigns are for people.
         let commands = commands
             .replace("--runs 300", "--runs 12")
             .replace("--trials 40", "--trials 12")
             .replace("check-oracles configs/pick.toml", "check-oracles configs/pick.toml --runs 2");
-        let codes = self.path().join("codes");
-        let _ = std::fs::remove_file(&codes);
-        let output = Command::new("sh")
+        Command::new("sh")
             .args(["-c", &commands])
             .current_dir(self.path())
             .env("PATH", &self.path)
             .env("NO_COLOR", "1")
             .envs(environment.iter().copied())
             .output()
-            .unwrap();
+            .unwrap()
+    }
+
+    /// Runs commands in a shell, and returns their outputs. Panics if the last one fails, one of actcheck has an unexpected
+    /// exit code, or a query has an empty answer.
+    pub fn run(&self, commands: &str, environment: &[(&str, &str)]) -> String {
+        let codes = self.path().join("codes");
+        let _ = std::fs::remove_file(&codes);
+        let output = self.shell(commands, environment);
         let printed = format!("{}{}", String::from_utf8_lossy(&output.stdout), stderr(&output));
         assert!(output.status.code().is_some_and(|code| code <= 1), "{commands}\n{printed}");
         let codes = std::fs::read_to_string(codes).unwrap_or_default();
