@@ -28,7 +28,7 @@ use actcheck_facts::extract;
 /// A history that only this process may write, or that it only reads (after [`History::open_to_read`]).
 ///
 /// A run that [`History::commit`] stored survives a kill of the process. Before a power cut, the operating system may not
-/// have written the last seconds to the disk; what was stored before [`History::flush`] survives that, too.
+/// have written the last seconds to the disk; runs stored before [`History::flush`] survive that, too.
 /// Its trace file is written first, so that every run in the store has one.
 pub struct History {
     // Dropped before the folder, which releases the lock. `None` only if reopening failed.
