@@ -241,7 +241,7 @@ fn files(path: &Path, found: &mut Vec<PathBuf>) {
 fn comments_messages_and_documents_avoid_the_listed_patterns() {
     let (patterns, ignored) = compiled();
     let mut paths = Vec::new();
-    let places = "src benches tests clients fuzz ontology rules configs models notebooks build.rs README.md CONTRIBUTING.md CHANGELOG.md";
+    let places = "src benches tests clients fuzz ontology rules configs models notebooks docs build.rs README.md CONTRIBUTING.md CHANGELOG.md";
     places.split(' ').for_each(|place| files(&root().join(place), &mut paths));
     let mut found = Vec::new();
     for path in paths {

@@ -105,7 +105,7 @@ p(X, Z) :- assign(X, Y), p(Y, Z).
 p(X, W) :- load(X, Y), p(Y, Z), p(Z, W).
 p(Z, W) :- store(X, Y), p(X, Z), p(Y, W)."""
 TRIANGLES = "p(X, Y, Z) :- e(X, Y), e(Y, Z), e(X, Z)."
-# A points-to analysis of C: what may be reached through pointers that escape is not known exactly.
+# A points-to analysis of C: the objects reachable through pointers that escape are not known exactly.
 MEMORY = """
 lptr(V) :- stackalloc(V, O).
 lptr(V) :- heapalloc(V, O).

@@ -17,9 +17,6 @@ use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config::Launcher;
 use actcheck_history::{History, RunRecord};
 
-/// Maximum time between flushes of the store to disk. Unit: seconds.
-const FLUSH_SECS: f64 = 1.0;
-
 /// Maximum number of runs per worker that are made but not stored yet, because an earlier run is missing.
 const AHEAD: usize = 4;
 
@@ -196,7 +193,6 @@ struct RunWriter<'a> {
     most_broken: Option<u64>,
     /// Summaries of the batch's runs for the schedule.
     results: Vec<RunResult>,
-    flushed_at: f64,
 }
 
 impl<'a> RunWriter<'a> {
@@ -209,7 +205,6 @@ impl<'a> RunWriter<'a> {
         on_run: &'a mut dyn FnMut(&RunRecord),
     ) -> Self {
         let end = CampaignResult { ending: Ending::Finished, committed: 0, discards: Vec::new(), rates: Vec::new() };
-        let flushed_at = (clock.secs)();
         let most_broken = match &env.campaign.launcher {
             Launcher::Reference => None,
             Launcher::Program(skill) => Some(skill.max_broken),
@@ -226,7 +221,6 @@ impl<'a> RunWriter<'a> {
             broken_in_a_row: 0,
             most_broken,
             results: Vec::new(),
-            flushed_at,
         }
     }
 
@@ -285,13 +279,7 @@ impl<'a> RunWriter<'a> {
     }
 
     fn commit(&mut self, record: &RunRecord) -> Result<(), Diagnostics> {
-        self.history.commit(record)?;
-        let now = (self.clock.secs)();
-        if now - self.flushed_at >= FLUSH_SECS {
-            self.flushed_at = now;
-            self.history.flush()?;
-        }
-        Ok(())
+        self.history.commit(record)
     }
 
     fn stop(&mut self, faults: Diagnostics) {

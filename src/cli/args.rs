@@ -207,8 +207,10 @@ pub enum Command {
     ///
     /// Editors that use taplo, such as VS Code with Even Better TOML, read it if a configuration begins with the line
     /// `#:schema campaign.schema.json`. Only `actcheck check` checks model names and relations between keys.
-    #[command(after_help = "Example:\n  actcheck schema > campaign.schema.json")]
-    Schema,
+    #[command(
+        after_help = "Examples:\n  actcheck schema > campaign.schema.json\n  actcheck schema --markdown > configuration.md"
+    )]
+    Schema(crate::schema::SchemaArgs),
     /// Print a shell completion script for commands and options
     ///
     /// Save it where the shell finds it: `~/.local/share/bash-completion/completions/actcheck` for bash, `_actcheck` in

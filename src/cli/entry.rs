@@ -10,7 +10,6 @@ use crate::{
     show, shrink, stop, why,
 };
 use actcheck_base::set_program_digest;
-use actcheck_config::SCHEMA;
 
 /// Parses the process's arguments and runs the command.
 ///
@@ -44,8 +43,8 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Why(args) => stop::interruptible(|stop| why::why(&args, stop).map(|()| 0)),
         Command::New(args) => new::new(&args).map(|()| 0),
         Command::Datalog(args) => stop::interruptible(|stop| datalog::datalog(&args, stop)),
-        Command::Schema => {
-            output::print(SCHEMA);
+        Command::Schema(args) => {
+            crate::schema::schema(&args);
             Ok(0)
         }
         Command::Completions(args) => {

@@ -50,6 +50,7 @@ mod report_rrd;
 mod rules;
 mod run;
 mod run_args;
+mod schema;
 mod serve;
 mod session;
 mod show;

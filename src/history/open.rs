@@ -2,6 +2,7 @@
 
 use std::ops::Deref;
 use std::path::Path;
+use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, PoisonError, RwLock};
 use std::thread::sleep;
 use std::time::Duration;
@@ -69,7 +70,7 @@ impl History {
     pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
         let folder = Folder::to_read(dir)?;
         let opened = read_present(&folder, TRIES)?;
-        Ok(Self { opened: RwLock::new(Some(opened)), folder })
+        Ok(Self { opened: RwLock::new(Some(opened)), folder, logged: AtomicUsize::new(0) })
     }
 
     /// Like [`History::open_to_read`], for a damaged history: reads everything that can be read into memory. Returns it
@@ -84,7 +85,7 @@ impl History {
             salvage(&opened.store, &folder.traced()).map_err(|error| fault::store(dir, "reading it", &error))?;
         let store = OpenStore { store: salvaged.store, _snapshot: opened.snapshot.clone() };
         let opened = Opened { store, snapshot: opened.snapshot };
-        Ok((Self { opened: RwLock::new(Some(opened)), folder }, salvaged.lost))
+        Ok((Self { opened: RwLock::new(Some(opened)), folder, logged: AtomicUsize::new(0) }, salvaged.lost))
     }
 
     /// Takes a new snapshot if the history has changed since the last one. Returns whether it has. Answers that are
@@ -116,7 +117,7 @@ impl History {
             return Err(fault::damaged_file(folder.dir(), name));
         }
         let opened = own(&folder)?;
-        Ok(Self { opened: RwLock::new(Some(opened)), folder })
+        Ok(Self { opened: RwLock::new(Some(opened)), folder, logged: AtomicUsize::new(0) })
     }
 
     /// Returns a handle of the store. (All clones use the same store.)

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::RwLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use oxigraph::model::vocab::rdf;
 use oxigraph::model::{GraphNameRef, NamedNode, QuadRef};
@@ -26,13 +27,20 @@ use actcheck_facts::extract;
 
 /// A history that only this process may write, or that it only reads (after [`History::open_to_read`]).
 ///
-/// A run that [`History::commit`] stored survives a kill of the process, and after [`History::flush`] also a power cut.
+/// A run that [`History::commit`] stored survives a kill of the process. Before a power cut, the operating system may not
+/// have written the last seconds to the disk; runs stored before [`History::flush`] survive that, too.
 /// Its trace file is written first, so that every run in the store has one.
 pub struct History {
     // Dropped before the folder, which releases the lock. `None` only if reopening failed.
     pub(super) opened: RwLock<Option<Opened>>,
     pub(super) folder: Folder,
+    /// Number of quads that are only in the store's log.
+    pub(super) logged: AtomicUsize,
 }
+
+/// Number of quads in the log at which they are written to the store's tables: about 100 runs. Smaller tables would be
+/// merged and written again several times, and readers take longer to open a long log.
+const MOST_LOGGED: usize = 50_000;
 
 impl History {
     /// The folder as the caller gave it.
@@ -100,11 +108,15 @@ impl History {
             .map_err(|error| Diagnostic::error("H006", format!("{doing} failed: {error}")))?;
         let file = self.folder.trace(&record.id);
         write_atomic(&file, &bytes).map_err(|error| fault::io(self.dir(), &doing, &error))?;
-        self.store()?.extend(write_run::quads(record)).map_err(|error| {
+        let quads = write_run::quads(record);
+        let count = quads.len();
+        self.store()?.extend(quads).map_err(|error| {
             // A trace without a run is harmless; if it can't be removed now, the next campaign removes it.
             let _ = std::fs::remove_file(&file);
             self.fault(&doing, &error)
-        })
+        })?;
+        let logged = self.logged.fetch_add(count, Ordering::Relaxed) + count;
+        if logged >= MOST_LOGGED { self.flush() } else { Ok(()) }
     }
 
     /// Flushes all committed data to the disk.
@@ -112,6 +124,7 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub fn flush(&self) -> Result<(), Diagnostics> {
+        self.logged.store(0, Ordering::Relaxed);
         self.store()?.flush().map_err(|error| self.fault("writing to the disk", &error))
     }
 

@@ -111,7 +111,7 @@ impl ExternalSkill for Performance<'_> {
         let stop = Arc::clone(&self.stop);
         let begun =
             self.started(world).and_then(|session| session.reset(&ToProgram::Reset { run: &run, index, seed }, &stop));
-        // A stop ends the wait, which is no fault of the program.
+        // A stop ends the wait; the program is not at fault.
         self.stopped |= begun.is_err() && stop.load(Ordering::Relaxed);
         begun.map_err(|fault| self.give_up(fault))
     }

@@ -92,7 +92,7 @@ impl Watch {
         }
     }
 
-    /// Returns a watch with the same deadline and the memory that is left. What it refuses doesn't stop the evaluation.
+    /// Returns a watch with the same deadline and the memory that is left. Its limits don't stop the evaluation.
     pub(crate) fn trial(&self) -> Self {
         Self {
             deadline: self.deadline.clone(),

@@ -1,5 +1,6 @@
 //! Shared helpers: the built program, and temporary folders.
 
+pub mod checkout;
 pub mod chromium;
 pub mod expected;
 pub mod foreign;

@@ -45,7 +45,7 @@ pub(crate) struct Sampler<'s, 'a, 'b> {
 #[derive(Debug, Clone)]
 struct Drawn {
     binding: Vec<TermId>,
-    /// Number of bindings that it stands for.
+    /// Number of bindings that it represents.
     weight: f64,
     /// The binding of the search that it belongs to, by its place in [`Search::origins`].
     origin: usize,
@@ -56,7 +56,7 @@ struct Drawn {
 struct Search {
     /// Cost of the atoms before. Unit: rows read.
     before: f64,
-    /// For each binding before, the number of bindings that it stands for, and the cost to find all its matches.
+    /// For each binding before, the number of bindings that it represents, and the cost to find all its matches.
     origins: Vec<(f64, f64)>,
 }
 

@@ -23,7 +23,7 @@ const TOLERANCE: f64 = 4.0;
 /// The variants that were planned by samples, and the number of rows that each may read before it is planned again.
 pub(crate) type Adapted = HashMap<(usize, usize), (Variant, u64)>;
 
-/// What the evaluation of a rule reads and writes.
+/// The facts, terms and limits with which a rule is evaluated.
 pub(crate) struct Context<'s, 'a, 'u, 't> {
     pub(crate) access: &'s mut Access<'a>,
     pub(crate) universe: &'u mut Universe<'t>,
