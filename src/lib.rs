@@ -32,11 +32,11 @@
 //! | [`facts`] | a `Trace` to RDF facts, interned once | |
 //! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxrdf, oxrdfio (imports), oxigraph (evaluator, feature `sparql`) |
 //! | [`verdict`] | findings to outcomes with witness and margin; the scores | |
-//! | [`history`] | the run store: transactions, queries, traces | oxigraph (store) |
+//! | [`history`] | the run store: transactions, queries, traces | oxigraph (store), spargebra (parser) |
 //! | [`campaign`] | runs the stages of a campaign; the only crate that calls many stages | rayon |
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, comparison of campaigns, failure conditions | polars, statrs |
 //! | [`report`] | verdicts and tables as text, JSON and HTML, and in the formats of other tools; runs as pictures and in 3D | rerun (feature `rerun`) |
-//! | [`serve`] | a history over HTTP: SPARQL endpoint, query page, report | oxhttp |
+//! | [`serve`] | a history over HTTP: SPARQL endpoint, query page, report | hyper, tokio |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap, clap_complete, clap_mangen |
 //!
 //! A crate depends only on crates above it in this table ([`campaign`] on many, [`cli`] on all), and on a listed library only if the

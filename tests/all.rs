@@ -71,6 +71,7 @@ mod schema;
 mod search;
 mod second_judge;
 mod serve;
+mod serve_load;
 mod set_up;
 mod shrink;
 mod shrunk;

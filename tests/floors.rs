@@ -32,7 +32,7 @@ const FLOORS: [(&str, &[&str]); 17] = [
 ];
 
 /// Libraries of the field and the crates that may depend on them.
-const FENCES: [(&str, &[&str]); 24] = [
+const FENCES: [(&str, &[&str]); 27] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh-loader", &["config"]),
@@ -51,7 +51,10 @@ const FENCES: [(&str, &[&str]); 24] = [
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),
-    ("oxhttp", &["serve"]),
+    ("hyper", &["serve"]),
+    ("hyper-util", &["serve"]),
+    ("tokio", &["serve"]),
+    ("spargebra", &["history"]),
     ("re_chunk", &["report"]),
     ("re_log_encoding", &["report"]),
     ("re_log_types", &["report"]),

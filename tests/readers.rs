@@ -100,6 +100,27 @@ fn a_reader_does_not_keep_others_from_writing() {
     assert_eq!(runs(&reader), 1);
 }
 
+/// Readers that met a half-created store called it damaged.
+#[test]
+fn a_reader_waits_until_a_new_history_is_created() {
+    let folder = tempfile::tempdir().unwrap();
+    for number in 0..5 {
+        let dir = folder.path().join(format!("h{number}"));
+        let (owner, opened) = std::thread::scope(|scope| {
+            let creating = scope.spawn(|| History::open(&dir));
+            let opened = loop {
+                match History::open_to_read(&dir) {
+                    // Not even begun.
+                    Err(faults) if faults.iter().all(|fault| fault.code == "H003") => std::thread::yield_now(),
+                    other => break other,
+                }
+            };
+            (creating.join().unwrap(), opened)
+        });
+        assert_eq!((runs(&owner.unwrap()), runs(&opened.unwrap())), (0, 0));
+    }
+}
+
 #[test]
 fn every_reading_command_answers_while_another_process_owns_the_history() {
     let folder = tempfile::tempdir().unwrap();

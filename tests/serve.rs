@@ -1,121 +1,14 @@
 //! `actcheck serve` from outside: its answers and refusals.
 
-use std::collections::BTreeMap;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use tempfile::TempDir;
 
+use crate::support::server::{Reply, Server};
 use crate::support::{actcheck, copy_made_history, foreign, made_history, signal, stderr, stdout};
-
-/// A server that is stopped at the end of the test.
-struct Server {
-    process: Child,
-    port: u16,
-    /// Its private history, if it has one.
-    _history: Option<TempDir>,
-}
-
-impl Server {
-    fn start(history: &Path, options: &[&str]) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_actcheck"))
-            .args(["serve", "--port", "0", "--history"])
-            .arg(history)
-            .args(options)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let port = line.split("127.0.0.1:").nth(1).and_then(|rest| rest.split('/').next()).unwrap().parse().unwrap();
-        Self { process, port, _history: None }
-    }
-
-    /// A server with a private history.
-    fn alone(options: &[&str]) -> Self {
-        let history = made_history();
-        let mut server = Self::start(history.path(), options);
-        server._history = Some(history);
-        server
-    }
-
-    fn connect(&self) -> TcpStream {
-        let stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
-        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
-        stream
-    }
-
-    /// Sends raw bytes.
-    fn raw(&self, request: &[u8]) -> Reply {
-        let mut stream = self.connect();
-        stream.write_all(request).unwrap();
-        Reply::read(stream)
-    }
-
-    fn request(&self, method: &str, target: &str, headers: &[(&str, &str)], body: &[u8]) -> Reply {
-        let mut text = format!("{method} {target} HTTP/1.1\r\n");
-        if !headers.iter().any(|(name, _)| *name == "Host") {
-            text.push_str(&format!("Host: localhost:{}\r\n", self.port));
-        }
-        if !body.is_empty() {
-            text.push_str(&format!("Content-Length: {}\r\n", body.len()));
-        }
-        headers.iter().for_each(|(name, value)| text.push_str(&format!("{name}: {value}\r\n")));
-        text.push_str("\r\n");
-        self.raw(&[text.as_bytes(), body].concat())
-    }
-
-    fn get(&self, target: &str) -> Reply {
-        self.request("GET", target, &[], b"")
-    }
-
-    /// Sends the query by POST, unencoded.
-    fn ask(&self, query: &str, accept: &str) -> Reply {
-        let headers = [("Content-Type", "application/sparql-query"), ("Accept", accept)];
-        self.request("POST", "/sparql", &headers, query.as_bytes())
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-#[derive(Debug)]
-struct Reply {
-    status: u16,
-    headers: BTreeMap<String, String>,
-    body: String,
-}
-
-impl Reply {
-    fn read(mut stream: TcpStream) -> Self {
-        let mut bytes = Vec::new();
-        // A server that closes early may have answered before.
-        let _ = stream.read_to_end(&mut bytes);
-        let text = String::from_utf8_lossy(&bytes).into_owned();
-        let (head, body) = text.split_once("\r\n\r\n").unwrap_or((&text, ""));
-        let mut lines = head.lines();
-        let status = lines.next().and_then(|line| line.split(' ').nth(1)).and_then(|code| code.parse().ok());
-        let headers = lines.filter_map(|line| line.split_once(':'));
-        Self {
-            status: status.unwrap_or(0),
-            headers: headers.map(|(name, value)| (name.to_lowercase(), value.trim().to_owned())).collect(),
-            body: body.to_owned(),
-        }
-    }
-
-    fn media_type(&self) -> &str {
-        self.headers.get("content-type").map_or("", String::as_str)
-    }
-}
 
 /// A server with narrow limits.
 fn limited() -> Server {
@@ -313,7 +206,7 @@ fn path_traversal_is_refused() {
         "\0\0\0\0\r\n\r\n",
         "GET / HTTP/1.1\r\nHost: a b\r\nX\r\n\r\n",
     ] {
-        let reply = server.raw(raw.as_bytes());
+        let reply = server.garbage(raw.as_bytes());
         assert!(reply.status == 0 || reply.status >= 400, "{raw:?}: {reply:?}");
     }
     assert_eq!(server.get("/").status, 200);
@@ -363,13 +256,20 @@ fn slow_clients_are_disconnected_and_do_not_block_others() {
 fn requests_from_other_sites_are_refused() {
     let server = limited();
     let target = "/sparql?query=ASK%7B%7D";
-    let with = |name, value| server.request("GET", target, &[(name, value)], b"").status;
+    let with = |name: &str, value: &str| server.request("GET", target, &[(name, value)], b"").status;
     assert_eq!(with("Host", "evil.example"), 421);
     assert_eq!(with("Host", "127.0.0.1.evil.example:7878"), 421);
     assert_eq!(with("Origin", "http://evil.example"), 403);
     assert_eq!(with("Origin", "null"), 403);
     assert_eq!(with("Origin", &format!("http://localhost:{}", server.port)), 200);
-    assert_eq!(server.raw(b"GET / HTTP/1.1\r\n\r\n").status, 400, "missing host");
+    assert_eq!(with("Sec-Fetch-Site", "cross-site"), 403);
+    assert_eq!(with("Sec-Fetch-Site", "same-site"), 403);
+    assert_eq!(with("Sec-Fetch-Site", "same-origin"), 200);
+    assert_eq!(with("Sec-Fetch-Site", "none"), 200);
+    assert_eq!(server.get(&format!("http://evil.example{target}")).status, 421);
+    let hosts = [("Host", "localhost"), ("Host", "evil.example")];
+    assert_eq!(server.request("GET", target, &hosts, b"").status, 400);
+    assert_eq!(server.raw(b"GET / HTTP/1.1\r\nConnection: close\r\n\r\n").status, 400, "missing host");
 }
 
 #[test]
@@ -393,7 +293,7 @@ fn the_page_and_the_report_are_served() {
     assert_eq!(server.request("POST", "/", &[], b"x").status, 405);
 }
 
-/// The server blocks no other process: it opens the history only while it answers a request.
+/// The server blocks no other process: it reads snapshots of the history.
 #[test]
 fn a_second_process_can_use_the_history_beside_the_server() {
     let folder = tempfile::tempdir().unwrap();
@@ -427,8 +327,12 @@ fn a_second_process_can_use_the_history_beside_the_server() {
 #[test]
 fn ctrl_c_stops_the_server_cleanly() {
     let mut server = Server::alone(&[]);
+    assert_eq!(server.get("/nowhere").status, 404);
     signal(server.process.id(), "INT");
     assert_eq!(server.process.wait().unwrap().code(), Some(0));
+    let mut said = String::new();
+    server.output.read_to_string(&mut said).unwrap();
+    assert!(said.starts_with("0 requests served, 1 refused, 0 failed; 99 % of them within "), "{said}");
     assert!(TcpStream::connect(("127.0.0.1", server.port)).is_err());
 }
 

@@ -30,7 +30,8 @@ pub use findings::{Findings, RuleFault, WitnessRow};
 pub use judgement::{Judgement, Outcome};
 pub use printable::{printable, printable_in_colour};
 pub use query_texts::{
-    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls, string_end,
+    COUNTED_TEXT, MOST_NESTED_CALLS, TEXT_FUNCTIONS, TextFunction, TextTooLong, bounded_texts, check_calls,
+    check_calls_within, string_end,
 };
 pub use rotation::{tilt_of, yaw_of};
 pub use run_facts::{ActionFacts, RunFacts, Triple};

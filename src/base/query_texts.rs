@@ -61,6 +61,14 @@ pub fn bounded_texts(query: &str) -> String {
 /// # Errors
 /// Place of the first call that is deeper, in bytes.
 pub fn check_calls(query: &str) -> Result<(), usize> {
+    check_calls_within(query, MOST_NESTED_CALLS)
+}
+
+/// Like [`check_calls`], with another maximum.
+///
+/// # Errors
+/// As [`check_calls`].
+pub fn check_calls_within(query: &str, most: usize) -> Result<(), usize> {
     // For each open parenthesis, whether it begins the arguments of such a call.
     let mut open: Vec<bool> = Vec::new();
     let (mut rest, mut calls) = (query, false);
@@ -68,7 +76,7 @@ pub fn check_calls(query: &str) -> Result<(), usize> {
         match token {
             "(" => {
                 open.push(calls);
-                if open.iter().filter(|call| **call).count() > MOST_NESTED_CALLS {
+                if open.iter().filter(|call| **call).count() > most {
                     return Err(query.len() - rest.len());
                 }
             }

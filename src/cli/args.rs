@@ -130,10 +130,10 @@ pub enum Command {
     Query(crate::query::QueryArgs),
     /// Serve a history over HTTP: a read-only SPARQL 1.1 endpoint, a query page, and the current report
     ///
-    /// Each query runs in its own process, which is stopped if it exceeds its limit of time, memory or answer size.
-    /// Updates, `SERVICE`, file access and requests from pages of other sites are refused. The history is open only
-    /// during a query, so that other commands can use it in between; while one of them writes, the server answers 503
-    /// with Retry-After.
+    /// Light queries are answered at once. Others wait for a process, which is stopped if it exceeds its limit of time,
+    /// memory or answer size. Updates, `SERVICE`, file access and requests from pages of other sites are refused. Answers
+    /// come from snapshots, so that other commands can use and change the history meanwhile. `/health` counts requests and
+    /// reports their response times.
     ///
     /// Exit code: 0 stopped by Ctrl-C, 2 the history could not be served.
     #[command(

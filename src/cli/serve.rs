@@ -37,7 +37,7 @@ pub struct ServeArgs {
     /// Memory limit for a query
     #[arg(long, value_name = "MB", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(100..=1_000_000))]
     pub max_memory_mb: u64,
-    /// Maximum number of concurrent queries
+    /// Maximum number of processes for queries that are not light; others wait
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..))]
     pub max_queries: u16,
     /// The folder of the history.
@@ -45,7 +45,7 @@ pub struct ServeArgs {
     pub history: HistoryArgs,
 }
 
-/// `actcheck serve-query`, which [`serve`] starts for each query.
+/// `actcheck serve-query`, which [`serve`] starts for queries that are not light.
 #[derive(Debug, Args)]
 pub struct ServeQueryArgs {
     /// The folder of the history.
@@ -80,10 +80,11 @@ pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
     ));
     // Only Ctrl-C sends; if its handler is dropped, the wait ends too.
     let _ = waiting.recv();
+    output::print(&format!("{}\n", serving.counts));
     Ok(())
 }
 
-/// Answers the query from standard input.
+/// Answers the queries from standard input.
 pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
     let folder = history_dir::folder(&args.history)?;
     serve::answer(&folder, std::io::stdin().lock(), std::io::stdout().lock())

@@ -21,6 +21,20 @@ pub(super) fn in_use(dir: &Path) -> Diagnostics {
         .into()
 }
 
+/// H002: another process is creating the history.
+pub(super) fn being_created(dir: &Path) -> Diagnostics {
+    Diagnostic::error("H002", format!("the history `{}` is being created by another process", dir.display()))
+        .help("try again in a moment: it has no runs yet")
+        .into()
+}
+
+/// H003: the process that created the history was stopped before it was complete.
+pub(super) fn not_created(dir: &Path) -> Diagnostics {
+    Diagnostic::error("H003", format!("the history `{}` has no runs: its creation was interrupted", dir.display()))
+        .help("`actcheck run CONFIG` completes it, and adds runs; or name another folder with `--history DIR`")
+        .into()
+}
+
 /// H003: the folder has no history.
 pub(super) fn none_there(dir: &Path) -> Diagnostics {
     Diagnostic::error("H003", format!("there is no history at `{}`", dir.display()))

@@ -59,7 +59,9 @@ impl Folder {
     /// An existing folder, to read it while other processes may read or write it.
     pub(super) fn to_read(dir: &Path) -> Result<Self, Diagnostics> {
         if !has_version(dir)? {
-            return Err(if holds_other_things(dir) { fault::foreign(dir) } else { fault::none_there(dir) });
+            // A process may have created the history meanwhile.
+            let is_foreign = holds_other_things(dir) && !has_version(dir)?;
+            return Err(if is_foreign { fault::foreign(dir) } else { fault::none_there(dir) });
         }
         Ok(Self { dir: dir.to_path_buf(), _lock: None })
     }

@@ -11,6 +11,7 @@ mod folder;
 mod frames;
 mod graphs;
 mod integrity;
+mod light;
 mod lists;
 pub mod merge;
 mod newest;
@@ -49,5 +50,5 @@ pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, R
 pub use scene_digest::SceneDigest;
 pub use store::History;
 pub use vitals::RunVitals;
-pub use wire::{WireFault, WireSyntax};
+pub use wire::{WireFault, WireLimits, WireSyntax};
 pub use write_scene::{NOISE_TERMS, noise};

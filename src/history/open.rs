@@ -4,6 +4,8 @@ use std::ops::Deref;
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
 use std::sync::{Arc, PoisonError, RwLock};
+use std::thread::sleep;
+use std::time::Duration;
 
 use oxigraph::store::Store;
 
@@ -13,6 +15,11 @@ use crate::seal::{Found, Seal};
 use crate::snapshot::{MOST_COMPARED, Snapshot};
 use crate::{History, fault};
 use actcheck_base::Diagnostics;
+
+/// Time between two tries to read a history that another process is creating.
+const PAUSE: Duration = Duration::from_millis(10);
+/// Number of these tries. Creating takes some tenths of a second, because the store syncs each of its parts to the disk.
+const TRIES: usize = 300;
 
 /// An open store. All clones use the same one.
 #[derive(Clone)]
@@ -59,10 +66,10 @@ impl History {
     /// and other processes may read and write it at the same time, before and after.
     ///
     /// # Errors
-    /// As [`History::open_existing`], but `H002` only while another process is creating it.
+    /// As [`History::open_existing`], but `H002` only if another process takes seconds to create it.
     pub fn open_to_read(dir: &Path) -> Result<Self, Diagnostics> {
         let folder = Folder::to_read(dir)?;
-        let opened = read(&folder, Snapshot::take(&folder)?)?;
+        let opened = read_present(&folder, TRIES)?;
         Ok(Self { opened: RwLock::new(Some(opened)), folder, logged: AtomicUsize::new(0) })
     }
 
@@ -87,16 +94,19 @@ impl History {
     /// # Errors
     /// As [`History::open_to_read`]; the earlier snapshot is then kept.
     pub fn refresh(&self) -> Result<bool, Diagnostics> {
-        let is_stale = {
-            let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
-            let snapshot = opened.as_ref().and_then(|opened| opened.snapshot.as_ref());
-            snapshot.is_some_and(|snapshot| snapshot.is_stale(&self.folder))
-        };
+        let is_stale = self.is_stale();
         if is_stale {
-            let opened = read(&self.folder, Snapshot::take(&self.folder)?)?;
+            let opened = read_present(&self.folder, TRIES)?;
             *self.opened.write().unwrap_or_else(PoisonError::into_inner) = Some(opened);
         }
         Ok(is_stale)
+    }
+
+    /// Whether the history has changed since the last snapshot was taken. Takes some microseconds.
+    pub fn is_stale(&self) -> bool {
+        let opened = self.opened.read().unwrap_or_else(PoisonError::into_inner);
+        let snapshot = opened.as_ref().and_then(|opened| opened.snapshot.as_ref());
+        snapshot.is_some_and(|snapshot| snapshot.is_stale(&self.folder))
     }
 
     fn open_folder(folder: Folder) -> Result<Self, Diagnostics> {
@@ -138,6 +148,36 @@ impl Drop for History {
     }
 }
 
+/// Opens the present state of a store. A store that another process is creating lacks parts, as a damaged one does, so it is
+/// tried again for a moment.
+fn read_present(folder: &Folder, tries: usize) -> Result<Opened, Diagnostics> {
+    let (mut left, mut was_locked) = (tries, true);
+    loop {
+        let faults = match Snapshot::take(folder).and_then(|snapshot| read(folder, snapshot)) {
+            Ok(opened) => return Ok(opened),
+            Err(faults) => faults,
+        };
+        // The first owner seals the store when it closes it.
+        let is_new = matches!(Seal::read(folder), Found::Missing);
+        if !is_new || faults.iter().all(|fault| !["H002", "H007"].contains(&fault.code)) {
+            return Err(faults);
+        }
+        let is_locked = folder.is_locked();
+        if is_locked && left == 0 {
+            return Err(fault::being_created(folder.dir()));
+        }
+        if is_locked {
+            left -= 1;
+            sleep(PAUSE);
+        } else if !was_locked {
+            let is_empty = folder.traced().is_empty();
+            return Err(if is_empty { fault::not_created(folder.dir()) } else { faults });
+        }
+        // If the owner is gone now, it may have completed the store after it was read.
+        was_locked = is_locked;
+    }
+}
+
 fn read(folder: &Folder, snapshot: Snapshot) -> Result<Opened, Diagnostics> {
     let store = Store::open_read_only(snapshot.store());
     let store = store.map_err(|error| fault::damaged(folder.dir(), &error.to_string()))?;
@@ -156,4 +196,56 @@ fn own(folder: &Folder) -> Result<Opened, Diagnostics> {
         }
     }
     Ok(Opened { store: OpenStore { store, _snapshot: None }, snapshot: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::ScratchFolder;
+    use std::fs;
+
+    fn codes(folder: &Folder) -> Vec<&'static str> {
+        match read_present(folder, 0) {
+            Ok(_) => Vec::new(),
+            Err(faults) => faults.iter().map(|fault| fault.code).collect(),
+        }
+    }
+
+    /// A reader met a store whose column families or version were not written yet, and called it damaged.
+    #[test]
+    fn a_history_that_is_being_created_is_not_reported_as_damaged() {
+        let scratch = ScratchFolder::create().expect("it can be created");
+        let dir = scratch.path().join("history");
+        drop(History::open(&dir).expect("it can be created"));
+        fs::remove_dir_all(dir.join("seal")).expect("it was sealed");
+        let store = dir.join("store");
+        let files = || fs::read_dir(&store).expect("it exists").map(|entry| entry.expect("it can be read").path());
+        let named = |part: &str| {
+            let is_named = |path: &std::path::PathBuf| {
+                path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(part))
+            };
+            files().find(is_named).expect("the store has it")
+        };
+        let (manifest, current) = (named("MANIFEST-"), named("CURRENT"));
+        let written = fs::read(&manifest).expect("it can be read");
+        let reader = Folder::to_read(&dir).expect("it is a history");
+        let mut seen = [0, 0];
+        // The manifest grows with each part that is created.
+        for length in (0..written.len()).step_by(41) {
+            fs::write(&manifest, &written[..length]).expect("it can be written");
+            let owner = Folder::lock_exclusive(&dir, false).expect("it is not locked");
+            let during = codes(&reader);
+            drop(owner);
+            let after = codes(&reader);
+            assert!(during.is_empty() || during == ["H002"], "{length}: {during:?}");
+            assert!(after.is_empty() || after == ["H003"], "{length}: {after:?}");
+            seen = [seen[0] + during.len(), seen[1] + after.len()];
+        }
+        assert!(seen.iter().all(|faults| *faults > 2), "{seen:?}");
+        fs::remove_file(current).expect("it exists");
+        assert_eq!(codes(&reader), ["H003"]);
+        // With runs, the same is damage.
+        fs::write(reader.trace("k7f3-0"), "").expect("it can be written");
+        assert_eq!(codes(&reader), ["H007"]);
+    }
 }

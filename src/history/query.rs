@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use oxigraph::model::{NamedNode, Term as StoreTerm};
-use oxigraph::sparql::{QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError};
+use oxigraph::sparql::{PreparedSparqlQuery, QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError};
 
 use crate::evaluation::{Unfinished, evaluate};
 use crate::fault;
@@ -30,27 +30,44 @@ const LONGEST_TEXT: usize = 32 << 20;
 pub(super) fn answer(dir: &Path, store: OpenStore, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
-    if let Err(at) = check_calls(&text.text) {
-        let message = format!("calls are nested more than {MOST_NESTED_CALLS} deep");
-        let help = "name the inner values, as in `BIND(CONCAT(?a, ?b) AS ?c)`";
-        return Err(Diagnostic::error("H010", message).at(text, at..at + 1).help(help).into());
-    }
-    let syntax = |error: SparqlSyntaxError| syntax_fault(text, &error.to_string());
-    drop(evaluator(cancel).parse_query(&*text.text).map_err(syntax)?);
-    // Places in the text that is evaluated differ from the original's, so errors were reported before.
-    let made = Arc::new(AtomicUsize::new(0));
-    let bounded = with_text_functions(evaluator(cancel), cancel, &made);
-    let prepared = bounded.parse_query(&bounded_texts(&text.text)).map_err(syntax)?;
+    let query = prepare(text, cancel)?;
+    let prepared = query.prepared.clone();
     let evaluated = evaluate(&store, cancel, move |store| prepared.on_store(store).execute().and_then(collect));
-    if made.load(Ordering::Relaxed) > MOST_TEXT {
-        return Err(too_much_text(text).into());
-    }
+    query.check_texts(text)?;
     evaluated.map_err(|fault| match fault {
         Unfinished::Stopped => stopped(text).into(),
         Unfinished::Failed(error) => evaluation_fault(text, &error).into(),
         Unfinished::Crashed => Diagnostic::error("H012", "the query made the evaluator crash").in_source(text).into(),
         Unfinished::Damaged(error) => fault::damaged(dir, &error.to_string()),
     })
+}
+
+/// A query that can be evaluated, with limits on the texts that it makes.
+pub(super) struct Prepared {
+    pub prepared: PreparedSparqlQuery,
+    /// Length of the texts so far. Unit: bytes.
+    made: Arc<AtomicUsize>,
+}
+
+impl Prepared {
+    /// Refuses a query that made too much text. Without this check, its answer lacks the texts beyond the limit.
+    pub(super) fn check_texts(&self, text: &Source) -> Result<(), Diagnostics> {
+        if self.made.load(Ordering::Relaxed) > MOST_TEXT { Err(too_much_text(text).into()) } else { Ok(()) }
+    }
+}
+
+/// Parses a query that [`refuse_excess`] accepts.
+///
+/// # Errors
+/// Syntax errors.
+pub(super) fn prepare(text: &Source, cancel: &Cancel) -> Result<Prepared, Diagnostics> {
+    let syntax = |error: SparqlSyntaxError| syntax_fault(text, &error.to_string());
+    drop(evaluator(cancel).parse_query(&*text.text).map_err(syntax)?);
+    // Places in the text that is evaluated differ from the original's, so errors were reported before.
+    let made = Arc::new(AtomicUsize::new(0));
+    let bounded = with_text_functions(evaluator(cancel), cancel, &made);
+    let prepared = bounded.parse_query(&bounded_texts(&text.text)).map_err(syntax)?;
+    Ok(Prepared { prepared, made })
 }
 
 /// Adds functions that make texts of limited length: the evaluator keeps them until the query ends. Beyond the limit, they
@@ -94,15 +111,18 @@ fn too_much_text(text: &Source) -> Diagnostic {
         .help("repeated concatenation doubles a text: write texts once, or filter the rows before")
 }
 
-/// Refuses a query that could exhaust the stack.
+/// Refuses a query that could exhaust the stack, or whose parsing takes too long.
 pub(super) fn refuse_excess(text: &Source) -> Result<(), Diagnostics> {
-    match sparql_excess(&text.text) {
-        Some((span, message)) => {
-            let help = "split it, or shorten it";
-            Err(Diagnostic::error("H010", message).at(text, span).help(help).into())
-        }
-        None => Ok(()),
+    if let Some((span, message)) = sparql_excess(&text.text) {
+        let help = "split it, or shorten it";
+        return Err(Diagnostic::error("H010", message).at(text, span).help(help).into());
     }
+    if let Err(at) = check_calls(&text.text) {
+        let message = format!("calls are nested more than {MOST_NESTED_CALLS} deep");
+        let help = "name the inner values, as in `BIND(CONCAT(?a, ?b) AS ?c)`";
+        return Err(Diagnostic::error("H010", message).at(text, at..at + 1).help(help).into());
+    }
+    Ok(())
 }
 
 fn stopped(text: &Source) -> Diagnostic {

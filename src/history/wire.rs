@@ -3,11 +3,13 @@
 use std::io;
 
 use oxigraph::sparql::results::{QueryResultsFormat, QueryResultsSerializer};
-use oxigraph::sparql::{QueryEvaluationError, QueryResults, QuerySolutionIter, QueryTripleIter};
+use oxigraph::sparql::{
+    PreparedSparqlQuery, QueryEvaluationError, QueryResults, QuerySolutionIter, QueryTripleIter, SparqlEvaluator,
+};
 
-use crate::query::{evaluation_fault, evaluator, refuse_excess, refuse_update};
+use crate::light::light;
+use crate::query::{evaluation_fault, prepare, refuse_excess, refuse_update};
 use crate::rdf_text::serializer;
-use crate::syntax_fault::syntax_fault;
 use crate::{Cancel, History, RdfSyntax};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span};
 
@@ -59,13 +61,27 @@ pub enum WireFault {
     Refused(Diagnostics),
     /// The client accepts no format of the answer.
     NotAcceptable,
+    /// The answer is larger than allowed.
+    TooLarge,
     /// The evaluation failed.
     Failed(Diagnostics),
 }
 
+/// Limits on an answer.
+#[derive(Debug, Clone, Copy)]
+pub struct WireLimits {
+    /// Maximum number of rows or triples.
+    pub rows: u64,
+    /// Maximum size. Unit: bytes.
+    pub bytes: u64,
+}
+
+/// An answer and its format.
+pub type WireAnswer = (WireSyntax, Vec<u8>);
+
 impl History {
-    /// Answers a query in the format that `choose` selects from those available. Refuses answers with more than
-    /// `most_rows` rows or triples. Can't be cancelled: to stop it early, end the process.
+    /// Answers a query in the format that `choose` selects from those available. Can't be cancelled: to stop it early,
+    /// end the process.
     ///
     /// # Errors
     /// See [`WireFault`].
@@ -73,17 +89,44 @@ impl History {
         &self,
         text: &Source,
         choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
-        most_rows: u64,
-    ) -> Result<(WireSyntax, Vec<u8>), WireFault> {
+        limits: WireLimits,
+    ) -> Result<WireAnswer, WireFault> {
         refuse_update(text).map_err(WireFault::Refused)?;
         refuse_excess(text).map_err(WireFault::Refused)?;
         if let Some(span) = service(&text.text) {
             let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
-        let prepared = evaluator(&Cancel::new())
-            .parse_query(&*text.text)
-            .map_err(|error| WireFault::Malformed(syntax_fault(text, &error.to_string()).into()))?;
+        let query = prepare(text, &Cancel::new()).map_err(WireFault::Malformed)?;
+        let answer = self.evaluate(query.prepared.clone(), text, choose, limits);
+        query.check_texts(text).map_err(WireFault::Refused)?;
+        answer
+    }
+
+    /// Answers a light query within the process of a server: one that stops soon after `cancel`, and that can't exhaust
+    /// memory before. Returns `None` for any other text, valid or not.
+    ///
+    /// # Errors
+    /// See [`WireFault`]. A cancelled query is [`WireFault::Failed`].
+    pub fn light_answer(
+        &self,
+        text: &Source,
+        choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
+        limits: WireLimits,
+        cancel: &Cancel,
+    ) -> Option<Result<WireAnswer, WireFault>> {
+        let query = light(&text.text)?;
+        let prepared = SparqlEvaluator::new().with_cancellation_token(cancel.token()).for_query(query);
+        Some(self.evaluate(prepared, text, choose, limits))
+    }
+
+    fn evaluate(
+        &self,
+        prepared: PreparedSparqlQuery,
+        text: &Source,
+        choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
+        limits: WireLimits,
+    ) -> Result<WireAnswer, WireFault> {
         let failed = |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
         let store = self.store().map_err(WireFault::Failed)?;
         let written = match prepared.on_store(&store).execute().map_err(failed)? {
@@ -94,20 +137,21 @@ impl History {
             }
             QueryResults::Solutions(solutions) => {
                 let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
-                table(solutions, syntax, most_rows).map(|body| (syntax, body))
+                table(solutions, syntax, limits).map(|body| (syntax, body))
             }
             QueryResults::Graph(triples) => {
                 let syntax = choose(&WireSyntax::GRAPHS).ok_or(WireFault::NotAcceptable)?;
-                graph(triples, syntax, most_rows).map(|body| (syntax, body))
+                graph(triples, syntax, limits).map(|body| (syntax, body))
             }
         };
         written.map_err(|stop| match stop {
             Stop::TooMany => {
-                let message = format!("the answer has more than {most_rows} rows");
+                let message = format!("the answer has more than {} rows", limits.rows);
                 let fault = Diagnostic::error("H018", message)
                     .help("request less, or fetch it in parts with `LIMIT` and `OFFSET`");
                 WireFault::Refused(fault.into())
             }
+            Stop::TooLarge => WireFault::TooLarge,
             Stop::Evaluation(error) => failed(error),
             Stop::Writing(error) => WireFault::Failed(Diagnostic::error("H012", error.to_string()).into()),
         })
@@ -117,13 +161,40 @@ impl History {
 /// The reason why an answer was not written completely.
 enum Stop {
     TooMany,
+    TooLarge,
     Evaluation(QueryEvaluationError),
     Writing(io::Error),
 }
 
 impl From<io::Error> for Stop {
     fn from(error: io::Error) -> Self {
-        Self::Writing(error)
+        if error.kind() == io::ErrorKind::FileTooLarge { Self::TooLarge } else { Self::Writing(error) }
+    }
+}
+
+/// Bytes up to a maximum size; writing more fails.
+struct Bounded {
+    bytes: Vec<u8>,
+    most: u64,
+}
+
+impl Bounded {
+    fn new(most: u64) -> Self {
+        Self { bytes: Vec::new(), most }
+    }
+}
+
+impl io::Write for Bounded {
+    fn write(&mut self, more: &[u8]) -> io::Result<usize> {
+        if (self.bytes.len() + more.len()) as u64 > self.most {
+            return Err(io::ErrorKind::FileTooLarge.into());
+        }
+        self.bytes.extend_from_slice(more);
+        Ok(more.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 
@@ -142,32 +213,33 @@ fn table_format(syntax: WireSyntax) -> QueryResultsFormat {
     }
 }
 
-fn table(solutions: QuerySolutionIter<'_>, syntax: WireSyntax, most_rows: u64) -> Result<Vec<u8>, Stop> {
+fn table(solutions: QuerySolutionIter<'_>, syntax: WireSyntax, limits: WireLimits) -> Result<Vec<u8>, Stop> {
     let serializer = QueryResultsSerializer::from_format(table_format(syntax));
-    let mut writer = serializer.serialize_solutions_to_writer(Vec::new(), solutions.variables().to_vec())?;
+    let mut writer =
+        serializer.serialize_solutions_to_writer(Bounded::new(limits.bytes), solutions.variables().to_vec())?;
     for (solution, number) in solutions.zip(1u64..) {
-        if number > most_rows {
+        if number > limits.rows {
             return Err(Stop::TooMany);
         }
         writer.serialize(&solution?)?;
     }
-    Ok(writer.finish()?)
+    Ok(writer.finish()?.bytes)
 }
 
-fn graph(triples: QueryTripleIter<'_>, syntax: WireSyntax, most_rows: u64) -> Result<Vec<u8>, Stop> {
+fn graph(triples: QueryTripleIter<'_>, syntax: WireSyntax, limits: WireLimits) -> Result<Vec<u8>, Stop> {
     let syntax = match syntax {
         WireSyntax::NTriples => RdfSyntax::NTriples,
         WireSyntax::RdfXml => RdfSyntax::RdfXml,
         _ => RdfSyntax::Turtle,
     };
-    let mut writer = serializer(syntax).for_writer(Vec::new());
+    let mut writer = serializer(syntax).for_writer(Bounded::new(limits.bytes));
     for (triple, number) in triples.zip(1u64..) {
-        if number > most_rows {
+        if number > limits.rows {
             return Err(Stop::TooMany);
         }
         writer.serialize_triple(&triple?)?;
     }
-    Ok(writer.finish()?)
+    Ok(writer.finish()?.bytes)
 }
 
 /// Returns the span of the keyword `SERVICE` outside of strings, IRIs, names and comments, or `None` if it does not

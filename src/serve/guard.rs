@@ -4,21 +4,40 @@ use std::net::IpAddr;
 
 use crate::question::Refusal;
 
-/// Checks the headers `Host` and `Origin`.
+/// The headers that say where a request comes from.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Origin<'a> {
+    /// `Host`.
+    pub host: Option<&'a str>,
+    /// The host of a request target in absolute form.
+    pub target_host: Option<&'a str>,
+    /// `Origin`: the page that sent a POST or a script's request.
+    pub origin: Option<&'a str>,
+    /// `Sec-Fetch-Site`: the relation of that page to this server, in the words of a browser.
+    pub site: Option<&'a str>,
+}
+
+/// Checks the origin of a request.
 ///
 /// The page of another site could make its own name resolve to this machine (DNS rebinding) and then read the
-/// responses. Therefore the host must be an IP address, `localhost`, or an allowed name.
-pub(super) fn guard(host: Option<&str>, origin: Option<&str>, allowed: &[String]) -> Result<(), Refusal> {
-    let Some(host) = host else { return Err(Refusal::new(400, "the header `Host` is missing")) };
-    if !is_known(name(host), allowed) {
-        let why = format!("`{}` is not a name of this server; `--allow-host` adds one", name(host));
-        return Err(Refusal::new(421, why));
+/// responses. Therefore the host must be an IP address, `localhost`, or an allowed name. It could also send requests
+/// here whose responses it can't read, but which take time: browsers mark these.
+pub(super) fn guard(from: &Origin<'_>, allowed: &[String]) -> Result<(), Refusal> {
+    let Some(host) = from.host else { return Err(Refusal::new(400, "the header `Host` is missing")) };
+    for host in [Some(host), from.target_host].into_iter().flatten() {
+        if !is_known(name(host), allowed) {
+            let why = format!("`{}` is not a name of this server; `--allow-host` adds one", name(host));
+            return Err(Refusal::new(421, why));
+        }
     }
-    match origin {
-        None => Ok(()),
-        Some(origin) if origin.split_once("://").is_some_and(|(_, of)| of.eq_ignore_ascii_case(host)) => Ok(()),
-        Some(_) => Err(Refusal::new(403, "requests from pages of another origin are forbidden")),
+    let same = |origin: &str| origin.split_once("://").is_some_and(|(_, of)| of.eq_ignore_ascii_case(host));
+    // `none`: the user entered the address.
+    if from.origin.is_some_and(|origin| !same(origin))
+        || from.site.is_some_and(|site| !["same-origin", "none"].contains(&site))
+    {
+        return Err(Refusal::new(403, "requests from pages of another origin are forbidden"));
     }
+    Ok(())
 }
 
 /// The host without its port.
@@ -56,8 +75,26 @@ mod tests {
             (Some("localhost:7878"), Some("null"), Some(403)),
             (Some("localhost:7878"), Some("http://localhost:1"), Some(403)),
         ] {
-            let refused = guard(host, origin, &allowed).err().map(|refusal| refusal.status);
+            let from = Origin { host, origin, ..Origin::default() };
+            let refused = guard(&from, &allowed).err().map(|refusal| refusal.status);
             assert_eq!(refused, status, "{host:?} {origin:?}");
+        }
+    }
+
+    #[test]
+    fn pages_of_other_sites_are_refused() {
+        for (site, target_host, status) in [
+            (None, None, None),
+            (Some("none"), None, None),
+            (Some("same-origin"), Some("localhost:7878"), None),
+            (Some("same-site"), None, Some(403)),
+            (Some("cross-site"), None, Some(403)),
+            (Some("anything"), None, Some(403)),
+            (None, Some("evil.example"), Some(421)),
+        ] {
+            let from = Origin { host: Some("localhost:7878"), target_host, site, ..Origin::default() };
+            let refused = guard(&from, &[]).err().map(|refusal| refusal.status);
+            assert_eq!(refused, status, "{site:?} {target_host:?}");
         }
     }
 }

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError, RwLock};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
+
+use hyper::body::Bytes;
 
 use crate::question::Refusal;
 use crate::worker::{Ended, Worker};
@@ -12,6 +14,8 @@ use crate::worker::{Ended, Worker};
 const MOST_TIME: Duration = Duration::from_secs(300);
 /// Maximum size of the page. Unit: bytes.
 const MOST_BYTES: u64 = 1 << 30;
+/// Folders that a report depends on.
+const FOLDERS: [&str; 3] = ["store", "tables", "traces"];
 
 /// Paths, sizes and modification times of a history's files.
 type State = BTreeMap<PathBuf, (u64, Option<SystemTime>)>;
@@ -21,35 +25,38 @@ type State = BTreeMap<PathBuf, (u64, Option<SystemTime>)>;
 pub(super) struct LiveReport {
     pub worker: Worker,
     pub history: PathBuf,
-    pub kept: Mutex<Option<(State, Vec<u8>)>>,
+    pub kept: Mutex<Option<(State, Bytes)>>,
 }
 
 impl LiveReport {
-    /// Returns the page. `history` is locked while it is rendered.
+    /// Returns the last page if the history is unchanged.
+    pub fn cached(&self) -> Option<Bytes> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let (of, page) = kept.as_ref()?;
+        (*of == state(&self.history)).then(|| page.clone())
+    }
+
+    /// Renders the page.
     ///
     /// # Errors
-    /// A refusal if the page can't be rendered in time, or a campaign locks the history and no page was rendered before.
-    pub fn page(&self, history: &RwLock<()>) -> Result<Vec<u8>, Refusal> {
-        // Concurrent requests wait for the same page.
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((of, page)) = &*kept
-            && *of == state(&self.history)
-        {
-            return Ok(page.clone());
+    /// A refusal if the page can't be rendered, and no page was rendered before, or if that takes too long.
+    pub fn render(&self) -> Result<Bytes, Refusal> {
+        // Another request may have rendered it while this one waited.
+        if let Some(page) = self.cached() {
+            return Ok(page);
         }
-        let ended = {
-            let _alone = history.write().unwrap_or_else(PoisonError::into_inner);
-            self.worker.run(&[], MOST_TIME, MOST_BYTES)
-        };
+        let ended = self.worker.run(MOST_TIME, MOST_BYTES);
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         match ended {
             Ended::Itself { code: Some(0), output, .. } => {
                 // Rendering updates the tables beside the history.
-                *kept = Some((state(&self.history), output.clone()));
-                Ok(output)
+                let page = Bytes::from(output);
+                *kept = Some((state(&self.history), page.clone()));
+                Ok(page)
             }
             Ended::Itself { errors, .. } => {
                 let why = String::from_utf8_lossy(&errors).into_owned();
-                // While a campaign locks the history, the previous page is served.
+                // Such as a damaged history: the previous page is served.
                 match &*kept {
                     Some((_, page)) => Ok(page.clone()),
                     None => Err(Refusal::new(503, why)),
@@ -63,12 +70,10 @@ impl LiveReport {
 }
 
 fn state(history: &Path) -> State {
-    // The store's log files change with every access.
-    let files = ["store", "tables", "traces"]
-        .iter()
-        .flat_map(|part| std::fs::read_dir(history.join(part)).into_iter().flatten());
+    let files = FOLDERS.iter().flat_map(|part| std::fs::read_dir(history.join(part)).into_iter().flatten());
     files
         .filter_map(Result::ok)
+        // The store's log files change with every access.
         .filter(|entry| !entry.file_name().to_string_lossy().starts_with("LOG"))
         .filter_map(|entry| entry.metadata().ok().map(|data| (entry.path(), (data.len(), data.modified().ok()))))
         .collect()

@@ -1,52 +1,59 @@
-//! The HTTP server: routes requests and runs worker processes.
+//! The HTTP server: accepts connections and routes requests.
 
-use std::io::{Error, ErrorKind, Read as _};
+use std::convert::Infallible;
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use oxhttp::Server;
-use oxhttp::model::header::{self, HeaderName, HeaderValue};
-use oxhttp::model::{Body, Request, Response, StatusCode};
+use hyper::body::{Bytes, Incoming};
+use hyper::header;
+use hyper::http::request;
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper::{Method, Request, Response};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::runtime::Runtime;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 
-use crate::answer::{Head, Question};
+use crate::answer::{Question, too_large};
+use crate::body::AnswerBody;
+use crate::connections::{Connections, Doing};
+use crate::counts::Counts;
 use crate::guard::guard;
+use crate::lanes::{Evaluated, Lanes, processors};
 use crate::page::{self, ExampleQuery};
 use crate::question::{Parts, Refusal, question};
+use crate::reply::{NO_POLICY, PAGE_POLICY, REPORT_POLICY, Reply, response};
 use crate::report::LiveReport;
-use crate::watch;
-use crate::worker::{Ended, Worker};
+use crate::request::{PATIENCE, origin, read, text};
+use crate::snapshot::Snapshots;
+use crate::threads::Threads;
+use crate::worker::{Asked, Worker};
 
-/// Maximum size of a request body. Unit: bytes.
-const MOST_BODY: u64 = 1 << 20;
-/// Time limit for a client to send its request.
-const PATIENCE: Duration = Duration::from_secs(10);
-/// Maximum number of concurrent connections; others wait.
-const MOST_CONNECTIONS: usize = 64;
-/// Additional time for a process to start and open the history.
-const START: Duration = Duration::from_secs(5);
-/// Maximum number of tries for a free port, because another program may take it in between.
-const TRIES: usize = 8;
-
-/// Policy of the query page: load its script and stylesheet, and connect to this server.
-const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
-/// Policy of the report, a single file with inline scripts and images that connects to no server. The file also has a
-/// policy of its own, which names its scripts by digest; both apply. This one adds `frame-ancestors`, which only a
-/// header can set.
-const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-/// Policy of answers, which are not pages.
-const NO_POLICY: &str = "default-src 'none'; frame-ancestors 'none'; sandbox";
+/// Maximum size of the head of a request: twice the longest target that the library accepts. Unit: bytes.
+const MOST_HEAD: usize = 128 << 10;
+/// Stack of a thread that evaluates light queries; only the used part takes memory. Unit: bytes.
+const STACK: usize = 64 << 20;
+/// Threads for connections for each processor: a query may occupy one for a moment.
+const THREADS: usize = 4;
+/// Threads that evaluate light queries, besides one for each processor: for stopped queries that have not ended yet.
+const SPARE_THREADS: usize = 6;
+/// Number of the largest allowed answers that may wait for their clients at a time.
+const MOST_ANSWERS: u64 = 4;
+/// Unit in which memory for answers is counted. Unit: bytes.
+const MEMORY_UNIT: u64 = 64 << 10;
+/// Interval at which stalled connections are closed.
+const TIDY_EVERY: Duration = Duration::from_secs(1);
 
 /// Options of [`serve`].
 #[derive(Debug, Clone)]
 pub struct ServeOptions {
     /// Folder of the history.
     pub history: PathBuf,
-    /// Path of this program, which is started for each query.
+    /// Path of this program, which is started for queries that are not light.
     pub program: PathBuf,
-    /// Arguments with which it answers a query ([`crate::answer()`]).
+    /// Arguments with which it answers queries ([`crate::answer()`]).
     pub query_arguments: Vec<String>,
     /// Arguments with which it prints the report.
     pub report_arguments: Vec<String>,
@@ -64,17 +71,30 @@ pub struct ServeOptions {
     pub most_bytes: u64,
     /// Memory limit of a query. Unit: bytes.
     pub most_memory: u64,
-    /// Maximum number of concurrent queries.
+    /// Maximum number of processes that evaluate queries.
     pub most_queries: usize,
     /// Example queries of the page.
     pub examples: Vec<ExampleQuery>,
 }
 
-/// A server that runs until the process ends.
+/// A server that runs until the value is dropped.
 #[derive(Debug)]
 pub struct Serving {
     /// Address on which it listens.
     pub address: SocketAddr,
+    /// Requests so far.
+    pub counts: Arc<Counts>,
+    runtime: Option<Runtime>,
+    lanes: Arc<Lanes>,
+}
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        self.lanes.close();
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_background();
+        }
+    }
 }
 
 /// Starts the server.
@@ -82,220 +102,212 @@ pub struct Serving {
 /// # Errors
 /// The address can't be bound.
 pub fn serve(options: ServeOptions) -> std::io::Result<Serving> {
-    let (ip, wanted) = (options.address, options.port);
-    let state = std::sync::Arc::new(AppState::new(options));
-    let mut last = Error::from(ErrorKind::AddrInUse);
-    for _ in 0..if wanted == 0 { TRIES } else { 1 } {
-        let address = match wanted {
-            // The library does not report its port, so bind a free one first and reuse it.
-            0 => TcpListener::bind((ip, 0))?.local_addr()?,
-            port => SocketAddr::new(ip, port),
-        };
-        let shared = std::sync::Arc::clone(&state);
-        let server = Server::new(move |request| shared.respond(request))
-            .bind(address)
-            .with_global_timeout(PATIENCE)
-            .with_max_concurrent_connections(MOST_CONNECTIONS);
-        match server.spawn() {
-            // Its threads continue without the handle.
-            Ok(_) => return Ok(Serving { address }),
-            Err(error) => last = error,
-        }
-    }
-    Err(last)
+    let listener = TcpListener::bind((options.address, options.port))?;
+    listener.set_nonblocking(true)?;
+    let address = listener.local_addr()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .max_blocking_threads(processors() + SPARE_THREADS)
+        .thread_stack_size(STACK)
+        .enable_all()
+        .build()?;
+    let inside = runtime.enter();
+    let listener = tokio::net::TcpListener::from_std(listener)?;
+    let app = Arc::new(App::new(options, Threads::start(processors() * THREADS, STACK)?));
+    drop(inside);
+    let (counts, lanes) = (Arc::clone(&app.counts), Arc::clone(&app.lanes));
+    runtime.spawn(app.run(listener));
+    Ok(Serving { address, counts, runtime: Some(runtime), lanes })
 }
 
 /// State shared by all requests.
-struct AppState {
+struct App {
     options: ServeOptions,
-    query: Worker,
-    report: LiveReport,
-    page: String,
-    running: AtomicUsize,
-    /// Queries take the read lock, the report the write lock, because it needs exclusive access.
-    history: RwLock<()>,
+    lanes: Arc<Lanes>,
+    report: Arc<LiveReport>,
+    page: Bytes,
+    counts: Arc<Counts>,
+    connections: Arc<Connections>,
+    threads: Threads,
+    /// Memory for large answers, in [`MEMORY_UNIT`]s.
+    memory: Arc<Semaphore>,
+    /// Concurrent requests for the report wait for the same page.
+    rendering: Arc<tokio::sync::Mutex<()>>,
 }
 
-/// A response before conversion to the library's type.
-struct Reply {
-    status: u16,
-    media_type: String,
-    policy: &'static str,
-    body: Vec<u8>,
-}
-
-impl Reply {
-    fn page(media_type: &str, policy: &'static str, body: impl Into<Vec<u8>>) -> Self {
-        Self { status: 200, media_type: media_type.to_owned(), policy, body: body.into() }
-    }
-}
-
-impl From<Refusal> for Reply {
-    fn from(Refusal { status, why }: Refusal) -> Self {
-        let body = format!("{}\n", why.trim_end()).into_bytes();
-        Self { status, media_type: "text/plain; charset=utf-8".to_owned(), policy: NO_POLICY, body }
-    }
-}
-
-impl AppState {
-    fn new(options: ServeOptions) -> Self {
+impl App {
+    fn new(options: ServeOptions, threads: Threads) -> Self {
         let worker = |arguments: &[String]| Worker { program: options.program.clone(), arguments: arguments.to_vec() };
         let report = LiveReport {
             worker: worker(&options.report_arguments),
             history: options.history.clone(),
             kept: Mutex::new(None),
         };
-        let page = page::page(&options.history.display().to_string(), &options.examples);
-        let (query, running) = (worker(&options.query_arguments), AtomicUsize::new(0));
-        Self { query, report, page, running, history: RwLock::new(()), options }
-    }
-
-    fn respond(&self, request: &mut Request<Body>) -> Response<Body> {
-        let reply = self.reply(request).unwrap_or_else(Reply::from);
-        let head = request.method().as_str() == "HEAD";
-        // The rest of the request is not read, so the connection can't be reused.
-        *request.body_mut() = Body::empty();
-        request.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
-        response(reply, head)
-    }
-
-    fn reply(&self, request: &mut Request<Body>) -> Result<Reply, Refusal> {
-        let header = |name: HeaderName| request.headers().get(name).and_then(|value| value.to_str().ok());
-        guard(header(header::HOST), header(header::ORIGIN), &self.options.hosts)?;
-        let (path, method) = (request.uri().path(), request.method().as_str());
-        let reads = matches!(method, "GET" | "HEAD");
-        match path {
-            "/sparql" => self.sparql(request),
-            "/" | "/style.css" | "/query.js" | "/report" if !reads => Err(Refusal::new(405, "use GET or HEAD")),
-            "/" => Ok(Reply::page("text/html; charset=utf-8", PAGE_POLICY, self.page.as_str())),
-            "/style.css" => Ok(Reply::page("text/css; charset=utf-8", NO_POLICY, page::STYLE)),
-            "/query.js" => Ok(Reply::page("text/javascript; charset=utf-8", NO_POLICY, page::SCRIPT)),
-            "/report" => {
-                let page = self.report.page(&self.history)?;
-                Ok(Reply::page("text/html; charset=utf-8", REPORT_POLICY, page))
-            }
-            _ => Err(Refusal::new(404, "not found: see /, /report and /sparql")),
+        let page = page::page(&options.history.display().to_string(), &options.examples).into();
+        let counts = Arc::new(Counts::default());
+        let worker = worker(&options.query_arguments);
+        let lanes = Lanes::new(Snapshots::new(&options.history), Arc::clone(&counts), worker, options.most_queries);
+        let units = usize::try_from(memory_units(options.most_bytes) * MOST_ANSWERS).unwrap_or(usize::MAX);
+        Self {
+            lanes: Arc::new(lanes),
+            report: Arc::new(report),
+            page,
+            counts,
+            connections: Connections::new(),
+            threads,
+            memory: Arc::new(Semaphore::new(units.min(Semaphore::MAX_PERMITS))),
+            rendering: Arc::default(),
+            options,
         }
     }
 
-    fn sparql(&self, request: &mut Request<Body>) -> Result<Reply, Refusal> {
-        let body = body(request)?;
-        let header = |name: HeaderName| request.headers().get(name).and_then(|value| value.to_str().ok());
+    /// Accepts connections until the runtime ends.
+    async fn run(self: Arc<Self>, listener: tokio::net::TcpListener) {
+        let app = Arc::clone(&self);
+        tokio::spawn(async move {
+            loop {
+                tokio::time::sleep(TIDY_EVERY).await;
+                app.connections.close_stalled();
+            }
+        });
+        let mut next = None;
+        loop {
+            let stream = match next.take() {
+                Some(stream) => stream,
+                None => match listener.accept().await {
+                    Ok((stream, _)) => stream,
+                    Err(_) => {
+                        // Too many open files, or a client that has gone away already.
+                        tokio::time::sleep(Duration::from_millis(10)).await;
+                        continue;
+                    }
+                },
+            };
+            // Without it, small answers wait for the acknowledgement of earlier ones; the connection works anyway.
+            let _ = stream.set_nodelay(true);
+            let Some(thread) = self.threads.next() else { continue };
+            let (app, mut slot) = (Arc::clone(&self), Some(stream));
+            let added = self.connections.add(thread, |doing| {
+                let stream = slot.take();
+                async move {
+                    // It was accepted on another thread.
+                    let stream = stream.and_then(|stream| stream.into_std().ok());
+                    if let Some(Ok(stream)) = stream.map(tokio::net::TcpStream::from_std) {
+                        app.converse(stream, doing).await;
+                    }
+                }
+            });
+            if !added {
+                next = slot;
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            }
+        }
+    }
+
+    /// Answers the requests of one connection.
+    async fn converse(self: Arc<Self>, stream: tokio::net::TcpStream, doing: Arc<Doing>) {
+        let service = service_fn(move |request| {
+            let (app, doing) = (Arc::clone(&self), Arc::clone(&doing));
+            async move { Ok::<_, Infallible>(app.respond(request, doing).await) }
+        });
+        let mut server = http1::Builder::new();
+        server.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(MOST_HEAD);
+        // The error is the client's: it sent no HTTP, was too slow, or has gone away.
+        let _ = server.serve_connection(TokioIo::new(stream), service).await;
+    }
+
+    async fn respond(self: Arc<Self>, request: Request<Incoming>, doing: Arc<Doing>) -> Response<AnswerBody> {
+        doing.answers();
+        let began = Instant::now();
+        let (parts, mut body) = request.into_parts();
+        let reply = self.reply(&parts, &mut body).await.unwrap_or_else(Reply::from);
+        let memory = self.reserve(reply.body.len() as u64).await;
+        self.counts.record(reply.status, began.elapsed());
+        response(reply, parts.method == Method::HEAD, |bytes| AnswerBody::new(bytes, doing, memory))
+    }
+
+    /// Reserves memory for a large answer until it is sent.
+    async fn reserve(&self, bytes: u64) -> Option<OwnedSemaphorePermit> {
+        let units = u32::try_from(memory_units(bytes)).unwrap_or(u32::MAX).min(self.options_units());
+        if bytes <= MEMORY_UNIT {
+            return None;
+        }
+        Arc::clone(&self.memory).acquire_many_owned(units).await.ok()
+    }
+
+    fn options_units(&self) -> u32 {
+        u32::try_from(memory_units(self.options.most_bytes)).unwrap_or(u32::MAX).max(1)
+    }
+
+    async fn reply(&self, request: &request::Parts, body: &mut Incoming) -> Result<Reply, Refusal> {
+        guard(&origin(request)?, &self.options.hosts)?;
+        let (path, reads) = (request.uri.path(), matches!(request.method, Method::GET | Method::HEAD));
+        match path {
+            "/sparql" => self.sparql(request, body).await,
+            "/" | "/style.css" | "/query.js" | "/report" | "/health" if !reads => {
+                Err(Refusal::new(405, "use GET or HEAD"))
+            }
+            "/" => Ok(Reply::page("text/html; charset=utf-8", PAGE_POLICY, self.page.clone())),
+            "/style.css" => Ok(Reply::page("text/css; charset=utf-8", NO_POLICY, page::STYLE)),
+            "/query.js" => Ok(Reply::page("text/javascript; charset=utf-8", NO_POLICY, page::SCRIPT)),
+            "/health" => Ok(Reply::page("application/json", NO_POLICY, self.counts.json())),
+            "/report" => self.live_report().await,
+            _ => Err(Refusal::new(404, "not found: see /, /report, /sparql and /health")),
+        }
+    }
+
+    async fn live_report(&self) -> Result<Reply, Refusal> {
+        let page = match self.report.cached() {
+            Some(page) => page,
+            None => {
+                let alone = Arc::clone(&self.rendering).lock_owned().await;
+                let (report, (sender, receiver)) = (Arc::clone(&self.report), oneshot::channel());
+                std::thread::spawn(move || {
+                    let page = report.render();
+                    drop(alone);
+                    // The receiver is gone if the client is.
+                    let _ = sender.send(page);
+                });
+                receiver.await.map_err(|_| Refusal::new(500, "the report crashed"))??
+            }
+        };
+        Ok(Reply::page("text/html; charset=utf-8", REPORT_POLICY, page))
+    }
+
+    async fn sparql(&self, request: &request::Parts, body: &mut Incoming) -> Result<Reply, Refusal> {
+        let body = read(request, body).await?;
         let parts = Parts {
-            method: request.method().as_str(),
-            query: request.uri().query(),
-            content_type: header(header::CONTENT_TYPE),
+            method: request.method.as_str(),
+            query: request.uri.query(),
+            content_type: text(&request.headers, &header::CONTENT_TYPE),
             body: &body,
         };
         let query = question(&parts)?;
-        let accepts = request.headers().get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
+        let accepts = request.headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
         let accept = accepts.collect::<Vec<&str>>().join(",");
-        let _place =
-            self.reserve_slot().ok_or_else(|| Refusal::new(503, "too many queries are running: try again soon"))?;
-        self.ask(query, accept)
+        let ServeOptions { most_rows, most_bytes, most_secs, most_memory, .. } = self.options;
+        let question = Arc::new(Question { query, accept, most_rows, most_bytes, most_secs, most_memory });
+        match self.lanes.evaluate(&question).await? {
+            Evaluated::Here(answered) => Ok(answered.into()),
+            Evaluated::There(asked) => self.asked(asked),
+        }
     }
 
-    fn ask(&self, query: String, accept: String) -> Result<Reply, Refusal> {
-        let ServeOptions { most_rows, most_secs, most_memory, most_bytes, .. } = self.options;
-        let question = Question { query, accept, most_rows, most_secs, most_memory };
-        let Ok(input) = serde_json::to_vec(&question) else { return Err(Refusal::new(400, "the query can't be read")) };
-        let time = START + Duration::try_from_secs_f64(most_secs).unwrap_or(Duration::MAX / 2);
-        let ended = {
-            let _reading = self.history.read().unwrap_or_else(PoisonError::into_inner);
-            self.query.run(&input, time, most_bytes)
+    /// The reply with the result of a process.
+    fn asked(&self, asked: Asked) -> Result<Reply, Refusal> {
+        let ServeOptions { most_secs, most_memory, most_bytes, .. } = self.options;
+        let why = match asked {
+            Asked::Answer(head, body) => return Ok(Reply::answer(head.status, &head.media_type, body)),
+            Asked::TooMuch => return Ok(too_large(most_bytes).into()),
+            Asked::Late => return Err(Refusal::new(504, format!("the query took longer than {most_secs} s"))),
+            Asked::MemorySpent => format!("the query took more than {} MB of memory", most_memory / 1_000_000),
+            Asked::NotStarted(why) => format!("the query process could not be started: {why}"),
+            Asked::Crashed | Asked::NotTaken | Asked::Gone => "the query crashed the evaluator".to_owned(),
         };
-        let late = || Refusal::new(504, format!("the query took longer than {most_secs} s"));
-        match ended {
-            Ended::Itself { code: Some(0), output, .. } => parse_output(output),
-            Ended::Itself { code: Some(watch::TIME_SPENT), .. } | Ended::Late => Err(late()),
-            Ended::Itself { code: Some(watch::MEMORY_SPENT), .. } => {
-                Err(Refusal::new(500, format!("the query took more than {} MB of memory", most_memory / 1_000_000)))
-            }
-            Ended::Itself { .. } => Err(Refusal::new(500, "the query crashed the evaluator")),
-            Ended::TooMuch => {
-                Err(Refusal::new(500, format!("the answer is larger than {} MB: use `LIMIT`", most_bytes / 1_000_000)))
-            }
-            Ended::NotStarted(why) => Err(Refusal::new(500, format!("the query process could not be started: {why}"))),
-        }
-    }
-
-    /// Reserves a slot for a query. Returns `None` if all slots are in use.
-    fn reserve_slot(&self) -> Option<QuerySlot<'_>> {
-        let taken = self.running.fetch_add(1, Ordering::AcqRel);
-        let slot = QuerySlot(&self.running);
-        (taken < self.options.most_queries).then_some(slot)
+        Err(Refusal::new(500, why))
     }
 }
 
-/// A slot for a running query; dropping it frees the slot.
-struct QuerySlot<'a>(&'a AtomicUsize);
-
-impl Drop for QuerySlot<'_> {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::AcqRel);
-    }
-}
-
-/// Splits the output of the process into head and body.
-fn parse_output(output: Vec<u8>) -> Result<Reply, Refusal> {
-    let crashed = || Refusal::new(500, "the query crashed the evaluator");
-    let end = output.iter().position(|byte| *byte == b'\n').ok_or_else(crashed)?;
-    let head: Head = serde_json::from_slice(&output[..end]).map_err(|_| crashed())?;
-    let text = head.media_type.starts_with("text/");
-    let media_type = if text { format!("{}; charset=utf-8", head.media_type) } else { head.media_type };
-    Ok(Reply { status: head.status, media_type, policy: NO_POLICY, body: output[end + 1..].to_vec() })
-}
-
-/// Reads the body of a request. Fails if it is too long or arrives too slowly.
-fn body(request: &mut Request<Body>) -> Result<Vec<u8>, Refusal> {
-    let too_long = || Refusal::new(413, format!("a request may have at most {MOST_BODY} bytes"));
-    let slow = || Refusal::new(408, format!("the request took longer than {} s to arrive", PATIENCE.as_secs()));
-    if request.body().len().is_some_and(|length| length > MOST_BODY) {
-        return Err(too_long());
-    }
-    let until = Instant::now() + PATIENCE;
-    let (mut body, mut piece) = (Vec::new(), [0; 8192]);
-    loop {
-        match request.body_mut().read(&mut piece) {
-            Ok(0) => return Ok(body),
-            Ok(length) => body.extend_from_slice(&piece[..length]),
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => return Err(slow()),
-            Err(error) => return Err(Refusal::new(400, format!("the request can't be read: {error}"))),
-        }
-        if body.len() as u64 > MOST_BODY {
-            return Err(too_long());
-        }
-        if Instant::now() > until {
-            return Err(slow());
-        }
-    }
-}
-
-fn response(reply: Reply, head: bool) -> Response<Body> {
-    let status = StatusCode::from_u16(reply.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-    let mut response = Response::new(if head { Body::empty() } else { Body::from(reply.body) });
-    *response.status_mut() = status;
-    let headers = response.headers_mut();
-    let mut set = |name: HeaderName, value: &str| {
-        // Media types and policies come from this program and contain no line breaks.
-        if let Ok(value) = HeaderValue::from_str(value) {
-            headers.insert(name, value);
-        }
-    };
-    set(header::CONTENT_TYPE, &reply.media_type);
-    set(header::CONTENT_SECURITY_POLICY, reply.policy);
-    set(header::X_CONTENT_TYPE_OPTIONS, "nosniff");
-    set(header::X_FRAME_OPTIONS, "DENY");
-    set(header::REFERRER_POLICY, "no-referrer");
-    set(header::CACHE_CONTROL, "no-store");
-    set(HeaderName::from_static("cross-origin-resource-policy"), "same-origin");
-    set(header::VARY, "Accept");
-    set(header::CONNECTION, "close");
-    match reply.status {
-        405 => set(header::ALLOW, "GET, HEAD, POST"),
-        503 => set(header::RETRY_AFTER, "1"),
-        _ => {}
-    }
-    response
+fn memory_units(bytes: u64) -> u64 {
+    bytes.div_ceil(MEMORY_UNIT)
 }

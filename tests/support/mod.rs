@@ -10,6 +10,7 @@ pub mod made_up;
 pub mod mutations;
 pub mod paged;
 pub mod planted;
+pub mod server;
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt as _;
