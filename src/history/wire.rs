@@ -5,7 +5,7 @@ use std::io;
 use oxigraph::sparql::results::{QueryResultsFormat, QueryResultsSerializer};
 use oxigraph::sparql::{QueryEvaluationError, QueryResults, QuerySolutionIter, QueryTripleIter};
 
-use crate::query::{evaluation_fault, evaluator, refuse_excess, refuse_update};
+use crate::query::{evaluation_fault, query_evaluator, refuse_excess, refuse_update};
 use crate::rdf_text::serializer;
 use crate::syntax_fault::syntax_fault;
 use crate::{Cancel, History, RdfSyntax};
@@ -81,11 +81,11 @@ impl History {
             let fault = Diagnostic::error("H017", "`SERVICE` queries another endpoint, which is not supported");
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
-        let prepared = evaluator(&Cancel::new())
+        let store = self.store().map_err(WireFault::Failed)?;
+        let prepared = query_evaluator(&store, &Cancel::new())
             .parse_query(&*text.text)
             .map_err(|error| WireFault::Malformed(syntax_fault(text, &error.to_string()).into()))?;
         let failed = |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
-        let store = self.store().map_err(WireFault::Failed)?;
         let written = match prepared.on_store(&store).execute().map_err(failed)? {
             QueryResults::Boolean(value) => {
                 let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
